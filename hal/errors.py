@@ -1,0 +1,35 @@
+"""What can go wrong with a cell; every error says what to do."""
+
+from mskgrasp.errors import MskgraspError
+
+
+class HalError(MskgraspError):
+    """Base of all faults of arms, cameras and cells."""
+
+
+class NotConnected(HalError):
+    """The device is used outside its context or was never connected."""
+
+
+class DriverMissing(HalError):
+    """The vendor's package is not installed; the message names the extra."""
+
+
+class CommunicationLost(HalError):
+    """The device stopped answering."""
+
+
+class CaptureFailed(HalError):
+    """The camera delivered no frame, a stale one or a partial one."""
+
+
+class OutOfWorkspace(HalError):
+    """The commanded pose lies outside the workspace, the joint limits or the table clearance."""
+
+
+class MotionAborted(HalError):
+    """A motion ended before its goal: contact, reflex, or stop()."""
+
+
+class NeedsRecovery(HalError):
+    """An error happened before; nothing moves until recover() is called."""

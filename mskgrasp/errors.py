@@ -1,0 +1,37 @@
+"""The errors that a user can mend: one line that names the value and the remedy."""
+
+
+class MskgraspError(Exception):
+    """Something failed; the message is one line with the value, the legal values and the remedy."""
+
+    exit_code = 1
+
+
+class UsageError(MskgraspError):
+    """What the user typed or wrote into a configuration file cannot be used."""
+
+    exit_code = 2
+
+
+class BadConfig(UsageError):
+    """A YAML file or a command-line override does not describe a valid configuration."""
+
+
+class BadPart(MskgraspError):
+    """A mesh or a part folder cannot be used as a part."""
+
+
+class BadDataset(MskgraspError):
+    """A dataset folder or one of its shards is missing, empty, truncated or foreign."""
+
+
+class BadModel(MskgraspError):
+    """A model folder is missing, damaged, or made for other inputs."""
+
+
+class NoPartFound(MskgraspError):
+    """The depth image shows no part that could be grasped."""
+
+
+class NoGraspFound(MskgraspError):
+    """No candidate meets what the planner demands."""

@@ -1,0 +1,70 @@
+"""A part: what simulation, pictures and reports need to know about one industrial component."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mskgrasp.geometry import Pose
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """One part folder, read.
+
+    The part's frame *obj* has its origin at the centroid of the volume and the axes of its mesh file.
+
+    Attributes:
+        name: Unique, also the folder's name; lower case letters, digits, ``-`` and ``_``.
+        folder: Where ``mesh.ply``, ``hulls.glb`` and ``part.json`` lie.
+        family: Kind of part, for example ``hex_bolt``.
+        source: Where the dimensions come from, for example ``ISO 4017``.
+        licence: SPDX identifier.
+        dimensions: What was built, metres (counts without a unit are allowed).
+        content_hash: Hex digest of mesh, hulls and physical data.
+        density: kg/m^3.
+        mass: kg.
+        inertia: (3, 3) about the centroid, axes of obj, kg m^2.
+        principal_inertia: (3,) kg m^2.
+        quat_obj_principal: (4,) wxyz, orientation of the principal axes in obj.
+        extents: (3,) size of the bounding box in obj axes, metres.
+        longest_axis: Longest edge of the oriented minimal box, metres.
+        n_hulls: How many convex hulls ``hulls.glb`` holds.
+        hull_error: Largest distance between the hulls' union and the mesh, metres.
+        resting: ``T_table_obj`` of the k stable poses (z of the table is 0): position (k, 3) with
+            x = y = 0, quat_wxyz (k, 4).
+        resting_probability: (k,), sums to 1.
+    """
+
+    name: str
+    folder: Path
+    family: str
+    source: str
+    licence: str
+    dimensions: dict[str, float]
+    content_hash: str
+    density: float
+    mass: float
+    inertia: np.ndarray
+    principal_inertia: np.ndarray
+    quat_obj_principal: np.ndarray
+    extents: np.ndarray
+    longest_axis: float
+    n_hulls: int
+    hull_error: float
+    resting: Pose
+    resting_probability: np.ndarray
+
+    @property
+    def mesh_path(self) -> Path:
+        """The visual mesh, metres, obj frame."""
+        return self.folder / "mesh.ply"
+
+    @property
+    def hulls_path(self) -> Path:
+        """The collision hulls, one geometry each, millimetres, obj frame."""
+        return self.folder / "hulls.glb"
