@@ -1,0 +1,244 @@
+"""From a depth image to what the networks see: heights, where the part lies, patches around grasps."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor
+
+from mskgrasp.errors import NoPartFound
+from mskgrasp.geometry import Array, Pose, quat_conjugate, quat_rotate, quat_to_matrix
+from mskgrasp.grasp import PartView
+
+REGION_MARGIN = 0.05
+"""How far a part that lies in the region may reach beyond it, metres."""
+MIN_PIXELS = 5
+"""Smaller groups of pixels are specks: an M3 nut covers 6 pixels of 2.2 mm."""
+_PLAUSIBLE_DEPTH = 20.0
+"""Metres; a camera above a table never is that far away, but a depth in millimetres always is."""
+
+
+def height_image(depth: Array, intrinsics: np.ndarray, T_base_camera: Pose, table_z: float) -> Array:
+    """Heights above the table of every pixel of depth images.
+
+    Args:
+        depth: (..., h, w) numpy array or tensor, metres along the optical axis, NaN where invalid.
+        intrinsics: (3, 3) pinhole matrix; pixel centres lie at integer coordinates.
+        T_base_camera: Pose of the camera's optical frame in the base.
+        table_z: Height of the table, base frame, metres.
+
+    Returns:
+        (..., h, w) of the kind of ``depth``, metres, NaN where the depth is invalid.
+    """
+    rays = _rays(depth.shape[-2:], intrinsics)
+    camera_z = quat_to_matrix(np.asarray(T_base_camera.quat_wxyz, dtype=np.float64))[2]
+    slope = rays @ camera_z
+    offset = float(T_base_camera.position[2]) - table_z
+    if isinstance(depth, torch.Tensor):
+        slope = torch.as_tensor(slope, dtype=depth.dtype, device=depth.device)
+    else:
+        slope = slope.astype(depth.dtype)
+    return depth * slope + offset
+
+
+def _rays(shape: tuple[int, ...], intrinsics: np.ndarray) -> np.ndarray:
+    """(h, w, 3) points at depth 1 that the pixels look at, camera frame."""
+    rows, columns = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
+    pixels = np.stack([columns, rows, np.ones_like(rows)], axis=-1)
+    return pixels @ np.linalg.inv(np.asarray(intrinsics, dtype=np.float64)).T
+
+
+def view_part(
+    depth: Array,
+    intrinsics: np.ndarray,
+    T_base_camera: Pose,
+    *,
+    table_z: float,
+    region: tuple[float, float, float, float],
+    min_height: float = 0.002,
+) -> PartView:
+    """Finds the part that lies on the table, by its height alone.
+
+    The part is the largest connected group of pixels higher than ``min_height``. Its box lies along the
+    image's axes: a side wall that is seen bounds it directly, an edge of the top half a pixel further
+    out than its last pixel. Its top is the height that 2 % of its pixels exceed, so that a flying pixel
+    does not raise it.
+
+    Args:
+        depth: (h, w) metres, NaN where invalid.
+        intrinsics: (3, 3) pinhole matrix.
+        T_base_camera: Pose of the camera's optical frame in the base; it need not look straight down.
+        table_z: Height of the table, base frame, metres.
+        region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
+        min_height: What rises less above the table is table, metres.
+
+    Raises:
+        NoPartFound: Nothing rises above the table there, or the image is no depth in metres.
+    """
+    depth = np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth)
+    _check_depth(depth)
+    x, y, z = _points_base(depth, intrinsics, T_base_camera)
+    heights = z - table_z
+    x_min, x_max, y_min, y_max = region
+    near = (x > x_min - REGION_MARGIN) & (x < x_max + REGION_MARGIN)
+    near &= (y > y_min - REGION_MARGIN) & (y < y_max + REGION_MARGIN)
+    mask = _largest_component(near & (heights > min_height))
+    if mask is None:
+        highest = heights[near].max() if near.any() else np.nan
+        raise NoPartFound(
+            f"nothing rises more than {min_height * 1e3:g} mm above the table in the region (highest point "
+            f"{highest * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the camera's pose"
+        )
+
+    T_base_axes = _box_axes(T_base_camera)
+    cos, sin = quat_to_matrix(T_base_axes.quat_wxyz)[:2, 0]
+    pitch = float(np.median(depth[mask])) / np.array([intrinsics[0][0], intrinsics[1][1]])
+    along_x = _extent(cos * x + sin * y, mask, float(pitch[0]))
+    along_y = _extent((cos * y - sin * x).T, mask.T, float(pitch[1]))
+    top = _robust_top(heights[mask])
+    middle = np.array([sum(along_x) / 2, sum(along_y) / 2, 0.0])
+    centre_base = T_base_axes.apply(middle)
+    if not (x_min <= centre_base[0] <= x_max and y_min <= centre_base[1] <= y_max):
+        raise NoPartFound(
+            f"the part's centre ({centre_base[0]:.3f}, {centre_base[1]:.3f}) lies outside the region "
+            f"x {x_min:g}..{x_max:g}, y {y_min:g}..{y_max:g}; move the part or clear what else is there"
+        )
+    spread = np.stack([x[mask] - centre_base[0], y[mask] - centre_base[1]], axis=-1)
+    return PartView(
+        centre_base=np.array([centre_base[0], centre_base[1], table_z + top / 2]),
+        T_base_box=Pose(
+            position=np.array([centre_base[0], centre_base[1], table_z]), quat_wxyz=T_base_axes.quat_wxyz
+        ),
+        size=np.array([along_x[1] - along_x[0], along_y[1] - along_y[0], top]),
+        gyration_radius=float(np.sqrt((spread**2).sum(axis=1).mean())),
+        table_z=float(table_z),
+    )
+
+
+def _points_base(depth: np.ndarray, intrinsics: np.ndarray, T_base_camera: Pose) -> np.ndarray:
+    """(3, h, w) x, y, z of what every pixel sees, base frame."""
+    rotation = quat_to_matrix(np.asarray(T_base_camera.quat_wxyz, dtype=np.float64))
+    directions = np.moveaxis(_rays(depth.shape, intrinsics) @ rotation.T, -1, 0)
+    return directions * depth + np.reshape(T_base_camera.position, (3, 1, 1))
+
+
+def _check_depth(depth: np.ndarray) -> None:
+    valid = depth[np.isfinite(depth)] if np.issubdtype(depth.dtype, np.floating) else depth[depth > 0]
+    if not valid.size:
+        raise NoPartFound("the depth image has no valid pixel; check the camera, its range and its exposure")
+    typical = float(np.median(valid))
+    if not np.issubdtype(depth.dtype, np.floating) or typical > _PLAUSIBLE_DEPTH:
+        raise NoPartFound(
+            f"depth is {depth.dtype} with a median of {typical:g}, expected floating metres; "
+            "convert it from millimetres first"
+        )
+
+
+def _largest_component(mask: np.ndarray) -> np.ndarray | None:
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    if len(stats) < 2:
+        return None
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))  # 0 is the background
+    return labels == largest if stats[largest, cv2.CC_STAT_AREA] >= MIN_PIXELS else None
+
+
+def _box_axes(T_base_camera: Pose) -> Pose:
+    """A frame at the base's origin, z up, x along the image's rows as seen from above."""
+    right = quat_to_matrix(np.asarray(T_base_camera.quat_wxyz, dtype=np.float64))[:2, 0]
+    half = np.arctan2(right[1], right[0]) / 2
+    return Pose(position=np.zeros(3), quat_wxyz=np.array([np.cos(half), 0.0, 0.0, np.sin(half)]))
+
+
+def _extent(along: np.ndarray, mask: np.ndarray, pitch: float) -> tuple[float, float]:
+    """Bounds of the masked points in a coordinate (h, w) that runs along the image's rows."""
+    bounds = []
+    for sign in (-1.0, 1.0):
+        outward = np.where(mask, sign * along, -np.inf)
+        row, column = np.unravel_index(int(np.argmax(outward)), mask.shape)
+        neighbours = [outward[row, c] for c in (column - 1, column + 1) if 0 <= c < mask.shape[1]]
+        # On a wall two neighbouring pixels have the same coordinate: its place is known exactly. On a
+        # flat top they are a pixel apart, and the edge is, on average, half of that further out.
+        step = outward[row, column] - max(neighbours)
+        bounds.append(sign * float(outward[row, column] + min(step, pitch) / 2))
+    return bounds[0], bounds[1]
+
+
+def _robust_top(heights: np.ndarray) -> float:
+    k = max(2, int(np.ceil(0.02 * heights.size)))
+    return float(np.partition(heights, -k)[-k])
+
+
+def crop_patches(
+    heights: Tensor,
+    grasps: Tensor,
+    intrinsics: Array,
+    T_base_camera: Pose,
+    *,
+    n_pixels: int = 64,
+    side: float = 0.128,
+) -> Tensor:
+    """Crops the height image around grasps, turned so that the fingers close along the columns.
+
+    A patch is a square of the horizontal plane through the grasp point, centred on it: the grasp frame's
+    x points right, its y, the closing direction, up. It is sampled bilinearly. Invalid pixels do not
+    spread: they are left out of the interpolation, and where they prevail the table (0) is assumed, as
+    outside the image.
+
+    Args:
+        heights: (h, w) one image for all grasps, or (n, h, w) one image each; metres above the table,
+            NaN where invalid.
+        grasps: (n, 4) base frame, metres and radians.
+        intrinsics: (3, 3) or (n, 3, 3).
+        T_base_camera: One pose or n poses.
+        n_pixels: Pixels along a side.
+        side: Length of a side, metres.
+
+    Returns:
+        (n, 1, n_pixels, n_pixels) float32 on the device of ``heights``, metres above the table.
+    """
+    height, width = heights.shape[-2:]
+    origin, right, up = _patch_axes(grasps.to(heights.device), intrinsics, T_base_camera)
+    steps = torch.arange(n_pixels, device=heights.device, dtype=torch.float32) - (n_pixels - 1) / 2
+    steps = steps * (side / n_pixels)
+    projected = (
+        origin[:, None, None]
+        + steps[None, None, :, None] * right[:, None, None]
+        - steps[None, :, None, None] * up[:, None, None]
+    )
+    in_front = projected[..., 2:].clamp(min=1e-6)  # what is behind the camera lands far outside
+    to_unit = torch.tensor([2 / (width - 1), 2 / (height - 1)], device=heights.device)
+    where = (projected[..., :2] / in_front) * to_unit - 1
+
+    valid = ~torch.isnan(heights)
+    source = torch.stack([torch.where(valid, heights, 0.0), valid.to(heights.dtype)], dim=-3).float()
+    if heights.ndim == 2:
+        # All grasps look at the same image: one tall grid over it needs no copy of the image.
+        where = where.reshape(1, -1, n_pixels, 2)
+        source = source[None]
+    sampled = torch.nn.functional.grid_sample(
+        source, where, mode="bilinear", padding_mode="zeros", align_corners=True
+    )
+    if heights.ndim == 2:
+        sampled = sampled.reshape(2, -1, n_pixels, n_pixels).transpose(0, 1)
+    value, weight = sampled[:, :1], sampled[:, 1:]
+    return torch.where(weight >= 0.5, value / weight.clamp(min=0.5), 0.0)
+
+
+def _patch_axes(grasps: Tensor, intrinsics: Array, T_base_camera: Pose) -> tuple[Tensor, Tensor, Tensor]:
+    """Homogeneous pixels (n, 3) of the grasp points and of a metre along the grasp frames' x and y."""
+    device = grasps.device
+    grasps = grasps.double()
+    matrix = torch.as_tensor(intrinsics, dtype=torch.float64, device=device)
+    position = torch.as_tensor(T_base_camera.position, dtype=torch.float64, device=device)
+    to_camera = quat_conjugate(torch.as_tensor(T_base_camera.quat_wxyz, dtype=torch.float64, device=device))
+    cos, sin, zero = torch.cos(grasps[:, 3]), torch.sin(grasps[:, 3]), torch.zeros_like(grasps[:, 3])
+    vectors_base = (
+        grasps[:, :3] - position,
+        torch.stack([cos, sin, zero], dim=-1),
+        torch.stack([-sin, cos, zero], dim=-1),
+    )
+    origin, right, up = (
+        (matrix @ quat_rotate(to_camera, vector)[..., None])[..., 0].float() for vector in vectors_base
+    )
+    return origin, right, up
