@@ -1,0 +1,216 @@
+"""One grasp attempt from pre-grasp to hold, in every sub-scene at once."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+from mani_skill.utils.structs.actor import Actor
+from torch import Tensor
+
+from mskgrasp.geometry import Pose
+from mskgrasp.grasp import MAX_OPENING, lowest_grasp_z, object_displacement, pose_base_tcp
+from tasks.contacts import HandContacts
+from tasks.frames import base_pose
+from tasks.kinematics import top_down
+from tasks.motion import PandaMotion, ease, ease_duration
+from tasks.outcome import MAX_DRIFT, MIN_GAP, MIN_PAD_FORCE, Observed, judge
+from tasks.panda import GraspPanda
+from tasks.physics import Physics
+
+TABLE_Z = 0.0
+"""Height of the table, base frame, m."""
+SPEED_WINDOW_S = 0.02
+"""The last part of the hold, over which the part's speed in the hand is measured, s."""
+LEFT_BEHIND = 0.04
+"""The hand this much higher than the part it should carry has lost it, m."""
+
+
+class Attempt:
+    """Executes grasps and measures what they did to the parts.
+
+    Args:
+        agent: The Panda of n sub-scenes.
+        part: The part of each.
+        vertices: For each sub-scene the vertices (k, 3) of its part's hulls, obj frame, metres.
+        motion: Moves arm and fingers.
+        contacts: What touches the hand.
+        physics: Speeds, forces and times of the attempt.
+    """
+
+    def __init__(
+        self,
+        agent: GraspPanda,
+        part: Actor,
+        vertices: list[np.ndarray],
+        motion: PandaMotion,
+        contacts: HandContacts,
+        physics: Physics,
+    ):
+        self._agent = agent
+        self._part = part
+        self._vertices = [torch.as_tensor(v, dtype=torch.float32, device=motion.device) for v in vertices]
+        self._motion = motion
+        self._contacts = contacts
+        self._physics = physics
+
+    def run(self, grasp: Tensor) -> dict[str, Tensor]:
+        """Executes one grasp in every sub-scene; all of them wait for the slowest.
+
+        Args:
+            grasp: (n, 4) x, y, z, theta, base frame.
+
+        Returns:
+            success (n) bool; failure (n) uint8; displacement (n, 4) and tilt (n), NaN where not
+            successful; width_after (n) m; pose_base_obj, pose_tcp_obj_before, pose_tcp_obj_after (n, 7);
+            penetration (n) m, NaN where unknown; seconds (n) of simulated time.
+
+        Raises:
+            ValueError: A grasp is too low or out of the arm's reach.
+        """
+        check_grasps(grasp)
+        physics, motion = self._physics, self._motion
+        began = motion.seconds
+        down = self._line(self._pre_grasp(grasp), grasp, physics.descend_speed)
+        motion.place(down[0])
+        laid = base_pose(self._part)
+        motion.step(motion.n_steps(physics.settle_s))
+        rest = base_pose(self._part)
+        settled = (rest.position - laid.position).norm(dim=-1) < MAX_DRIFT
+        collided = torch.zeros_like(settled)
+
+        def reflex(_: int) -> bool:
+            collided.logical_or_(self._contacts.hand_force().to(motion.device) > physics.reflex_force)
+            return bool((collided | ~settled).all())
+
+        motion.follow(down, check=reflex, frozen=collided)
+        held, penetration = torch.zeros_like(settled), torch.zeros(motion.n, device=motion.device)
+        alive = settled & ~collided
+        if bool(alive.any()):
+            motion.move_fingers(-MAX_OPENING / 2)
+            held, penetration = self.grip()
+        alive = alive & held
+        if bool(alive.any()):
+            self._lift(grasp, alive, collided)
+        return self._outcome(grasp, rest, settled, collided, held, penetration, began)
+
+    def _lift(self, grasp: Tensor, alive: Tensor, collided: Tensor) -> None:
+        motion, physics = self._motion, self._physics
+        lifted = grasp.clone()
+        lifted[:, 2] += physics.lift_height
+        hand_z = base_pose(self._agent.tcp).position[:, 2]
+        part_z = base_pose(self._part).position[:, 2]
+
+        def all_lost(_: int) -> bool:
+            hand_rise = base_pose(self._agent.tcp).position[:, 2] - hand_z
+            part_rise = base_pose(self._part).position[:, 2] - part_z
+            lost = ~alive | (self._gap() <= MIN_GAP) | (hand_rise - part_rise > LEFT_BEHIND)
+            return bool(lost.all())
+
+        up = self._line(grasp, lifted, physics.lift_speed)
+        # An arm that its reflex has stopped stays where it is.
+        if motion.follow(up, check=all_lost, check_every=25, frozen=collided):
+            motion.step(motion.n_steps(physics.hold_s - SPEED_WINDOW_S))
+
+    def _outcome(
+        self,
+        grasp: Tensor,
+        rest: Pose,
+        settled: Tensor,
+        collided: Tensor,
+        held: Tensor,
+        penetration: Tensor,
+        began: float,
+    ) -> dict[str, Tensor]:
+        speed = self.relative_speed()
+        now, tcp = base_pose(self._part), base_pose(self._agent.tcp)
+        touch, deepest = self.grip()
+        deepest = torch.maximum(penetration, deepest)
+        moved = now.position - rest.position
+        success, failure = judge(
+            Observed(
+                settled=settled,
+                collided=collided,
+                held_closed=held,
+                pads_touch=touch,
+                gap=self._gap(),
+                rise=moved[:, 2] / self._physics.lift_height,
+                relative_speed=speed,
+                penetration=deepest,
+                wandered=moved[:, :2].norm(dim=-1),
+            )
+        )
+        before, after = pose_base_tcp(grasp).inverse() @ rest, tcp.inverse() @ now
+        displacement, tilt = object_displacement(before, after)
+        unknown = torch.full_like(displacement, math.nan)
+        return dict(
+            success=success,
+            failure=failure,
+            displacement=torch.where(success[:, None], displacement, unknown),
+            tilt=torch.where(success, tilt, unknown[:, 0]),
+            width_after=self._gap(),
+            pose_base_obj=rest.as_vector(),
+            pose_tcp_obj_before=before.as_vector(),
+            pose_tcp_obj_after=after.as_vector(),
+            penetration=deepest,
+            seconds=torch.full_like(deepest, self._motion.seconds - began),
+        )
+
+    def grip(self) -> tuple[Tensor, Tensor]:
+        """(n,) whether both pads hold something, and (n,) the deepest overlap of finger and part, m."""
+        force, penetration = self._contacts.pads_on_part()
+        force, penetration = force.to(self._motion.device), penetration.to(self._motion.device)
+        return (force > MIN_PAD_FORCE).all(dim=-1) & (self._gap() > MIN_GAP), penetration
+
+    def relative_speed(self) -> Tensor:
+        """(n,) speed of the part's origin in the hand over the next 20 ms, which it simulates, m/s.
+
+        From positions: after a TGS step PhysX's velocities still hold impulses that a contact undoes.
+        """
+        start = (base_pose(self._agent.tcp).inverse() @ base_pose(self._part)).position
+        n_steps = self._motion.n_steps(SPEED_WINDOW_S)
+        self._motion.step(n_steps)
+        end = (base_pose(self._agent.tcp).inverse() @ base_pose(self._part)).position
+        return (end - start).norm(dim=-1) * self._physics.rate_hz / n_steps
+
+    def _gap(self) -> Tensor:
+        return self._agent.robot.get_qpos()[:, 7:9].sum(dim=-1)
+
+    def _pre_grasp(self, grasp: Tensor) -> Tensor:
+        """The hand above the grasp, pads clear of the part's top by the approach clearance."""
+        pose = base_pose(self._part)
+        tops = [
+            Pose(position=pose.position[i], quat_wxyz=pose.quat_wxyz[i]).apply(vertices)[:, 2].max()
+            for i, vertices in enumerate(self._vertices)
+        ]
+        clear = torch.stack(tops) + lowest_grasp_z(0.0) + self._physics.approach_clearance
+        raised = grasp.clone()
+        raised[:, 2] = torch.maximum(clear, grasp[:, 2])
+        return raised
+
+    def _line(self, start: Tensor, goal: Tensor, speed: float) -> Tensor:
+        """(steps, n, 7) joints along straight lines between grasps; as long as the longest line needs."""
+        distance = float((goal - start)[:, :3].norm(dim=-1).max())
+        n_steps = self._motion.n_steps(ease_duration(distance, speed))
+        share = ease(n_steps, self._motion.device)[:, None, None]
+        start, goal = start.double(), goal.double()
+        return top_down(start + share * (goal - start))[0]
+
+
+def check_grasps(grasp: Tensor) -> None:
+    """Refuses grasps that would drive the pads into the table or that the arm cannot reach.
+
+    Raises:
+        ValueError: Names the first such grasp.
+    """
+    lowest = lowest_grasp_z(TABLE_Z)
+    if bool((grasp[:, 2] < lowest - 1e-6).any()):  # float32 rounds the bound itself
+        raise ValueError(
+            f"grasp z {float(grasp[:, 2].min()):.4f} m would put the pads into the table; "
+            f"the lowest is {lowest:.4f} m"
+        )
+    reachable = top_down(grasp.double())[1]
+    if not bool(reachable.all()):
+        first = [round(v, 4) for v in grasp[~reachable][0].tolist()]
+        raise ValueError(f"grasp {first} (x, y, z, theta) is out of the arm's reach")

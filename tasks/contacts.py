@@ -1,0 +1,76 @@
+"""What touches the hand: forces and penetration, batched over sub-scenes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+from mani_skill.envs.scene import ManiSkillScene
+from mani_skill.utils.structs.actor import Actor
+from torch import Tensor
+
+from tasks.panda import FINGER_LINKS, HAND_LINKS, GraspPanda
+
+
+class HandContacts:
+    """Contacts of the last simulation step.
+
+    On the CPU one pass over PhysX's contact report serves every question. On the GPU PhysX reports
+    forces alone, so penetration is unknown there (NaN).
+    """
+
+    def __init__(self, scene: ManiSkillScene, agent: GraspPanda, part: Actor):
+        self._scene = scene
+        self._agent = agent
+        self._part = part
+        self._gpu = scene.gpu_sim_enabled
+        if not self._gpu:
+            self._hand = [agent.robot.links_map[name]._objs[0].entity for name in HAND_LINKS]
+            self._fingers = [agent.robot.links_map[name]._objs[0].entity for name in FINGER_LINKS]
+            self._entity = part._objs[0]
+
+    def hand_force(self) -> Tensor:
+        """(n,) largest net contact force on the hand or a finger, N."""
+        if self._gpu:
+            return self._agent.robot.get_net_contact_forces(HAND_LINKS).norm(dim=-1).amax(dim=-1)
+        total: dict[int, np.ndarray] = {}
+        for contact in self._scene.px.get_contacts():
+            for sign, body in zip((1.0, -1.0), contact.bodies, strict=True):
+                for i, entity in enumerate(self._hand):
+                    if body.entity == entity:
+                        total[i] = total.get(i, 0.0) + sign * _impulse(contact)
+        largest = max((float(np.linalg.norm(v)) for v in total.values()), default=0.0)
+        return torch.tensor([largest / self._scene.px.timestep])
+
+    def pads_on_part(self) -> tuple[Tensor, Tensor]:
+        """Grip on the part.
+
+        Returns:
+            force: (n, 2) force between the part and each finger, N.
+            penetration: (n,) how deep a finger and the part overlap, metres; NaN on the GPU.
+        """
+        if self._gpu:
+            forces = [
+                self._scene.get_pairwise_contact_forces(self._agent.robot.links_map[name], self._part).norm(
+                    dim=-1
+                )
+                for name in FINGER_LINKS
+            ]
+            return torch.stack(forces, dim=-1), torch.full_like(forces[0], math.nan)
+        impulses = [np.zeros(3), np.zeros(3)]
+        deepest = 0.0
+        for contact in self._scene.px.get_contacts():
+            first, second = (body.entity for body in contact.bodies)
+            if self._entity not in (first, second):
+                continue
+            for i, finger in enumerate(self._fingers):
+                if finger in (first, second):
+                    impulses[i] = impulses[i] + _impulse(contact)
+                    deepest = max([deepest, *(-float(point.separation) for point in contact.points)])
+        forces = np.array([np.linalg.norm(v) for v in impulses]) / self._scene.px.timestep
+        return torch.tensor(forces[None], dtype=torch.float32), torch.tensor([deepest])
+
+
+def _impulse(contact) -> np.ndarray:  # noqa: ANN001 (a pybind class without a stub)
+    return np.sum([point.impulse for point in contact.points], axis=0) if contact.points else np.zeros(3)

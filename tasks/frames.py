@@ -1,0 +1,46 @@
+"""The conversion between ManiSkill's world and the robot's base, and between camera conventions."""
+
+from __future__ import annotations
+
+import numpy as np
+import sapien
+import torch
+from mani_skill.utils.structs import Actor, Link
+
+from mskgrasp.geometry import Array, Pose
+
+BASE_IN_WORLD = (-0.615, 0.0, 0.0)
+"""Where ManiSkill's tabletop tasks put the Panda; the table's top is at z = 0 of the world."""
+
+
+def to_world(position_base: Array) -> Array:
+    """Positions (..., 3) of the base frame in ManiSkill's world."""
+    return position_base + _offset(position_base)
+
+
+def to_base(position_world: Array) -> Array:
+    """Positions (..., 3) of ManiSkill's world in the base frame."""
+    return position_world - _offset(position_world)
+
+
+def _offset(like: Array) -> Array:
+    if isinstance(like, torch.Tensor):
+        return torch.tensor(BASE_IN_WORLD, dtype=like.dtype, device=like.device)
+    return np.asarray(BASE_IN_WORLD)
+
+
+def base_pose(body: Actor | Link) -> Pose:
+    """Poses of a body of every sub-scene in the base frame: positions (n, 3), quaternions (n, 4)."""
+    pose = body.pose
+    return Pose(position=to_base(pose.p), quat_wxyz=pose.q)
+
+
+def sapien_camera_pose(T_base_camera: Pose) -> sapien.Pose:
+    """The world pose that SAPIEN wants (x forward, y left, z up) of an optical frame in the base."""
+    optical = T_base_camera.as_matrix()
+    matrix = np.eye(4)
+    matrix[:3, 0] = optical[:3, 2]
+    matrix[:3, 1] = -optical[:3, 0]
+    matrix[:3, 2] = -optical[:3, 1]
+    matrix[:3, 3] = to_world(optical[:3, 3])
+    return sapien.Pose(matrix)

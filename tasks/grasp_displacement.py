@@ -1,0 +1,249 @@
+"""The ManiSkill task: one action is one grasp, and its outcome is how the part moved in the hand."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+import sapien
+import torch
+from mani_skill.envs.sapien_env import BaseEnv
+from mani_skill.sensors.camera import CameraConfig
+from mani_skill.utils import sapien_utils
+from mani_skill.utils.registration import register_env
+from mani_skill.utils.structs.actor import Actor
+from mani_skill.utils.structs.pose import Pose as ManiSkillPose
+from mani_skill.utils.structs.types import SimConfig
+from sapien.physx import PhysxMaterial
+from torch import Tensor
+
+from mskgrasp.config import check_config
+from mskgrasp.geometry import Pose
+from mskgrasp.grasp import MAX_OPENING
+from mskgrasp.parts import Part, builtin_names, find_part
+from tasks.attempt import TABLE_Z, Attempt
+from tasks.camera import Overhead, camera_config
+from tasks.contacts import HandContacts
+from tasks.frames import BASE_IN_WORLD, base_pose, to_world
+from tasks.motion import PandaMotion
+from tasks.outcome import MIN_RISE
+from tasks.panda import GraspPanda, panda_for
+from tasks.part_actor import build_part, hull_vertices
+from tasks.physics import Physics
+from tasks.placement import Region, random_resting_pose
+
+REGION: Region = (0.38, 0.62, -0.12, 0.12)
+"""The 24 x 24 cm on the table where parts lie, base frame, metres."""
+
+
+@register_env("GraspDisplacement-v1", max_episode_steps=250)
+class GraspDisplacementEnv(BaseEnv):
+    """Grasp an industrial part from a table and measure how it shifts in the hand.
+
+    **Task Description:**
+    A part lies on the table. In control mode ``grasp`` an action is one top-down grasp (x, y, z, theta
+    in the robot's base frame) and one ``env.step`` is the whole attempt: pre-grasp, straight descent,
+    close, lift, hold. The other control modes of the Panda (joint and end-effector) work as usual.
+
+    **Randomizations:**
+    - the part: one for each sub-scene, given by ``parts`` or drawn from the built-in ones
+    - its resting pose, by the poses' probabilities
+    - its place, uniform in a 24 x 24 cm region, and its turn about the vertical
+
+    **Success Conditions:**
+    - after the lift and 0.2 s of holding, both pads touch the part and their gap is over 0.5 mm
+    - the part has risen by at least 80 % of the lift and moves slower than 5 cm/s against the hand
+    - no overlap of finger and part over 1 mm was seen
+
+    **Fail Conditions:**
+    In mode ``grasp``: every attempt that is no success, with its reason (``missed``, ``slipped``,
+    ``ejected``, ``collided``, ``unsettled``) in ``info["failure"]``.
+
+    **Goal Specification:**
+    None. ``info["displacement"]`` holds dx, dy, dz, dtheta of the part in the hand.
+
+    **Additional Notes:**
+    - ``obs_mode`` renders nothing by itself; `capture_depth` takes the overhead image in float metres
+    - ``reset(options=dict(pose_base_obj=...))`` lays the part as told, ``options=dict(parts=[...],
+      reconfigure=True)`` loads other parts
+    """
+
+    _sample_video_link = None
+    SUPPORTED_ROBOTS: ClassVar = None  # the agent class is built from the physics settings
+    SUPPORTED_REWARD_MODES: ClassVar = ("sparse", "none")
+    agent: GraspPanda
+
+    def __init__(
+        self,
+        *args: Any,
+        parts: list[str] | None = None,
+        physics: dict | None = None,
+        camera: dict | None = None,
+        region: Region = REGION,
+        robot_uids: str = "panda_grasp",
+        num_envs: int = 1,
+        **kwargs: Any,
+    ):
+        """Builds the environment.
+
+        Args:
+            *args: Passed to ManiSkill.
+            parts: Names or folders of parts, dealt out over the sub-scenes; drawn when None.
+            physics: Overrides of `tasks.physics.Physics`.
+            camera: Overrides of `tasks.camera.Overhead`.
+            region: Where parts lie, base frame.
+            robot_uids: Only ``panda_grasp``.
+            num_envs: Sub-scenes; more than one needs PhysX on a GPU.
+            **kwargs: Passed to ManiSkill.
+
+        Raises:
+            BadConfig: An override is not valid.
+            BadPart: A part is unknown or damaged.
+        """
+        if robot_uids != "panda_grasp":
+            raise ValueError(f"robot_uids must be 'panda_grasp', got {robot_uids!r}")
+        self.physics = check_config(Physics, physics or {}, "physics")
+        self.overhead = check_config(Overhead, camera or {}, "camera")
+        self.region = tuple(region)
+        self._part_names = list(parts) if parts else None
+        self.parts: list[Part] = []
+        self._outcome: dict[str, Tensor] | None = None
+        super().__init__(*args, robot_uids=panda_for(self.physics, self.region), num_envs=num_envs, **kwargs)
+
+    @property
+    def _default_sim_config(self) -> SimConfig:
+        return self.physics.sim_config()
+
+    @property
+    def _default_sensor_configs(self) -> list[CameraConfig]:
+        return [camera_config(self.overhead, self.region_centre)]
+
+    @property
+    def _default_human_render_camera_configs(self) -> CameraConfig:
+        x, y = self.region_centre
+        pose = sapien_utils.look_at(
+            to_world(np.array([x + 0.55, y + 0.5, 0.4])), to_world(np.array([x, y, 0.1]))
+        )
+        return CameraConfig("render_camera", pose, 512, 512, 0.9, 0.01, 100)
+
+    @property
+    def region_centre(self) -> tuple[float, float]:
+        """Middle of the region, base frame, metres."""
+        x_min, x_max, y_min, y_max = self.region
+        return (x_min + x_max) / 2, (y_min + y_max) / 2
+
+    # ------------------------------------------------------------------ building
+
+    def _load_agent(self, options: dict, *_: Any, **__: Any) -> None:
+        super()._load_agent(options, sapien.Pose(p=BASE_IN_WORLD))
+
+    def _load_scene(self, options: dict) -> None:
+        names = options.get("parts") or self._part_names
+        if names is None:
+            names = [str(name) for name in self._batched_episode_rng.choice(list(builtin_names()))]
+        self.parts = [find_part(names[i % len(names)]) for i in range(self.num_envs)]
+        self._build_table()
+        actors = []
+        for i, part in enumerate(self.parts):
+            actor = build_part(self.scene, part, i, self.physics.friction_pad_part)
+            self.remove_from_state_dict_registry(actor)
+            actors.append(actor)
+        self.part = Actor.merge(actors, name="part")
+        self.add_to_state_dict_registry(self.part)
+        self._vertices = [hull_vertices(part) for part in self.parts]
+
+    def _build_table(self) -> None:
+        builder = self.scene.create_actor_builder()
+        half = np.array([0.5, 0.7, 0.02])
+        pose = sapien.Pose(p=to_world(np.array([0.45, 0.0, TABLE_Z - half[2]])))
+        # PhysX averages the two materials of a contact; the part's is that of the pads.
+        mu = max(0.0, 2 * self.physics.friction_table_part - self.physics.friction_pad_part)
+        builder.add_box_collision(pose, half, material=PhysxMaterial(mu, mu, 0.0))
+        if self.scene.can_render():
+            look = sapien.render.RenderMaterial(base_color=(0.33, 0.35, 0.38, 1.0), roughness=0.9)
+            builder.add_box_visual(pose, half, material=look)
+        builder.initial_pose = sapien.Pose()
+        builder.build_static(name="table")
+
+    def _after_reconfigure(self, options: dict) -> None:
+        self._laid_z = torch.zeros(self.num_envs, device=self.device)
+        self.motion = PandaMotion(self.scene, self.agent, self.physics)
+        self.contacts = HandContacts(self.scene, self.agent, self.part)
+        self.attempt = Attempt(
+            self.agent, self.part, self._vertices, self.motion, self.contacts, self.physics
+        )
+
+    def _initialize_episode(self, env_idx: Tensor, options: dict) -> None:
+        self._outcome = None
+        given = options.get("pose_base_obj")
+        if given is None:
+            rows = [
+                random_resting_pose(
+                    self.parts[i], self._vertices[i], self.region, self._batched_episode_rng[i]
+                )
+                for i in env_idx.tolist()
+            ]
+            given = np.stack(rows)
+        pose = torch.as_tensor(np.asarray(given), dtype=torch.float32, device=self.device).reshape(-1, 7)
+        self._laid_z[env_idx] = pose[:, 2]
+        self.part.set_pose(ManiSkillPose.create_from_pq(to_world(pose[:, :3]), pose[:, 3:]))
+        qpos = np.tile(self.agent.rest_qpos, (len(env_idx), 1))
+        self.agent.reset(qpos)
+        self.agent.set_drives()
+        if len(env_idx) == self.num_envs:
+            self.motion.seconds = 0.0
+            self.motion.finger_target = torch.full((self.num_envs,), MAX_OPENING / 2, device=self.device)
+
+    # ------------------------------------------------------------------ looking
+
+    def capture_depth(self) -> Tensor:
+        """(n, h, w) float32 depth in metres from the overhead camera, the robot left out of the picture."""
+        return self.capture_rgbd()[1]
+
+    def capture_rgbd(self) -> tuple[Tensor, Tensor]:
+        """Colour (n, h, w, 3) uint8 and depth (n, h, w) float32 metres, without the robot."""
+        self.agent.show(False)
+        try:
+            self.scene.update_render(update_sensors=True, update_human_render_cameras=False)
+            sensor = self._sensors["overhead"]
+            sensor.capture()
+            seen = sensor.get_obs(rgb=True, depth=True, position=False, segmentation=False)
+        finally:
+            self.agent.show(True)
+        return seen["rgb"], seen["depth"][..., 0]
+
+    def part_pose(self) -> Pose:
+        """``T_base_obj`` of the parts: positions (n, 3), quaternions (n, 4)."""
+        return base_pose(self.part)
+
+    def tcp_pose(self) -> Pose:
+        """Measured ``T_base_tcp``: positions (n, 3), quaternions (n, 4)."""
+        return base_pose(self.agent.tcp)
+
+    # ------------------------------------------------------------------ stepping
+
+    def _step_action(self, action: Any) -> Any:
+        if self.agent.control_mode != "grasp" or action is None:
+            self._outcome = None
+            return super()._step_action(action)
+        grasp = torch.as_tensor(action, dtype=torch.float32, device=self.device).reshape(-1, 4)
+        self._outcome = self.attempt.run(grasp)
+        return grasp
+
+    # ------------------------------------------------------------------ ManiSkill's questions
+
+    def evaluate(self) -> dict[str, Tensor]:
+        """Outcome of the last attempt; in the other control modes, whether the part is held aloft now."""
+        if self._outcome is not None:
+            return dict(self._outcome, fail=~self._outcome["success"])
+        risen = self.part.pose.p[:, 2] - self._laid_z
+        held, _ = self.attempt.grip()
+        aloft = risen >= MIN_RISE * self.physics.lift_height
+        return dict(success=held & aloft)
+
+    def compute_sparse_reward(self, obs: Any, action: Tensor, info: dict) -> Tensor:
+        """S: 1 for a success, 0 otherwise."""
+        return info["success"].to(torch.float32)
+
+    def _get_obs_extra(self, info: dict) -> dict[str, Tensor]:
+        return dict(tcp_pose=self.tcp_pose().as_vector(), part_pose=self.part_pose().as_vector())

@@ -1,0 +1,174 @@
+"""Motions of the simulated Panda, step by step: straight lines, joint paths and the fingers' ramp.
+
+The same motions serve the task, which runs whole attempts in batch, and the simulated cell, which
+executes one command at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import torch
+from mani_skill.envs.scene import ManiSkillScene
+from torch import Tensor
+
+from mskgrasp.grasp import MAX_OPENING
+from tasks.panda import GraspPanda
+from tasks.physics import Physics
+
+STILL_FINGER = 2e-3
+"""A finger slower than this, m/s, has met what it holds. Speeds are differences of positions: PhysX's
+TGS solver reports the velocity of a pressed joint with the drive's impulse still in it."""
+_CHECK_EVERY = 5
+
+
+def ease(n_steps: int, device: torch.device) -> Tensor:
+    """(n_steps,) fractions of a path from just above 0 to 1, starting and ending without speed."""
+    time = torch.arange(1, n_steps + 1, dtype=torch.float64, device=device) / n_steps
+    return 0.5 - 0.5 * torch.cos(math.pi * time)
+
+
+def ease_duration(distance: float, peak_speed: float) -> float:
+    """Seconds that `ease` needs over a distance at a peak speed."""
+    return max(0.5 * math.pi * distance / peak_speed, 0.02)
+
+
+class PandaMotion:
+    """Writes drive targets and advances the simulation.
+
+    Args:
+        scene: The scene of all n sub-scenes.
+        agent: The Panda in them.
+        physics: Rate, finger speed and force.
+    """
+
+    def __init__(self, scene: ManiSkillScene, agent: GraspPanda, physics: Physics):
+        self._scene = scene
+        self._agent = agent
+        self._physics = physics
+        self._gpu = scene.gpu_sim_enabled
+        self.device = agent.device
+        self.n = scene.num_envs
+        self._arm_drives = [joint._objs[0] for joint in agent.arm_joints]
+        self._finger_drives = [joint._objs[0] for joint in agent.finger_joints]
+        self.finger_target = torch.full((self.n,), MAX_OPENING / 2, device=self.device)
+        self.seconds = 0.0
+
+    def n_steps(self, seconds: float) -> int:
+        """Simulation steps in a time, at least one."""
+        return max(1, round(seconds * self._physics.rate_hz))
+
+    def place(self, q: Tensor, width: float = MAX_OPENING) -> None:
+        """Puts the arm at joints (n, 7) at once, at rest, fingers open by ``width`` metres."""
+        fingers = torch.full((self.n, 2), width / 2, device=self.device)
+        qpos = torch.cat([q.to(torch.float32), fingers], dim=-1)
+        self._agent.robot.set_qpos(qpos)
+        self._agent.robot.set_qvel(torch.zeros_like(qpos))
+        if self._gpu:
+            self._scene._gpu_apply_all()
+            self._scene.px.gpu_update_articulation_kinematics()
+            self._scene._gpu_fetch_all()
+        self.set_fingers(fingers[:, 0])
+        self.set_arm(q, torch.zeros_like(q))
+
+    def set_arm(self, q: Tensor, qd: Tensor) -> None:
+        """Drive targets of the arm: (n, 7) radians and radians a second."""
+        if self._gpu:
+            robot = self._agent.robot
+            robot.set_joint_drive_targets(q.to(torch.float32), self._agent.arm_joints)
+            robot.set_joint_drive_velocity_targets(qd.to(torch.float32), self._agent.arm_joints)
+        else:
+            rows = zip(self._arm_drives, q[0].tolist(), qd[0].tolist(), strict=True)
+            for drive, position, velocity in rows:
+                drive.set_drive_target(position)
+                drive.set_drive_velocity_target(velocity)
+
+    def set_fingers(self, target: Tensor) -> None:
+        """Drive targets of both fingers: (n,) metres from the middle, negative to press."""
+        self.finger_target = target
+        if self._gpu:
+            pair = target[:, None].expand(-1, 2)
+            self._agent.robot.set_joint_drive_targets(pair, self._agent.finger_joints)
+        else:
+            value = float(target[0])
+            for drive in self._finger_drives:
+                drive.set_drive_target(value)
+
+    def step(self, n_steps: int = 1) -> None:
+        """Advances the simulation with the targets as they are."""
+        if self._gpu:
+            self._scene.px.gpu_apply_articulation_target_position()
+            self._scene.px.gpu_apply_articulation_target_velocity()
+        for _ in range(n_steps):
+            self._scene.step()
+        self.seconds += n_steps / self._physics.rate_hz
+        if self._gpu:
+            self._scene._gpu_fetch_all()
+
+    def follow(
+        self,
+        path: Tensor,
+        *,
+        check: Callable[[int], bool] | None = None,
+        check_every: int = 4,
+        frozen: Tensor | None = None,
+    ) -> bool:
+        """Follows joint targets, one a simulation step.
+
+        Args:
+            path: (steps, n, 7) radians.
+            check: Called every ``check_every`` steps with the index of the step; True ends the motion.
+            check_every: How often, steps.
+            frozen: (n,) bool, arms that stay where their targets are; read at every step.
+
+        Returns:
+            False where ``check`` ended the motion.
+        """
+        rate = self._physics.rate_hz
+        speed = torch.zeros_like(path)
+        speed[1:] = (path[1:] - path[:-1]) * rate
+        still = torch.zeros_like(path[0])
+        last = path[0]
+        for i in range(len(path)):
+            target, velocity = path[i], speed[i]
+            if frozen is not None and self.n > 1:
+                target = torch.where(frozen[:, None], last, target)
+                velocity = torch.where(frozen[:, None], still, velocity)
+            self.set_arm(target, velocity)
+            self.step()
+            last = target
+            if check is not None and i % check_every == check_every - 1 and check(i):
+                self.set_arm(last, still)
+                return False
+        self.set_arm(last, still)
+        return True
+
+    def move_fingers(self, target: float, speed: float | None = None) -> None:
+        """Ramps the fingers' targets to ``target`` (metres from the middle) and waits until they stop.
+
+        A target inside the part keeps pressing with the drive's force limit.
+        """
+        step = (speed or self._physics.finger_speed) / self._physics.rate_hz
+        current = self.finger_target.clone()
+        quiet = torch.zeros(self.n, dtype=torch.int64, device=self.device)
+        # A held part stops the fingers before their targets; wait until the drives press in full.
+        lag = self._physics.finger_force / self._physics.finger_stiffness
+        timeout = self.n_steps(MAX_OPENING / (speed or self._physics.finger_speed) + 0.5)
+        last = self._agent.robot.get_qpos()[:, 7:9]
+        far = STILL_FINGER * _CHECK_EVERY / self._physics.rate_hz
+        for i in range(timeout):
+            current = current + (target - current).clamp(-step, step)
+            self.set_fingers(current)
+            self.step()
+            if i % _CHECK_EVERY != _CHECK_EVERY - 1:
+                continue
+            fingers = self._agent.robot.get_qpos()[:, 7:9]
+            still = ((fingers - last).abs() < far).all(dim=-1)
+            last = fingers
+            lagging = (fingers.mean(dim=-1) - current).abs() > lag
+            arrived = (current == target) & ((fingers.mean(dim=-1) - target).abs() < 1e-3)
+            quiet = torch.where(still & (lagging | arrived), quiet + _CHECK_EVERY, 0)
+            if bool((quiet >= self.n_steps(0.03)).all()):
+                break
+        self.set_fingers(torch.full_like(current, target))

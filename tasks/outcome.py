@@ -1,0 +1,75 @@
+"""When an attempt is a success, and why it failed otherwise; pure batched functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from mskgrasp.grasp import FAILURES
+
+MIN_GAP = 0.5e-3
+"""Fingers closer than this hold nothing, m."""
+MIN_RISE = 0.8
+"""Least share of the lift that the part must have risen."""
+MAX_RELATIVE_SPEED = 0.05
+"""A held part moves slower than this against the hand, m/s."""
+MAX_PENETRATION = 1e-3
+"""Deeper overlap of finger and part makes a label worthless, m."""
+MIN_PAD_FORCE = 0.05
+"""Less force is no touch, N."""
+EJECTED_DISTANCE = 0.05
+"""A part that ends this far from where it lay, and not in the hand, was ejected, m."""
+MAX_DRIFT = 1e-3
+"""A part that moves more than this on the table before it is grasped was not at rest, m."""
+
+CODE = {name: i for i, name in enumerate(FAILURES)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observed:
+    """What was seen of n attempts; every field has shape (n,).
+
+    Attributes:
+        settled: The part was at rest before the grasp.
+        collided: The descent met more force than the reflex allows.
+        held_closed: Both pads touched the part, and there was a gap, when the fingers had closed.
+        pads_touch: Both pads touch the part after the hold.
+        gap: Distance of the pads after the hold, m.
+        rise: How far the part has risen, as a share of the lift.
+        relative_speed: Speed of the part against the hand after the hold, m/s.
+        penetration: Deepest overlap of finger and part seen, m; NaN where it is not known.
+        wandered: Horizontal distance of the part from where it lay, m.
+    """
+
+    settled: Tensor
+    collided: Tensor
+    held_closed: Tensor
+    pads_touch: Tensor
+    gap: Tensor
+    rise: Tensor
+    relative_speed: Tensor
+    penetration: Tensor
+    wandered: Tensor
+
+
+def judge(seen: Observed) -> tuple[Tensor, Tensor]:
+    """Success and failure code of attempts.
+
+    Returns:
+        success: (n,) bool, S of the design: all conditions hold.
+        failure: (n,) uint8, index into `mskgrasp.grasp.FAILURES`; the earliest reason wins.
+    """
+    holds = seen.pads_touch & (seen.gap > MIN_GAP) & (seen.rise >= MIN_RISE)
+    overlap = seen.penetration > MAX_PENETRATION  # NaN compares false: unknown is no evidence
+    steady = (seen.relative_speed < MAX_RELATIVE_SPEED) & ~overlap
+    success = seen.settled & ~seen.collided & seen.held_closed & holds & steady
+    failure = torch.full_like(seen.gap, CODE["unsettled"], dtype=torch.uint8)
+    failure[~holds] = CODE["slipped"]
+    failure[~seen.held_closed] = CODE["missed"]
+    failure[~holds & (seen.wandered > EJECTED_DISTANCE)] = CODE["ejected"]
+    failure[seen.collided] = CODE["collided"]
+    failure[~seen.settled] = CODE["unsettled"]
+    failure[success] = CODE["none"]
+    return success, failure
