@@ -1,0 +1,9 @@
+"""Parts: industrial components with a mesh, collision hulls, mass, inertia and resting poses."""
+
+from __future__ import annotations
+
+from mskgrasp.parts.build import build_part, builtin_names, find_part
+from mskgrasp.parts.part import Part
+from mskgrasp.parts.store import load_part, parts_folder
+
+__all__ = ["Part", "build_part", "builtin_names", "find_part", "load_part", "parts_folder"]

@@ -1,0 +1,223 @@
+"""From a shape to a part folder, and from a name to a part."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import json
+import re
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from scipy.spatial import ConvexHull
+from trimesh.exchange.gltf import export_glb
+from trimesh.exchange.ply import export_ply
+
+from mskgrasp.errors import BadPart
+from mskgrasp.parts import families, store
+from mskgrasp.parts.families.recipe import Recipe
+from mskgrasp.parts.measure import MOST_OBLONG, hull_fit, longest_axis, mass_properties, oblongness
+from mskgrasp.parts.part import SCHEMA_VERSION, Part
+from mskgrasp.parts.resting import stable_poses
+from mskgrasp.parts.solid import MAX_HULL_VERTICES, Solid
+
+MAX_HULL_FACES = 64
+LEGAL_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
+
+
+def builtin_names() -> tuple[str, ...]:
+    """Names of the built-in parts, sorted."""
+    return tuple(families.recipes())
+
+
+def build_part(name: str) -> Part:
+    """Builds a built-in part, unless it lies ready in the parts folder.
+
+    Raises:
+        BadPart: There is no such built-in part.
+    """
+    recipe = families.recipes().get(name)
+    if recipe is None:
+        raise unknown_part(name)
+    recipe_hash = _recipe_hash(recipe)
+    folder = store.parts_folder() / name
+    if store.recipe_hash(folder) == recipe_hash:
+        return store.load_part(folder)
+    dimensions = {
+        key.removesuffix("_mm"): value / 1000 if key.endswith("_mm") else value
+        for key, value in recipe.dimensions.items()
+    }
+    return write_solid(
+        recipe.make(recipe.dimensions),
+        name=name,
+        family=recipe.family,
+        source=recipe.source,
+        licence="Apache-2.0",
+        density=recipe.density,
+        dimensions=dimensions,
+        recipe_hash=recipe_hash,
+    )
+
+
+def find_part(name_or_folder: str | Path) -> Part:
+    """A part by its name or by its folder; a built-in one that is not there yet is built.
+
+    Raises:
+        BadPart: There is no such part; the message lists similar names.
+    """
+    text = str(name_or_folder)
+    if text in families.recipes():
+        return build_part(text)
+    if LEGAL_NAME.fullmatch(text) and (store.parts_folder() / text).is_dir():
+        return store.load_part(store.parts_folder() / text)
+    if Path(text).is_dir():
+        return store.load_part(Path(text))
+    raise unknown_part(text)
+
+
+def imported_names() -> tuple[str, ...]:
+    """Names of the parts in the parts folder that are not built in, sorted."""
+    root = store.parts_folder()
+    found = (path.name for path in root.iterdir() if path.is_dir()) if root.is_dir() else ()
+    builtin = families.recipes()
+    return tuple(sorted(name for name in found if LEGAL_NAME.fullmatch(name) and name not in builtin))
+
+
+def unknown_part(name: str) -> BadPart:
+    """The error for a name that no part has."""
+    known = [*builtin_names(), *imported_names()]
+    close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    hint = f"did you mean {', '.join(close)}?" if close else "`python -m mskgrasp.parts list` shows the parts"
+    return BadPart(f"no part is called {name!r}, and no part folder lies there: {hint}")
+
+
+def write_solid(
+    solid: Solid,
+    *,
+    name: str,
+    family: str,
+    source: str,
+    licence: str,
+    density: float,
+    dimensions: dict[str, float],
+    recipe_hash: str,
+) -> Part:
+    """Measures a shape, moves its centroid to the origin and stores it as a part."""
+    masses = mass_properties(solid.mesh, density)
+    centroid_mm = masses.centroid * 1000
+    mesh = trimesh.Trimesh(solid.mesh.vertices - centroid_mm, solid.mesh.faces, process=False)
+    # Rounded to what the file will hold: everything measured below is then true of the stored hulls.
+    hulls = [_corners((points - centroid_mm).astype(np.float32)) for points in solid.hulls]
+    for number, points in enumerate(hulls):
+        _check_hull(name, number, points)
+    fit = hull_fit(mesh, hulls)
+    resting, probability = stable_poses(np.concatenate(hulls).astype(np.float64))
+    record: dict[str, Any] = {
+        "schema_version": SCHEMA_VERSION,
+        "name": name,
+        "family": family,
+        "source": source,
+        "licence": licence,
+        "dimensions": dimensions,
+        "density": density,
+        "volume": masses.volume,
+        "mass": masses.mass,
+        "centroid_in_source": masses.centroid,
+        "inertia": masses.inertia,
+        "principal_inertia": masses.principal_inertia,
+        "quat_obj_principal": masses.quat_principal,
+        "extents": mesh.extents / 1000,
+        "longest_axis": longest_axis(mesh) / 1000,
+        "n_hulls": len(hulls),
+        "hull_error": fit.largest / 1000,
+        "hull_error_p95": fit.p95 / 1000,
+        "hull_volume_ratio": fit.volume_ratio,
+        "resting": {"position": resting.position, "quat_wxyz": resting.quat_wxyz},
+        "resting_probability": probability,
+        "recipe_hash": recipe_hash,
+    }
+    return store.write_part(
+        name, _ply(mesh), _glb(hulls), {key: _plain(value) for key, value in record.items()}
+    )
+
+
+def source_digest() -> str:
+    """Digest of the code that makes parts: when it changes, parts are made anew."""
+    return _source_digest()
+
+
+@lru_cache(maxsize=1)
+def _source_digest() -> str:
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    for name in ("build.py", "measure.py", "resting.py", "solid.py", "decompose.py"):
+        digest.update((here / name).read_bytes() if (here / name).exists() else b"")
+    for path in sorted((here / "families").glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _recipe_hash(recipe: Recipe) -> str:
+    text = json.dumps(
+        [
+            SCHEMA_VERSION,
+            source_digest(),
+            recipe.name,
+            recipe.family,
+            recipe.source,
+            recipe.density,
+            recipe.dimensions,
+        ],
+        sort_keys=True,
+    )
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _corners(points: np.ndarray) -> np.ndarray:
+    """The points that are corners of their convex hull."""
+    return points[np.sort(ConvexHull(points.astype(np.float64)).vertices)]
+
+
+def _check_hull(name: str, number: int, points: np.ndarray) -> None:
+    faces = len(ConvexHull(points.astype(np.float64)).simplices)
+    if len(points) > MAX_HULL_VERTICES or faces > MAX_HULL_FACES:
+        raise BadPart(
+            f"{name}: hull {number} has {len(points)} vertices and {faces} faces, "
+            f"the limits are {MAX_HULL_VERTICES} and {MAX_HULL_FACES}: split it"
+        )
+    ratio = oblongness(points.astype(np.float64))
+    if ratio > MOST_OBLONG:
+        raise BadPart(
+            f"{name}: hull {number} is {ratio:.0f} times longer than thick, PhysX takes up to "
+            f"{MOST_OBLONG:.0f}: make the part thicker or shorter"
+        )
+
+
+def _ply(mesh_mm: trimesh.Trimesh) -> bytes:
+    mesh = trimesh.Trimesh(mesh_mm.vertices / 1000, mesh_mm.faces, process=False)
+    return export_ply(mesh, encoding="binary", vertex_normal=False)
+
+
+def _glb(hulls_mm: list[np.ndarray]) -> bytes:
+    """One node per hull. SAPIEN takes the numbers of a GLB as they are, so no turn to y-up is made."""
+    scene = trimesh.Scene()
+    for number, points in enumerate(hulls_mm):
+        hull = trimesh.convex.convex_hull(points.astype(np.float64))
+        scene.add_geometry(hull, node_name=f"hull_{number:02d}", geom_name=f"hull_{number:02d}")
+    return export_glb(scene, include_normals=False)
+
+
+def _plain(value: Any) -> Any:
+    """JSON types, floats to 9 significant digits so that rounding noise does not reach the file."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(item) for item in value]
+    if isinstance(value, (float, np.floating)):
+        return float(f"{float(value):.9g}") + 0.0
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    return value

@@ -1,0 +1,174 @@
+"""What is measured on a shape: mass, inertia, size, and how well the hulls stand for the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from manifold3d import Manifold, Mesh64, OpType
+from scipy.spatial import ConvexHull, KDTree
+
+from mskgrasp.geometry import quat_from_matrix
+
+MOST_SAMPLES = 20_000
+"""Points per surface at which hulls and mesh are compared."""
+
+MOST_OBLONG = 50.0
+"""PhysX on a GPU drops hulls whose length is about 64 times their thickness."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MassProperties:
+    """Of a uniform body.
+
+    Attributes:
+        volume: Cubic metres.
+        mass: kg.
+        centroid: (3,) metres, in the frame of the given mesh.
+        inertia: (3, 3) about the centroid, kg m^2.
+        principal_inertia: (3,) kg m^2.
+        quat_principal: (4,) wxyz, the principal axes in the mesh's axes.
+    """
+
+    volume: float
+    mass: float
+    centroid: np.ndarray
+    inertia: np.ndarray
+    principal_inertia: np.ndarray
+    quat_principal: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class HullFit:
+    """How well the union of the hulls stands for the mesh; lengths in millimetres.
+
+    Attributes:
+        largest: Largest distance found between the two surfaces, either way.
+        p95: 95th percentile of the distance over both surfaces.
+        volume_ratio: Volume of the union by that of the mesh.
+    """
+
+    largest: float
+    p95: float
+    volume_ratio: float
+
+
+def mass_properties(mesh_mm: trimesh.Trimesh, density: float) -> MassProperties:
+    """Integrates over a watertight mesh in millimetres; density in kg/m^3."""
+    # In millimetres and scaled afterwards: the integrals of small parts in metres vanish beside tolerances.
+    found = trimesh.triangles.mass_properties(mesh_mm.triangles, density=1.0, skip_inertia=False)
+    inertia = np.asarray(found.inertia, dtype=float) * density * 1e-15
+    inertia = (inertia + inertia.T) / 2
+    principal, axes = _principal_axes(inertia)
+    volume = float(found.volume) * 1e-9
+    return MassProperties(
+        volume=volume,
+        mass=volume * density,
+        centroid=np.asarray(found.center_mass, dtype=float) / 1000,
+        inertia=inertia,
+        principal_inertia=principal,
+        quat_principal=quat_from_matrix(axes),
+    )
+
+
+def _principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Principal moments (3,) and right-handed axes as columns (3, 3)."""
+    diagonal = np.diag(inertia)
+    if np.abs(inertia - np.diag(diagonal)).max() < 1e-6 * diagonal.max():
+        # The mesh's own axes are principal; a symmetric part must not get arbitrary ones from rounding.
+        return diagonal.copy(), np.eye(3)
+    moments, axes = np.linalg.eigh(inertia)
+    largest = np.abs(axes).argmax(axis=0)
+    axes = axes * np.sign(axes[largest, range(3)])
+    if np.linalg.det(axes) < 0:
+        axes[:, 2] *= -1
+    return moments, axes
+
+
+def longest_axis(mesh: trimesh.Trimesh) -> float:
+    """Longest edge of the oriented box of least volume, in the mesh's unit."""
+    _, extents = trimesh.bounds.oriented_bounds(mesh)
+    # For round parts the least volume leaves room for turned boxes; none is needed where axes fit as well.
+    if np.prod(mesh.extents) <= np.prod(extents) * 1.0001:
+        extents = mesh.extents
+    return float(np.max(extents))
+
+
+def hull_fit(mesh_mm: trimesh.Trimesh, hulls_mm: Sequence[np.ndarray]) -> HullFit:
+    """Compares the surface of the union of the hulls with that of the mesh."""
+    union = Manifold.batch_boolean(
+        [Manifold.hull_points(np.asarray(points, dtype=np.float64)) for points in hulls_mm], OpType.Add
+    )
+    mesh = Manifold(Mesh64(np.asarray(mesh_mm.vertices, np.float64), np.asarray(mesh_mm.faces, np.uint64)))
+    step = float(np.max(mesh_mm.extents)) / 40
+    surfaces = [
+        _outer_triangles(_triangles(union.refine_to_length(step)), hulls_mm),
+        _triangles(mesh.refine_to_length(step)),
+    ]
+    distances, areas = [], []
+    for source, target in (surfaces, surfaces[::-1]):
+        samples, weight = _samples(source)
+        distances.append(_distance_to(target, samples))
+        areas.append(weight)
+    distance, area = np.concatenate(distances), np.concatenate(areas)
+    order = np.argsort(distance)
+    covered = np.cumsum(area[order]) / area.sum()
+    p95 = distance[order][min(int(np.searchsorted(covered, 0.95)), len(distance) - 1)]
+    return HullFit(
+        largest=float(distance.max()), p95=float(p95), volume_ratio=float(union.volume() / mesh_mm.volume)
+    )
+
+
+def oblongness(points: np.ndarray) -> float:
+    """Length of a convex body by its least thickness."""
+    hull = ConvexHull(points)
+    corners = points[hull.vertices]
+    heights = corners @ hull.equations[:, :3].T
+    thickness = (heights.max(axis=0) - heights.min(axis=0)).min()
+    length = np.linalg.norm(corners[:, None] - corners[None], axis=-1).max()
+    return float(length / thickness)
+
+
+def _triangles(body: Manifold) -> np.ndarray:
+    data = body.to_mesh64()
+    return np.asarray(data.vert_properties)[:, :3][np.asarray(data.tri_verts)]
+
+
+def _outer_triangles(triangles: np.ndarray, hulls: Sequence[np.ndarray]) -> np.ndarray:
+    """Those triangles that have no hull in front of them.
+
+    Hulls that share a face differ by rounding, so their union keeps both sides of it as an inner wall.
+    """
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    in_front = triangles.mean(axis=1) + 0.01 * normal
+    covered = np.zeros(len(triangles), dtype=bool)
+    for points in hulls:
+        planes = ConvexHull(points).equations
+        covered |= (in_front @ planes[:, :3].T + planes[:, 3]).max(axis=1) < 0
+    return triangles[~covered]
+
+
+def _samples(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points on the surface (centres, and corners without weight) and the area each one stands for."""
+    area = np.linalg.norm(
+        np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1
+    )
+    stride = -(-len(triangles) // (MOST_SAMPLES // 2))
+    chosen = triangles[::stride]
+    points = np.concatenate([chosen.mean(axis=1), chosen[:, 0]])
+    return points, np.concatenate([area[::stride], np.zeros(len(chosen))])
+
+
+def _distance_to(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Distance of points (n, 3) to a finely cut surface, by way of its eight nearest triangles."""
+    count = min(8, len(triangles))
+    _, nearest = KDTree(triangles.mean(axis=1)).query(points, k=count)
+    nearest = np.reshape(nearest, (len(points), count))
+    best = np.full(len(points), np.inf)
+    for column in nearest.T:
+        closest = trimesh.triangles.closest_point(triangles[column], points)
+        best = np.minimum(best, np.linalg.norm(closest - points, axis=1))
+    return best

@@ -1,0 +1,216 @@
+"""Part folders: written whole or not at all, checked when read."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import shutil
+import time
+import uuid
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mskgrasp.errors import BadPart
+from mskgrasp.geometry import Pose
+from mskgrasp.parts.part import SCHEMA_VERSION, Part
+
+FILES = ("mesh.ply", "hulls.glb", "part.json")
+
+_ABANDONED_S = 3600.0
+"""Temporary folders older than this were left by a killed build."""
+
+
+def parts_folder() -> Path:
+    """Where parts are kept: ``$XDG_CACHE_HOME/mskgrasp/parts`` or ``~/.cache/mskgrasp/parts``."""
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    # The XDG specification says that a relative path there is to be ignored.
+    root = Path(base) if os.path.isabs(base) else Path.home() / ".cache"
+    return root / "mskgrasp" / "parts"
+
+
+def content_hash(mesh: bytes, hulls: bytes, record: dict[str, Any]) -> str:
+    """Hex digest of a part's mesh, hulls and physical data."""
+    physical = {key: value for key, value in record.items() if key not in ("content_hash", "recipe_hash")}
+    digest = hashlib.sha256()
+    for block in (mesh, hulls, json.dumps(physical, sort_keys=True).encode()):
+        digest.update(hashlib.sha256(block).digest())
+    return digest.hexdigest()
+
+
+def write_part(name: str, mesh: bytes, hulls: bytes, record: dict[str, Any]) -> Part:
+    """Puts a part into the parts folder under its name, replacing another one of that name.
+
+    Everything is written to a temporary folder that is renamed at the end. Where another process was faster
+    and its part has the same recipe, that one stays.
+    """
+    root = parts_folder()
+    root.mkdir(parents=True, exist_ok=True)
+    _sweep(root)
+    record = record | {"content_hash": content_hash(mesh, hulls, record)}
+    text = json.dumps(record, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
+    temporary = root / f".tmp-{name}-{uuid.uuid4().hex[:12]}"
+    temporary.mkdir()
+    try:
+        for file_name, content in zip(FILES, (mesh, hulls, text.encode()), strict=True):
+            with open(temporary / file_name, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+        _take_place(temporary, root / name, record["recipe_hash"])
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return load_part(root / name)
+
+
+def load_part(folder: Path | str) -> Part:
+    """Reads a part folder.
+
+    Raises:
+        BadPart: A file is missing, damaged, of another schema version, or leads out of the folder.
+    """
+    folder = Path(folder)
+    contents = {name: _read(folder, name) for name in FILES}
+    record = _record(folder, contents["part.json"])
+    if record.get("schema_version") != SCHEMA_VERSION:
+        raise BadPart(
+            f"{folder / 'part.json'} has schema version {record.get('schema_version')!r}, "
+            f"this program reads {SCHEMA_VERSION}: build or import the part again"
+        )
+    try:
+        part = _part_of(folder, record)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        what = f"key {error} is missing" if isinstance(error, KeyError) else str(error).splitlines()[0]
+        raise BadPart(f"{folder / 'part.json'} is damaged ({what}): {_REMEDY}") from error
+    if content_hash(contents["mesh.ply"], contents["hulls.glb"], record) != part.content_hash:
+        raise BadPart(f"{folder}: the files do not match the hash in part.json: {_REMEDY}")
+    return part
+
+
+def recipe_hash(folder: Path) -> str | None:
+    """The recipe by which a folder's part was made; None where there is no sound part."""
+    try:
+        load_part(folder)
+        return str(_record(folder, _read(folder, "part.json")).get("recipe_hash"))
+    except BadPart:
+        return None
+
+
+def read_record(folder: Path) -> dict[str, Any]:
+    """All of ``part.json``, also what Part leaves out (``hull_error_p95``, ``hull_volume_ratio``, ...)."""
+    return _record(folder, _read(folder, "part.json"))
+
+
+_REMEDY = "delete the folder, then build or import the part again"
+
+
+def _take_place(temporary: Path, final: Path, recipe: str) -> None:
+    for _ in range(20):
+        try:
+            os.rename(temporary, final)
+            return
+        except OSError as error:
+            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
+                raise
+        if recipe_hash(final) == recipe:
+            return
+        old = temporary.with_name(temporary.name + "-old")
+        try:
+            os.rename(final, old)
+        except FileNotFoundError:
+            continue
+        if old.is_dir():
+            shutil.rmtree(old, ignore_errors=True)
+        else:
+            old.unlink()
+    raise BadPart(f"{final} keeps being replaced by another process: run one build at a time")
+
+
+def _sweep(root: Path) -> None:
+    for folder in root.glob(".tmp-*"):
+        try:
+            if time.time() - folder.stat().st_mtime > _ABANDONED_S:
+                shutil.rmtree(folder, ignore_errors=True)
+        except FileNotFoundError:
+            continue
+
+
+def _read(folder: Path, name: str) -> bytes:
+    path = folder / name
+    if not path.is_file():
+        raise BadPart(f"{folder} is no part folder: {name} is missing; a part has {', '.join(FILES)}")
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise BadPart(f"{path} leads out of its folder to {path.resolve()}: {_REMEDY}")
+    return path.read_bytes()
+
+
+def _record(folder: Path, text: bytes) -> dict[str, Any]:
+    try:
+        record = json.loads(text.decode())
+    except ValueError as error:
+        raise BadPart(f"{folder / 'part.json'} is damaged (no JSON): {_REMEDY}") from error
+    if not isinstance(record, dict):
+        raise BadPart(f"{folder / 'part.json'} is damaged (no JSON object): {_REMEDY}")
+    return record
+
+
+def _part_of(folder: Path, record: dict[str, Any]) -> Part:
+    probability = _array(record, "resting_probability", (-1,))
+    count = len(probability)
+    if count < 1 or not np.isclose(probability.sum(), 1.0, atol=1e-6) or (probability < 0).any():
+        raise ValueError("resting_probability does not sum to 1")
+    return Part(
+        name=_text(record, "name"),
+        folder=folder,
+        family=_text(record, "family"),
+        source=_text(record, "source"),
+        licence=_text(record, "licence"),
+        dimensions={str(key): float(value) for key, value in record["dimensions"].items()},
+        content_hash=_text(record, "content_hash"),
+        density=_positive(record, "density"),
+        mass=_positive(record, "mass"),
+        inertia=_array(record, "inertia", (3, 3)),
+        principal_inertia=_array(record, "principal_inertia", (3,)),
+        quat_obj_principal=_unit(_array(record, "quat_obj_principal", (4,))),
+        extents=_array(record, "extents", (3,)),
+        longest_axis=_positive(record, "longest_axis"),
+        n_hulls=int(_positive(record, "n_hulls")),
+        hull_error=float(record["hull_error"]),
+        resting=Pose(
+            position=_array(record["resting"], "position", (count, 3)),
+            quat_wxyz=_unit(_array(record["resting"], "quat_wxyz", (count, 4))),
+        ),
+        resting_probability=probability / probability.sum(),
+    )
+
+
+def _text(record: dict[str, Any], key: str) -> str:
+    if not isinstance(record[key], str):
+        raise ValueError(f"{key} is no text")
+    return record[key]
+
+
+def _positive(record: dict[str, Any], key: str) -> float:
+    value = float(record[key])
+    if not (np.isfinite(value) and value > 0):
+        raise ValueError(f"{key} is {value}, it must be positive")
+    return value
+
+
+def _array(record: dict[str, Any], key: str, shape: tuple[int, ...]) -> np.ndarray:
+    array = np.asarray(record[key], dtype=np.float64)
+    expected = tuple(len(array) if size == -1 and array.ndim else size for size in shape)
+    if array.shape != expected or not np.isfinite(array).all():
+        raise ValueError(f"{key} has shape {array.shape}, it must be finite and {shape}")
+    array.flags.writeable = False  # a Part is shared between whoever asks for it
+    return array
+
+
+def _unit(quat: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(quat, axis=-1, keepdims=True)
+    if not np.allclose(length, 1.0, atol=1e-6):
+        raise ValueError("a quaternion is not of unit length")
+    return quat / length
