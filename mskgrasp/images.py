@@ -19,27 +19,34 @@ _PLAUSIBLE_DEPTH = 20.0
 """Metres; a camera above a table never is that far away, but a depth in millimetres always is."""
 
 
-def height_image(depth: Array, intrinsics: np.ndarray, T_base_camera: Pose, table_z: float) -> Array:
+def height_image(
+    depth: Array, intrinsics: np.ndarray, T_base_camera: Pose, table_z: float | np.ndarray
+) -> Array:
     """Heights above the table of every pixel of depth images.
 
     Args:
         depth: (..., h, w) numpy array or tensor, metres along the optical axis, NaN where invalid.
-        intrinsics: (3, 3) pinhole matrix; pixel centres lie at integer coordinates.
-        T_base_camera: Pose of the camera's optical frame in the base.
-        table_z: Height of the table, base frame, metres.
+        intrinsics: (..., 3, 3) pinhole matrices; pixel centres lie at integer coordinates.
+        T_base_camera: Pose of the camera's optical frame in the base, one or one an image.
+        table_z: Height of the table, base frame, metres, one or one an image.
 
     Returns:
         (..., h, w) of the kind of ``depth``, metres, NaN where the depth is invalid.
     """
-    rays = _rays(depth.shape[-2:], intrinsics)
-    camera_z = quat_to_matrix(np.asarray(T_base_camera.quat_wxyz, dtype=np.float64))[2]
-    slope = rays @ camera_z
-    offset = float(T_base_camera.position[2]) - table_z
-    if isinstance(depth, torch.Tensor):
-        slope = torch.as_tensor(slope, dtype=depth.dtype, device=depth.device)
-    else:
-        slope = slope.astype(depth.dtype)
-    return depth * slope + offset
+    camera_z = quat_to_matrix(np.asarray(T_base_camera.quat_wxyz, dtype=np.float64))[..., 2, :]
+    inverse = np.linalg.inv(np.asarray(intrinsics, dtype=np.float64))
+    # How far a ray of depth 1 rises, z . inv(K) (u, v, 1), is linear in the pixel.
+    slope = _as_kind((camera_z[..., None, :] @ inverse)[..., 0, :], depth)
+    offset = _as_kind(np.asarray(T_base_camera.position)[..., 2] - table_z, depth)
+    rows, columns = _as_kind(np.arange(depth.shape[-2]), depth), _as_kind(np.arange(depth.shape[-1]), depth)
+    rising = slope[..., None, None, 0] * columns + slope[..., None, None, 1] * rows[:, None]
+    return depth * (rising + slope[..., None, None, 2]) + offset[..., None, None]
+
+
+def _as_kind(values: np.ndarray, like: Array) -> Array:
+    if isinstance(like, torch.Tensor):
+        return torch.as_tensor(values, dtype=like.dtype, device=like.device)
+    return np.asarray(values, dtype=like.dtype)
 
 
 def _rays(shape: tuple[int, ...], intrinsics: np.ndarray) -> np.ndarray:

@@ -1,0 +1,274 @@
+"""Plans a grasp that is likely to hold and whose displacement is best known (paper, section 3.4)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from pydantic import Field
+
+from hal.camera import RgbdFrame
+from mskgrasp.config import Config
+from mskgrasp.errors import BadModel, NoGraspFound
+from mskgrasp.geometry import wrap_angle
+from mskgrasp.grasp import PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
+from mskgrasp.images import crop_patches, height_image, view_part
+from mskgrasp.networks import Models
+
+
+class PlannerConfig(Config):
+    """How a grasp is searched and chosen; the defaults are the paper's."""
+
+    n_candidates: int = Field(3200, ge=1)
+    top_fraction: float = Field(0.03, gt=0.0, le=1.0)
+    """Share of the candidates, best quality first, among which the displacement decides."""
+    policy: Literal["low_variance", "quality"] = "low_variance"
+    """quality: take the best quality, whatever its variance (the paper's experiment 1)."""
+    min_quality: float = Field(0.0, ge=0.0, le=1.0)
+    """A grasp whose predicted quality is lower is not taken."""
+    min_height: float = Field(0.002, gt=0.0)
+    """What rises less above the table is table, metres."""
+    chunk_size: int = Field(32, ge=1)
+    """Grasps a network sees at once: more do not fit a CPU's cache (measured: 32 beats 256 by half)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraspPlan:
+    """The chosen grasp, what is expected of it, and what it was chosen from.
+
+    Attributes:
+        grasp: (4,) base frame, metres and radians.
+        quality: Predicted probability of success.
+        displacement: (4,) expected object displacement, axes of the grasp frame, metres and radians.
+        displacement_cov: (4, 4) its covariance, to first order.
+        grasp_displacement: (4,) expected grasp displacement, as the network predicts it.
+        grasp_displacement_var: (4,) its variances; NaN if the network predicts none.
+        score: Variance score of the grasp, square metres; NaN if the network predicts no variance.
+        view: Where the part was seen.
+        candidates: (n, 4) all grasps considered.
+        qualities: (n,) theirs.
+        shortlist: (k,) indices of the candidates of best quality, best first.
+        shortlist_scores: (k,) their variance scores, square metres.
+        seconds: Time spent in each stage.
+    """
+
+    grasp: np.ndarray
+    quality: float
+    displacement: np.ndarray
+    displacement_cov: np.ndarray
+    grasp_displacement: np.ndarray
+    grasp_displacement_var: np.ndarray
+    score: float
+    view: PartView
+    candidates: np.ndarray
+    qualities: np.ndarray
+    shortlist: np.ndarray
+    shortlist_scores: np.ndarray
+    seconds: dict[str, float]
+
+    @property
+    def displacement_std(self) -> np.ndarray:
+        """(4,) standard deviations of the object displacement, metres and radians."""
+        return np.sqrt(np.diag(self.displacement_cov))
+
+    def to_json(self) -> dict[str, Any]:
+        """The plan without its candidates, as plain values; what is unknown (NaN) is None."""
+        return {
+            "grasp": _plain(self.grasp),
+            "quality": float(self.quality),
+            "displacement": _plain(self.displacement),
+            "displacement_std": _plain(self.displacement_std),
+            "displacement_cov": _plain(self.displacement_cov),
+            "grasp_displacement": _plain(self.grasp_displacement),
+            "grasp_displacement_var": _plain(self.grasp_displacement_var),
+            "score": _plain(np.asarray(self.score)),
+            "part": {
+                "centre_base": _plain(self.view.centre_base),
+                "size": _plain(self.view.size),
+                "gyration_radius": float(self.view.gyration_radius),
+            },
+            "n_candidates": len(self.candidates),
+            "n_shortlist": len(self.shortlist),
+            "seconds": {stage: round(value, 4) for stage, value in self.seconds.items()},
+        }
+
+
+def _plain(values: np.ndarray) -> Any:
+    if values.ndim:
+        return [_plain(np.asarray(value)) for value in values]
+    return float(values) if np.isfinite(values) else None
+
+
+class Planner:
+    """Samples grasps over the part, scores them with the networks, and selects one."""
+
+    def __init__(
+        self,
+        models: Models,
+        config: PlannerConfig,
+        *,
+        table_z: float,
+        region: tuple[float, float, float, float],
+    ):
+        """Takes the workspace's table height and region (x_min, x_max, y_min, y_max), base, metres.
+
+        Raises:
+            BadModel: The policy needs variances and the model predicts none.
+        """
+        if config.policy == "low_variance" and not models.meta.network.variance:
+            raise BadModel(
+                "this model predicts no variance; use policy: quality, or train with variance: true"
+            )
+        self.models = models
+        self.config = config
+        self.table_z = table_z
+        self.region = region
+
+    def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
+        """Plans a grasp of the part that a frame shows.
+
+        Raises:
+            NoPartFound: The frame shows none.
+            NoGraspFound: No candidate is of the demanded quality.
+        """
+        started = time.perf_counter()
+        view, candidates = self.sample(frame, rng)
+        sampled = time.perf_counter()
+        qualities = self.score(frame, view, candidates)
+        scored = time.perf_counter()
+        best = shortlist(qualities, self.config.top_fraction)
+        mean, variance = self.predict(frame, view, candidates[best])
+        scores = variance_score(variance, view.gyration_radius)
+        chosen = select(qualities[best], scores, self.config)
+        selected = time.perf_counter()
+
+        grasp, quality = candidates[best[chosen]], float(qualities[best[chosen]])
+        centre_grasp = centre_in_grasp_frame(view.centre_base, grasp)
+        return GraspPlan(
+            grasp=grasp,
+            quality=quality,
+            displacement=to_object_displacement(mean[chosen], centre_grasp),
+            displacement_cov=object_displacement_covariance(mean[chosen], variance[chosen], centre_grasp),
+            grasp_displacement=mean[chosen],
+            grasp_displacement_var=variance[chosen],
+            score=float(scores[chosen]),
+            view=view,
+            candidates=candidates,
+            qualities=qualities,
+            shortlist=best,
+            shortlist_scores=scores,
+            seconds={
+                "sample": sampled - started,
+                "score": scored - sampled,
+                "select": selected - scored,
+                "total": selected - started,
+            },
+        )
+
+    def sample(self, frame: RgbdFrame, rng: np.random.Generator) -> tuple[PartView, np.ndarray]:
+        """Finds the part and draws candidates (n, 4) over it."""
+        view = view_part(
+            frame.depth,
+            frame.intrinsics,
+            frame.T_base_camera,
+            table_z=self.table_z,
+            region=self.region,
+            min_height=self.config.min_height,
+        )
+        return view, sample_grasps(view, self.config.n_candidates, rng)
+
+    def score(self, frame: RgbdFrame, view: PartView, candidates: np.ndarray) -> np.ndarray:
+        """Qualities (n,) of candidates (n, 4)."""
+        pieces = [self.models.quality(*inputs) for inputs in self._inputs(frame, view, candidates)]
+        return torch.cat(pieces).cpu().double().numpy()
+
+    def predict(
+        self, frame: RgbdFrame, view: PartView, candidates: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and variance (n, 4) of the candidates' grasp displacement; NaN variance if none is known."""
+        means, variances = [], []
+        for inputs in self._inputs(frame, view, candidates):
+            mean, variance = self.models.grasp_displacement(*inputs)
+            means.append(mean)
+            variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
+        return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
+
+    def _inputs(
+        self, frame: RgbdFrame, view: PartView, candidates: np.ndarray
+    ) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
+        """Patches (k, 1, p, p) and object centres (k, 3) of the candidates, a chunk at a time."""
+        depth = torch.as_tensor(np.asarray(frame.depth, dtype=np.float32), device=self.models.device)
+        heights = height_image(depth, frame.intrinsics, frame.T_base_camera, self.table_z)
+        network = self.models.meta.network
+        centres = centre_in_grasp_frame(view.centre_base, candidates)
+        for start in range(0, len(candidates), self.config.chunk_size):
+            rows = slice(start, start + self.config.chunk_size)
+            patches = crop_patches(
+                heights,
+                torch.as_tensor(candidates[rows]),
+                frame.intrinsics,
+                frame.T_base_camera,
+                n_pixels=network.patch_pixels,
+                side=network.patch_side,
+            )
+            yield patches, torch.as_tensor(centres[rows], dtype=torch.float32, device=heights.device)
+
+
+def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:
+    """Indices of the best qualities, best first: ``top_fraction`` of them, at least one."""
+    n = max(1, int(round(top_fraction * len(qualities))))
+    return np.argsort(-qualities, kind="stable")[:n]
+
+
+def variance_score(variance: np.ndarray, gyration_radius: float) -> np.ndarray:
+    """One number for four variances (..., 4): var_x + var_y + var_z + r^2 var_theta, square metres.
+
+    With r the part's radius of gyration it is the mean squared distance by which the part's points miss
+    their predicted places.
+    """
+    return variance[..., :3].sum(axis=-1) + gyration_radius**2 * variance[..., 3]
+
+
+def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> int:
+    """Which of the shortlisted grasps, best quality first, is taken.
+
+    Raises:
+        NoGraspFound: None has the demanded quality.
+    """
+    good = np.flatnonzero(qualities >= config.min_quality)
+    if not len(good):
+        raise NoGraspFound(
+            f"the best of the candidates has quality {qualities.max():.2f}, min_quality is "
+            f"{config.min_quality:g}; move the part, or lower min_quality"
+        )
+    return int(good[0] if config.policy == "quality" else good[np.argmin(scores[good])])
+
+
+def object_displacement_covariance(
+    grasp_displacement: np.ndarray, variance: np.ndarray, centre_grasp: np.ndarray
+) -> np.ndarray:
+    """Covariance of the object displacement, to first order in the grasp displacement's deviations.
+
+    Args:
+        grasp_displacement: (..., 4) mean.
+        variance: (..., 4) of independent components.
+        centre_grasp: (..., 3) object centre in the grasp frame before the grasp, metres.
+
+    Returns:
+        (..., 4, 4) J diag(variance) J', J the derivative of `grasp.to_object_displacement`.
+    """
+    turn = -wrap_angle(grasp_displacement[..., 3])
+    cos, sin = np.cos(turn), np.sin(turn)
+    arm = centre_grasp - grasp_displacement[..., :3]
+    jacobian = np.zeros(grasp_displacement.shape[:-1] + (4, 4))
+    jacobian[..., 0, 0], jacobian[..., 0, 1] = -cos, sin
+    jacobian[..., 1, 0], jacobian[..., 1, 1] = -sin, -cos
+    jacobian[..., 2, 2] = -1.0
+    jacobian[..., 0, 3] = sin * arm[..., 0] + cos * arm[..., 1]
+    jacobian[..., 1, 3] = -cos * arm[..., 0] + sin * arm[..., 1]
+    jacobian[..., 3, 3] = -1.0
+    return jacobian * variance[..., None, :] @ np.swapaxes(jacobian, -1, -2)
