@@ -41,11 +41,9 @@ def build_part(name: str) -> Part:
     """
     recipe = families.recipes().get(name)
     if recipe is None:
-        raise unknown_part(name)
-    recipe_hash = _recipe_hash(recipe)
-    folder = store.parts_folder() / name
-    if store.recipe_hash(folder) == recipe_hash:
-        return store.load_part(folder)
+        raise unknown_part(name, builtin_only=True)
+    if is_built(name):
+        return store.load_part(store.parts_folder() / name)
     dimensions = {
         key.removesuffix("_mm"): value / 1000 if key.endswith("_mm") else value
         for key, value in recipe.dimensions.items()
@@ -58,8 +56,13 @@ def build_part(name: str) -> Part:
         licence="Apache-2.0",
         density=recipe.density,
         dimensions=dimensions,
-        recipe_hash=recipe_hash,
+        recipe_hash=_recipe_hash(recipe),
     )
+
+
+def is_built(name: str) -> bool:
+    """Whether a built-in part lies ready, sound and made by the present recipe."""
+    return store.recipe_hash(store.parts_folder() / name) == _recipe_hash(families.recipes()[name])
 
 
 def find_part(name_or_folder: str | Path) -> Part:
@@ -86,12 +89,13 @@ def imported_names() -> tuple[str, ...]:
     return tuple(sorted(name for name in found if LEGAL_NAME.fullmatch(name) and name not in builtin))
 
 
-def unknown_part(name: str) -> BadPart:
+def unknown_part(name: str, *, builtin_only: bool = False) -> BadPart:
     """The error for a name that no part has."""
-    known = [*builtin_names(), *imported_names()]
+    known = builtin_names() if builtin_only else (*builtin_names(), *imported_names())
     close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(close)}?" if close else "`python -m mskgrasp.parts list` shows the parts"
-    return BadPart(f"no part is called {name!r}, and no part folder lies there: {hint}")
+    kind = "built-in part" if builtin_only else "part or part folder"
+    return BadPart(f"no {kind} is called {name!r}: {hint}")
 
 
 def write_solid(

@@ -163,10 +163,20 @@ def _samples(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _distance_to(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Distance of points (n, 3) to a finely cut surface, by way of its eight nearest triangles."""
-    count = min(8, len(triangles))
-    _, nearest = KDTree(triangles.mean(axis=1)).query(points, k=count)
-    nearest = np.reshape(nearest, (len(points), count))
+    """Distance of points (n, 3) to a finely cut surface."""
+    tree = KDTree(triangles.mean(axis=1))
+    distance = _distance_by_nearest(tree, triangles, points, 8)
+    # Among slivers eight centres may all belong to farther triangles: the large distances are looked at again.
+    doubtful = np.flatnonzero(distance > max(float(np.quantile(distance, 0.9)), 0.01))
+    if len(doubtful):
+        distance[doubtful] = _distance_by_nearest(tree, triangles, points[doubtful], 64)
+    return distance
+
+
+def _distance_by_nearest(tree: KDTree, triangles: np.ndarray, points: np.ndarray, count: int) -> np.ndarray:
+    """Distance to the triangles whose centres are nearest."""
+    count = min(count, len(triangles))
+    nearest = np.reshape(tree.query(points, k=count)[1], (len(points), count))
     best = np.full(len(points), np.inf)
     for column in nearest.T:
         closest = trimesh.triangles.closest_point(triangles[column], points)
