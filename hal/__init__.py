@@ -1,0 +1,14 @@
+"""Hardware abstraction: cameras, arms and cells; a YAML file chooses what stands behind them."""
+
+from hal.arm import Arm, ArmLimits, ArmState, GraspOutcome
+from hal.camera import Camera, RgbdFrame
+from hal.cell import Cell, PartFeeder, PartTracker, Workspace
+from hal.errors import HalError
+from hal.execute import GraspResult, execute_grasp, go_home
+from hal.open_cell import cell_from_yaml, open_cell
+
+__all__ = [
+    "Arm", "ArmLimits", "ArmState", "Camera", "Cell", "GraspOutcome", "GraspResult", "HalError",
+    "PartFeeder", "PartTracker", "RgbdFrame", "Workspace", "cell_from_yaml", "execute_grasp", "go_home",
+    "open_cell",
+]  # fmt: skip

@@ -20,11 +20,11 @@ class Config(BaseModel):
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
 
 
-def read_config(model: type[ConfigT], path: Path) -> ConfigT:
-    """Reads a YAML file as a configuration.
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Reads a YAML file that holds a mapping; an empty file is an empty one.
 
     Raises:
-        BadConfig: The file is missing, is no YAML mapping, or does not fit the model.
+        BadConfig: The file is missing, no YAML, or no mapping.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -36,7 +36,20 @@ def read_config(model: type[ConfigT], path: Path) -> ConfigT:
         where = str(getattr(error, "problem_mark", "")).strip()
         problem = getattr(error, "problem", None) or "syntax error"
         raise BadConfig(f"{path} is not valid YAML: {problem} {where}".strip()) from error
-    return check_config(model, {} if values is None else values, str(path))
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise BadConfig(f"{path}: expected a mapping of keys to values, got {type(values).__name__}")
+    return values
+
+
+def read_config(model: type[ConfigT], path: Path) -> ConfigT:
+    """Reads a YAML file as a configuration.
+
+    Raises:
+        BadConfig: The file is missing, is no YAML mapping, or does not fit the model.
+    """
+    return check_config(model, read_yaml(path), str(path))
 
 
 def check_config(model: type[ConfigT], values: Any, source: str) -> ConfigT:

@@ -200,9 +200,9 @@ class GraspDisplacementEnv(BaseEnv):
         """(n, h, w) float32 depth in metres from the overhead camera, the robot left out of the picture."""
         return self.capture_rgbd()[1]
 
-    def capture_rgbd(self) -> tuple[Tensor, Tensor]:
-        """Colour (n, h, w, 3) uint8 and depth (n, h, w) float32 metres, without the robot."""
-        self.agent.show(False)
+    def capture_rgbd(self, *, with_robot: bool = False) -> tuple[Tensor, Tensor]:
+        """Colour (n, h, w, 3) uint8 and depth (n, h, w) float32 metres from the overhead camera."""
+        self.agent.show(with_robot)
         try:
             self.scene.update_render(update_sensors=True, update_human_render_cameras=False)
             sensor = self._sensors["overhead"]

@@ -98,3 +98,39 @@ def top_down(grasps: Tensor) -> tuple[Tensor, Tensor]:
     q = torch.stack([q1, q2, zero, q4, zero, q6, q7], dim=-1)
     lower, upper = (torch.tensor(v, dtype=q.dtype, device=q.device) for v in (JOINT_LOWER, JOINT_UPPER))
     return q, within & ((q >= lower) & (q <= upper)).all(-1)
+
+
+def track(path: Tensor, start: Tensor, *, iterations: int = 8) -> tuple[Tensor, Tensor]:
+    """Joint angles along a path of poses, each solved from the one before (damped least squares).
+
+    Args:
+        path: (k, 4, 4) ``T_base_tcp``, consecutive poses close to each other.
+        start: (7,) joints near the first pose.
+        iterations: Newton steps a pose.
+
+    Returns:
+        q: (k, 7) radians.
+        error: (k,) what is left, metres and radians mixed; above 1e-4 the pose was not reached.
+    """
+    q, solved, errors = start.clone(), [], []
+    damping = 1e-6 * torch.eye(6, dtype=q.dtype, device=q.device)
+    for target in path:
+        for _ in range(iterations):
+            pose, jacobian = forward(q)
+            residual = _pose_error(pose, target)
+            if float(residual.norm()) < 1e-7:
+                break
+            q = q + jacobian.T @ torch.linalg.solve(jacobian @ jacobian.T + damping, residual)
+        solved.append(q)
+        errors.append(_pose_error(forward(q)[0], target).norm())
+    return torch.stack(solved), torch.stack(errors)
+
+
+def _pose_error(pose: Tensor, target: Tensor) -> Tensor:
+    """(6,) translation and rotation vector from a pose to its target, base frame."""
+    turn = target[:3, :3] @ pose[:3, :3].T
+    skew = torch.stack([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    sine = skew.norm() / 2
+    angle = torch.atan2(sine, (torch.trace(turn) - 1) / 2)
+    axis = skew / (2 * sine).clamp(min=1e-12)
+    return torch.cat([target[:3, 3] - pose[:3, 3], angle * axis])

@@ -117,12 +117,13 @@ class GraspPanda(Panda):
                 float(ARM_STIFFNESS[i]), float(ARM_DAMPING[i]), float(ARM_TORQUE_LIMIT[i]), mode="force"
             )
             joint.set_friction(0.0)
+        self.set_finger_force(self.physics.finger_force)
+
+    def set_finger_force(self, force: float) -> None:
+        """Limits the force of each pad, N."""
         for joint in self.finger_joints:
             joint.set_drive_properties(
-                self.physics.finger_stiffness,
-                self.physics.finger_damping,
-                self.physics.finger_force,
-                mode="force",
+                self.physics.finger_stiffness, self.physics.finger_damping, force, mode="force"
             )
 
     @property

@@ -1,0 +1,76 @@
+"""A cell: a camera over a table, an arm beside it, and what is known about both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from hal.arm import Arm
+from hal.camera import Camera
+from mskgrasp.geometry import Pose
+
+
+@dataclass(frozen=True, kw_only=True)
+class Workspace:
+    """The table in front of the arm.
+
+    Attributes:
+        table_z: Height of the table, base frame, metres.
+        region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
+        home: (7,) joints at which the arm is out of the camera's sight, radians.
+        min_height: What rises less over the table is taken for table, metres.
+        lift_height: How far a grasped part is lifted, metres.
+        grasp_force: N.
+    """
+
+    table_z: float
+    region: tuple[float, float, float, float]
+    home: np.ndarray
+    min_height: float
+    lift_height: float
+    grasp_force: float
+
+
+class PartFeeder(Protocol):
+    """Lays parts on the table: a simulator by itself, on a real cell an operator."""
+
+    def present(self, part: str, seed: int) -> None:
+        """Lays the part, by name or folder, at a place and turn that follow from the seed."""
+        ...
+
+
+class PartTracker(Protocol):
+    """Knows where the part is: the simulator's truth, or markers on a real part."""
+
+    def part_pose(self) -> Pose:
+        """``T_base_obj`` now."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """Everything a program needs; a context manager that connects camera and arm.
+
+    Attributes:
+        camera: Looks down on the table.
+        arm: Stands beside it.
+        workspace: The table.
+        feeder: Lays parts on the table; None where nobody does.
+        tracker: Knows the part's pose; None where nothing does.
+    """
+
+    camera: Camera
+    arm: Arm
+    workspace: Workspace
+    feeder: PartFeeder | None = None
+    tracker: PartTracker | None = None
+
+    @contextmanager
+    def connected(self) -> Iterator[Cell]:
+        """Connects camera and arm, and releases both however the block ends."""
+        with self.camera, self.arm:
+            yield self

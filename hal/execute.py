@@ -1,0 +1,83 @@
+"""The motion of a grasp, written against the interfaces alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hal.cell import Cell
+from hal.errors import MotionAborted
+from mskgrasp.geometry import Pose
+from mskgrasp.grasp import MAX_OPENING, pose_base_tcp
+
+HOLD_S = 0.2
+"""How long a lifted part is held before it is judged, s."""
+MIN_GAP = 0.5e-3
+"""Fingers closer than this hold nothing, m."""
+APPROACH = 0.12
+"""Height over the table from which the straight descent begins, m."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraspResult:
+    """What the arm itself knows of a grasp.
+
+    Attributes:
+        holding: The fingers hold something after lift and hold.
+        width: Distance of the pads then, metres.
+        T_base_tcp: Measured TCP then.
+        aborted: Why the motion ended early; None where it did not. The arm then needs `recover`.
+    """
+
+    holding: bool
+    width: float
+    T_base_tcp: Pose
+    aborted: str | None
+
+
+def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
+    """Opens, approaches, descends, closes, lifts and holds.
+
+    Args:
+        cell: Connected, the arm fit to move.
+        grasp: (4,) x, y, z, theta, base frame.
+
+    Raises:
+        OutOfWorkspace: The grasp is refused before anything moves.
+        HalError: The arm was lost; a motion that met resistance is a result, not an error.
+    """
+    arm, lift = cell.arm, cell.workspace.lift_height
+    grasp = np.asarray(grasp, dtype=np.float64)
+    target = pose_base_tcp(grasp)
+    above = grasp.copy()
+    above[2] = max(cell.workspace.table_z + APPROACH, grasp[2] + 0.02)
+    lifted = grasp + np.array([0.0, 0.0, lift, 0.0])
+    for pose in (target, pose_base_tcp(above), pose_base_tcp(lifted)):
+        arm.check_pose(pose)
+    try:
+        arm.move_gripper(MAX_OPENING)
+        arm.move_to_pose(pose_base_tcp(above), speed=0.4)
+        arm.move_to_pose(target, speed=0.25)
+        closed = arm.grasp(cell.workspace.grasp_force)
+        if closed.holding:
+            arm.move_to_pose(pose_base_tcp(lifted), speed=0.25)
+            arm.wait(HOLD_S)
+    except MotionAborted as error:
+        state = arm.state()
+        return GraspResult(
+            holding=False, width=state.gripper_width, T_base_tcp=state.T_base_tcp, aborted=str(error)
+        )
+    state = arm.state()
+    return GraspResult(
+        holding=closed.holding and state.gripper_width > MIN_GAP,
+        width=state.gripper_width,
+        T_base_tcp=state.T_base_tcp,
+        aborted=None,
+    )
+
+
+def go_home(cell: Cell) -> None:
+    """Opens the fingers and moves the arm out of the camera's sight."""
+    cell.arm.move_gripper(MAX_OPENING)
+    cell.arm.move_to_joints(cell.workspace.home)

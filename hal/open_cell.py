@@ -1,0 +1,49 @@
+"""From a YAML file to a cell: the one place that knows which backends there are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Literal, assert_never, get_args
+
+from hal.cell import Cell
+from mskgrasp.config import check_config, read_yaml
+from mskgrasp.errors import BadConfig
+
+CellType = Literal["sapien"]
+
+
+@contextmanager
+def open_cell(path: str | Path) -> Iterator[Cell]:
+    """Opens the cell that a YAML file describes: connected, and released when the block ends.
+
+    Args:
+        path: A file such as ``configs/cells/sapien.yaml``; its ``type`` chooses the backend.
+
+    Raises:
+        BadConfig: The file is missing or not valid.
+        HalError: The devices cannot be used.
+    """
+    with cell_from_yaml(Path(path)).connected() as cell:
+        yield cell
+
+
+def cell_from_yaml(path: Path) -> Cell:
+    """Builds the cell that a YAML file describes; nothing is connected yet.
+
+    Raises:
+        BadConfig: The file is missing or not valid.
+    """
+    values = read_yaml(path)
+    kind: CellType = values.get("type")
+    if kind not in get_args(CellType):
+        legal = ", ".join(get_args(CellType))
+        raise BadConfig(f"{path}: 'type' is {kind!r}; legal: {legal}")
+    match kind:
+        case "sapien":
+            from hal.sim import SapienCellConfig, sapien_cell
+
+            return sapien_cell(check_config(SapienCellConfig, values, str(path)))
+        case _:
+            assert_never(kind)

@@ -1,0 +1,160 @@
+"""The simulated Panda: an articulation that follows joint and straight-line motions."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from hal.arm import Arm, ArmLimits, ArmState, GraspOutcome
+from hal.errors import MotionAborted, OutOfWorkspace
+from hal.sim.world import SapienWorld
+from mskgrasp.geometry import Pose
+from mskgrasp.grasp import MAX_OPENING
+from tasks.kinematics import forward, track
+from tasks.motion import ease, ease_duration
+from tasks.outcome import MIN_GAP
+
+JOINT_SPEED = 2.0
+"""Greatest joint speed, rad/s (Panda datasheet: 2.175 rad/s for joints 1 to 4)."""
+TURN_SPEED = 1.0
+"""Greatest turning speed of the hand on a straight motion, rad/s."""
+SETTLE_S = 0.15
+"""How long the drives may settle at the end of a motion, s."""
+UNREACHED = 1e-4
+_WAYPOINT_M = 0.01
+
+
+class SapienArm(Arm):
+    """Moves the Panda of a `SapienWorld`; a contact force over the reflex's ends a motion."""
+
+    def __init__(self, world: SapienWorld, limits: ArmLimits):
+        super().__init__(limits)
+        self._world = world
+        self._open = False
+
+    def connect(self) -> None:
+        """Builds the world, if the camera has not."""
+        if not self._open:
+            self._world.open()
+            self._open = True
+
+    def close(self) -> None:
+        """Frees the world, if the camera has."""
+        if self._open:
+            self._open = False
+            self._world.close()
+
+    def _connected(self) -> bool:
+        return self._open
+
+    def _state(self) -> ArmState:
+        env = self._world.env
+        qpos = env.agent.robot.get_qpos()[0].cpu().numpy().astype(np.float64)
+        tcp = env.tcp_pose()
+        return ArmState(
+            joints=qpos[:7],
+            T_base_tcp=Pose(
+                position=tcp.position[0].cpu().numpy().astype(np.float64),
+                quat_wxyz=tcp.quat_wxyz[0].cpu().numpy().astype(np.float64),
+            ),
+            gripper_width=float(qpos[7:9].sum()),
+            timestamp_s=time.monotonic(),
+        )
+
+    def _move_to_joints(self, joints: np.ndarray, speed: float) -> None:
+        start = self._target()
+        goal = torch.as_tensor(joints, dtype=torch.float64)
+        seconds = ease_duration(float((goal - start).abs().max()), speed * JOINT_SPEED)
+        share = ease(self._world.env.motion.n_steps(seconds), start.device)[:, None]
+        self._follow(start + share * (goal - start))
+
+    def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
+        start = self._target()
+        here = Pose.from_matrix(forward(start)[0].numpy())
+        distance = float(np.linalg.norm(T_base_tcp.position - here.position))
+        angle = 2 * math.acos(min(1.0, abs(float(np.dot(here.quat_wxyz, T_base_tcp.quat_wxyz)))))
+        seconds = max(ease_duration(distance, speed), ease_duration(angle, TURN_SPEED))
+        n_waypoints = max(2, math.ceil(distance / _WAYPOINT_M), math.ceil(angle / 0.05))
+        line = _straight(here, T_base_tcp, np.linspace(0, 1, n_waypoints + 1)[1:])
+        joints, error = track(torch.as_tensor(line), start)
+        lower, upper = self.limits.joint_lower, self.limits.joint_upper
+        inside = ((joints.numpy() >= lower) & (joints.numpy() <= upper)).all()
+        if float(error.max()) > UNREACHED or not inside:
+            target = ", ".join(f"{value:.3f}" for value in T_base_tcp.position)
+            raise OutOfWorkspace(f"no straight line from here to TCP ({target}) m within the joint limits")
+        share = ease(self._world.env.motion.n_steps(seconds), start.device)
+        self._follow(_interpolate(torch.cat([start[None], joints]), share))
+
+    def _follow(self, path: Tensor) -> None:
+        motion, contacts = self._world.env.motion, self._world.env.contacts
+        reason = ""
+
+        def check(_: int) -> bool:
+            nonlocal reason
+            if self._stop.is_set():
+                reason = "stop() was called"
+            elif float(contacts.hand_force()[0]) > self._reflex_force():
+                reason = f"contact force over {self._reflex_force():.0f} N"
+            return bool(reason)
+
+        if not motion.follow(path[:, None], check=check):
+            raise MotionAborted(f"{reason}: the arm stopped; call recover() when it is safe")
+        motion.step(motion.n_steps(SETTLE_S))
+
+    def _reflex_force(self) -> float:
+        """The reflex watches for surprises: the gripper's own force on what it holds is none."""
+        physics = self._world.physics
+        pressing = float(self._world.env.motion.finger_target[0]) < 0
+        return physics.reflex_force + (physics.finger_force * 1.5 if pressing else 0.0)
+
+    def _target(self) -> Tensor:
+        """(7,) where the drives point: a motion starts there, so that nothing jumps."""
+        drives = [joint._objs[0].drive_target for joint in self._world.env.agent.arm_joints]
+        return torch.tensor(
+            [float(np.asarray(value).reshape(-1)[0]) for value in drives], dtype=torch.float64
+        )
+
+    def _move_gripper(self, width: float) -> None:
+        self._world.env.motion.move_fingers(width / 2)
+
+    def _grasp(self, force: float) -> GraspOutcome:
+        env = self._world.env
+        env.agent.set_finger_force(force)
+        env.motion.move_fingers(-MAX_OPENING / 2)
+        width = self._state().gripper_width
+        return GraspOutcome(width=width, holding=width > MIN_GAP)
+
+    def _wait(self, seconds: float) -> None:
+        self._world.env.motion.step(self._world.env.motion.n_steps(seconds))
+
+    def _halt(self) -> None:
+        """The drives hold their last targets; a motion in progress sees the stop flag."""
+
+    def _recover(self) -> None:
+        """Nothing to reset in a simulator; the drives start again from where the arm is."""
+        env = self._world.env
+        joints = env.agent.robot.get_qpos()[:, :7].double()
+        env.motion.set_arm(joints, torch.zeros_like(joints))
+
+
+def _straight(start: Pose, goal: Pose, share: np.ndarray) -> np.ndarray:
+    """(k, 4, 4) poses on the straight line between two, turning at constant rate."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    ends = Rotation.from_quat(np.stack([start.quat_wxyz, goal.quat_wxyz]), scalar_first=True)
+    line = np.tile(np.eye(4), (len(share), 1, 1))
+    line[:, :3, :3] = Slerp([0, 1], ends)(share).as_matrix()
+    line[:, :3, 3] = start.position + share[:, None] * (goal.position - start.position)
+    return line
+
+
+def _interpolate(waypoints: Tensor, share: Tensor) -> Tensor:
+    """(steps, 7) joints at shares in [0, 1] of evenly spaced waypoints (k, 7)."""
+    where = share * (len(waypoints) - 1)
+    index = where.floor().long().clamp(max=len(waypoints) - 2)
+    rest = (where - index)[:, None]
+    return waypoints[index] * (1 - rest) + waypoints[index + 1] * rest

@@ -1,0 +1,55 @@
+"""The overhead depth camera of the simulated cell."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from hal.camera import Camera, RgbdFrame
+from hal.errors import NotConnected
+from hal.sim.world import SapienWorld
+from tasks.camera import FAR
+
+
+class SapienCamera(Camera):
+    """Renders what a camera over the table would see, the arm included."""
+
+    def __init__(self, world: SapienWorld):
+        self._world = world
+        self._open = False
+
+    def connect(self) -> None:
+        """Builds the world, if the arm has not."""
+        if not self._open:
+            self._world.open()
+            self._open = True
+
+    def close(self) -> None:
+        """Frees the world, if the arm has."""
+        if self._open:
+            self._open = False
+            self._world.close()
+
+    def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
+        """Renders a frame now; ``timeout_s`` is not needed.
+
+        Raises:
+            NotConnected: Outside the camera's context.
+        """
+        if not self._open:
+            raise NotConnected("SapienCamera is not connected; use it inside its context (with ...)")
+        env = self._world.env
+        taken = time.monotonic()
+        colour, depth = env.capture_rgbd(with_robot=True)
+        metres = depth[0].cpu().numpy().astype(np.float32)
+        metres[metres >= 0.99 * FAR] = np.nan
+        x_min, x_max, y_min, y_max = self._world.region
+        return RgbdFrame(
+            colour=colour[0].cpu().numpy(),
+            depth=metres,
+            intrinsics=self._world.overhead.intrinsics(),
+            T_base_camera=self._world.overhead.T_base_camera(((x_min + x_max) / 2, (y_min + y_max) / 2)),
+            timestamp_s=taken,
+            serial="sapien",
+        )

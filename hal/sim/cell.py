@@ -1,0 +1,80 @@
+"""The simulated cell as a YAML file describes it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from hal.arm import ArmLimits
+from hal.cell import Cell, Workspace
+from hal.sim.arm import SapienArm
+from hal.sim.camera import SapienCamera
+from hal.sim.world import SapienWorld
+from mskgrasp.config import Config
+from tasks import REGION, Overhead, Physics
+from tasks.attempt import TABLE_Z
+from tasks.kinematics import JOINT_LOWER, JOINT_UPPER
+
+READY = (0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398)
+"""The Panda's usual ready pose, radians: the hand is behind the camera's field of view."""
+
+
+class SapienCellConfig(Config):
+    """Settings of the simulated cell."""
+
+    type: Literal["sapien"]
+    part: str = "hex_nut_m30"
+    """What lies on the table when the cell is opened: a name or a folder."""
+    seed: int = Field(default=0, ge=0)
+    """Its place and turn follow from it."""
+    region: tuple[float, float, float, float] = REGION
+    """x_min, x_max, y_min, y_max where parts lie, base frame, m."""
+    home: tuple[float, float, float, float, float, float, float] = READY
+    """Joints at which the arm is out of the camera's sight, rad."""
+    min_height: float = Field(default=0.002, gt=0)
+    """What rises less over the table is taken for table, m."""
+    lift_height: float = Field(default=0.1, gt=0, le=0.3)
+    """How far a grasped part is lifted, m."""
+    grasp_force: float = Field(default=20.0, gt=0, le=70)
+    """N."""
+    physics: Physics = Physics()
+    """The simulation."""
+    camera: Overhead = Overhead()
+    """The overhead depth camera."""
+
+
+def sapien_cell(config: SapienCellConfig) -> Cell:
+    """Builds the simulated cell; nothing is simulated before it is connected."""
+    home = np.array(config.home)
+    world = SapienWorld(
+        physics=config.physics,
+        overhead=config.camera,
+        region=config.region,
+        home=home,
+        part=config.part,
+        seed=config.seed,
+    )
+    limits = ArmLimits(
+        joint_lower=np.array(JOINT_LOWER),
+        joint_upper=np.array(JOINT_UPPER),
+        box_lower=np.array([0.25, -0.4, TABLE_Z]),
+        box_upper=np.array([0.75, 0.4, 0.75]),
+        table_z=TABLE_Z,
+        max_force=70.0,
+    )
+    return Cell(
+        camera=SapienCamera(world),
+        arm=SapienArm(world, limits),
+        workspace=Workspace(
+            table_z=TABLE_Z,
+            region=config.region,
+            home=home,
+            min_height=config.min_height,
+            lift_height=config.lift_height,
+            grasp_force=config.grasp_force,
+        ),
+        feeder=world,
+        tracker=world,
+    )

@@ -1,0 +1,109 @@
+"""The simulated world that camera, arm, feeder and tracker of one cell share."""
+
+from __future__ import annotations
+
+import logging
+
+import gymnasium
+import numpy as np
+import torch
+
+from hal.errors import NotConnected
+from mskgrasp.geometry import Pose
+from mskgrasp.parts import find_part
+from tasks import GraspDisplacementEnv, Overhead, Physics
+from tasks.placement import Region
+from tasks.renderer import render_backend
+
+
+class SapienWorld:
+    """One sub-scene of ``GraspDisplacement-v1`` on the CPU; built when first connected.
+
+    Args:
+        physics: Settings of the simulation.
+        overhead: Settings of the camera.
+        region: Where parts lie, base frame, metres.
+        home: (7,) joints of the arm when a part is laid down.
+        part: What lies on the table at first.
+        seed: Its place and turn follow from it.
+    """
+
+    def __init__(
+        self,
+        *,
+        physics: Physics,
+        overhead: Overhead,
+        region: Region,
+        home: np.ndarray,
+        part: str,
+        seed: int,
+    ):
+        self.physics = physics
+        self.overhead = overhead
+        self.region = region
+        self._home = torch.as_tensor(home, dtype=torch.float64)[None]
+        self._first = (part, seed)
+        self._loaded = ""
+        self._users = 0
+        self._gym: gymnasium.Env | None = None
+
+    @property
+    def env(self) -> GraspDisplacementEnv:
+        """The environment.
+
+        Raises:
+            NotConnected: No device of this cell is connected.
+        """
+        if self._gym is None:
+            raise NotConnected("the simulated cell is closed; use it inside open_cell(...)")
+        env = self._gym.unwrapped
+        assert isinstance(env, GraspDisplacementEnv)
+        return env
+
+    def open(self) -> None:
+        """Builds the world for its first user."""
+        self._users += 1
+        if self._gym is None:
+            logging.getLogger("mani_skill").setLevel(logging.ERROR)
+            part, seed = self._first
+            folder = str(find_part(part).folder)
+            self._gym = gymnasium.make(
+                "GraspDisplacement-v1",
+                parts=[folder],
+                obs_mode="none",
+                physics=self.physics.model_dump(),
+                camera=self.overhead.model_dump(),
+                region=self.region,
+                sim_backend="physx_cpu",
+                render_backend=render_backend(),
+            )
+            self._loaded = folder
+            self.present(part, seed)
+
+    def close(self) -> None:
+        """Frees the world after its last user."""
+        self._users = max(0, self._users - 1)
+        if self._users == 0 and self._gym is not None:
+            self._gym.close()
+            self._gym = None
+
+    def present(self, part: str, seed: int) -> None:
+        """Lays a part on the table, arm at home, everything at rest.
+
+        Raises:
+            BadPart: There is no such part.
+        """
+        folder = str(find_part(part).folder)
+        # A fresh scene each time, so that a trial does not depend on those before it.
+        self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
+        self._loaded = folder
+        self.env.motion.place(self._home)
+        self.env.motion.step(self.env.motion.n_steps(self.physics.settle_s))
+
+    def part_pose(self) -> Pose:
+        """``T_base_obj`` of the part, the simulator's truth."""
+        pose = self.env.part_pose()
+        return Pose(
+            position=pose.position[0].cpu().numpy().astype(np.float64),
+            quat_wxyz=pose.quat_wxyz[0].cpu().numpy().astype(np.float64),
+        )

@@ -1,0 +1,1 @@
+"""Program: collect a dataset of simulated grasps. Run ``python -m mskgrasp.collect --help``."""

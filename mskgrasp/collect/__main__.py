@@ -1,0 +1,174 @@
+"""``python -m mskgrasp.collect``."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+
+from rich.console import Console
+from tqdm import tqdm
+
+from mskgrasp.cli import parse, run
+from mskgrasp.collect.config import CollectConfig
+from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary
+from mskgrasp.collect.shard import ShardTask
+from mskgrasp.collect.workers import Finished, Lost, Progress, make_shards
+from mskgrasp.config import read_config, write_config
+from mskgrasp.dataset import check_shard, shard_path
+from mskgrasp.errors import BadConfig, BadDataset, BadPart
+from mskgrasp.parts import Part, builtin_names, find_part
+
+DESCRIPTION = """Simulates random grasps of parts and records what happened.
+
+For each part and attempt: the part lies in a resting pose at a random place and turn, the overhead
+camera takes a depth image, a grasp is drawn uniformly from the part's box in that image, the arm tries
+it, and one row is written: success, reason of failure, how the part moved in the hand. A run that was
+stopped goes on where it was when started again with the same settings."""
+
+
+def main() -> int:
+    """Parses, collects, reports."""
+    config = parse(
+        CollectConfig,
+        prog="python -m mskgrasp.collect",
+        description=DESCRIPTION,
+        default_config=Path("configs/collect/demo.yaml")
+        if Path("configs/collect/demo.yaml").exists()
+        else None,
+    )
+    collect(config)
+    return 0
+
+
+def collect(config: CollectConfig) -> None:
+    """Makes the shards that are missing and sums up the dataset."""
+    parts = chosen_parts(config)
+    begin(config)
+    everything = plan_shards(config, parts)
+    missing = [task for task in everything if not is_done(config.out, task)]
+    done = sum(task.n for task in everything) - sum(task.n for task in missing)
+    n_workers = min(config.workers or os.cpu_count() or 1, max(1, len(missing)))
+    print(
+        f"{len(parts)} parts, {sum(task.n for task in everything)} attempts into {config.out}"
+        + (f", {done} of them already there" if done else "")
+        + (f"; {n_workers} workers" if missing else "")
+    )
+    if missing:
+        _simulate(config, missing, sum(task.n for task in everything), done, n_workers)
+    summaries = summarise(config.out, config.part_filter)
+    print_table(summaries, Console(width=None if sys.stdout.isatty() else 150))
+    write_summary(summaries, config.out)
+    print(f"wrote {config.out / 'summary.json'} and {draw_summary(config.out, config.seed)}")
+
+
+def chosen_parts(config: CollectConfig) -> list[Part]:
+    """The parts of the run, built where need be, without those of the wrong size."""
+    low, high = config.part_filter.min_length, config.part_filter.max_length
+    parts = []
+    for name in tqdm(config.parts or builtin_names(), desc="parts", unit="part", leave=False, disable=None):
+        part = find_part(name)
+        if (low is not None and part.longest_axis < low) or (high is not None and part.longest_axis > high):
+            size = f"longest axis {part.longest_axis * 1e3:.0f} mm"
+            print(f"left out {part.name}: {size} is outside the part filter", file=sys.stderr)
+        else:
+            parts.append(part)
+    names = [part.name for part in parts]
+    doubles = sorted({name for name in names if names.count(name) > 1})
+    if doubles:
+        raise BadPart(f"two parts are called '{doubles[0]}'; give each its own name")
+    if not parts:
+        raise BadPart("no part is left to collect; widen part_filter.min_length and max_length")
+    return parts
+
+
+def begin(config: CollectConfig) -> None:
+    """Opens the dataset's folder: new, or begun with the same settings.
+
+    Raises:
+        BadDataset: The folder holds something else.
+    """
+    settings = config.out / "config.yaml"
+    if config.out.exists() and not config.out.is_dir():
+        raise BadDataset(f"--out {config.out} is a file; choose a folder")
+    if not settings.exists():
+        if config.out.is_dir() and any(config.out.iterdir()):
+            raise BadDataset(f"--out {config.out} holds other files; choose a new folder")
+        (config.out / "shards").mkdir(parents=True, exist_ok=True)
+        write_config(config, settings)
+        return
+    try:
+        before = read_config(CollectConfig, settings).identity()
+    except BadConfig as error:
+        raise BadDataset(f"{error}; choose another --out") from error
+    now = config.identity()
+    changed = [key for key in now if now[key] != before[key]]
+    if changed:
+        raise BadDataset(
+            f"{config.out} was begun with other settings ({', '.join(changed)} differ); choose another "
+            "--out, or the settings in its config.yaml"
+        )
+    for leftover in (config.out / "shards").glob("*.tmp"):
+        leftover.unlink()
+
+
+def plan_shards(config: CollectConfig, parts: list[Part]) -> list[ShardTask]:
+    """The shards of a run, dealt part by part in turn so that an early stop leaves some of each."""
+    starts = range(0, config.attempts_per_part, config.shard_size)
+    return [
+        ShardTask(
+            part=part.name,
+            folder=str(part.folder),
+            index=index,
+            first=first,
+            n=min(config.shard_size, config.attempts_per_part - first),
+            seed=config.seed,
+        )
+        for index, first in enumerate(starts)
+        for part in parts
+    ]
+
+
+def is_done(out: Path, task: ShardTask) -> bool:
+    """Whether a shard lies on disk and is whole; a damaged one is put aside to be made again."""
+    path = shard_path(out, task.part, task.index)
+    if not path.exists():
+        return False
+    try:
+        check_shard(path)
+    except BadDataset as error:
+        print(f"making again: {error}", file=sys.stderr)
+        return False
+    return True
+
+
+def _simulate(config: CollectConfig, tasks: list[ShardTask], total: int, done: int, n_workers: int) -> None:
+    started, attempts, successes = time.monotonic(), 0, 0
+    bar = tqdm(
+        total=total, initial=done, unit="grasp", dynamic_ncols=True, smoothing=0.05,
+        mininterval=0.5 if sys.stderr.isatty() else 15.0, file=sys.stderr,
+    )  # fmt: skip
+    events = make_shards(config, tasks, n_workers)
+    try:
+        for event in events:
+            match event:
+                case Progress(outcome=outcome):
+                    attempts += outcome >= 0
+                    successes += outcome == 1
+                    bar.set_postfix_str(f"success {successes / max(attempts, 1):.1%}", refresh=False)
+                    bar.update(1)
+                case Lost(undone=undone, exit_code=code):
+                    bar.update(-undone)
+                    bar.write(f"a worker died (exit code {code}); its shard is made again", file=sys.stderr)
+                case Finished():
+                    pass
+    finally:
+        events.close()
+        bar.close()
+    seconds = time.monotonic() - started
+    print(f"{attempts} grasps in {seconds:.0f} s: {attempts / seconds:.1f} grasps/s with {n_workers} workers")
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,59 @@
+"""What a collection run is: its parts, its numbers and its physics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from pydantic import Field, model_validator
+
+from mskgrasp.config import Config
+from tasks.camera import Overhead
+from tasks.physics import Physics
+
+
+class PartFilter(Config):
+    """Which parts are worth collecting and learning from; null switches a bound off."""
+
+    min_length: float | None = None
+    """Least length of a part's longest axis, m; shorter parts are not collected."""
+    max_length: float | None = None
+    """Greatest length of a part's longest axis, m; longer parts are not collected."""
+    min_success: float | None = Field(default=None, ge=0, le=1)
+    """Parts with a lower share of successful random grasps are marked as not kept."""
+    max_success: float | None = Field(default=None, ge=0, le=1)
+    """Parts with a higher share of successful random grasps are marked as not kept."""
+
+
+class CollectConfig(Config):
+    """Settings of a collection run."""
+
+    out: Path = Path("data/demo")
+    """Folder of the dataset; a run into a folder that was begun with the same settings goes on."""
+    parts: tuple[str, ...] = ()
+    """Names or folders of parts; all built-in parts when empty."""
+    attempts_per_part: int = Field(default=200, ge=1)
+    """Grasps for each part."""
+    shard_size: int = Field(default=100, ge=1)
+    """Grasps in a file; a killed run loses at most the files being made."""
+    seed: int = Field(default=0, ge=0)
+    """Everything random follows from it; the number of workers changes nothing."""
+    workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
+    """Processes; 0: one for each core."""
+    part_filter: PartFilter = PartFilter()
+    """Bounds on the size of parts and on how easily they are grasped."""
+    physics: Physics = Physics()
+    """The simulated cell."""
+    camera: Overhead = Overhead()
+    """The overhead depth camera."""
+
+    @model_validator(mode="after")
+    def _check(self) -> CollectConfig:
+        if self.shard_size > 10_000:
+            raise ValueError("shard_size is at most 10000")
+        return self
+
+    def identity(self) -> dict:
+        """What decides the data: two runs with the same identity make the same arrays."""
+        return self.model_dump(mode="json", exclude={"out", "workers"})

@@ -1,0 +1,151 @@
+"""One shard: some attempts on one part, all of them determined by the seed."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+import zlib
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+
+import mskgrasp
+from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, u16_to_depth
+from mskgrasp.errors import NoPartFound
+from mskgrasp.grasp import sample_grasps
+from mskgrasp.images import view_part
+from tasks import REGION, GraspDisplacementEnv, Overhead, Physics
+from tasks.attempt import TABLE_Z
+from tasks.renderer import render_backend
+
+FIELDS = (
+    "success", "failure", "displacement", "tilt", "width_after",
+    "pose_base_obj", "pose_tcp_obj_before", "pose_tcp_obj_after",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShardTask:
+    """Which attempts to make: `n` of them on a part, from number `first` on."""
+
+    part: str
+    folder: str
+    index: int
+    first: int
+    n: int
+    seed: int
+
+
+class Simulator:
+    """The environment of one worker, built once and refilled with part after part."""
+
+    def __init__(self, physics: Physics, camera: Overhead):
+        self._physics = physics
+        self._camera = camera
+        self._env: gymnasium.Env | None = None
+
+    def _load(self, folder: str) -> GraspDisplacementEnv:
+        """A fresh scene with the part: what earlier shards left behind in PhysX must not matter."""
+        if self._env is None:
+            self._env = gymnasium.make(
+                "GraspDisplacement-v1",
+                parts=[folder],
+                obs_mode="none",
+                physics=self._physics.model_dump(),
+                camera=self._camera.model_dump(),
+                render_backend=render_backend(),
+            )
+        else:
+            self._env.reset(seed=0, options=dict(parts=[folder], reconfigure=True))
+        env = self._env.unwrapped
+        assert isinstance(env, GraspDisplacementEnv)
+        return env
+
+    def run(self, task: ShardTask, report: Callable[[int], None]) -> tuple[Attempts, ShardInfo]:
+        """Makes the attempts of a shard.
+
+        Args:
+            task: Which ones.
+            report: Called after each with 1 for a success, 0 for a failure and -1 for a discarded one.
+        """
+        env = self._load(task.folder)
+        part = env.parts[0]
+        intrinsics = self._camera.intrinsics()
+        T_base_camera = self._camera.T_base_camera(env.region_centre)
+        rows: list[dict[str, np.ndarray]] = []
+        discarded: Counter[str] = Counter()
+        for attempt in range(task.first, task.first + task.n):
+            sequence = np.random.SeedSequence([task.seed, zlib.crc32(task.part.encode()), attempt])
+            episode_seed, grasp_seed = sequence.generate_state(2) >> 1
+            self._env.reset(seed=int(episode_seed))  # type: ignore[union-attr]
+            depth = depth_to_u16(env.capture_depth()[0].cpu().numpy())
+            try:
+                view = view_part(
+                    u16_to_depth(depth), intrinsics, T_base_camera, table_z=TABLE_Z, region=REGION
+                )
+            except NoPartFound:
+                discarded["part_not_seen"] += 1
+                report(-1)
+                continue
+            grasp = sample_grasps(view, 1, np.random.default_rng(grasp_seed)).astype(np.float32)
+            outcome = env.attempt.run(torch.as_tensor(grasp, device=env.device))
+            row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
+            if not all(np.isfinite(row[name]).all() for name in FIELDS if name.startswith("pose")):
+                discarded["not_finite"] += 1
+                report(-1)
+                continue
+            rows.append(dict(row, depth=depth, grasp=grasp[0]))
+            report(int(row["success"]))
+        attempts = _stack(rows, (self._camera.n_pixels, self._camera.n_pixels))
+        info = ShardInfo(
+            part=part.name,
+            part_hash=part.content_hash,
+            family=part.family,
+            index=task.index,
+            seed=task.seed,
+            intrinsics=intrinsics,
+            T_base_camera=T_base_camera,
+            table_z=TABLE_Z,
+            region=REGION,
+            physics=self._physics.model_dump(),
+            versions=versions(),
+            discarded=dict(discarded),
+        )
+        return attempts, info
+
+    def close(self) -> None:
+        """Frees the simulation."""
+        if self._env is not None:
+            self._env.close()
+
+
+def _stack(rows: list[dict[str, np.ndarray]], shape: tuple[int, int]) -> Attempts:
+    empty: dict[str, Any] = dict(
+        depth=np.zeros((0, *shape), np.uint16),
+        grasp=np.zeros((0, 4), np.float32),
+        success=np.zeros(0, bool),
+        failure=np.zeros(0, np.uint8),
+        displacement=np.zeros((0, 4), np.float32),
+        tilt=np.zeros(0, np.float32),
+        width_after=np.zeros(0, np.float32),
+        pose_base_obj=np.zeros((0, 7), np.float32),
+        pose_tcp_obj_before=np.zeros((0, 7), np.float32),
+        pose_tcp_obj_after=np.zeros((0, 7), np.float32),
+    )
+    if not rows:
+        return Attempts(**empty)
+    return Attempts(
+        **{name: np.stack([row[name] for row in rows]).astype(kind.dtype) for name, kind in empty.items()}
+    )
+
+
+def versions() -> dict[str, str]:
+    """Versions of what makes the data."""
+    packages = ("sapien", "mani_skill", "torch", "numpy")
+    found = {name: importlib.metadata.version(name) for name in packages}
+    return dict(found, mskgrasp=mskgrasp.__version__, python=platform.python_version())

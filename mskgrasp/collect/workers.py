@@ -1,0 +1,185 @@
+"""A pool of processes, each with its own simulator, that survives the death of any of them."""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any
+
+from mskgrasp.collect.config import CollectConfig
+from mskgrasp.collect.shard import ShardTask
+from mskgrasp.errors import MskgraspError
+
+MAX_TRIES = 3
+
+
+class WorkerFailed(MskgraspError):
+    """A shard could not be made."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """One attempt is over: 1 success, 0 failure, -1 discarded."""
+
+    outcome: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finished:
+    """A shard lies on disk."""
+
+    task: ShardTask
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lost:
+    """A worker died; `undone` attempts of its shard will be made again."""
+
+    task: ShardTask
+    undone: int
+    exit_code: int | None
+
+
+@dataclass
+class _Worker:
+    process: Any
+    connection: Connection
+    task: ShardTask | None = None
+    done: int = 0
+
+
+def make_shards(
+    config: CollectConfig, tasks: Sequence[ShardTask], n_workers: int
+) -> Iterator[Progress | Finished | Lost]:
+    """Makes shards in parallel and tells of every step; closing the iterator stops all workers.
+
+    A shard whose worker dies is made again by another, at most `MAX_TRIES` times.
+
+    Raises:
+        WorkerFailed: A shard failed for a reason that trying again will not mend.
+    """
+    context = multiprocessing.get_context("spawn")  # a forked simulator shares the parent's driver state
+    waiting = deque(tasks)
+    tries: dict[tuple[str, int], int] = {}
+    workers: list[_Worker] = []
+    try:
+        while waiting or any(worker.task for worker in workers):
+            while waiting and len(workers) < n_workers:
+                workers.append(_start(context, config))
+            for worker in workers:
+                if worker.task is None and waiting:
+                    _give(worker, waiting.popleft())
+            ready = wait([worker.connection for worker in workers], timeout=1.0)
+            for worker in [w for w in workers if w.connection in ready]:
+                event = _listen(worker)
+                if isinstance(event, Lost):
+                    workers.remove(worker)
+                    if worker.task is None:
+                        continue
+                    key = (event.task.part, event.task.index)
+                    tries[key] = tries.get(key, 0) + 1
+                    if tries[key] >= MAX_TRIES:
+                        raise WorkerFailed(
+                            f"shard {event.task.index} of part '{event.task.part}' killed its worker "
+                            f"{MAX_TRIES} times (exit code {event.exit_code}); leave the part out with "
+                            "--parts, or run with --workers 1 to see more"
+                        )
+                    waiting.appendleft(event.task)
+                if event is not None:
+                    yield event
+    finally:
+        for worker in workers:
+            worker.process.terminate()
+        for worker in workers:
+            worker.process.join(timeout=5)
+            if worker.process.is_alive():
+                worker.process.kill()
+            worker.connection.close()
+
+
+def _start(context: Any, config: CollectConfig) -> _Worker:
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_work, args=(theirs, config), daemon=True)
+    process.start()
+    theirs.close()
+    return _Worker(process=process, connection=ours)
+
+
+def _give(worker: _Worker, task: ShardTask) -> None:
+    worker.task, worker.done = task, 0
+    try:
+        worker.connection.send(task)
+    except OSError:
+        pass  # it has just died; reading from it says so
+
+
+def _listen(worker: _Worker) -> Progress | Finished | Lost | None:
+    try:
+        kind, value = worker.connection.recv()
+    except (EOFError, OSError):
+        worker.process.join(timeout=5)
+        if worker.task is None:
+            return Lost(task=_NO_TASK, undone=0, exit_code=worker.process.exitcode)
+        return Lost(task=worker.task, undone=worker.done, exit_code=worker.process.exitcode)
+    if kind == "error":
+        raise WorkerFailed(value)
+    if kind == "progress":
+        worker.done += 1
+        return Progress(outcome=value)
+    task, worker.task = worker.task, None
+    assert task is not None
+    return Finished(task=task)
+
+
+_NO_TASK = ShardTask(part="", folder="", index=-1, first=0, n=0, seed=0)
+
+
+def _work(connection: Connection, config: CollectConfig) -> None:
+    """A worker's life: receive a task, simulate it, write the shard, say so."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
+    _leave_with_parent()
+    # One core a worker: neither torch nor the software renderer may spread over the others.
+    os.environ.setdefault("LP_NUM_THREADS", "1")
+    try:
+        import torch
+
+        from mskgrasp.collect.shard import Simulator
+        from mskgrasp.dataset import shard_path, write_shard
+
+        torch.set_num_threads(1)
+        logging.getLogger("mani_skill").setLevel(logging.ERROR)
+        simulator = Simulator(config.physics, config.camera)
+        while True:
+            task: ShardTask = connection.recv()
+            attempts, info = simulator.run(task, lambda outcome: connection.send(("progress", outcome)))
+            write_shard(shard_path(config.out, task.part, task.index), attempts, info)
+            connection.send(("finished", None))
+    except (EOFError, BrokenPipeError):
+        pass
+    except MskgraspError as error:
+        connection.send(("error", str(error)))
+    except OSError as error:
+        place = f" ({error.filename})" if error.filename else ""
+        remedy = f"free some space for {Path(config.out)}; what is finished is kept, run the command again"
+        connection.send(("error", f"{error.strerror or error}{place}: {remedy}"))
+
+
+def _leave_with_parent() -> None:
+    """Ends this process when its parent is gone, however that ended."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
