@@ -108,8 +108,8 @@ def view_part(
     centre_base = T_base_axes.apply(middle)
     if not (x_min <= centre_base[0] <= x_max and y_min <= centre_base[1] <= y_max):
         raise NoPartFound(
-            f"the part's centre ({centre_base[0]:.3f}, {centre_base[1]:.3f}) lies outside the region "
-            f"x {x_min:g}..{x_max:g}, y {y_min:g}..{y_max:g}; move the part or clear what else is there"
+            f"the part lies outside the region (centre at {centre_base[0]:.3f}, {centre_base[1]:.3f}, region "
+            f"x {x_min:g}..{x_max:g}, y {y_min:g}..{y_max:g}); move it, or clear away what else is there"
         )
     spread = np.stack([x[mask] - centre_base[0], y[mask] - centre_base[1]], axis=-1)
     return PartView(

@@ -33,13 +33,13 @@ class NetworkConfig(Config):
     The paper does not state the padding. Convolutions are "valid", the default of Keras at the time.
     """
 
-    patch_pixels: int = Field(64, ge=32, le=256)
-    patch_side: float = Field(0.128, gt=0.0, le=1.0)
-    channels: int = Field(32, ge=1)
-    trunk_width: int = Field(1024, ge=1)
-    action_width: int = Field(64, ge=1)
-    head_width: int = Field(512, ge=1)
-    dropout: float = Field(0.5, ge=0.0, lt=1.0)
+    patch_pixels: int = Field(default=64, ge=32, le=256)
+    patch_side: float = Field(default=0.128, gt=0.0, le=1.0)
+    channels: int = Field(default=32, ge=1)
+    trunk_width: int = Field(default=1024, ge=1)
+    action_width: int = Field(default=64, ge=1)
+    head_width: int = Field(default=512, ge=1)
+    dropout: float = Field(default=0.5, ge=0.0, lt=1.0)
     variance: bool = True
     """False: the displacement network predicts the mean alone (the paper's GCIP-M)."""
 
@@ -52,7 +52,7 @@ class Normalisation(Config):
     target_mean: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     target_std: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     """Of the grasp displacement, metres and radians."""
-    base_rate: float = Field(0.5, gt=0.0, lt=1.0)
+    base_rate: float = Field(default=0.5, gt=0.0, lt=1.0)
     """Share of successes among the attempts; training shows the network as many of either kind."""
 
     @field_validator("action_scale", "target_std")

@@ -23,16 +23,16 @@ from mskgrasp.networks import Models
 class PlannerConfig(Config):
     """How a grasp is searched and chosen; the defaults are the paper's."""
 
-    n_candidates: int = Field(3200, ge=1)
-    top_fraction: float = Field(0.03, gt=0.0, le=1.0)
+    n_candidates: int = Field(default=3200, ge=1)
+    top_fraction: float = Field(default=0.03, gt=0.0, le=1.0)
     """Share of the candidates, best quality first, among which the displacement decides."""
     policy: Literal["low_variance", "quality"] = "low_variance"
     """quality: take the best quality, whatever its variance (the paper's experiment 1)."""
-    min_quality: float = Field(0.0, ge=0.0, le=1.0)
+    min_quality: float = Field(default=0.0, ge=0.0, le=1.0)
     """A grasp whose predicted quality is lower is not taken."""
-    min_height: float = Field(0.002, gt=0.0)
+    min_height: float = Field(default=0.002, gt=0.0)
     """What rises less above the table is table, metres."""
-    chunk_size: int = Field(32, ge=1)
+    chunk_size: int = Field(default=32, ge=1)
     """Grasps a network sees at once: more do not fit a CPU's cache (measured: 32 beats 256 by half)."""
 
 

@@ -1,0 +1,354 @@
+"""Pictures for people: a planned grasp, a sheet of attempts, curves of a training run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import torch
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse, Rectangle
+
+from hal.camera import RgbdFrame
+from mskgrasp.dataset import Attempts, ShardInfo, u16_to_depth
+from mskgrasp.geometry import Pose
+from mskgrasp.grasp import FAILURES, MAX_OPENING, centre_in_grasp_frame
+from mskgrasp.images import crop_patches, height_image
+from mskgrasp.planner import GraspPlan
+
+_INK, _FAINT = "#22252b", "#8b909a"
+_JAW, _SHIFT, _GOOD, _BAD = "#1f6feb", "#e8590c", "#2b8a3e", "#c92a2a"
+_STYLE: dict[Any, Any] = {
+    "font.size": 10,
+    "font.family": "DejaVu Sans",
+    "text.color": _INK,
+    "axes.edgecolor": _FAINT,
+    "axes.labelcolor": _INK,
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "xtick.color": _FAINT,
+    "ytick.color": _FAINT,
+    "savefig.dpi": 150,
+}
+_PAD_WIDTH, _PAD_THICKNESS = 0.020, 0.008  # drawn size of a finger pad seen from above, metres
+_MM = 1e3
+
+
+def _figure(width: float, height: float) -> Figure:
+    return Figure(figsize=(width, height), layout="constrained")  # no pyplot: nothing global, no window
+
+
+def _from_above(
+    depth: np.ndarray,
+    intrinsics: np.ndarray,
+    T_base_camera: Pose,
+    table_z: float,
+    square: np.ndarray,
+    side: float,
+) -> np.ndarray:
+    """Heights in mm of a square (x, y, z, theta) seen from above, its y up."""
+    heights = height_image(torch.from_numpy(depth), intrinsics, T_base_camera, table_z)
+    patch = crop_patches(
+        heights, torch.from_numpy(square[None]), intrinsics, T_base_camera, n_pixels=240, side=side
+    )
+    return patch[0, 0].numpy() * _MM
+
+
+def _show_heights(
+    axes: Axes, heights: np.ndarray, centre: np.ndarray | tuple[float, float], side: float, top: float
+) -> Any:
+    half = side / 2 * _MM
+    x, y = centre[0] * _MM, centre[1] * _MM
+    image = axes.imshow(
+        heights,
+        extent=(x - half, x + half, y - half, y + half),
+        cmap="Greys",
+        vmin=-0.15 * top,
+        vmax=1.5 * top,
+    )
+    axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
+    axes.tick_params(length=2, labelsize=8)
+    return image
+
+
+def _jaw(
+    axes: Axes, origin: np.ndarray, theta: float, opening: float = MAX_OPENING, scale: float = 1.0
+) -> None:
+    """The open hand seen from above: two pads and the line along which they close, to scale (mm)."""
+    closing = np.array([-np.sin(theta), np.cos(theta)])
+    origin = np.asarray(origin[:2]) * _MM
+    reach = opening / 2 * _MM
+    ends = np.stack([origin - reach * closing, origin + reach * closing])
+    axes.plot(*ends.T, color=_JAW, lw=1.4 * scale, ls=(0, (4, 2)), zorder=6)
+    axes.plot(*origin, "o", color=_JAW, ms=3.5 * scale, zorder=7)
+    width, thickness = _PAD_WIDTH * _MM, _PAD_THICKNESS * _MM
+    for start in (reach, -reach - thickness):
+        corner = origin + start * closing - width / 2 * np.array([np.cos(theta), np.sin(theta)])
+        axes.add_patch(
+            Rectangle(
+                tuple(corner),
+                width,
+                thickness,
+                angle=np.degrees(theta),
+                fc=_JAW,
+                ec="white",
+                lw=0.8,
+                zorder=7,
+            )
+        )
+
+
+def _arrow(axes: Axes, start: np.ndarray, shift: np.ndarray, width: float = 1.8) -> None:
+    # An annotation, because its head keeps its size on paper whatever the length.
+    axes.annotate(
+        "",
+        xy=tuple(start + shift),
+        xytext=tuple(start),
+        arrowprops={"arrowstyle": "-|>", "color": _SHIFT, "lw": width, "shrinkA": 0, "shrinkB": 0},
+        zorder=9,
+    )
+
+
+def _ellipse(axes: Axes, centre: np.ndarray, covariance: np.ndarray, n_sigma: float = 2.0) -> None:
+    values, vectors = np.linalg.eigh(covariance)
+    diameters = 2 * n_sigma * np.sqrt(np.maximum(values, 0.0)) * _MM
+    angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
+    axes.add_patch(
+        Ellipse(
+            tuple(centre), diameters[1], diameters[0], angle=angle, fc=_SHIFT, ec=_SHIFT, alpha=0.28, zorder=8
+        )
+    )
+
+
+def draw_plan(frame: RgbdFrame, plan: GraspPlan, path: Path) -> None:
+    """Draws a plan: candidates by quality over the part, and the chosen grasp with the expected shift.
+
+    Left, the base frame from above, right, the grasp frame; both in millimetres and to scale.
+    """
+    with matplotlib.rc_context(_STYLE):
+        figure = _figure(11.5, 6.2)
+        left, right = figure.subplots(1, 2)
+        _draw_candidates(figure, left, frame, plan)
+        _draw_chosen(right, frame, plan)
+        figure.suptitle(_plan_text(plan), fontsize=11, x=0.01, ha="left")
+        figure.savefig(path)
+
+
+def _plan_text(plan: GraspPlan) -> str:
+    shift, std = plan.displacement * _MM, plan.displacement_std * _MM
+    names = "xyz"
+    known = np.isfinite(std).all()
+    parts = [
+        f"{name} {shift[i]:+.1f}" + (f" ± {std[i]:.1f}" if known else "") + " mm"
+        for i, name in enumerate(names)
+    ]
+    turn = np.degrees(plan.displacement[3])
+    spread = f" ± {np.degrees(plan.displacement_std[3]):.1f}" if known else ""
+    return (
+        f"quality {plan.quality:.2f}     expected shift in the hand: {',  '.join(parts)},  "
+        f"turn {turn:+.1f}{spread}°     planned in {plan.seconds['total']:.1f} s"
+    )
+
+
+def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
+    view = plan.view
+    side = max(0.14, 1.5 * float(np.hypot(*view.size[:2])))
+    # The plane of the part's top: there the picture is free of parallax.
+    square = np.array([*view.centre_base[:2], view.table_z + view.size[2], 0.0])
+    heights = _from_above(frame.depth, frame.intrinsics, frame.T_base_camera, view.table_z, square, side)
+    _show_heights(axes, heights, view.centre_base[:2], side, float(view.size[2]) * _MM)
+    order = np.argsort(plan.qualities)
+    grasps = plan.candidates[order]
+    closing = 0.0035 * np.stack([-np.sin(grasps[:, 3]), np.cos(grasps[:, 3])], axis=-1)
+    ends = np.stack([grasps[:, :2] - closing, grasps[:, :2] + closing], axis=1) * _MM
+    lines = LineCollection(list(ends), cmap="viridis", linewidths=0.8, alpha=0.75, zorder=4)
+    lines.set_array(plan.qualities[order])
+    lines.set_clim(0.0, 1.0)
+    axes.add_collection(lines)
+    bar = figure.colorbar(lines, ax=axes, shrink=0.8, pad=0.02)
+    bar.set_label("predicted quality")
+    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    best = plan.candidates[plan.shortlist]
+    axes.plot(*(best[:, :2] * _MM).T, "o", ms=3.2, mfc="none", mec=_INK, mew=0.6, zorder=5, label="shortlist")
+    _jaw(axes, plan.grasp, float(plan.grasp[3]))
+    axes.legend(loc="lower left", frameon=False, fontsize=8)
+    axes.set(xlabel="base x, mm", ylabel="base y, mm", title=f"{len(plan.candidates)} candidates")
+
+
+def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
+    side = 0.128
+    heights = _from_above(
+        frame.depth, frame.intrinsics, frame.T_base_camera, plan.view.table_z, plan.grasp, side
+    )
+    top = float(plan.view.size[2]) * _MM
+    _show_heights(axes, heights, (0.0, 0.0), side, top)
+    _jaw(axes, np.zeros(2), 0.0)
+    centre = centre_in_grasp_frame(plan.view.centre_base, plan.grasp)[:2] * _MM
+    shift, turn = plan.displacement[:2] * _MM, float(plan.displacement[3])
+    _outline_after(axes, heights, side, top, centre, shift, turn)
+    axes.plot(*centre, "+", color=_SHIFT, ms=8, mew=1.5, zorder=9)
+    known = bool(np.isfinite(plan.displacement_cov).all())
+    covariance = plan.displacement_cov[:2, :2] if known else np.zeros((2, 2))
+    axes.set(
+        xlabel="grasp x, mm",
+        ylabel="grasp y (closing direction), mm",
+        title="The chosen grasp, in its own frame",
+    )
+    _draw_shift(axes, centre, shift, covariance)
+    reach = float(np.hypot(*shift)) + 2 * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])) * _MM
+    if reach < 20.0:
+        _inset(axes, shift, covariance, max(1.4 * reach, 1.0), right=bool(centre[0] < 0))
+
+
+def _draw_shift(axes: Axes, start: np.ndarray, shift: np.ndarray, covariance: np.ndarray) -> None:
+    _ellipse(axes, start + shift, covariance)
+    _arrow(axes, start, shift)
+
+
+def _outline_after(
+    axes: Axes,
+    heights: np.ndarray,
+    side: float,
+    top: float,
+    centre: np.ndarray,
+    shift: np.ndarray,
+    turn: float,
+) -> None:
+    """The part's outline where it is expected to end up in the hand, before the jaw's frame."""
+    n = heights.shape[0]
+    pixel = (np.arange(n) - (n - 1) / 2) * (side * _MM / n)
+    x, y = np.meshgrid(pixel, -pixel)
+    cos, sin = np.cos(turn), np.sin(turn)
+    dx, dy = x - centre[0], y - centre[1]
+    moved_x = centre[0] + shift[0] + cos * dx - sin * dy
+    moved_y = centre[1] + shift[1] + sin * dx + cos * dy
+    level = [min(2.0, top / 2)]
+    axes.contour(x, y, heights, levels=level, colors=[_INK], linewidths=0.9, zorder=5)
+    axes.contour(
+        moved_x, moved_y, heights, levels=level, colors=[_SHIFT], linewidths=1.3, linestyles="--", zorder=6
+    )
+    axes.plot([], [], color=_INK, lw=0.9, label="part before")
+    axes.plot([], [], color=_SHIFT, lw=1.3, ls="--", label="part expected in the hand")
+    axes.legend(loc="upper left", frameon=False, fontsize=8)
+
+
+def _inset(axes: Axes, shift: np.ndarray, covariance: np.ndarray, half: float, *, right: bool) -> None:
+    inset = axes.inset_axes((0.70 if right else 0.02, 0.02, 0.28, 0.28))
+    inset.set(xlim=(-half, half), ylim=(-half, half), xticks=[], yticks=[], aspect="equal")
+    inset.set_facecolor("white")
+    for spine in inset.spines.values():
+        spine.set_color(_FAINT)
+    inset.axhline(0, color=_FAINT, lw=0.5)
+    inset.axvline(0, color=_FAINT, lw=0.5)
+    _draw_shift(inset, np.zeros(2), shift, covariance)
+    bar = next(step for step in (10, 5, 2, 1, 0.5) if step <= 0.8 * half or step == 0.5)
+    inset.plot([-0.9 * half, -0.9 * half + bar], [-0.85 * half] * 2, color=_INK, lw=2)
+    inset.text(-0.9 * half, -0.8 * half, f"{bar:g} mm", fontsize=7, va="bottom")
+    inset.set_title("shift and 2σ", fontsize=8, fontweight="normal", loc="center", pad=3)
+
+
+def draw_contact_sheet(attempts: Attempts, info: ShardInfo, path: Path, *, limit: int = 24) -> None:
+    """Draws attempts of a shard from above: the hand, and where a held part's centre went."""
+    n = len(attempts)
+    rows = np.unique(np.linspace(0, n - 1, min(n, limit)).astype(int)) if n else np.array([], int)
+    columns = min(6, max(1, len(rows)))
+    lines = max(1, -(-len(rows) // columns))
+    with matplotlib.rc_context(_STYLE):
+        figure = _figure(2.1 * columns, 2.35 * lines + 0.5)
+        grid = np.atleast_1d(figure.subplots(lines, columns, squeeze=False)).ravel()
+        for axes in grid[len(rows) :]:
+            axes.axis("off")
+        for axes, row in zip(grid, rows, strict=False):
+            _draw_attempt(axes, attempts, info, int(row))
+        held = int(attempts.success.sum())
+        figure.suptitle(f"{info.part}: {held} of {n} grasps held", fontsize=12, fontweight="bold")
+        figure.savefig(path)
+
+
+def _draw_attempt(axes: Axes, attempts: Attempts, info: ShardInfo, row: int) -> None:
+    side = 0.16
+    grasp = attempts.grasp[row].astype(np.float64)
+    centre = attempts.pose_base_obj[row, :3].astype(np.float64)
+    square = np.array([*centre[:2], centre[2], 0.0])
+    depth = u16_to_depth(attempts.depth[row])
+    heights = _from_above(depth, info.intrinsics, info.T_base_camera, info.table_z, square, side)
+    _show_heights(axes, heights, centre[:2], side, max(float(heights.max()), 1.0))
+    axes.set(xticks=[], yticks=[])
+    success = bool(attempts.success[row])
+    # Once it holds, the pads stand as far apart as the part is wide there.
+    _jaw(axes, grasp, float(grasp[3]), scale=0.6)
+    if success:
+        displacement = attempts.displacement[row].astype(np.float64)
+        cos, sin = np.cos(grasp[3]), np.sin(grasp[3])
+        shift = np.array([[cos, -sin], [sin, cos]]) @ displacement[:2] * _MM
+        _arrow(axes, centre[:2] * _MM, shift, width=1.3)
+        distance = float(np.linalg.norm(displacement[:3])) * _MM
+        caption = f"{distance:.1f} mm, {np.degrees(displacement[3]):+.0f}°"
+    else:
+        caption = FAILURES[int(attempts.failure[row])]
+    axes.set_title(
+        caption, color=_GOOD if success else _BAD, fontsize=9, loc="center", fontweight="normal", pad=3
+    )
+    for spine in axes.spines.values():
+        spine.set(color=_GOOD if success else _BAD, linewidth=1.2)
+
+
+def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Path) -> None:
+    """Draws losses and validation metrics by epoch, beside predictors that learned nothing.
+
+    Args:
+        history: One row an epoch, as `mskgrasp.training.train` returns them.
+        report: The final metrics, with the trivial predictors' errors.
+        path: Where the picture goes.
+    """
+    with matplotlib.rc_context(_STYLE | {"axes.spines.top": False, "axes.spines.right": False}):
+        figure = _figure(11.5, 6.0)
+        panels = figure.subplots(2, 3)
+        for line, name in zip(panels, ("gqn", "gdn"), strict=True):
+            rows = [row for row in history if row["stage"] == name]
+            _curve(line[0], rows, "train_loss", "training (with noise and dropout)", _FAINT)
+            _curve(line[0], rows, "validation_loss", "parts never seen", _JAW)
+            line[0].set(title=f"{name.upper()} loss", xlabel="epoch")
+            line[0].legend(frameon=False, fontsize=8)
+        gqn, gdn = report["gqn"], report["gdn"]
+        rows = [row for row in history if row["stage"] == "gqn"]
+        _curve(panels[0, 1], rows, "auroc", "parts never seen", _JAW)
+        panels[0, 1].axhline(0.5, color=_FAINT, lw=1, ls="--", label="guessing")
+        panels[0, 1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.45, 1.01))
+        panels[0, 1].legend(frameon=False, fontsize=8, loc="lower right")
+        bars = {
+            "network": (gqn["brier"], _JAW),
+            "base rate": (gqn["brier_of_base_rate"], _FAINT),
+        }
+        panels[0, 2].bar(
+            list(bars), [v for v, _ in bars.values()], color=[c for _, c in bars.values()], width=0.5
+        )
+        panels[0, 2].set(title="Success: Brier score, less is better")
+        for place, (value, _) in enumerate(bars.values()):
+            panels[0, 2].text(place, value, f"{value:.3f}", ha="center", va="bottom")
+        rows = [row for row in history if row["stage"] == "gdn"]
+        for axes, key, unit, factor in (
+            (panels[1, 1], "translation_rmse", "mm", _MM),
+            (panels[1, 2], "rotation_rmse", "degrees", float(np.degrees(1.0))),
+        ):
+            _curve(axes, rows, key, "parts never seen", _JAW, factor)
+            for style, other in (("--", "zero_displacement"), (":", "training_mean")):
+                axes.axhline(
+                    gdn[other][key] * factor, color=_FAINT, lw=1.2, ls=style, label=other.replace("_", " ")
+                )
+            axes.set(title=f"Displacement: {key.split('_')[0]} RMSE, {unit}", xlabel="epoch")
+            axes.set_ylim(bottom=0)
+            axes.legend(frameon=False, fontsize=8)
+        figure.savefig(path)
+
+
+def _curve(
+    axes: Axes, rows: list[dict[str, Any]], key: str, label: str, colour: str, factor: float = 1.0
+) -> None:
+    values = [row[key] * factor for row in rows]
+    axes.plot([row["epoch"] for row in rows], values, color=colour, lw=1.8, label=label, marker="o", ms=3)

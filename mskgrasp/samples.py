@@ -1,0 +1,191 @@
+"""A dataset as the networks see it: one patch and one action an attempt, split by parts."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard, u16_to_depth
+from mskgrasp.errors import BadDataset, NoPartFound
+from mskgrasp.grasp import centre_in_grasp_frame, to_grasp_displacement
+from mskgrasp.images import crop_patches, height_image, view_part
+
+
+@dataclass(frozen=True, kw_only=True)
+class Samples:
+    """n attempts.
+
+    Attributes:
+        patches: (n, 1, p, p) float32, metres above the table.
+        centre_grasp: (n, 3) float32 object centre, estimated from the image, in the grasp frame, metres.
+        success: (n,) bool.
+        displacement: (n, 4) float32 true object displacement, NaN where the grasp failed.
+        grasp_displacement: (n, 4) float32, the same as grasp displacement: what is learned.
+        part: (n,) int64, index into ``parts``.
+        parts: Names of the parts.
+        skipped: Why and how many attempts could not be used: at run time, too, the planner would find
+            no part in them.
+        fingerprint: Hex digest of grasps and outcomes: two equal ones are the same data.
+    """
+
+    patches: Tensor
+    centre_grasp: Tensor
+    success: Tensor
+    displacement: Tensor
+    grasp_displacement: Tensor
+    part: Tensor
+    parts: tuple[str, ...]
+    skipped: dict[str, int]
+    fingerprint: str
+
+    def __len__(self) -> int:
+        return len(self.success)
+
+
+def read_samples(
+    folder: Path,
+    *,
+    patch_pixels: int,
+    patch_side: float,
+    advance: Callable[[int, int], None] = lambda done, total: None,
+) -> Samples:
+    """Reads all shards of a dataset and crops every attempt's patch.
+
+    Only the patches stay in memory (16 kB an attempt of 64 pixels), never the images of two shards.
+
+    Args:
+        folder: The dataset.
+        patch_pixels: Pixels along a patch's side.
+        patch_side: Length of a patch's side, metres.
+        advance: Called with the shards done and their number.
+
+    Raises:
+        BadDataset: A shard cannot be read, or no attempt shows a part.
+    """
+    paths = list_shards(folder)
+    parts: list[str] = []
+    skipped: Counter[str] = Counter()
+    digest = hashlib.sha256()
+    pieces = []
+    for done, path in enumerate(paths):
+        advance(done, len(paths))
+        attempts, info = read_shard(path)
+        if info.part not in parts:
+            parts.append(info.part)
+        for array in (attempts.grasp, attempts.success, attempts.displacement):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        piece, missing = _shard_samples(attempts, info, patch_pixels, patch_side)
+        skipped.update(missing)
+        if piece is not None:
+            pieces.append((*piece, torch.full((len(piece[0]),), parts.index(info.part))))
+    advance(len(paths), len(paths))
+    if not pieces:
+        reason = f": {skipped.most_common(1)[0][0]}" if skipped else ""
+        raise BadDataset(f"no usable attempt in {folder}{reason}; collect again")
+    patches, centre, success, displacement, grasp_displacement, part = (
+        torch.cat(arrays) for arrays in zip(*pieces, strict=True)
+    )
+    return Samples(
+        patches=patches,
+        centre_grasp=centre,
+        success=success,
+        displacement=displacement,
+        grasp_displacement=grasp_displacement,
+        part=part,
+        parts=tuple(parts),
+        skipped=dict(skipped),
+        fingerprint=digest.hexdigest(),
+    )
+
+
+def _shard_samples(
+    attempts: Attempts, info: ShardInfo, patch_pixels: int, patch_side: float
+) -> tuple[tuple[Tensor, ...] | None, Counter[str]]:
+    skipped: Counter[str] = Counter()
+    depth = u16_to_depth(attempts.depth)
+    rows, centres = [], []
+    for row, image in enumerate(depth):
+        try:
+            view = view_part(
+                image, info.intrinsics, info.T_base_camera, table_z=info.table_z, region=info.region
+            )
+        except NoPartFound as error:
+            # The message without its numbers: what is counted is the reason.
+            skipped[str(error).split(" (")[0]] += 1
+            continue
+        rows.append(row)
+        centres.append(view.centre_base)
+    if not rows:
+        return None, skipped
+    grasp = attempts.grasp[rows].astype(np.float64)
+    displacement = attempts.displacement[rows].astype(np.float64)
+    centre_grasp = centre_in_grasp_frame(np.array(centres), grasp)
+    heights = height_image(torch.from_numpy(depth[rows]), info.intrinsics, info.T_base_camera, info.table_z)
+    patches = crop_patches(
+        heights,
+        torch.from_numpy(grasp),
+        info.intrinsics,
+        info.T_base_camera,
+        n_pixels=patch_pixels,
+        side=patch_side,
+    )
+    return (
+        patches,
+        torch.from_numpy(centre_grasp).float(),
+        torch.from_numpy(attempts.success[rows]),
+        torch.from_numpy(displacement).float(),
+        torch.from_numpy(to_grasp_displacement(displacement, centre_grasp)).float(),
+    ), skipped
+
+
+def validation_parts(parts: tuple[str, ...], fraction: float) -> tuple[str, ...]:
+    """The parts that training never sees, chosen by a hash of their names.
+
+    A part stays on its side when other parts join the dataset. At least one part is on either side.
+
+    Raises:
+        BadDataset: There are fewer than two parts.
+    """
+    if len(parts) < 2:
+        raise BadDataset(
+            f"the dataset has one part ({', '.join(parts)}), validation needs another that training never "
+            "sees; collect at least 2 parts"
+        )
+    order = sorted(parts, key=_name_hash)
+    n = sum(_name_hash(part) < fraction for part in order)
+    return tuple(order[: min(max(n, 1), len(order) - 1)])
+
+
+def _name_hash(name: str) -> float:
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big") / 2**64
+
+
+def mirror_and_turn(
+    patches: Tensor, centre_grasp: Tensor, target: Tensor, generator: torch.Generator
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Turns a random half of the samples by half a turn, and mirrors a random half of them.
+
+    A parallel jaw is the same after half a turn about its approach, and after mirroring its closing
+    direction (the part's mirror image is as good a part), so the samples are as true as before.
+
+    Args:
+        patches: (n, 1, p, p).
+        centre_grasp: (n, 3), grasp frame.
+        target: (n, 4) displacement, grasp frame.
+        generator: On the device of the patches.
+    """
+    turn, mirror = torch.rand((2, len(patches)), generator=generator, device=patches.device) < 0.5
+    patches = torch.where(turn[:, None, None, None], patches.flip(-1, -2), patches)
+    patches = torch.where(mirror[:, None, None, None], patches.flip(-2), patches)
+    turned = torch.where(turn, -1.0, 1.0)
+    mirrored = torch.where(mirror, -1.0, 1.0)
+    same = torch.ones_like(turned)
+    signs = torch.stack([turned, turned * mirrored, same, mirrored], dim=-1)
+    return patches, centre_grasp * signs[:, :3], target * signs

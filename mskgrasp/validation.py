@@ -1,0 +1,95 @@
+"""How good trained networks are on parts they never saw, beside predictors that learned nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+
+from mskgrasp import metrics
+from mskgrasp.grasp import to_object_displacement
+from mskgrasp.networks import Models
+from mskgrasp.samples import Samples
+
+_CHUNK = 64
+
+
+def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.ndarray:
+    """Predicted probabilities of success (n,)."""
+    pieces = [
+        models.quality(samples.patches[r].to(models.device), samples.centre_grasp[r].to(models.device))
+        for r in rows.split(_CHUNK)
+    ]
+    return torch.cat(pieces).cpu().double().numpy()
+
+
+def predict_grasp_displacement(
+    models: Models, samples: Samples, rows: torch.Tensor
+) -> tuple[np.ndarray, np.ndarray]:
+    """Predicted mean and variance (n, 4) of the grasp displacement; NaN variance where none is predicted."""
+    means, variances = [], []
+    for r in rows.split(_CHUNK):
+        mean, variance = models.grasp_displacement(
+            samples.patches[r].to(models.device), samples.centre_grasp[r].to(models.device)
+        )
+        means.append(mean)
+        variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
+    return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
+
+
+def quality_metrics(models: Models, samples: Samples, rows: torch.Tensor) -> dict[str, Any]:
+    """Balanced accuracy, AUROC and Brier score of the GQN, and the Brier score of saying the base rate.
+
+    A grasp counts as told to succeed where its probability exceeds the training data's base rate: with
+    balanced data, that is one half.
+    """
+    success = samples.success[rows].numpy()
+    probability = predict_quality(models, samples, rows)
+    base_rate = models.meta.normalisation.base_rate
+    return {
+        "n": len(success),
+        "base_rate": float(success.mean()),
+        "balanced_accuracy": metrics.balanced_accuracy(probability, success, base_rate),
+        "auroc": metrics.auroc(probability, success),
+        "brier": metrics.brier(probability, success),
+        "brier_of_base_rate": metrics.brier(np.full(len(success), base_rate), success),
+    }
+
+
+def displacement_metrics(
+    models: Models, samples: Samples, training_rows: torch.Tensor, rows: torch.Tensor
+) -> dict[str, Any]:
+    """Errors of the GDN on successful grasps, and of predicting zero and the training data's mean.
+
+    RMSE is over the object displacement, likelihood and coverage over the grasp displacement.
+    """
+    training_rows = training_rows[samples.success[training_rows]]
+    rows = rows[samples.success[rows]]
+    mean, variance = predict_grasp_displacement(models, samples, rows)
+    seen = samples.grasp_displacement[training_rows].double().numpy()
+    floor = 1e-12
+    constants = {
+        "zero_displacement": (np.zeros(4), np.maximum((seen**2).mean(axis=0), floor)),
+        "training_mean": (seen.mean(axis=0), np.maximum(seen.var(axis=0), floor)),
+    }
+    report: dict[str, Any] = {"n": len(rows)} | _errors(samples, rows, mean, variance)
+    for name, (constant, spread) in constants.items():
+        repeated = np.tile(constant, (len(rows), 1))
+        report[name] = _errors(samples, rows, repeated, np.tile(spread, (len(rows), 1)))
+    return report
+
+
+def _errors(samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray) -> dict[str, Any]:
+    centre_grasp = samples.centre_grasp[rows].double().numpy()
+    predicted = to_object_displacement(mean, centre_grasp)
+    displacement = samples.displacement[rows].double().numpy()
+    target = samples.grasp_displacement[rows].double().numpy()
+    covered = metrics.coverage(mean, variance, target)
+    known = bool(np.isfinite(variance).all())
+    return {
+        "translation_rmse": metrics.translation_rmse(predicted, displacement),
+        "rotation_rmse": metrics.rotation_rmse(predicted, displacement),
+        "nll": metrics.gaussian_nll(mean, variance, target) if known else None,
+        "coverage_90": dict(zip("x y z theta".split(), covered.tolist(), strict=True)) if known else None,
+    }
