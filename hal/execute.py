@@ -24,12 +24,14 @@ class GraspResult:
     """What the arm itself knows of a grasp.
 
     Attributes:
+        lifted: The fingers closed on something and the arm lifted it.
         holding: The fingers hold something after lift and hold.
         width: Distance of the pads then, metres.
         T_base_tcp: Measured TCP then.
         aborted: Why the motion ended early; None where it did not. The arm then needs `recover`.
     """
 
+    lifted: bool
     holding: bool
     width: float
     T_base_tcp: Pose
@@ -66,10 +68,15 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
     except MotionAborted as error:
         state = arm.state()
         return GraspResult(
-            holding=False, width=state.gripper_width, T_base_tcp=state.T_base_tcp, aborted=str(error)
+            lifted=False,
+            holding=False,
+            width=state.gripper_width,
+            T_base_tcp=state.T_base_tcp,
+            aborted=str(error),
         )
     state = arm.state()
     return GraspResult(
+        lifted=closed.holding,
         holding=closed.holding and state.gripper_width > MIN_GAP,
         width=state.gripper_width,
         T_base_tcp=state.T_base_tcp,

@@ -12,7 +12,7 @@ import tyro
 from pydantic import BaseModel, ValidationError
 
 from mskgrasp.config import check_config, read_config
-from mskgrasp.errors import BadConfig, MskgraspError
+from mskgrasp.errors import BadConfig, MskgraspError, UsageError
 
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
 
@@ -75,6 +75,18 @@ def _take_config_option(arguments: list[str]) -> tuple[list[str], Path | None]:
         else:
             rest.append(argument)
     return rest, path
+
+
+def make_folder(path: Path) -> None:
+    """Makes an output folder.
+
+    Raises:
+        UsageError: A file is in the way, or the place is not writable.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"cannot make folder {path}: {error.strerror}; choose another --out") from error
 
 
 def run(main: Callable[[], int | None]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -252,21 +253,27 @@ def _inset(axes: Axes, shift: np.ndarray, covariance: np.ndarray, half: float, *
     inset.set_title("shift and 2σ", fontsize=8, fontweight="normal", loc="center", pad=3)
 
 
-def draw_contact_sheet(attempts: Attempts, info: ShardInfo, path: Path, *, limit: int = 24) -> None:
-    """Draws attempts of a shard from above: the hand, and where a held part's centre went."""
-    n = len(attempts)
-    rows = np.unique(np.linspace(0, n - 1, min(n, limit)).astype(int)) if n else np.array([], int)
+def draw_contact_sheet(
+    rows: Sequence[tuple[Attempts, ShardInfo, int]], path: Path, *, title: str = "Grasp attempts"
+) -> None:
+    """Draws attempts from above: the hand, and where a held part's centre went.
+
+    Args:
+        rows: Attempts, what their shard tells of them, and which row of them to draw.
+        path: The picture, PNG.
+        title: Stands above it.
+    """
     columns = min(6, max(1, len(rows)))
     lines = max(1, -(-len(rows) // columns))
     with matplotlib.rc_context(_STYLE):
-        figure = _figure(2.1 * columns, 2.35 * lines + 0.5)
+        figure = _figure(2.1 * columns, 2.45 * lines + 0.5)
         grid = np.atleast_1d(figure.subplots(lines, columns, squeeze=False)).ravel()
         for axes in grid[len(rows) :]:
             axes.axis("off")
-        for axes, row in zip(grid, rows, strict=False):
-            _draw_attempt(axes, attempts, info, int(row))
-        held = int(attempts.success.sum())
-        figure.suptitle(f"{info.part}: {held} of {n} grasps held", fontsize=12, fontweight="bold")
+        for axes, (attempts, info, row) in zip(grid, rows, strict=False):
+            _draw_attempt(axes, attempts, info, row)
+            axes.set_xlabel(info.part, fontsize=8, labelpad=3)
+        figure.suptitle(title, fontsize=12, fontweight="bold")
         figure.savefig(path)
 
 

@@ -20,18 +20,26 @@ from tasks.physics import Physics
 STILL_FINGER = 2e-3
 """A finger slower than this, m/s, has met what it holds. Speeds are differences of positions: PhysX's
 TGS solver reports the velocity of a pressed joint with the drive's impulse still in it."""
+STILL_S = 0.03
+"""Fingers that did not move for this long have closed, s."""
+FINGER_TIMEOUT_S = 0.5
+"""Fingers that never come to rest (the part slides through them) are given up after this, s."""
 _CHECK_EVERY = 5
 
 
 def ease(n_steps: int, device: torch.device) -> Tensor:
-    """(n_steps,) fractions of a path from just above 0 to 1, starting and ending without speed."""
-    time = torch.arange(1, n_steps + 1, dtype=torch.float64, device=device) / n_steps
-    return 0.5 - 0.5 * torch.cos(math.pi * time)
+    """(n_steps,) fractions of a path from just above 0 to 1, without speed or acceleration at its ends.
+
+    The minimum-jerk profile (Flash and Hogan 1985, equation 5): with an acceleration at the end the arm
+    would overshoot by its inertia over its stiffness, more than the clearance between pads and table.
+    """
+    t = torch.arange(1, n_steps + 1, dtype=torch.float64, device=device) / n_steps
+    return t**3 * (10 - 15 * t + 6 * t**2)
 
 
 def ease_duration(distance: float, peak_speed: float) -> float:
-    """Seconds that `ease` needs over a distance at a peak speed."""
-    return max(0.5 * math.pi * distance / peak_speed, 0.02)
+    """Seconds that `ease` needs over a distance at a peak speed (15/8 of the mean speed)."""
+    return max(15 / 8 * distance / peak_speed, 0.02)
 
 
 class PandaMotion:
@@ -79,10 +87,12 @@ class PandaMotion:
             robot.set_joint_drive_targets(q.to(torch.float32), self._agent.arm_joints)
             robot.set_joint_drive_velocity_targets(qd.to(torch.float32), self._agent.arm_joints)
         else:
-            rows = zip(self._arm_drives, q[0].tolist(), qd[0].tolist(), strict=True)
-            for drive, position, velocity in rows:
-                drive.set_drive_target(position)
-                drive.set_drive_velocity_target(velocity)
+            self._drive_arm(q[0].tolist(), qd[0].tolist())
+
+    def _drive_arm(self, positions: list[float], velocities: list[float]) -> None:
+        for drive, position, velocity in zip(self._arm_drives, positions, velocities, strict=True):
+            drive.set_drive_target(position)
+            drive.set_drive_velocity_target(velocity)
 
     def set_fingers(self, target: Tensor) -> None:
         """Drive targets of both fingers: (n,) metres from the middle, negative to press."""
@@ -128,16 +138,19 @@ class PandaMotion:
         rate = self._physics.rate_hz
         speed = torch.zeros_like(path)
         speed[1:] = (path[1:] - path[:-1]) * rate
+        # One environment: plain numbers, once; a tensor a step would cost as much as the physics.
+        rows = None if self._gpu else list(zip(path[:, 0].tolist(), speed[:, 0].tolist(), strict=True))
         still = torch.zeros_like(path[0])
         last = path[0]
         for i in range(len(path)):
-            target, velocity = path[i], speed[i]
-            if frozen is not None and self.n > 1:
-                target = torch.where(frozen[:, None], last, target)
-                velocity = torch.where(frozen[:, None], still, velocity)
-            self.set_arm(target, velocity)
+            if rows is not None:
+                self._drive_arm(*rows[i])
+                last = path[i]
+            else:
+                stop = torch.zeros(self.n, dtype=torch.bool, device=self.device) if frozen is None else frozen
+                last = torch.where(stop[:, None], last, path[i])
+                self.set_arm(last, torch.where(stop[:, None], still, speed[i]))
             self.step()
-            last = target
             if check is not None and i % check_every == check_every - 1 and check(i):
                 self.set_arm(last, still)
                 return False
@@ -149,26 +162,30 @@ class PandaMotion:
 
         A target inside the part keeps pressing with the drive's force limit.
         """
-        step = (speed or self._physics.finger_speed) / self._physics.rate_hz
-        current = self.finger_target.clone()
+        speed = speed or self._physics.finger_speed
+        start = self.finger_target
+        way = target - start
+        n_ramp = max(1, math.ceil(float(way.abs().max()) / speed * self._physics.rate_hz))
+        done = torch.arange(1, n_ramp + 1, device=self.device)[:, None] * speed / self._physics.rate_hz
+        ramp = start + way.sign() * torch.minimum(done, way.abs())
         quiet = torch.zeros(self.n, dtype=torch.int64, device=self.device)
         # A held part stops the fingers before their targets; wait until the drives press in full.
         lag = self._physics.finger_force / self._physics.finger_stiffness
-        timeout = self.n_steps(MAX_OPENING / (speed or self._physics.finger_speed) + 0.5)
         last = self._agent.robot.get_qpos()[:, 7:9]
         far = STILL_FINGER * _CHECK_EVERY / self._physics.rate_hz
-        for i in range(timeout):
-            current = current + (target - current).clamp(-step, step)
-            self.set_fingers(current)
+        for i in range(n_ramp + self.n_steps(FINGER_TIMEOUT_S)):
+            if i < n_ramp:
+                self.set_fingers(ramp[i])
             self.step()
             if i % _CHECK_EVERY != _CHECK_EVERY - 1:
                 continue
             fingers = self._agent.robot.get_qpos()[:, 7:9]
             still = ((fingers - last).abs() < far).all(dim=-1)
             last = fingers
-            lagging = (fingers.mean(dim=-1) - current).abs() > lag
-            arrived = (current == target) & ((fingers.mean(dim=-1) - target).abs() < 1e-3)
-            quiet = torch.where(still & (lagging | arrived), quiet + _CHECK_EVERY, 0)
-            if bool((quiet >= self.n_steps(0.03)).all()):
+            middle = fingers.mean(dim=-1)
+            pressing = (middle - ramp[min(i, n_ramp - 1)]).abs() > lag
+            arrived = (middle - target).abs() < 1e-3
+            quiet = torch.where(still & (pressing | arrived), quiet + _CHECK_EVERY, 0)
+            if bool((quiet >= self.n_steps(STILL_S)).all()):
                 break
-        self.set_fingers(torch.full_like(current, target))
+        self.set_fingers(torch.full_like(start, target))

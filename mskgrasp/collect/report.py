@@ -142,12 +142,8 @@ def draw_summary(folder: Path, seed: int) -> Path:
         if not len(candidates):
             candidates = np.arange(len(attempts))
         if len(candidates):
-            row = rng.choice(candidates)
-            rows.append((_take(attempts, row), info))
+            rows.append((attempts, info, int(rng.choice(candidates))))
     path = folder / "summary.png"
-    draw_contact_sheet(rows, path)
+    n_parts = len({path.name.rsplit("-", 1)[0] for path in paths})
+    draw_contact_sheet(rows, path, title=f"Random grasps of {n_parts} parts, seen from above")
     return path
-
-
-def _take(attempts: Attempts, row: int) -> Attempts:
-    return Attempts(**{name: value[row : row + 1] for name, value in vars(attempts).items()})

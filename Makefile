@@ -1,0 +1,46 @@
+# `make help` explains every target. Each target does its own set-up.
+PYTHON ?= python3
+VENV := .venv
+READY := $(VENV)/.ready
+RUN := $(VENV)/bin/python -m
+
+.PHONY: help setup collect train plan evaluate test check format clean
+.DEFAULT_GOAL := help
+
+help: ## Explain the targets
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1\t\2/' | expand -t 18
+
+setup: $(READY) ## Virtual environment in .venv with pinned packages, and a Vulkan driver
+
+$(READY): pyproject.toml .ci/constraints.txt .ci/setup
+	PYTHON=$(PYTHON) .ci/setup
+	@touch $@
+
+collect: $(READY) ## Collect the demo dataset into data/demo (the main job; resumes)
+	$(RUN) mskgrasp.collect --config configs/collect/demo.yaml
+
+train: $(READY) ## Train both networks on data/demo into models/demo
+	$(RUN) mskgrasp.train --data data/demo --out models/demo
+
+plan: $(READY) ## Plan a grasp in the simulated cell with models/demo
+	$(RUN) mskgrasp.plan --cell configs/cells/sapien.yaml --models models/demo --out out/plan
+
+evaluate: $(READY) ## Plan and execute grasps in the simulated cell with models/demo
+	$(RUN) mskgrasp.evaluate --cell configs/cells/sapien.yaml --models models/demo --trials 2 --out out/eval
+
+test: $(READY) ## Run the tests
+	$(RUN) pytest
+
+check: $(READY) ## Check style, types and the floors of the house
+	$(RUN) ruff format --check .
+	$(RUN) ruff check .
+	$(VENV)/bin/pyright
+	$(VENV)/bin/lint-imports
+
+format: $(READY) ## Format the code
+	$(RUN) ruff format .
+	$(RUN) ruff check --fix .
+
+clean: ## Remove the virtual environment and caches (data, models and out stay)
+	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis .import_linter_cache *.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,108 @@
+"""Program: look at the cell's table and plan one grasp. Run ``python -m mskgrasp.plan --help``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import torch
+from pydantic import Field
+
+from hal import open_cell
+from hal.cell import Cell
+from hal.errors import HalError
+from mskgrasp.cli import make_folder, parse, run
+from mskgrasp.config import Config
+from mskgrasp.networks import load_models
+from mskgrasp.pictures import draw_plan
+from mskgrasp.planner import GraspPlan, Planner, PlannerConfig
+
+DESCRIPTION = """Takes a depth image of the cell and plans a precise grasp of the part in it.
+
+Samples grasps over the part, keeps those of the best predicted quality, and chooses the one whose
+displacement in the hand is best known. Nothing moves. Writes plan.png and plan.json."""
+
+
+class PlanConfig(Config):
+    """Settings of one planning."""
+
+    cell: Path
+    """YAML file of the cell, for example configs/cells/sapien.yaml."""
+    models: Path
+    """Folder with model.safetensors and model.json, as mskgrasp.train writes it."""
+    out: Path = Path("out/plan")
+    """Folder for plan.png and plan.json."""
+    part: str | None = None
+    """Lay this part (a name or a folder) on the table first; the cell needs a feeder."""
+    seed: int = Field(default=0, ge=0)
+    """Candidates, and the place of --part, follow from it."""
+    planner: PlannerConfig = PlannerConfig()
+    """How the grasp is chosen."""
+
+
+def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
+    """The planner for a cell: its networks, and the cell's table.
+
+    Raises:
+        BadModel: The model cannot be used.
+    """
+    device = "cuda" if torch.cuda.is_available() else "cpu"
+    workspace = cell.workspace
+    config = config.model_copy(update=dict(min_height=workspace.min_height))
+    return Planner(
+        load_models(models, device), config, table_z=workspace.table_z, region=workspace.region
+    )
+
+
+def present(cell: Cell, part: str, seed: int) -> None:
+    """Has the cell's feeder lay a part on the table.
+
+    Raises:
+        HalError: The cell has none.
+    """
+    if cell.feeder is None:
+        raise HalError("this cell has no feeder; put the part there by hand and leave --part away")
+    cell.feeder.present(part, seed)
+
+
+def describe(plan: GraspPlan) -> str:
+    """The plan in words, with units."""
+    x, y, z, theta = plan.grasp
+    mean, std = plan.displacement, plan.displacement_std
+    shifts = ", ".join(
+        f"{name} {value * 1e3:+.1f} +- {deviation * 1e3:.1f} mm"
+        for name, value, deviation in zip(("dx", "dy", "dz"), mean[:3], std[:3], strict=True)
+    )
+    turn = f"dtheta {np.degrees(mean[3]):+.1f} +- {np.degrees(std[3]):.1f} deg"
+    stages = ", ".join(f"{name} {value:.2f} s" for name, value in plan.seconds.items() if name != "total")
+    return "\n".join(
+        [
+            f"grasp         x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, theta {np.degrees(theta):.1f} deg (base)",
+            f"quality       {plan.quality:.3f} (best of {len(plan.candidates)}: {plan.qualities.max():.3f})",
+            f"displacement  {shifts}, {turn} (grasp frame)",
+            f"planned in    {plan.seconds['total']:.2f} s ({stages})",
+        ]
+    )
+
+
+def main() -> int:
+    """Captures, plans, writes."""
+    config = parse(PlanConfig, prog="python -m mskgrasp.plan", description=DESCRIPTION)
+    make_folder(config.out)
+    with open_cell(config.cell) as cell:
+        planner = make_planner(config.models, config.planner, cell)
+        if config.part is not None:
+            present(cell, config.part, config.seed)
+        frame = cell.camera.capture()
+        plan = planner.plan(frame, np.random.default_rng(config.seed))
+    print(describe(plan))
+    text = json.dumps(dict(plan.to_json(), seed=config.seed), indent=1, allow_nan=False)
+    (config.out / "plan.json").write_text(text + "\n", encoding="utf-8")
+    draw_plan(frame, plan, config.out / "plan.png")
+    print(f"wrote {config.out / 'plan.json'} and {config.out / 'plan.png'}")
+    return 0
+
+
+if __name__ == "__main__":
+    run(main)
