@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, KDTree
 
 from mskgrasp.geometry import quat_from_matrix
 
-MOST_SAMPLES = 20_000
+MOST_SAMPLES = 12_000
 """Points per surface at which hulls and mesh are compared."""
 
 MOST_OBLONG = 50.0
@@ -166,10 +166,10 @@ def _distance_to(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Distance of points (n, 3) to a finely cut surface."""
     tree = KDTree(triangles.mean(axis=1))
     distance = _distance_by_nearest(tree, triangles, points, 8)
-    # Among slivers eight centres may all belong to farther triangles: the large distances are looked at again.
+    # Among slivers eight centres may all be of farther triangles: the large distances are looked at again.
     doubtful = np.flatnonzero(distance > max(float(np.quantile(distance, 0.9)), 0.01))
     if len(doubtful):
-        distance[doubtful] = _distance_by_nearest(tree, triangles, points[doubtful], 64)
+        distance[doubtful] = _distance_by_nearest(tree, triangles, points[doubtful], 32)
     return distance
 
 

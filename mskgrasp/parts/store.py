@@ -178,7 +178,7 @@ def _part_of(folder: Path, record: dict[str, Any]) -> Part:
         extents=_array(record, "extents", (3,)),
         longest_axis=_positive(record, "longest_axis"),
         n_hulls=int(_positive(record, "n_hulls")),
-        hull_error=float(record["hull_error"]),
+        hull_error=_finite(record, "hull_error"),
         resting=Pose(
             position=_array(record["resting"], "position", (count, 3)),
             quat_wxyz=_unit(_array(record["resting"], "quat_wxyz", (count, 4))),
@@ -191,6 +191,13 @@ def _text(record: dict[str, Any], key: str) -> str:
     if not isinstance(record[key], str):
         raise ValueError(f"{key} is no text")
     return record[key]
+
+
+def _finite(record: dict[str, Any], key: str) -> float:
+    value = float(record[key])
+    if not (np.isfinite(value) and value >= 0):
+        raise ValueError(f"{key} is {value}, it must be finite and not negative")
+    return value
 
 
 def _positive(record: dict[str, Any], key: str) -> float:

@@ -1,0 +1,169 @@
+"""Mesh files as they come: good ones become parts, others are refused in one line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from mskgrasp.errors import BadPart
+from mskgrasp.parts import find_part
+from mskgrasp.parts.importing import import_part, legal_name
+
+
+def bracket() -> trimesh.Trimesh:
+    foot, wall = trimesh.creation.box((50, 30, 6)), trimesh.creation.box((6, 30, 40))
+    foot.apply_translation((25, 0, 3))
+    wall.apply_translation((3, 0, 20))
+    return trimesh.boolean.union([foot, wall], engine="manifold")
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply"])
+def test_a_box_comes_out_with_its_mass_and_size_from_every_format(tmp_path, suffix):
+    file = tmp_path / f"Würfel mit Ecken.{suffix}"
+    box = trimesh.creation.box((40, 30, 20))
+    box.apply_translation((100, 200, 300))
+    box.export(file)
+    part = import_part(file, density=1000.0)
+    assert part.name == "wuerfel-mit-ecken"
+    assert part.mass == pytest.approx(0.024)
+    assert np.allclose(part.extents, [0.04, 0.03, 0.02])
+    assert part.n_hulls == 1 and part.hull_error < 1e-6
+    assert part.source == f"imported from {file.name}"
+    assert find_part("wuerfel-mit-ecken").content_hash == part.content_hash
+
+
+@pytest.mark.parametrize(("unit", "edge"), [("mm", 40.0), ("m", 0.04), ("in", 40 / 25.4)])
+def test_units_are_converted(tmp_path, unit, edge):
+    trimesh.creation.box((edge, edge, edge)).export(tmp_path / "cube.stl")
+    assert import_part(tmp_path / "cube.stl", unit=unit).longest_axis == pytest.approx(0.04, rel=1e-5)
+
+
+def test_a_mesh_wound_inwards_is_turned_right_side_out(tmp_path):
+    box = trimesh.creation.box((40, 30, 20))
+    box.invert()
+    box.export(tmp_path / "box.stl")
+    assert import_part(tmp_path / "box.stl").mass == pytest.approx(7850 * 24e-6)
+
+
+def test_an_angle_is_cut_into_hulls_that_fit_and_the_same_ones_every_time(tmp_path, monkeypatch):
+    bracket().export(tmp_path / "bracket.stl")
+    part = import_part(tmp_path / "bracket.stl")
+    assert 2 <= part.n_hulls <= 8
+    assert part.hull_error < 0.002
+    first = [path.read_bytes() for path in sorted(part.folder.iterdir())]
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "second"))
+    again = import_part(tmp_path / "bracket.stl")
+    assert [path.read_bytes() for path in sorted(again.folder.iterdir())] == first
+
+
+def test_a_thin_sheet_is_cut_until_physx_takes_its_hulls(tmp_path):
+    trimesh.creation.box((100, 60, 1)).export(tmp_path / "sheet.stl")
+    part = import_part(tmp_path / "sheet.stl")
+    assert part.n_hulls > 1 and part.hull_error < 1e-5
+
+
+def test_the_same_file_is_not_imported_twice_and_a_changed_one_replaces_the_part(tmp_path):
+    file = tmp_path / "box.stl"
+    trimesh.creation.box((40, 30, 20)).export(file)
+    first = import_part(file)
+    made = (first.folder / "part.json").stat().st_mtime_ns
+    assert (import_part(file).folder / "part.json").stat().st_mtime_ns == made
+    trimesh.creation.box((40, 30, 25)).export(file)
+    assert import_part(file).mass > first.mass
+
+
+def write_open(file: Path) -> None:
+    box = trimesh.creation.box((40, 30, 20))
+    trimesh.Trimesh(box.vertices, box.faces[:-1], process=False).export(file)
+
+
+def write_flat(file: Path) -> None:
+    corners = [[0, 0, 0], [10, 0, 0], [0, 10, 0]]
+    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 1]], process=False).export(file)
+
+
+def write_two_bodies(file: Path) -> None:
+    boxes = [trimesh.creation.box((40, 30, 20)) for _ in range(2)]
+    boxes[1].apply_translation((100, 0, 0))
+    trimesh.util.concatenate(boxes).export(file)
+
+
+def write_half(file: Path) -> None:
+    content = trimesh.creation.annulus(10, 20, 15).export(file_type=file.suffix[1:])
+    file.write_bytes(content[: len(content) // 2])
+
+
+def write_not_finite(file: Path) -> None:
+    box = trimesh.creation.box((40, 30, 20))
+    vertices = np.array(box.vertices)
+    vertices[0, 0] = np.nan
+    trimesh.Trimesh(vertices, box.faces, process=False, validate=False).export(file)
+
+
+def write_text(file: Path) -> None:
+    file.write_text("Dear colleague, please find the part attached.\n" * 20)
+
+
+def write_foreign_index(file: Path) -> None:
+    file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")
+
+
+@pytest.mark.parametrize(
+    ("file_name", "write", "said"),
+    [
+        ("open.stl", write_open, "not watertight"),
+        ("flat.stl", write_flat, "volume is zero"),
+        ("two.stl", write_two_bodies, "2 separate bodies"),
+        ("half.stl", write_half, "export it again"),
+        ("half.ply", write_half, "no readable PLY"),
+        ("infinite.ply", write_not_finite, "not finite"),
+        ("letter.stl", write_text, "export it again"),
+        ("letter.ply", write_text, "export it again"),
+        ("index.obj", write_foreign_index, "export it again"),
+        ("empty.obj", lambda file: file.touch(), "is empty"),
+        ("zeros.stl", lambda file: file.write_bytes(bytes(84)), "holds no triangles"),
+        ("part.step", write_text, "mesh files end in .stl, .obj, .ply"),
+        ("missing.stl", lambda file: None, "No such file"),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_line_and_leaves_nothing(tmp_path, own_cache, file_name, write, said):
+    file = tmp_path / file_name
+    write(file)
+    with pytest.raises(BadPart) as caught:
+        import_part(file)
+    assert said in str(caught.value) and file_name in str(caught.value) and "\n" not in str(caught.value)
+    assert not own_cache.exists() or not any(own_cache.iterdir())
+
+
+def test_a_builtin_name_cannot_be_taken(tmp_path):
+    trimesh.creation.box((40, 30, 20)).export(tmp_path / "hex_nut_m20.stl")
+    with pytest.raises(BadPart, match="belongs to a built-in part"):
+        import_part(tmp_path / "hex_nut_m20.stl")
+
+
+def test_a_density_must_be_positive(tmp_path):
+    trimesh.creation.box((40, 30, 20)).export(tmp_path / "box.stl")
+    for density in (0.0, -1.0, float("nan")):
+        with pytest.raises(BadPart, match="density"):
+            import_part(tmp_path / "box.stl", density=density)
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("Größe 3", "groesse-3"),
+        ("../../etc/passwd", "etc-passwd"),
+        ("M8_Nut-v2", "m8_nut-v2"),
+        ("Écrou", "ecrou"),
+        ("a" * 300, "a" * 80),
+    ],
+)
+def test_names_are_made_legal_and_never_leave_the_folder(text, name):
+    assert legal_name(text) == name
+
+
+@pytest.mark.parametrize("text", ["", "...", "部品", "--"])
+def test_a_name_of_which_nothing_is_left_is_refused(text):
+    with pytest.raises(BadPart, match="--name"):
+        legal_name(text)
