@@ -1,0 +1,102 @@
+"""The task as a ManiSkill task: registration, control modes, wrappers, demo."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import gymnasium
+import h5py
+import numpy as np
+import pytest
+import torch
+from mani_skill.utils.wrappers import RecordEpisode
+
+from mskgrasp.errors import BadConfig, BadPart
+from tasks import GraspDisplacementEnv
+
+
+def make(boxes, **options):
+    options = dict(parts=[str(boxes["light"].folder)], render_backend="none") | options
+    return gymnasium.make("GraspDisplacement-v1", **options)
+
+
+def test_one_step_is_one_attempt_and_the_reward_is_success(boxes):
+    env = make(boxes, obs_mode="state_dict")
+    env.reset(seed=3)
+    pose = env.unwrapped.part_pose()
+    x, y, z = pose.position[0].tolist()
+    grasp = np.array([x, y, max(z, 0.0105), 0.0], dtype=np.float32)
+    observation, reward, terminated, truncated, info = env.step(grasp)
+    assert bool(terminated[0]) and not bool(truncated[0])
+    assert float(reward[0]) == float(info["success"][0])
+    assert info["displacement"].shape == (1, 4)
+    assert observation["extra"]["part_pose"].shape == (1, 7)
+    env.close()
+
+
+def test_the_same_seed_lays_the_part_at_the_same_place(boxes):
+    env = make(boxes, obs_mode="none")
+    poses = []
+    for seed in (7, 8, 7):
+        env.reset(seed=seed)
+        poses.append(env.unwrapped.part_pose().as_vector())
+    assert torch.equal(poses[0], poses[2]) and not torch.equal(poses[0], poses[1])
+    env.close()
+
+
+@pytest.mark.parametrize("mode", ["pd_joint_pos", "pd_ee_delta_pose"])
+def test_the_usual_control_modes_still_work(boxes, mode):
+    env = make(boxes, obs_mode="state", control_mode=mode)
+    env.reset(seed=0)
+    for _ in range(3):
+        _, reward, _, _, info = env.step(env.action_space.sample())
+    assert info["success"].shape == (1,) and float(reward[0]) == 0.0
+    env.close()
+
+
+def test_state_can_be_saved_and_restored(boxes):
+    env = make(boxes, obs_mode="none")
+    base = env.unwrapped
+    assert isinstance(base, GraspDisplacementEnv)
+    env.reset(seed=0)
+    state = base.get_state_dict()
+    pose = base.part_pose().as_vector()
+    env.reset(seed=1)
+    base.set_state_dict(state)
+    assert torch.allclose(base.part_pose().as_vector(), pose, atol=1e-6)
+    env.close()
+
+
+def test_record_episode_writes_a_trajectory(boxes, tmp_path):
+    env = RecordEpisode(
+        make(boxes, obs_mode="state"), str(tmp_path), save_video=False, trajectory_name="grasps"
+    )
+    env.reset(seed=0)
+    env.step(np.array([0.5, 0.0, 0.02, 0.0], dtype=np.float32))
+    env.close()
+    episodes = json.loads((tmp_path / "grasps.json").read_text())["episodes"]
+    assert len(episodes) == 1
+    with h5py.File(tmp_path / "grasps.h5") as file:
+        assert file["traj_0/actions"].shape == (1, 4)
+        assert file["traj_0/env_states/actors/part"].shape == (2, 13)
+
+
+def test_maniskills_demo_finds_and_runs_the_task():
+    command = [sys.executable, "-m", "mani_skill.examples.demo_random_action"]
+    command += ["-e", "tasks:GraspDisplacement-v1", "--quiet", "-o", "state", "--render-mode", "none"]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=240, cwd=Path(__file__).parents[2]
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+def test_wrong_settings_are_named(boxes):
+    with pytest.raises(BadConfig, match=r"rate_hz.*greater than or equal to 250"):
+        make(boxes, physics=dict(rate_hz=100))
+    with pytest.raises(BadConfig, match="unknown key 'gravitiy'"):
+        make(boxes, physics=dict(gravitiy=9.8))
+    with pytest.raises(BadPart, match="no_such_part"):
+        make(boxes, parts=["no_such_part"])

@@ -1,0 +1,71 @@
+"""What PhysX holds is the part: hulls, mass, inertia, rest, and room beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+from sapien.physx import PhysxRigidDynamicComponent
+
+from mskgrasp.geometry import Pose
+from mskgrasp.grasp import FAILURES, PAD_REACH, pose_base_grasp
+from mskgrasp.parts import find_part
+
+PARTS = ("hex_bolt_m20x50", "hex_nut_m30", "l_bracket_60x40", "spur_gear_m3_z17")
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_mass_and_inertia_are_those_of_the_mesh(env, name):
+    part = find_part(name)
+    env.reset(seed=1, options=dict(parts=[name], reconfigure=True))
+    body = env.part._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
+    assert len(body.collision_shapes) == part.n_hulls
+    assert body.mass == pytest.approx(part.mass, rel=1e-5)
+    assert np.asarray(body.inertia) == pytest.approx(part.principal_inertia, rel=1e-4)
+    assert np.abs(body.cmass_local_pose.p).max() < 1e-7
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_no_hull_lost_a_corner_in_physx(env, name):
+    env.reset(seed=1, options=dict(parts=[name], reconfigure=True))
+    body = env.part._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
+    cooked = np.concatenate([np.asarray(shape.vertices) * shape.scale for shape in body.collision_shapes])
+    stored = trimesh.load(find_part(name).hulls_path).geometry.values()
+    vertices = np.concatenate([mesh.vertices for mesh in stored]) * 1e-3
+    assert len(cooked) == len(vertices)
+    assert np.abs(cooked.min(axis=0) - vertices.min(axis=0)).max() < 1e-6
+    assert np.abs(cooked.max(axis=0) - vertices.max(axis=0)).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_parts_lie_still_where_they_are_laid(env, name):
+    for seed in range(5):
+        options = dict(parts=[name], reconfigure=True) if seed == 0 else {}
+        env.reset(seed=seed, options=options)
+        laid = env.part_pose()
+        env.motion.step(env.motion.n_steps(0.2))
+        moved = (env.part_pose().position - laid.position).norm()
+        assert float(moved) < 2e-4
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_a_descent_with_room_for_the_fingers_never_collides(env, name):
+    """Points on the part's surface against the fingers' sweep, 2 mm larger all around, and the palm."""
+    part = find_part(name)
+    points = trimesh.sample.sample_surface(trimesh.load_mesh(part.mesh_path), 4000, seed=0)[0]
+    rng = np.random.default_rng(0)
+    free = 0
+    for seed in range(20):
+        env.reset(seed=seed, options=dict(parts=[name], reconfigure=True) if seed == 0 else {})
+        pose = env.part_pose().as_vector()[0].double().numpy()
+        grasp = np.array([*(pose[:2] + rng.uniform(-0.01, 0.01, 2)), 0.0105, rng.uniform(-1.5, 1.5)])
+        seen = pose_base_grasp(grasp).inverse().apply(Pose.from_vector(pose).apply(points))
+        # A finger is 22 mm wide at most and reaches from 40 mm to 66 mm from the middle when open.
+        beside = (np.abs(seen[:, 0]) < 0.013) & (np.abs(seen[:, 1]) > 0.038) & (seen[:, 2] > -PAD_REACH)
+        if beside.any():
+            continue
+        free += 1
+        outcome = env.attempt.run(torch.as_tensor(grasp[None], dtype=torch.float32))
+        assert FAILURES[int(outcome["failure"][0])] != "collided"
+    assert free >= 3
