@@ -169,7 +169,7 @@ def _distance_to(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     # Among slivers eight centres may all be of farther triangles: the large distances are looked at again.
     doubtful = np.flatnonzero(distance > max(float(np.quantile(distance, 0.9)), 0.01))
     if len(doubtful):
-        distance[doubtful] = _distance_by_nearest(tree, triangles, points[doubtful], 32)
+        distance[doubtful] = _distance_by_nearest(tree, triangles, points[doubtful], 64)
     return distance
 
 
