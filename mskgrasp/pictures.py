@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import cv2
 import matplotlib
 import numpy as np
 import torch
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Rectangle
 
@@ -104,13 +107,20 @@ def _jaw(
         )
 
 
-def _arrow(axes: Axes, start: np.ndarray, shift: np.ndarray, width: float = 1.8) -> None:
+def _arrow(axes: Axes, start: np.ndarray, shift: np.ndarray, width: float = 1.8, head: float = 11) -> None:
     # An annotation, because its head keeps its size on paper whatever the length.
     axes.annotate(
         "",
         xy=tuple(start + shift),
         xytext=tuple(start),
-        arrowprops={"arrowstyle": "-|>", "color": _SHIFT, "lw": width, "shrinkA": 0, "shrinkB": 0},
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": _SHIFT,
+            "lw": width,
+            "mutation_scale": head,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        },
         zorder=9,
     )
 
@@ -132,7 +142,7 @@ def draw_plan(frame: RgbdFrame, plan: GraspPlan, path: Path) -> None:
     Left, the base frame from above, right, the grasp frame; both in millimetres and to scale.
     """
     with matplotlib.rc_context(_STYLE):
-        figure = _figure(11.5, 6.2)
+        figure = _figure(11.5, 5.7)
         left, right = figure.subplots(1, 2)
         _draw_candidates(figure, left, frame, plan)
         _draw_chosen(right, frame, plan)
@@ -167,11 +177,14 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     grasps = plan.candidates[order]
     closing = 0.0035 * np.stack([-np.sin(grasps[:, 3]), np.cos(grasps[:, 3])], axis=-1)
     ends = np.stack([grasps[:, :2] - closing, grasps[:, :2] + closing], axis=1) * _MM
-    lines = LineCollection(list(ends), cmap="viridis", linewidths=0.8, alpha=0.75, zorder=4)
+    lines = LineCollection(list(ends), cmap="viridis", linewidths=0.9, zorder=4)
     lines.set_array(plan.qualities[order])
+    # What is not worth considering must not hide the part.
+    lines.set_alpha(0.15 + 0.75 * plan.qualities[order].clip(0.0, 1.0))
     lines.set_clim(0.0, 1.0)
     axes.add_collection(lines)
-    bar = figure.colorbar(lines, ax=axes, shrink=0.8, pad=0.02)
+    opaque = ScalarMappable(norm=Normalize(0.0, 1.0), cmap="viridis")
+    bar = figure.colorbar(opaque, ax=axes, shrink=0.8, pad=0.02)
     bar.set_label("predicted quality")
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     best = plan.candidates[plan.shortlist]
@@ -191,7 +204,10 @@ def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
     _jaw(axes, np.zeros(2), 0.0)
     centre = centre_in_grasp_frame(plan.view.centre_base, plan.grasp)[:2] * _MM
     shift, turn = plan.displacement[:2] * _MM, float(plan.displacement[3])
-    _outline_after(axes, heights, side, top, centre, shift, turn)
+    _outlines(axes, heights, np.zeros(2), side, centre, shift, turn)
+    axes.plot([], [], color=_INK, lw=0.9, label="part before")
+    axes.plot([], [], color=_SHIFT, lw=1.3, ls="--", label="part expected in the hand")
+    axes.legend(loc="upper left", frameon=False, fontsize=8)
     axes.plot(*centre, "+", color=_SHIFT, ms=8, mew=1.5, zorder=9)
     known = bool(np.isfinite(plan.displacement_cov).all())
     covariance = plan.displacement_cov[:2, :2] if known else np.zeros((2, 2))
@@ -211,31 +227,30 @@ def _draw_shift(axes: Axes, start: np.ndarray, shift: np.ndarray, covariance: np
     _arrow(axes, start, shift)
 
 
-def _outline_after(
+def _outlines(
     axes: Axes,
     heights: np.ndarray,
+    origin: np.ndarray,
     side: float,
-    top: float,
     centre: np.ndarray,
     shift: np.ndarray,
     turn: float,
 ) -> None:
-    """The part's outline where it is expected to end up in the hand, before the jaw's frame."""
+    """The part's outline, and dashed where it ends up, turned about its centre and shifted (mm)."""
     n = heights.shape[0]
     pixel = (np.arange(n) - (n - 1) / 2) * (side * _MM / n)
-    x, y = np.meshgrid(pixel, -pixel)
+    x, y = np.meshgrid(origin[0] + pixel, origin[1] - pixel)
+    # A camera pixel is several of these: without the blur the outline shows its stairs.
+    smooth = cv2.GaussianBlur(heights, (0, 0), 0.0015 / (side / n))
+    level = [0.5 * max(float(heights.max()), 0.1)]
     cos, sin = np.cos(turn), np.sin(turn)
     dx, dy = x - centre[0], y - centre[1]
     moved_x = centre[0] + shift[0] + cos * dx - sin * dy
     moved_y = centre[1] + shift[1] + sin * dx + cos * dy
-    level = [min(2.0, top / 2)]
-    axes.contour(x, y, heights, levels=level, colors=[_INK], linewidths=0.9, zorder=5)
+    axes.contour(x, y, smooth, levels=level, colors=[_INK], linewidths=0.9, zorder=5)
     axes.contour(
-        moved_x, moved_y, heights, levels=level, colors=[_SHIFT], linewidths=1.3, linestyles="--", zorder=6
+        moved_x, moved_y, smooth, levels=level, colors=[_SHIFT], linewidths=1.3, linestyles="--", zorder=6
     )
-    axes.plot([], [], color=_INK, lw=0.9, label="part before")
-    axes.plot([], [], color=_SHIFT, lw=1.3, ls="--", label="part expected in the hand")
-    axes.legend(loc="upper left", frameon=False, fontsize=8)
 
 
 def _inset(axes: Axes, shift: np.ndarray, covariance: np.ndarray, half: float, *, right: bool) -> None:
@@ -278,7 +293,7 @@ def draw_contact_sheet(
 
 
 def _draw_attempt(axes: Axes, attempts: Attempts, info: ShardInfo, row: int) -> None:
-    side = 0.16
+    side = 0.15
     grasp = attempts.grasp[row].astype(np.float64)
     centre = attempts.pose_base_obj[row, :3].astype(np.float64)
     square = np.array([*centre[:2], centre[2], 0.0])
@@ -287,13 +302,14 @@ def _draw_attempt(axes: Axes, attempts: Attempts, info: ShardInfo, row: int) -> 
     _show_heights(axes, heights, centre[:2], side, max(float(heights.max()), 1.0))
     axes.set(xticks=[], yticks=[])
     success = bool(attempts.success[row])
-    # Once it holds, the pads stand as far apart as the part is wide there.
     _jaw(axes, grasp, float(grasp[3]), scale=0.6)
     if success:
         displacement = attempts.displacement[row].astype(np.float64)
         cos, sin = np.cos(grasp[3]), np.sin(grasp[3])
         shift = np.array([[cos, -sin], [sin, cos]]) @ displacement[:2] * _MM
-        _arrow(axes, centre[:2] * _MM, shift, width=1.3)
+        turn = float(displacement[3])
+        _outlines(axes, heights, centre[:2] * _MM, side, centre[:2] * _MM, shift, turn)
+        _arrow(axes, centre[:2] * _MM, shift, width=1.3, head=7)
         distance = float(np.linalg.norm(displacement[:3])) * _MM
         caption = f"{distance:.1f} mm, {np.degrees(displacement[3]):+.0f}°"
     else:
@@ -313,7 +329,7 @@ def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Pat
         report: The final metrics, with the trivial predictors' errors.
         path: Where the picture goes.
     """
-    with matplotlib.rc_context(_STYLE | {"axes.spines.top": False, "axes.spines.right": False}):
+    with matplotlib.rc_context({**_STYLE, "axes.spines.top": False, "axes.spines.right": False}):
         figure = _figure(11.5, 6.0)
         panels = figure.subplots(2, 3)
         for line, name in zip(panels, ("gqn", "gdn"), strict=True):
