@@ -16,6 +16,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Rectangle
+from matplotlib.ticker import MaxNLocator
 
 from hal.camera import RgbdFrame
 from mskgrasp.dataset import Attempts, ShardInfo, u16_to_depth
@@ -180,7 +181,7 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     lines = LineCollection(list(ends), cmap="viridis", linewidths=0.9, zorder=4)
     lines.set_array(plan.qualities[order])
     # What is not worth considering must not hide the part.
-    lines.set_alpha(0.15 + 0.75 * plan.qualities[order].clip(0.0, 1.0))
+    lines.set_alpha(list(0.15 + 0.75 * plan.qualities[order].clip(0.0, 1.0)))
     lines.set_clim(0.0, 1.0)
     axes.add_collection(lines)
     opaque = ScalarMappable(norm=Normalize(0.0, 1.0), cmap="viridis")
@@ -342,7 +343,7 @@ def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Pat
         rows = [row for row in history if row["stage"] == "gqn"]
         _curve(panels[0, 1], rows, "auroc", "parts never seen", _JAW)
         panels[0, 1].axhline(0.5, color=_FAINT, lw=1, ls="--", label="guessing")
-        panels[0, 1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.45, 1.01))
+        panels[0, 1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.3, 1.02))
         panels[0, 1].legend(frameon=False, fontsize=8, loc="lower right")
         bars = {
             "network": (gqn["brier"], _JAW),
@@ -374,4 +375,5 @@ def _curve(
     axes: Axes, rows: list[dict[str, Any]], key: str, label: str, colour: str, factor: float = 1.0
 ) -> None:
     values = [row[key] * factor for row in rows]
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.plot([row["epoch"] for row in rows], values, color=colour, lw=1.8, label=label, marker="o", ms=3)
