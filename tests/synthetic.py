@@ -61,7 +61,7 @@ def render(
         T_obj_base = box.T_base_obj.inverse()
         half = np.array(box.size) / 2
         # Only rays that end near the box can meet it: what stands on the table leans away by less.
-        radius = 1.5 * np.linalg.norm(half)
+        radius = 1.5 * np.linalg.norm(half) + box.size[2]
         ends = T_base_camera.position[:2] + rays[..., :2] * depth[..., None]
         near = np.linalg.norm(ends - [box.x, box.y], axis=-1) < radius
         origin = T_obj_base.apply(T_base_camera.position)
