@@ -94,7 +94,7 @@ def run(config: TrainConfig) -> int:
         if samples.skipped:
             skipped = ", ".join(f"{n} ({why})" for why, n in samples.skipped.items())
             console.print(f"left out: {skipped}")
-        out.mkdir(parents=True, exist_ok=True)
+        cli.make_folder(out)
         write_config(config, out / "config.yaml")
         models, history = train(
             samples,
@@ -116,7 +116,7 @@ def _check_out(config: TrainConfig, out: Path) -> None:
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return
     if not (out / "config.yaml").is_file():
-        raise UsageError(f"{out} is not empty and holds no training run; choose another --out")
+        raise UsageError(f"{out} exists and holds no training run; choose another --out")
     here = {"data", "out", "device"}
     before = read_config(TrainConfig, out / "config.yaml").model_dump(exclude=here)
     now = config.model_dump(exclude=here)

@@ -1,0 +1,281 @@
+import csv
+import dataclasses
+import json
+import sys
+
+import numpy as np
+import pytest
+import torch
+
+from mskgrasp import cli, train
+from mskgrasp.dataset import shard_path, write_shard
+from mskgrasp.errors import BadDataset, BadModel, UsageError
+from mskgrasp.grasp import centre_in_grasp_frame
+from mskgrasp.networks import NetworkConfig, load_models
+from mskgrasp.samples import mirror_and_turn, read_samples, validation_parts
+from mskgrasp.training import (
+    LearningConfig,
+    Reporter,
+    StageConfig,
+    TrainingDiverged,
+    split,
+)
+from mskgrasp.training import train as learn
+from tests import synthetic
+
+SMALL = NetworkConfig(
+    patch_pixels=40, channels=8, trunk_width=64, action_width=32, head_width=64, dropout=0.0
+)
+CONFIG = LearningConfig(
+    validation_fraction=0.2,
+    network=SMALL,
+    noise_std=0.001,
+    gqn=StageConfig(learning_rate=2e-3, epochs=12, batch_size=16),
+    gdn=StageConfig(learning_rate=2e-3, epochs=30, batch_size=16),
+)
+SHORT = CONFIG.model_copy(
+    update={
+        "gqn": StageConfig(learning_rate=1e-3, epochs=2, batch_size=32),
+        "gdn": StageConfig(learning_rate=1e-3, epochs=3, batch_size=32),
+    }
+)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread():
+    # On busy cores threads that wait for each other make such small networks ten times slower.
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("data")
+    return synthetic.write_dataset(folder, n_parts=8, n_attempts=80, seed=1)
+
+
+@pytest.fixture(scope="module")
+def samples(dataset):
+    return read_samples(dataset, patch_pixels=40, patch_side=0.128)
+
+
+def program(config: LearningConfig, **changes) -> train.TrainConfig:
+    return train.TrainConfig(**(config.model_dump() | {"device": "cpu"} | changes))
+
+
+def test_samples_hold_every_attempt_with_its_displacement_seen_from_the_estimated_centre(samples):
+    assert len(samples) == 640 and samples.patches.shape == (640, 1, 40, 40)
+    assert len(samples.parts) == 8 and not samples.skipped
+    held = samples.success
+    assert bool(torch.isfinite(samples.grasp_displacement[held]).all())
+    assert bool(torch.isnan(samples.grasp_displacement[~held]).all())
+    # Closing the jaw centres a box: along y the displacement undoes the centre's offset, to a pixel.
+    sideways = samples.displacement[held][:, 1] + samples.centre_grasp[held][:, 1]
+    assert float(sideways.abs().max()) < 0.0025
+
+
+def test_parts_are_split_by_name_and_stay_on_their_side():
+    names = tuple(f"part_{k}" for k in range(400))
+    held_out = set(validation_parts(names, 0.2))
+    assert 50 < len(held_out) < 110
+    fewer = names[:200]
+    assert set(validation_parts(fewer, 0.2)) == held_out & set(fewer)
+    assert all(len(validation_parts(("a", "b"), share)) == 1 for share in (0.01, 0.99))
+    with pytest.raises(BadDataset, match="at least 2 parts"):
+        validation_parts(("lonely",), 0.2)
+
+
+def test_validation_never_sees_a_part_of_training(samples):
+    training_rows, rows = split(samples, 0.2)
+    assert not set(samples.part[training_rows].tolist()) & set(samples.part[rows].tolist())
+    assert len(training_rows) + len(rows) == len(samples)
+
+
+@pytest.mark.parametrize(("success", "words"), [(True, "no failure"), (False, "no success")])
+def test_data_of_one_outcome_are_told(samples, success, words):
+    alike = dataclasses.replace(samples, success=torch.full((len(samples),), success))
+    with pytest.raises(BadDataset, match=words):
+        split(alike, 0.2)
+
+
+def test_turned_and_mirrored_samples_are_what_the_turned_and_mirrored_scene_would_give():
+    box = synthetic.Box(x=0.455, y=0.0, yaw=0.35, size=(0.06, 0.02, 0.03))
+    grasp = np.array([0.46, 0.004, 0.02, 0.1])
+    centre = centre_in_grasp_frame(box.T_base_obj.position, grasp)
+    _, shift = synthetic.attempt(box, grasp)
+    local = synthetic.Box(x=centre[0], y=centre[1], yaw=box.yaw - grasp[3], size=box.size)
+    flat = np.array([0, 0, 0.02, 0])
+    # The mirror image at the grasp's x axis, and the scene that a hand turned by half a turn sees.
+    mirrored = dataclasses.replace(local, y=-local.y, yaw=-local.yaw)
+    turned = dataclasses.replace(local, x=-local.x, y=-local.y)
+    outcomes = [synthetic.attempt(b, flat)[1] for b in (local, mirrored, turned)]
+    assert np.allclose(outcomes[0], shift)
+    patch = torch.rand(1, 1, 6, 6)
+    produced = set()
+    for seed in range(40):
+        generator = torch.Generator().manual_seed(seed)
+        image, c, target = mirror_and_turn(
+            patch, torch.from_numpy(centre)[None], torch.from_numpy(shift)[None], generator
+        )
+        signs = tuple(torch.sign(c[0, :2] / torch.from_numpy(centre[:2])).int().tolist())
+        produced.add(signs)
+        flips = {(1, 1): (), (1, -1): (-2,), (-1, -1): (-1, -2), (-1, 1): (-1,)}[signs]
+        assert torch.equal(image, patch.flip(flips) if flips else patch)
+        if signs == (1, -1):
+            assert np.allclose(target[0], outcomes[1])
+        if signs == (-1, -1):
+            assert np.allclose(target[0], outcomes[2])
+    assert len(produced) == 4
+
+
+def test_a_small_dataset_is_learned_and_beats_the_trivial_predictors(dataset, tmp_path):
+    out = tmp_path / "model"
+    assert train.run(program(CONFIG, data=dataset, out=out)) == 0
+    report = json.loads((out / "metrics.json").read_text())
+    gqn, gdn = report["gqn"], report["gdn"]
+    assert gqn["auroc"] > 0.85
+    assert gqn["brier"] < 0.8 * gqn["brier_of_base_rate"]
+    for trivial in ("zero_displacement", "training_mean"):
+        assert gdn["translation_rmse"] < 0.6 * gdn[trivial]["translation_rmse"]
+        # Some 200 successes teach such a small network the shift; the turn takes thousands.
+        assert gdn["nll"] < gdn[trivial]["nll"]
+    assert set(gdn["coverage_90"]) == {"x", "y", "z", "theta"}
+    models = load_models(out)
+    assert models.meta.metrics["gqn"]["auroc"] == pytest.approx(gqn["auroc"])
+    assert len(models.meta.training["training_parts"]) + len(models.meta.training["validation_parts"]) == 8
+    with open(out / "log.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["stage"] for row in rows] == ["gqn"] * 12 + ["gdn"] * 30
+    files = {path.name for path in out.iterdir()}
+    assert files == {
+        "model.safetensors",
+        "model.json",
+        "metrics.json",
+        "log.csv",
+        "curves.png",
+        "config.yaml",
+    }
+    # Started again, there is nothing to do; with other settings, the folder is taken.
+    assert train.run(program(CONFIG, data=dataset, out=out)) == 0
+    with pytest.raises(UsageError, match=r"other settings \(seed\)"):
+        train.run(program(CONFIG, data=dataset, out=out, seed=1))
+
+
+class StopAfter(Reporter):
+    """Ctrl-C in the middle of the epoch that follows the n-th."""
+
+    def __init__(self, n):
+        self.left = n
+
+    def epoch(self, history):
+        self.left -= 1
+
+    def batch(self, loss):
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("after", [1, 2, 4])
+def test_a_stopped_run_goes_on_to_the_same_weights(samples, tmp_path, after):
+    path = tmp_path / "checkpoint.safetensors"
+    whole, history = learn(samples, SHORT, checkpoint_path=tmp_path / "whole.safetensors")
+    with pytest.raises(KeyboardInterrupt):
+        learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(after))
+    resumed, again = learn(samples, SHORT, checkpoint_path=path)
+    for one, other in ((whole.gqn, resumed.gqn), (whole.gdn, resumed.gdn)):
+        assert all(
+            torch.equal(a, b)
+            for a, b in zip(one.state_dict().values(), other.state_dict().values(), strict=True)
+        )
+    assert [row["train_loss"] for row in again] == [row["train_loss"] for row in history]
+
+
+def test_the_seed_decides_the_weights_and_the_global_generator_is_left_alone(samples, tmp_path):
+    torch.manual_seed(5)
+    state = torch.get_rng_state()
+    first, _ = learn(samples, SHORT, checkpoint_path=tmp_path / "a")
+    assert torch.equal(torch.get_rng_state(), state)
+    other, _ = learn(samples, SHORT.model_copy(update={"seed": 1}), checkpoint_path=tmp_path / "b")
+    assert not torch.equal(first.gqn.head[0].weight, other.gqn.head[0].weight)
+
+
+def test_a_checkpoint_of_other_data_or_a_damaged_one_is_refused(samples, tmp_path):
+    path = tmp_path / "checkpoint.safetensors"
+    with pytest.raises(KeyboardInterrupt):
+        learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(1))
+    other = dataclasses.replace(samples, fingerprint="0")
+    with pytest.raises(UsageError, match="other data"):
+        learn(other, SHORT, checkpoint_path=path)
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(BadModel, match="damaged"):
+        learn(samples, SHORT, checkpoint_path=path)
+
+
+def test_a_mean_only_network_and_the_papers_optimiser_can_be_trained(samples, tmp_path):
+    stage = StageConfig(
+        optimiser="rmsprop", learning_rate=1e-4, decay=1e-6, schedule="constant", epochs=1, batch_size=32
+    )
+    changes = {"network": SMALL.model_copy(update={"variance": False}), "gqn": stage, "gdn": stage}
+    models, history = learn(samples, SHORT.model_copy(update=changes), checkpoint_path=tmp_path / "c")
+    assert len(history) == 2 and models.meta.metrics["gdn"]["nll"] is None
+
+
+def test_a_loss_that_is_no_number_stops_the_run_in_one_line(samples, tmp_path):
+    wild = StageConfig(learning_rate=1e30, schedule="constant", epochs=2, batch_size=32)
+    with pytest.raises(TrainingDiverged, match="gqn.learning_rate") as caught:
+        learn(samples, SHORT.model_copy(update={"gqn": wild}), checkpoint_path=tmp_path / "c")
+    assert "\n" not in str(caught.value)
+
+
+def message(monkeypatch, capsys, *arguments) -> tuple[int, str]:
+    monkeypatch.setattr(sys, "argv", ["train", *map(str, arguments)])
+    with pytest.raises(SystemExit) as ended:
+        cli.run(train.main)
+    return int(ended.value.code or 0), capsys.readouterr().err
+
+
+def test_mistakes_on_the_command_line_are_one_line_each(monkeypatch, capsys, tmp_path, dataset):
+    out = tmp_path / "out"
+    full = tmp_path / "full"
+    full.mkdir()
+    (full / "diary.txt").write_text("mine")
+    lonely = tmp_path / "lonely"
+    attempts = synthetic.random_attempts(6, (0.05, 0.02, 0.03), np.random.default_rng(3))
+    write_shard(shard_path(lonely, "box", 0), attempts, synthetic.info("box"))
+    cases = [
+        ((), 2, "--data is needed"),
+        (("--data", dataset), 2, "--out is needed"),
+        (("--data", tmp_path / "no", "--out", out), 1, "no dataset folder"),
+        (("--data", tmp_path, "--out", out), 1, "no shards"),
+        (("--data", dataset, "--out", full), 2, "holds no training run"),
+        (("--data", lonely, "--out", out), 1, "one part (box)"),
+        (("--config", tmp_path / "no.yaml"), 2, "cannot read configuration"),
+    ]
+    if not torch.cuda.is_available():
+        cases.append((("--data", dataset, "--out", out, "--device", "cuda"), 2, "no CUDA device"))
+    for arguments, code, words in cases:
+        ended, text = message(monkeypatch, capsys, *arguments)
+        assert ended == code and words in text and text.count("\n") == 1, (arguments, text)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("name", ["default", "paper"])
+def test_the_configurations_that_are_shipped_can_be_read(name):
+    config = cli.parse(
+        train.TrainConfig,
+        prog="train",
+        description="",
+        argv=["--config", str(train.DEFAULT_CONFIG.with_name(f"{name}.yaml")), "--seed", "3"],
+    )
+    assert config.seed == 3 and config.network == NetworkConfig()
+    if name == "paper":
+        assert config.gqn == StageConfig(
+            optimiser="rmsprop",
+            learning_rate=1e-5,
+            decay=1e-6,
+            schedule="constant",
+            epochs=100,
+            batch_size=32,
+        )
