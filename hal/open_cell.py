@@ -36,10 +36,10 @@ def cell_from_yaml(path: Path) -> Cell:
         BadConfig: The file is missing or not valid.
     """
     values = read_yaml(path)
-    kind: CellType = values.get("type")
-    if kind not in get_args(CellType):
+    if values.get("type") not in get_args(CellType):
         legal = ", ".join(get_args(CellType))
-        raise BadConfig(f"{path}: 'type' is {kind!r}; legal: {legal}")
+        raise BadConfig(f"{path}: 'type' is {values.get('type')!r}; legal: {legal}")
+    kind: CellType = values["type"]
     match kind:
         case "sapien":
             from hal.sim import SapienCellConfig, sapien_cell

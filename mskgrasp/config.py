@@ -33,7 +33,8 @@ def read_yaml(path: Path) -> dict[str, Any]:
     try:
         values = yaml.safe_load(text)
     except yaml.YAMLError as error:
-        where = str(getattr(error, "problem_mark", "")).strip()
+        mark = getattr(error, "problem_mark", None)
+        where = f"in line {mark.line + 1}, column {mark.column + 1}" if mark is not None else ""
         problem = getattr(error, "problem", None) or "syntax error"
         raise BadConfig(f"{path} is not valid YAML: {problem} {where}".strip()) from error
     if values is None:

@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 from rich.console import Console
-from rich.table import Table
 from tqdm import tqdm
 
 from hal import Cell, go_home, open_cell
 from mskgrasp.cli import make_folder, parse, run
-from mskgrasp.config import Config, write_config
+from mskgrasp.config import Config, read_config, write_config
 from mskgrasp.errors import BadDataset, NoGraspFound, NoPartFound
-from mskgrasp.metrics import rotation_rmse, translation_rmse, wilson_interval
 from mskgrasp.networks import Models
+from mskgrasp.outcomes import draw_errors, print_report, summarise
 from mskgrasp.parts import builtin_names, find_part
-from mskgrasp.pictures import draw_errors, draw_plan
+from mskgrasp.pictures import draw_plan
 from mskgrasp.plan import make_planner, present
 from mskgrasp.planner import Planner, PlannerConfig
 from mskgrasp.trial import Trial, run_trial
@@ -141,8 +140,6 @@ def begin(config: EvaluateConfig) -> None:
             raise BadDataset(f"{config.out} holds trials without their settings; choose another --out")
         write_config(config, settings)
         return
-    from mskgrasp.config import read_config
-
     before, now = read_config(EvaluateConfig, settings), config
     changed = [
         name
@@ -171,72 +168,13 @@ def read_trials(path: Path) -> dict[tuple[str, int], Trial]:
             values["predicted_std"] = [np.nan if v is None else v for v in values["predicted_std"]]
             trial = Trial(**values)
         except (ValueError, TypeError, KeyError) as error:
-            raise BadDataset(f"{path}: line {i + 1} is no trial; delete it or choose another --out") from error
+            raise BadDataset(
+                f"{path}: line {i + 1} is no trial; delete it or choose another --out"
+            ) from error
         found[trial.part, trial.number] = trial
     if lines[-1]:
         path.write_text("\n".join(lines[:-1]) + ("\n" if len(lines) > 1 else ""), encoding="utf-8")
     return found
-
-
-def summarise(trials: list[Trial]) -> dict[str, Any]:
-    """Success and displacement errors, of all trials and of each part.
-
-    Without a single measured success the errors are absent (None), not zero.
-    """
-    parts = sorted({trial.part for trial in trials})
-    return dict(
-        schema_version=1,
-        overall=_numbers(trials),
-        parts={part: _numbers([trial for trial in trials if trial.part == part]) for part in parts},
-    )
-
-
-def _numbers(trials: list[Trial]) -> dict[str, Any]:
-    measured = [trial for trial in trials if trial.measured is not None]
-    predicted = np.array([trial.predicted for trial in measured])
-    true = np.array([trial.measured for trial in measured])
-    n_success = sum(trial.success for trial in trials)
-    reasons = sorted({trial.reason for trial in trials if trial.reason})
-    return dict(
-        trials=len(trials),
-        successes=n_success,
-        success_rate=n_success / len(trials) if trials else None,
-        success_interval=list(wilson_interval(n_success, len(trials))) if trials else None,
-        measured=len(measured),
-        translation_rmse=translation_rmse(predicted, true) if measured else None,
-        rotation_rmse=rotation_rmse(predicted, true) if measured else None,
-        translation_rmse_of_zero=translation_rmse(0 * true, true) if measured else None,
-        rotation_rmse_of_zero=rotation_rmse(0 * true, true) if measured else None,
-        median_planning_s=float(np.median([trial.planning_s for trial in trials])) if trials else None,
-        reasons={reason: sum(trial.reason == reason for trial in trials) for reason in reasons},
-    )
-
-
-def print_report(report: dict[str, Any], console: Console) -> None:
-    """A row a part and one for all; "of zero" is the error of predicting no displacement at all."""
-    table = Table(title="Planned grasps")
-    for name in ("part", "lifted", "95 % interval", "RMSE", "of zero", "turn RMSE", "of zero", "failures"):
-        table.add_column(name, justify="left" if name in ("part", "failures") else "right")
-    for name, row in [*report["parts"].items(), ("all", report["overall"])]:
-        if name == "all":
-            table.add_section()
-        low, high = row["success_interval"]
-        table.add_row(
-            name,
-            f"{row['successes']} of {row['trials']}",
-            f"{low:.0%} - {high:.0%}",
-            _unit(row["translation_rmse"], 1e3, "mm"),
-            _unit(row["translation_rmse_of_zero"], 1e3, "mm"),
-            _unit(row["rotation_rmse"], 180 / np.pi, "deg"),
-            _unit(row["rotation_rmse_of_zero"], 180 / np.pi, "deg"),
-            ", ".join(f"{reason} {n}" for reason, n in row["reasons"].items()),
-        )
-    console.print(table)
-    console.print(f"median planning time {report['overall']['median_planning_s']:.2f} s")
-
-
-def _unit(value: float | None, scale: float, unit: str) -> str:
-    return "-" if value is None else f"{value * scale:.1f} {unit}"
 
 
 if __name__ == "__main__":

@@ -69,9 +69,8 @@ class GraspDisplacementEnv(BaseEnv):
     """
 
     _sample_video_link = None
-    SUPPORTED_ROBOTS: ClassVar = None  # the agent class is built from the physics settings
     SUPPORTED_REWARD_MODES: ClassVar = ("sparse", "none")
-    agent: GraspPanda
+    agent: GraspPanda  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __init__(
         self,

@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -59,7 +59,7 @@ class _Worker:
 
 def make_shards(
     config: CollectConfig, tasks: Sequence[ShardTask], n_workers: int
-) -> Iterator[Progress | Finished | Lost]:
+) -> Generator[Progress | Finished | Lost, None, None]:
     """Makes shards in parallel and tells of every step; closing the iterator stops all workers.
 
     A shard whose worker dies is made again by another, at most `MAX_TRIES` times.

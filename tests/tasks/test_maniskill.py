@@ -87,9 +87,7 @@ def test_record_episode_writes_a_trajectory(boxes, tmp_path):
 def test_maniskills_demo_finds_and_runs_the_task():
     command = [sys.executable, "-m", "mani_skill.examples.demo_random_action"]
     command += ["-e", "tasks:GraspDisplacement-v1", "--quiet", "-o", "state", "--render-mode", "none"]
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=240, cwd=Path(__file__).parents[2]
-    )
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, cwd=Path(__file__).parents[2])
     assert done.returncode == 0, done.stderr[-2000:]
 
 
