@@ -42,6 +42,19 @@ class NetworkConfig(Config):
     dropout: float = Field(default=0.5, ge=0.0, lt=1.0)
     variance: bool = True
     """False: the displacement network predicts the mean alone (the paper's GCIP-M)."""
+    least_std: tuple[float, float] = (0.0, 0.0)
+    """Deviation, metres and radians, below which no displacement is claimed to be known (paper: none).
+
+    Most parts do not rise in the hand by 0.1 mm, some rise by 10 mm: without a floor the likelihood drives
+    the variance of z so low that one such part costs more than all others gain.
+    """
+
+    @field_validator("least_std")
+    @classmethod
+    def _not_negative(cls, values: tuple[float, float]) -> tuple[float, float]:
+        if not all(0 <= value < float("inf") for value in values):
+            raise ValueError("deviations must not be negative")
+        return values
 
 
 class Normalisation(Config):
@@ -161,6 +174,10 @@ class GraspDisplacementNetwork(nn.Module):
         self.target_std: Tensor
         self.register_buffer("target_mean", torch.tensor(normalisation.target_mean), persistent=False)
         self.register_buffer("target_std", torch.tensor(normalisation.target_std), persistent=False)
+        metres, radians = config.least_std
+        self.least_variance: Tensor
+        floor = torch.tensor([metres, metres, metres, radians]).square()
+        self.register_buffer("least_variance", floor, persistent=False)
 
     def forward(self, patches: Tensor, centre_grasp: Tensor) -> tuple[Tensor, Tensor | None]:
         """Mean (n, 4) and variance (n, 4) of the grasp displacement, in metres and radians (squared).
@@ -177,7 +194,7 @@ class GraspDisplacementNetwork(nn.Module):
             return mean, None
         # The bound keeps one odd batch from driving the exponential to infinity or to zero.
         log_variance = self.variance_head(features).clamp(-_LOG_VARIANCE_LIMIT, _LOG_VARIANCE_LIMIT)
-        return mean, self.target_std.square() * log_variance.exp()
+        return mean, self.target_std.square() * log_variance.exp() + self.least_variance
 
     def start_from(self, gqn: GraspQualityNetwork) -> None:
         """Copies the convolutions' weights of a trained GQN (paper, figure 3)."""
