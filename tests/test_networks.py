@@ -83,6 +83,17 @@ def test_an_untrained_network_predicts_in_the_units_of_its_targets():
     assert torch.allclose(variance, torch.tensor(NORMAL.target_std).square())
 
 
+def test_no_displacement_is_claimed_to_be_known_below_the_floor():
+    models = small_models(least_std=(0.0005, 0.01))
+    with torch.no_grad():
+        models.gdn.variance_head[-1].bias.fill_(-100.0)
+    _, variance = models.grasp_displacement(torch.rand(2, 1, 32, 32), torch.zeros(2, 3))
+    floor = torch.tensor([0.0005, 0.0005, 0.0005, 0.01])
+    assert bool((variance.sqrt() >= floor * 0.999).all()) and torch.allclose(
+        variance.sqrt(), floor, rtol=0.01
+    )
+
+
 def test_preprocessing_standardises_and_ignores_the_height():
     patches = torch.rand(3, 1, 32, 32) * 0.05
     done = preprocess(patches)
