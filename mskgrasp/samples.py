@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +47,31 @@ class Samples:
 
     def __len__(self) -> int:
         return len(self.success)
+
+    def of_parts_between(self, low: float, high: float) -> Samples:
+        """The samples of the parts of which a share in [low, high] of the grasps succeeded.
+
+        Raises:
+            BadDataset: No part is left.
+        """
+        rates = [float(self.success[self.part == i].float().mean()) for i in range(len(self.parts))]
+        kept = [i for i, rate in enumerate(rates) if low <= rate <= high]
+        if not kept:
+            found = ", ".join(f"{rate:.0%}" for rate in sorted(rates))
+            raise BadDataset(
+                f"no part's success lies in {low:g}..{high:g} (found {found}); widen success_range"
+            )
+        rows = torch.isin(self.part, torch.tensor(kept, device=self.part.device))
+        return replace(
+            self,
+            patches=self.patches[rows],
+            centre_grasp=self.centre_grasp[rows],
+            success=self.success[rows],
+            displacement=self.displacement[rows],
+            grasp_displacement=self.grasp_displacement[rows],
+            part=torch.searchsorted(torch.tensor(kept), self.part[rows]),
+            parts=tuple(self.parts[i] for i in kept),
+        )
 
 
 def read_samples(

@@ -147,7 +147,7 @@ def _read(config: TrainConfig, data: Path, progress: Progress) -> Samples:
         advance=lambda done, total: progress.update(task, completed=done, total=total),
     )
     progress.remove_task(task)
-    return samples
+    return samples.of_parts_between(*config.success_range)
 
 
 def _table(history: list[dict[str, Any]]) -> str:

@@ -54,6 +54,8 @@ class LearningConfig(Config):
     seed: int = Field(default=0, ge=0)
     validation_fraction: float = Field(default=0.2, gt=0.0, lt=1.0)
     """Share of the parts that training never sees."""
+    success_range: tuple[float, float] = (0.0, 1.0)
+    """Parts whose share of successful random grasps lies outside are left out (paper: 0.05 to 0.40)."""
     network: NetworkConfig = NetworkConfig()
     noise_std: float = Field(default=0.003, ge=0.0)
     """Noise on each pixel of a training patch, metres."""

@@ -282,3 +282,19 @@ def test_the_configurations_that_are_shipped_can_be_read(name):
             epochs=100,
             batch_size=32,
         )
+
+
+def test_parts_outside_the_success_range_are_left_out(dataset):
+    samples = read_samples(dataset, patch_pixels=40, patch_side=0.128)
+    rates = sorted(
+        float(samples.success[samples.part == i].float().mean()) for i in range(len(samples.parts))
+    )
+    middle = rates[len(rates) // 2]
+    kept = samples.of_parts_between(0.0, middle)
+    assert 0 < len(kept.parts) < len(samples.parts) and len(kept) < len(samples)
+    for i, name in enumerate(kept.parts):
+        rows = samples.part == samples.parts.index(name)
+        assert float(kept.success[kept.part == i].float().mean()) <= middle
+        assert torch.equal(kept.patches[kept.part == i], samples.patches[rows])
+    with pytest.raises(BadDataset, match="widen success_range"):
+        samples.of_parts_between(0.999, 0.9991)

@@ -43,7 +43,6 @@ class SapienWorld:
         self.region = region
         self._home = torch.as_tensor(home, dtype=torch.float64)[None]
         self._first = (part, seed)
-        self._loaded = ""
         self._users = 0
         self._gym: gymnasium.Env | None = None
 
@@ -77,7 +76,6 @@ class SapienWorld:
                 sim_backend="physx_cpu",
                 render_backend=render_backend(),
             )
-            self._loaded = folder
             self.present(part, seed)
 
     def close(self) -> None:
@@ -96,7 +94,6 @@ class SapienWorld:
         folder = str(find_part(part).folder)
         # A fresh scene each time, so that a trial does not depend on those before it.
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
-        self._loaded = folder
         self.env.motion.place(self._home)
         self.env.motion.step(self.env.motion.n_steps(self.physics.settle_s))
 

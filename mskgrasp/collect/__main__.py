@@ -10,13 +10,13 @@ from pathlib import Path
 from rich.console import Console
 from tqdm import tqdm
 
-from mskgrasp.cli import parse, run
+from mskgrasp.cli import make_folder, parse, run
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary
 from mskgrasp.collect.shard import ShardTask
 from mskgrasp.collect.workers import Finished, Lost, Progress, make_shards
 from mskgrasp.config import read_config, write_config
-from mskgrasp.dataset import check_shard, shard_path
+from mskgrasp.dataset import read_shard, shard_path
 from mskgrasp.errors import BadConfig, BadDataset, BadPart
 from mskgrasp.parts import Part, builtin_names, find_part
 
@@ -44,10 +44,12 @@ def main() -> int:
 
 def collect(config: CollectConfig) -> None:
     """Makes the shards that are missing and sums up the dataset."""
+    check_out(config)
     parts = chosen_parts(config)
     begin(config)
     everything = plan_shards(config, parts)
-    missing = [task for task in everything if not is_done(config.out, task)]
+    hashes = {part.name: part.content_hash for part in parts}
+    missing = [task for task in everything if not is_done(config.out, task, hashes[task.part])]
     done = sum(task.n for task in everything) - sum(task.n for task in missing)
     n_workers = min(config.workers or os.cpu_count() or 1, max(1, len(missing)))
     print(
@@ -83,11 +85,11 @@ def chosen_parts(config: CollectConfig) -> list[Part]:
     return parts
 
 
-def begin(config: CollectConfig) -> None:
-    """Opens the dataset's folder: new, or begun with the same settings.
+def check_out(config: CollectConfig) -> None:
+    """Refuses an output folder that holds something else; changes nothing.
 
     Raises:
-        BadDataset: The folder holds something else.
+        BadDataset: A file is in the way, or the folder was begun with other settings, or is no dataset.
     """
     settings = config.out / "config.yaml"
     if config.out.exists() and not config.out.is_dir():
@@ -95,8 +97,6 @@ def begin(config: CollectConfig) -> None:
     if not settings.exists():
         if config.out.is_dir() and any(config.out.iterdir()):
             raise BadDataset(f"--out {config.out} holds other files; choose a new folder")
-        (config.out / "shards").mkdir(parents=True, exist_ok=True)
-        write_config(config, settings)
         return
     try:
         before = read_config(CollectConfig, settings).identity()
@@ -109,6 +109,13 @@ def begin(config: CollectConfig) -> None:
             f"{config.out} was begun with other settings ({', '.join(changed)} differ); choose another "
             "--out, or the settings in its config.yaml"
         )
+
+
+def begin(config: CollectConfig) -> None:
+    """Opens the dataset's folder, and clears away what a killed run left half-written."""
+    make_folder(config.out / "shards")
+    if not (config.out / "config.yaml").exists():
+        write_config(config, config.out / "config.yaml")
     for leftover in (config.out / "shards").glob("*.tmp"):
         leftover.unlink()
 
@@ -130,16 +137,24 @@ def plan_shards(config: CollectConfig, parts: list[Part]) -> list[ShardTask]:
     ]
 
 
-def is_done(out: Path, task: ShardTask) -> bool:
-    """Whether a shard lies on disk and is whole; a damaged one is put aside to be made again."""
+def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
+    """Whether a shard lies on disk and is whole; a damaged one is told of, to be made again.
+
+    Raises:
+        BadDataset: The part has changed since the shard was made.
+    """
     path = shard_path(out, task.part, task.index)
     if not path.exists():
         return False
     try:
-        check_shard(path)
+        _, info = read_shard(path)
     except BadDataset as error:
         print(f"making again: {error}", file=sys.stderr)
         return False
+    if info.part_hash != part_hash:
+        raise BadDataset(
+            f"{path}: part '{task.part}' has changed since; delete its shards or choose another --out"
+        )
     return True
 
 
