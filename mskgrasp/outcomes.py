@@ -94,7 +94,9 @@ def draw_errors(trials: list[Trial], path: Path) -> None:
         _points(turn, degrees[0], degrees[1], degrees[2], "turn")
         for axes, unit in ((shift, "mm"), (turn, "deg")):
             axes.axline((0, 0), slope=1, color="#c5c9d0", lw=1, zorder=0)
+            low, high = (f(*axes.get_xlim(), *axes.get_ylim()) for f in (min, max))
             axes.set(xlabel=f"predicted, {unit}", ylabel=f"measured, {unit}", aspect="equal")
+            axes.set(xlim=(low, high), ylim=(low, high))
         rmse = ("no success was measured", "")
         if measured:
             rmse = (
@@ -103,7 +105,7 @@ def draw_errors(trials: list[Trial], path: Path) -> None:
             )
         shift.set_title(f"Displacement in the hand: {rmse[0]}", loc="left", fontsize=11)
         turn.set_title(f"Turn in the hand: {rmse[1]}", loc="left", fontsize=11)
-        shift.legend(frameon=False)
+        shift.legend(frameon=False, loc="lower right")
         figure.savefig(path, dpi=150)
 
 
