@@ -49,8 +49,13 @@ def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
     """
     device = "cuda" if torch.cuda.is_available() else "cpu"
     workspace = cell.workspace
-    config = config.model_copy(update=dict(min_height=workspace.min_height))
-    return Planner(load_models(models, device), config, table_z=workspace.table_z, region=workspace.region)
+    return Planner(
+        load_models(models, device),
+        config,
+        table_z=workspace.table_z,
+        region=workspace.region,
+        min_height=workspace.min_height,
+    )
 
 
 def present(cell: Cell, part: str, seed: int) -> None:

@@ -30,8 +30,6 @@ class PlannerConfig(Config):
     """quality: take the best quality, whatever its variance (the paper's experiment 1)."""
     min_quality: float = Field(default=0.0, ge=0.0, le=1.0)
     """A grasp whose predicted quality is lower is not taken."""
-    min_height: float = Field(default=0.002, gt=0.0)
-    """What rises less above the table is table, metres."""
     chunk_size: int = Field(default=32, ge=1)
     """Grasps a network sees at once: more do not fit a CPU's cache (measured: 32 beats 256 by half)."""
 
@@ -113,8 +111,11 @@ class Planner:
         *,
         table_z: float,
         region: tuple[float, float, float, float],
+        min_height: float = 0.002,
     ):
-        """Takes the workspace's table height and region (x_min, x_max, y_min, y_max), base, metres.
+        """Takes the workspace: table height, region (x_min, x_max, y_min, y_max), least height of a part.
+
+        All in metres, base frame.
 
         Raises:
             BadModel: The policy needs variances and the model predicts none.
@@ -127,6 +128,7 @@ class Planner:
         self.config = config
         self.table_z = table_z
         self.region = region
+        self.min_height = min_height
 
     def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
         """Plans a grasp of the part that a frame shows.
@@ -177,7 +179,7 @@ class Planner:
             frame.T_base_camera,
             table_z=self.table_z,
             region=self.region,
-            min_height=self.config.min_height,
+            min_height=self.min_height,
         )
         return view, sample_grasps(view, self.config.n_candidates, rng)
 

@@ -155,8 +155,7 @@ class GraspDisplacementEnv(BaseEnv):
         builder = self.scene.create_actor_builder()
         half = np.array([0.5, 0.7, 0.02])
         pose = sapien.Pose(p=to_world(np.array([0.45, 0.0, TABLE_Z - half[2]])))
-        # PhysX averages the two materials of a contact; the part's is that of the pads.
-        mu = max(0.0, 2 * self.physics.friction_table_part - self.physics.friction_pad_part)
+        mu = self.physics.friction_table
         builder.add_box_collision(pose, half, material=PhysxMaterial(mu, mu, 0.0))
         if self.scene.can_render():
             look = sapien.render.RenderMaterial(base_color=(0.33, 0.35, 0.38, 1.0), roughness=0.9)

@@ -6,7 +6,7 @@ Every default has its reason beside it; docs/physics.md tells the measurements.
 from __future__ import annotations
 
 from mani_skill.utils.structs.types import GPUMemoryConfig, SceneConfig, SimConfig
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from mskgrasp.config import Config
 
@@ -50,6 +50,17 @@ class Physics(Config):
     """Height of the pads over the part's top at which the straight descent begins, m."""
     reflex_force: float = Field(default=20.0, gt=0)
     """Contact force on the hand that ends a descent, N, as the robot's reflex would."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Physics:
+        if self.friction_table < 0:
+            raise ValueError("friction_table_part must be at least half of friction_pad_part")
+        return self
+
+    @property
+    def friction_table(self) -> float:
+        """The table's own coefficient: PhysX averages both materials, and the part's is that of the pads."""
+        return 2 * self.friction_table_part - self.friction_pad_part
 
     def sim_config(self) -> SimConfig:
         """ManiSkill's configuration for these settings."""
