@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import threading
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
+from hal.device import Device
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace
 from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply
 from mskgrasp.grasp import MAX_OPENING, lowest_grasp_z
@@ -75,7 +74,7 @@ class ArmLimits:
     max_force: float
 
 
-class Arm(ABC):
+class Arm(Device):
     """A seven-axis arm with a parallel gripper; SI units, poses in the base frame.
 
     Commands block until the motion is over. The base class checks limits before a motion and arrival
@@ -193,28 +192,6 @@ class Arm(ABC):
         self._recover()
         self._stop.clear()
         self._fault = None
-
-    # ------------------------------------------------------------------ life
-
-    @abstractmethod
-    def connect(self) -> None:
-        """Opens the connection; nothing moves."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """Stops and releases the arm; safe to call twice."""
-
-    def __enter__(self) -> Self:
-        self.connect()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     # ------------------------------------------------------------------ checks
 

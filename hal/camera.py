@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
+from hal.device import Device
 from mskgrasp.geometry import Pose
 
 
@@ -34,20 +33,8 @@ class RgbdFrame:
     serial: str
 
 
-class Camera(ABC):
+class Camera(Device):
     """A calibrated depth camera. Construction neither connects nor captures; ``with`` does."""
-
-    @abstractmethod
-    def connect(self) -> None:
-        """Opens the device.
-
-        Raises:
-            DriverMissing, NotConnected: No driver, or no such device.
-        """
-
-    @abstractmethod
-    def close(self) -> None:
-        """Releases the device; safe to call twice."""
 
     @abstractmethod
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
@@ -57,15 +44,3 @@ class Camera(ABC):
             NotConnected: Outside the camera's context.
             CaptureFailed: No complete and fresh frame came within ``timeout_s``.
         """
-
-    def __enter__(self) -> Self:
-        self.connect()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

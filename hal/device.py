@@ -1,0 +1,35 @@
+"""What arms and cameras share: they are connected and released, as context managers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from types import TracebackType
+from typing import Self
+
+
+class Device(ABC):
+    """Something to connect to. Construction neither connects nor moves; ``with`` does."""
+
+    @abstractmethod
+    def connect(self) -> None:
+        """Opens the device; nothing moves.
+
+        Raises:
+            DriverMissing, NotConnected: No driver, or no such device.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Stops and releases the device; safe to call twice."""
+
+    def __enter__(self) -> Self:
+        self.connect()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
