@@ -33,6 +33,14 @@ TABLE_CLEARANCE = 0.001
 """Least distance between the pads and the table at the grasp, metres."""
 MAX_OPENING = 0.08
 """Distance between the pads of the open hand, metres (Franka Hand datasheet)."""
+MIN_GAP = 0.5e-3
+"""Pads closer than this hold nothing, metres."""
+MIN_RISE = 0.8
+"""Least share of the lift that a held part has risen."""
+HOLD_S = 0.2
+"""How long a lifted part is held before it is judged, seconds."""
+EJECTED_DISTANCE = 0.05
+"""A part that ends this far from where it lay, and not in the hand, was ejected, metres."""
 FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled")
 """Why an attempt failed, by code: a shard stores the index into this tuple."""
 

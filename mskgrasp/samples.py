@@ -69,7 +69,7 @@ class Samples:
             success=self.success[rows],
             displacement=self.displacement[rows],
             grasp_displacement=self.grasp_displacement[rows],
-            part=torch.searchsorted(torch.tensor(kept), self.part[rows]),
+            part=torch.searchsorted(torch.tensor(kept, device=self.part.device), self.part[rows]),
             parts=tuple(self.parts[i] for i in kept),
         )
 

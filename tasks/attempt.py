@@ -10,12 +10,12 @@ from mani_skill.utils.structs.actor import Actor
 from torch import Tensor
 
 from mskgrasp.geometry import Pose
-from mskgrasp.grasp import MAX_OPENING, lowest_grasp_z, object_displacement, pose_base_tcp
+from mskgrasp.grasp import MAX_OPENING, MIN_GAP, lowest_grasp_z, object_displacement, pose_base_tcp
 from tasks.contacts import HandContacts
 from tasks.frames import base_pose
 from tasks.kinematics import top_down
 from tasks.motion import PandaMotion, ease, ease_duration
-from tasks.outcome import MAX_DRIFT, MIN_GAP, MIN_PAD_FORCE, Observed, judge
+from tasks.outcome import MAX_DRIFT, MAX_TURN, MIN_PAD_FORCE, Observed, judge
 from tasks.panda import GraspPanda
 from tasks.physics import Physics
 
@@ -23,6 +23,8 @@ TABLE_Z = 0.0
 """Height of the table, base frame, m."""
 SPEED_WINDOW_S = 0.02
 """The last part of the hold, over which the part's speed in the hand is measured, s."""
+AFTERMATH_S = 0.3
+"""How long a part that was not lifted may fall, roll and come to rest before it is judged, s."""
 LEFT_BEHIND = 0.04
 """The hand this much higher than the part it should carry has lost it, m."""
 
@@ -69,36 +71,47 @@ class Attempt:
         Raises:
             ValueError: A grasp is too low or out of the arm's reach.
         """
-        check_grasps(grasp)
         physics, motion = self._physics, self._motion
+        pre_grasp, lifted = self._pre_grasp(grasp), grasp.clone()
+        lifted[:, 2] += physics.lift_height
+        for pose in (grasp, pre_grasp, lifted):
+            check_grasps(pose)
         began = motion.seconds
-        down = self._line(self._pre_grasp(grasp), grasp, physics.descend_speed)
+        down = self._line(pre_grasp, grasp, physics.descend_speed)
         motion.place(down[0])
         laid = base_pose(self._part)
         motion.step(motion.n_steps(physics.settle_s))
         rest = base_pose(self._part)
-        settled = (rest.position - laid.position).norm(dim=-1) < MAX_DRIFT
-        collided = torch.zeros_like(settled)
+        settled = at_rest(laid, rest)
+        collided, touched = torch.zeros_like(settled), torch.zeros_like(settled)
 
         def reflex(_: int) -> bool:
-            collided.logical_or_(self._contacts.hand_force().to(motion.device) > physics.reflex_force)
+            force = self._contacts.hand_force().to(motion.device)
+            collided.logical_or_(force > physics.reflex_force)
+            touched.logical_or_(force > 0)
             return bool((collided | ~settled).all())
 
         motion.follow(down, check=reflex, frozen=collided)
+        # A part that moved although nothing touched it was still toppling.
+        settled = settled & (touched | at_rest(rest, base_pose(self._part)))
         held, penetration = torch.zeros_like(settled), torch.zeros(motion.n, device=motion.device)
         alive = settled & ~collided
         if bool(alive.any()):
-            motion.move_fingers(-MAX_OPENING / 2)
+            motion.move_fingers(-MAX_OPENING / 2, frozen=collided)
             held, penetration = self.grip()
-        alive = alive & held
-        if bool(alive.any()):
-            self._lift(grasp, alive, collided)
+        carried = bool((alive & held).any())
+        if carried:
+            carried = self._lift(grasp, lifted, alive & held, collided, penetration)
+        if not carried and bool(alive.any()):
+            # Judged in flight, a part would be called missed or ejected by the moment of the look.
+            motion.step(motion.n_steps(AFTERMATH_S))
         return self._outcome(grasp, rest, settled, collided, held, penetration, began)
 
-    def _lift(self, grasp: Tensor, alive: Tensor, collided: Tensor) -> None:
+    def _lift(
+        self, grasp: Tensor, lifted: Tensor, alive: Tensor, collided: Tensor, penetration: Tensor
+    ) -> bool:
+        """Lifts and holds; False where nothing was left to hold. Deepens ``penetration`` in place."""
         motion, physics = self._motion, self._physics
-        lifted = grasp.clone()
-        lifted[:, 2] += physics.lift_height
         hand_z = base_pose(self._agent.tcp).position[:, 2]
         part_z = base_pose(self._part).position[:, 2]
 
@@ -106,12 +119,15 @@ class Attempt:
             hand_rise = base_pose(self._agent.tcp).position[:, 2] - hand_z
             part_rise = base_pose(self._part).position[:, 2] - part_z
             lost = ~alive | (self._gap() <= MIN_GAP) | (hand_rise - part_rise > LEFT_BEHIND)
+            torch.maximum(penetration, self.grip()[1], out=penetration)
             return bool(lost.all())
 
         up = self._line(grasp, lifted, physics.lift_speed)
         # An arm that its reflex has stopped stays where it is.
-        if motion.follow(up, check=all_lost, check_every=25, frozen=collided):
-            motion.step(motion.n_steps(physics.hold_s - SPEED_WINDOW_S))
+        if not motion.follow(up, check=all_lost, check_every=25, frozen=collided):
+            return False
+        motion.step(motion.n_steps(physics.hold_s - SPEED_WINDOW_S))
+        return True
 
     def _outcome(
         self,
@@ -196,6 +212,13 @@ class Attempt:
         share = ease(n_steps, self._motion.device)[:, None, None]
         start, goal = start.double(), goal.double()
         return top_down(start + share * (goal - start))[0]
+
+
+def at_rest(before: Pose, after: Pose) -> Tensor:
+    """(n,) whether the parts neither moved nor turned between two looks, beyond the bounds of rest."""
+    cosine = (before.quat_wxyz * after.quat_wxyz).sum(dim=-1).abs()
+    moved = (after.position - before.position).norm(dim=-1)
+    return (moved < MAX_DRIFT) & (cosine > math.cos(MAX_TURN / 2))
 
 
 def check_grasps(grasp: Tensor) -> None:

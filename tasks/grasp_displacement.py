@@ -19,14 +19,13 @@ from torch import Tensor
 
 from mskgrasp.config import check_config
 from mskgrasp.geometry import Pose
-from mskgrasp.grasp import MAX_OPENING
+from mskgrasp.grasp import MIN_RISE
 from mskgrasp.parts import Part, builtin_names, find_part
 from tasks.attempt import TABLE_Z, Attempt
 from tasks.camera import Overhead, camera_config
 from tasks.contacts import HandContacts
 from tasks.frames import BASE_IN_WORLD, base_pose, to_world
 from tasks.motion import PandaMotion
-from tasks.outcome import MIN_RISE
 from tasks.panda import GraspPanda, panda_for
 from tasks.part_actor import build_part, hull_vertices
 from tasks.physics import Physics
@@ -187,10 +186,10 @@ class GraspDisplacementEnv(BaseEnv):
         self.part.set_pose(ManiSkillPose.create_from_pq(to_world(pose[:, :3]), pose[:, 3:]))
         qpos = np.tile(self.agent.rest_qpos, (len(env_idx), 1))
         self.agent.reset(qpos)
-        self.agent.set_drives()
-        if len(env_idx) == self.num_envs:
-            self.motion.seconds = 0.0
-            self.motion.finger_target = torch.full((self.num_envs,), MAX_OPENING / 2, device=self.device)
+        if len(env_idx) == self.num_envs and self.agent.control_mode == "grasp":
+            # This mode's controller sets no targets: the drives would pull towards the last attempt.
+            rest = torch.as_tensor(self.agent.rest_qpos[:7], dtype=torch.float64, device=self.device)
+            self.motion.place(rest.expand(self.num_envs, 7))
 
     # ------------------------------------------------------------------ looking
 

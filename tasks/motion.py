@@ -157,20 +157,38 @@ class PandaMotion:
         self.set_arm(last, still)
         return True
 
-    def move_fingers(self, target: float, speed: float | None = None) -> None:
+    def move_fingers(
+        self,
+        target: float,
+        *,
+        force: float | None = None,
+        check: Callable[[], bool] | None = None,
+        frozen: Tensor | None = None,
+    ) -> bool:
         """Ramps the fingers' targets to ``target`` (metres from the middle) and waits until they stop.
 
         A target inside the part keeps pressing with the drive's force limit.
+
+        Args:
+            target: Of each finger, negative to press.
+            force: The drives' force limit, N; that of the physics settings by default.
+            check: Asked every few steps; True ends the motion, the fingers stay where they are.
+            frozen: (n,) bool, hands whose fingers do not move.
+
+        Returns:
+            False where ``check`` ended the motion.
         """
-        speed = speed or self._physics.finger_speed
-        start = self.finger_target
+        speed, start = self._physics.finger_speed, self.finger_target
         way = target - start
+        if frozen is not None:
+            way = torch.where(frozen, torch.zeros_like(way), way)
+        goal = start + way
         n_ramp = max(1, math.ceil(float(way.abs().max()) / speed * self._physics.rate_hz))
         done = torch.arange(1, n_ramp + 1, device=self.device)[:, None] * speed / self._physics.rate_hz
         ramp = start + way.sign() * torch.minimum(done, way.abs())
         quiet = torch.zeros(self.n, dtype=torch.int64, device=self.device)
         # A held part stops the fingers before their targets; wait until the drives press in full.
-        lag = self._physics.finger_force / self._physics.finger_stiffness
+        lag = (force or self._physics.finger_force) / self._physics.finger_stiffness
         last = self._agent.robot.get_qpos()[:, 7:9]
         far = STILL_FINGER * _CHECK_EVERY / self._physics.rate_hz
         for i in range(n_ramp + self.n_steps(FINGER_TIMEOUT_S)):
@@ -179,13 +197,17 @@ class PandaMotion:
             self.step()
             if i % _CHECK_EVERY != _CHECK_EVERY - 1:
                 continue
+            if check is not None and check():
+                self.set_fingers(self._agent.robot.get_qpos()[:, 7:9].mean(dim=-1))
+                return False
             fingers = self._agent.robot.get_qpos()[:, 7:9]
             still = ((fingers - last).abs() < far).all(dim=-1)
             last = fingers
             middle = fingers.mean(dim=-1)
             pressing = (middle - ramp[min(i, n_ramp - 1)]).abs() > lag
-            arrived = (middle - target).abs() < 1e-3
+            arrived = (middle - goal).abs() < 1e-3
             quiet = torch.where(still & (pressing | arrived), quiet + _CHECK_EVERY, 0)
             if bool((quiet >= self.n_steps(STILL_S)).all()):
                 break
-        self.set_fingers(torch.full_like(start, target))
+        self.set_fingers(goal)
+        return True

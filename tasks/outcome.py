@@ -7,22 +7,18 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from mskgrasp.grasp import FAILURES
+from mskgrasp.grasp import EJECTED_DISTANCE, FAILURES, MIN_GAP, MIN_RISE
 
-MIN_GAP = 0.5e-3
-"""Fingers closer than this hold nothing, m."""
-MIN_RISE = 0.8
-"""Least share of the lift that the part must have risen."""
 MAX_RELATIVE_SPEED = 0.05
 """A held part moves slower than this against the hand, m/s."""
 MAX_PENETRATION = 1e-3
 """Deeper overlap of finger and part makes a label worthless, m."""
 MIN_PAD_FORCE = 0.05
 """Less force is no touch, N."""
-EJECTED_DISTANCE = 0.05
-"""A part that ends this far from where it lay, and not in the hand, was ejected, m."""
 MAX_DRIFT = 1e-3
 """A part that moves more than this on the table before it is grasped was not at rest, m."""
+MAX_TURN = 0.02
+"""Nor was one that turns by more than this, rad."""
 
 CODE = {name: i for i, name in enumerate(FAILURES)}
 

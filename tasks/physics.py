@@ -9,6 +9,7 @@ from mani_skill.utils.structs.types import GPUMemoryConfig, SceneConfig, SimConf
 from pydantic import Field, model_validator
 
 from mskgrasp.config import Config
+from mskgrasp.grasp import HOLD_S
 
 
 class Physics(Config):
@@ -40,13 +41,13 @@ class Physics(Config):
     """Peak speed of the straight descent, m/s."""
     lift_speed: float = Field(default=0.25, gt=0)
     """Peak speed of the straight lift, m/s."""
-    lift_height: float = Field(default=0.1, gt=0)
+    lift_height: float = Field(default=0.1, gt=0, le=0.3)
     """How far a part is lifted, m."""
-    hold_s: float = Field(default=0.2, ge=0.2)
+    hold_s: float = Field(default=HOLD_S, ge=HOLD_S)
     """How long the lifted part is held before it is judged, s."""
     settle_s: float = Field(default=0.06, ge=0)
     """How long a part may settle on the table before it is grasped, s."""
-    approach_clearance: float = Field(default=0.01, gt=0)
+    approach_clearance: float = Field(default=0.01, gt=0, le=0.1)
     """Height of the pads over the part's top at which the straight descent begins, m."""
     reflex_force: float = Field(default=20.0, gt=0)
     """Contact force on the hand that ends a descent, N, as the robot's reflex would."""

@@ -13,10 +13,9 @@ from hal.arm import Arm, ArmLimits, ArmState, GraspOutcome
 from hal.errors import MotionAborted, OutOfWorkspace
 from hal.sim.world import SapienWorld
 from mskgrasp.geometry import Pose
-from mskgrasp.grasp import MAX_OPENING
+from mskgrasp.grasp import MAX_OPENING, MIN_GAP
 from tasks.kinematics import forward, track
 from tasks.motion import ease, ease_duration
-from tasks.outcome import MIN_GAP
 
 JOINT_SPEED = 2.0
 """Greatest joint speed, rad/s (Panda datasheet: 2.175 rad/s for joints 1 to 4)."""
