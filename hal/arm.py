@@ -13,7 +13,7 @@ import numpy as np
 from hal.device import Device
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace
 from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply
-from mskgrasp.grasp import MAX_OPENING, lowest_grasp_z
+from mskgrasp.grasp import MAX_OPENING, PAD_REACH, TABLE_CLEARANCE, lowest_grasp_z
 
 JOINT_TOLERANCE = 5e-3
 """A joint motion has arrived within this, radians."""
@@ -21,6 +21,23 @@ POSITION_TOLERANCE = 2e-3
 """A straight motion has arrived within this, metres."""
 ROTATION_TOLERANCE = 1e-2
 """A straight motion has arrived within this, radians."""
+
+
+_PATH_CHECKS = 16
+# Corners of the pads and of the palm in the tcp frame, metres (collision boxes of the Panda's hand).
+_HAND_CORNERS = np.array(
+    [
+        [x * half_x, y * half_y, z]
+        for half_x, half_y, z in ((0.011, 0.056, PAD_REACH), (0.032, 0.102, -0.045))
+        for x in (-1, 1)
+        for y in (-1, 1)
+    ]
+)
+
+
+def lowest_point(T_base_tcp: Pose) -> float:
+    """Height of the lowest corner of the open hand, base frame, metres."""
+    return float(T_base_tcp.apply(_HAND_CORNERS)[:, 2].min())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +133,10 @@ class Arm(Device):
             raise OutOfWorkspace(
                 f"joint {i + 1} to {target[i]:.3f} rad is outside {lower[i]:.3f} .. {upper[i]:.3f} rad"
             )
-        _check_share("speed", speed)
+        if not 0 < speed <= 1:
+            raise OutOfWorkspace(f"speed {speed:g} is outside 0 .. 1 (a fraction of the greatest)")
+        self._require_connection()
+        self._check_joint_path(self._state().joints, target)
         with self._motion():
             self._move_to_joints(target, speed)
             error = np.abs(self._state().joints - target).max()
@@ -172,7 +192,12 @@ class Arm(Device):
             return self._grasp(force)
 
     def wait(self, seconds: float) -> None:
-        """Holds still for a time, seconds of the cell's own clock."""
+        """Holds still for a time, seconds of the cell's own clock.
+
+        Raises:
+            MotionAborted: Stopped.
+            NeedsRecovery: An earlier error was not acknowledged.
+        """
         with self._motion():
             self._wait(seconds)
 
@@ -196,7 +221,7 @@ class Arm(Device):
     # ------------------------------------------------------------------ checks
 
     def check_pose(self, T_base_tcp: Pose) -> None:
-        """Refuses a target outside the workspace or too near the table; moves nothing.
+        """Refuses a target outside the workspace, out of reach or too near the table; moves nothing.
 
         Raises:
             OutOfWorkspace: Says what is wrong with it.
@@ -211,11 +236,31 @@ class Arm(Device):
                 f"TCP target ({shown}) m is outside the workspace {np.round(lower, 3).tolist()} .. "
                 f"{np.round(upper, 3).tolist()} m"
             )
-        lowest = lowest_grasp_z(self.limits.table_z)
-        if position[2] < lowest - 1e-6:
+        clearance = lowest_point(T_base_tcp) - self.limits.table_z
+        if clearance < TABLE_CLEARANCE - 1e-6:
             raise OutOfWorkspace(
-                f"TCP target z {position[2]:.4f} m would bring the pads too near the table; "
-                f"the lowest is {lowest:.4f} m"
+                f"TCP target z {position[2]:.4f} m would bring the hand {clearance * 1e3:.1f} mm over the "
+                f"table; it must stay {TABLE_CLEARANCE * 1e3:g} mm above (pointing down: z >= "
+                f"{lowest_grasp_z(self.limits.table_z):.4f} m)"
+            )
+        if not self._reachable(T_base_tcp):
+            raise OutOfWorkspace(f"TCP target ({shown}) m is out of the arm's reach")
+
+    def _check_joint_path(self, start: np.ndarray, target: np.ndarray) -> None:
+        """Refuses a joint motion whose end, or way, brings the hand to the table or out of the box."""
+        begin = lowest_point(self._forward(start))
+        lowest = min(begin, self.limits.table_z + TABLE_CLEARANCE) - 1e-3
+        for share in np.linspace(0, 1, _PATH_CHECKS)[1:]:
+            height = lowest_point(self._forward(start + share * (target - start)))
+            if height < lowest:
+                raise OutOfWorkspace(
+                    f"the way to these joints brings the hand to {height:.3f} m; the table is at "
+                    f"{self.limits.table_z:g} m"
+                )
+        end = self._forward(target).position
+        if (end < self.limits.box_lower).any() or (end > self.limits.box_upper).any():
+            raise OutOfWorkspace(
+                f"these joints put the TCP at {np.round(end, 3).tolist()} m, outside the workspace"
             )
 
     def _require_connection(self) -> None:
@@ -233,6 +278,8 @@ class Arm(Device):
             raise NeedsRecovery("stop() was called; call recover() before the next motion")
         try:
             yield
+            if self._stop.is_set():
+                raise MotionAborted("stop() was called; call recover() when it is safe")
         except OutOfWorkspace:
             raise  # found out before anything moved
         except BaseException as error:
@@ -247,6 +294,14 @@ class Arm(Device):
 
     @abstractmethod
     def _state(self) -> ArmState: ...
+
+    @abstractmethod
+    def _forward(self, joints: np.ndarray) -> Pose:
+        """``T_base_tcp`` at joints (7,)."""
+
+    @abstractmethod
+    def _reachable(self, T_base_tcp: Pose) -> bool:
+        """Whether some joints within their limits put the TCP there."""
 
     @abstractmethod
     def _move_to_joints(self, joints: np.ndarray, speed: float) -> None: ...
@@ -268,8 +323,3 @@ class Arm(Device):
 
     @abstractmethod
     def _recover(self) -> None: ...
-
-
-def _check_share(name: str, value: float) -> None:
-    if not 0 < value <= 1:
-        raise OutOfWorkspace(f"{name} {value:g} is outside 0 .. 1")

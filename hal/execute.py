@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hal.arm import JOINT_TOLERANCE
 from hal.cell import Cell
 from hal.errors import MotionAborted
 from mskgrasp.geometry import Pose
-from mskgrasp.grasp import MAX_OPENING, pose_base_tcp
+from mskgrasp.grasp import HOLD_S, MAX_OPENING, MIN_GAP, pose_base_tcp
 
-HOLD_S = 0.2
-"""How long a lifted part is held before it is judged, s."""
-MIN_GAP = 0.5e-3
-"""Fingers closer than this hold nothing, m."""
 APPROACH = 0.12
 """Height over the table from which the straight descent begins, m."""
+
+RETREAT = 0.05
+"""How far the open hand first rises on its way home, so that it does not drag the part along, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +85,16 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
 
 
 def go_home(cell: Cell) -> None:
-    """Opens the fingers and moves the arm out of the camera's sight."""
-    cell.arm.move_gripper(MAX_OPENING)
-    cell.arm.move_to_joints(cell.workspace.home)
+    """Opens the fingers, retreats upward and moves the arm out of the camera's sight."""
+    arm = cell.arm
+    arm.move_gripper(MAX_OPENING)
+    state = arm.state()
+    if np.abs(state.joints - cell.workspace.home).max() < JOINT_TOLERANCE:
+        return
+    here = state.T_base_tcp
+    above = max(cell.workspace.table_z + APPROACH, here.position[2] + RETREAT)
+    above = min(above, float(arm.limits.box_upper[2]))
+    arm.move_to_pose(
+        Pose(position=np.array([*here.position[:2], above]), quat_wxyz=here.quat_wxyz), speed=0.25
+    )
+    arm.move_to_joints(cell.workspace.home)

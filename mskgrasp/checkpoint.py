@@ -52,6 +52,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     about = {name: getattr(checkpoint, name) for name in ("fingerprint", "stage", "epoch", "history")}
     temporary = path.with_name(path.name + ".tmp")
     save_file(tensors, temporary, metadata={"progress": json.dumps(about)})
+    temporary.chmod(0o644)  # safetensors makes it readable for its owner alone
     os.replace(temporary, path)
 
 

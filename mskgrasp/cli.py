@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import io
+import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import tyro
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from mskgrasp.config import check_config, read_config
 from mskgrasp.errors import BadConfig, MskgraspError, UsageError
@@ -41,23 +44,32 @@ def parse(
     path = path or default_config
     default = read_config(model, path) if path is not None else None
     note = f" Settings come from --config FILE (default: {default_config}); options override it."
+    # Without a file there may be required options: tyro asks for them.
+    known: dict[str, Any] = {} if default is None else {"default": default}
+    description += note if default_config else ""
+    printed = io.StringIO()
     try:
-        # Without a file there may be required options: let tyro ask for them.
-        if default is None:
-            parsed = tyro.cli(model, prog=prog, description=description, args=rest)
-        else:
-            parsed = tyro.cli(
-                model,
-                prog=prog,
-                description=description + (note if default_config else ""),
-                default=default,
-                args=rest,
-            )
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise BadConfig(f"--{key}: {first['msg'].lower()}, got {first.get('input')!r}") from error
+        with contextlib.redirect_stderr(printed):
+            parsed = tyro.cli(model, prog=prog, description=description, args=rest, **known)
+    except SystemExit:
+        _raise_range_error(printed.getvalue())
+        sys.stderr.write(printed.getvalue())
+        raise
     return check_config(model, parsed.model_dump(), "command line")
+
+
+def _raise_range_error(printed: str) -> None:
+    """Says in one line what tyro quotes from pydantic in a box; does nothing for tyro's own messages."""
+    text = " ".join(re.sub(r"[│╭╮╰╯─]", " ", printed).split())
+    found = re.search(
+        r"validation errors? for \S+ (?:([\w.]+) )?"
+        r"((?:Input should|Value error).*?) \[type=\w+, input_value=(.*?), input_",
+        text,
+    )
+    if found:
+        name, problem, value = found.groups()
+        option = f"--{name.replace('_', '-')}: " if name else ""
+        raise BadConfig(f"command line: {option}{problem.removeprefix('Value error, ')}, got {value}")
 
 
 def _take_config_option(arguments: list[str]) -> tuple[list[str], Path | None]:
@@ -89,6 +101,16 @@ def make_folder(path: Path) -> None:
         raise UsageError(f"cannot make folder {path}: {error.strerror}; choose another --out") from error
 
 
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+
+
+def explain_os_error(error: OSError) -> str:
+    """One line: what failed, where, and the remedy."""
+    place = f": {error.filename}" if error.filename else ""
+    remedy = "free some space, what is finished is kept" if error.errno in _FULL else "choose another path"
+    return f"{error.strerror or error}{place}; {remedy}"
+
+
 def run(main: Callable[[], int | None]) -> None:
     """Runs a program's ``main`` and ends the process: 0, 1 failure, 2 usage, 130 Ctrl-C.
 
@@ -107,9 +129,8 @@ def run(main: Callable[[], int | None]) -> None:
         sys.stderr.close()
         code = 0
     except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EACCES, errno.EROFS, errno.EDQUOT):
+        if error.filename is None and error.errno not in _FULL:
             raise
-        place = f" ({error.filename})" if error.filename else ""
-        print(f"error: {error.strerror}{place}: free some space or choose another --out", file=sys.stderr)
+        print(f"error: {explain_os_error(error)}", file=sys.stderr)
         code = 1
     sys.exit(code)

@@ -267,15 +267,6 @@ def read_shard(path: Path) -> tuple[Attempts, ShardInfo]:
     return attempts, info
 
 
-def check_shard(path: Path) -> None:
-    """Reads a shard for its errors only.
-
-    Raises:
-        BadDataset: As `read_shard`.
-    """
-    read_shard(path)
-
-
 def _check_header(file: h5py.File, path: Path) -> None:
     kind = file.attrs.get("format")
     if kind != _FORMAT:

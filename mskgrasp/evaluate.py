@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sys
 from pathlib import Path
@@ -13,10 +14,11 @@ from rich.console import Console
 from tqdm import tqdm
 
 from hal import Cell, go_home, open_cell
+from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.cli import make_folder, parse, run
 from mskgrasp.config import Config, read_config, write_config
-from mskgrasp.errors import BadDataset, NoGraspFound, NoPartFound
-from mskgrasp.networks import Models
+from mskgrasp.errors import BadDataset, NoGraspFound, NoPartFound, UsageError
+from mskgrasp.networks import Models, load_models
 from mskgrasp.outcomes import draw_errors, print_report, summarise
 from mskgrasp.parts import builtin_names, find_part
 from mskgrasp.pictures import draw_plan
@@ -27,7 +29,7 @@ from mskgrasp.trial import Trial, run_trial
 DESCRIPTION = """Plans and executes grasps on a cell and reports how often the part was lifted and how well
 its displacement in the hand was predicted.
 
-Runs through the hardware abstraction alone: the same program drives the simulated and the real cell.
+Runs through the hardware abstraction alone, so that another cell is another YAML file.
 Every finished trial is stored at once; a stopped run goes on where it was."""
 
 
@@ -63,23 +65,31 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
     """Executes the trials that are missing and sums them up.
 
     Raises:
-        BadDataset: The folder holds a run with other settings.
+        UsageError: The folder holds a run with other settings, another model or another cell.
     """
-    begin(config)
+    models = load_models(config.models)
+    names = chosen_parts(config, models)
+    begin(config, names)
     finished = read_trials(config.out / "trials.jsonl")
-    with open_cell(config.cell) as cell:
-        planner = make_planner(config.models, config.planner, cell)
-        plan = [
-            (name, number)
-            for name in chosen_parts(config, planner.models)
-            for number in range(config.trials)
-            if (find_part(name).name, number) not in finished
-        ]
-        for name, number in tqdm(plan, unit="trial", disable=None):
-            trial = _one(cell, planner, config, name, number)
-            finished[trial.part, trial.number] = trial
-            with (config.out / "trials.jsonl").open("a", encoding="utf-8") as file:
-                file.write(json.dumps(trial.to_json(), allow_nan=False) + "\n")
+    missing = [
+        (name, number)
+        for name in names
+        for number in range(config.trials)
+        if (find_part(name).name, number) not in finished
+    ]
+    if missing:
+        with open_cell(config.cell) as cell:
+            planner = make_planner(config.models, config.planner, cell)
+            for name, number in tqdm(missing, unit="trial", file=sys.stderr):
+                clear(cell)
+                trial = _one(cell, planner, config, name, number)
+                finished[trial.part, trial.number] = trial
+                # Stored before the arm moves again: what comes now must not cost what is known.
+                with (config.out / "trials.jsonl").open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(trial.to_json(), allow_nan=False) + "\n")
+                if trial.reason == "collided":
+                    cell.arm.recover()
+            clear(cell)
     trials = [finished[key] for key in sorted(finished)]
     report = summarise(trials)
     text = json.dumps(report, indent=1, allow_nan=False)
@@ -88,23 +98,31 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
     return report
 
 
+def clear(cell: Cell) -> None:
+    """Brings the arm home, out of the camera's sight; after a contact on the way it tries once more.
+
+    Raises:
+        MotionAborted: Something still holds it.
+    """
+    try:
+        go_home(cell)
+    except MotionAborted:
+        cell.arm.recover()
+        go_home(cell)
+
+
 def _one(cell: Cell, planner: Planner, config: EvaluateConfig, name: str, number: int) -> Trial:
     part = find_part(name).name
     seed = int(np.random.SeedSequence([config.seed, number]).generate_state(1)[0] >> 1)
     present(cell, name, seed)
     try:
         trial, frame, plan = run_trial(cell, planner, part=part, number=number, seed=seed)
-    except (NoPartFound, NoGraspFound) as error:
-        nothing = [0.0] * 4
+    except (NoPartFound, NoGraspFound, OutOfWorkspace) as error:
         return Trial(
-            part=part, number=number, seed=seed, success=False, reason=type(error).__name__, grasp=nothing,
-            quality=0.0, predicted=nothing, predicted_std=nothing, measured=None, tilt=None, planning_s=0.0,
+            part=part, number=number, seed=seed, success=False, reason=type(error).__name__, grasp=None,
+            quality=None, predicted=None, predicted_std=None, measured=None, tilt=None, planning_s=None,
         )  # fmt: skip
     draw_plan(frame, plan, config.out / "plans" / f"{part}-{number:03d}.png")
-    if trial.reason == "collided":
-        cell.arm.recover()
-    if number + 1 < config.trials:
-        go_home(cell)
     return trial
 
 
@@ -127,29 +145,45 @@ def chosen_parts(config: EvaluateConfig, models: Models) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def begin(config: EvaluateConfig) -> None:
-    """Opens the folder of the run: new, or begun with the same settings.
+def begin(config: EvaluateConfig, names: list[str]) -> None:
+    """Opens the folder of the run: new, or begun with the same settings, model, cell and parts.
 
     Raises:
-        BadDataset: It holds something else.
+        UsageError: It holds something else.
     """
+    inputs = {
+        "cell": _digest(config.cell),
+        "model.json": _digest(config.models / "model.json"),
+        "model.safetensors": _digest(config.models / "model.safetensors"),
+    } | {f"part {name}": find_part(name).content_hash for name in names}
+    settings, fingerprint = config.out / "config.yaml", config.out / "inputs.json"
+    if settings.exists() and fingerprint.exists():
+        before = read_config(EvaluateConfig, settings)
+        changed = [
+            name
+            for name in EvaluateConfig.model_fields
+            if name not in ("out", "trials", "parts") and getattr(before, name) != getattr(config, name)
+        ]
+        known = json.loads(fingerprint.read_text(encoding="utf-8"))
+        changed += [name for name, value in inputs.items() if known.get(name, value) != value]
+        if changed:
+            raise UsageError(
+                f"{config.out} was begun with other inputs ({', '.join(changed)} differ); "
+                "choose another --out"
+            )
+        inputs = known | inputs
+    elif config.out.is_dir() and any(config.out.iterdir()):
+        raise UsageError(f"--out {config.out} holds other files; choose a new folder")
     make_folder(config.out / "plans")
-    settings = config.out / "config.yaml"
-    if not settings.exists():
-        if (config.out / "trials.jsonl").exists():
-            raise BadDataset(f"{config.out} holds trials without their settings; choose another --out")
-        write_config(config, settings)
-        return
-    before, now = read_config(EvaluateConfig, settings), config
-    changed = [
-        name
-        for name in EvaluateConfig.model_fields
-        if name not in ("out", "trials") and getattr(before, name) != getattr(now, name)
-    ]
-    if changed:
-        raise BadDataset(
-            f"{config.out} was begun with other settings ({', '.join(changed)} differ); choose another --out"
-        )
+    write_config(config, settings)
+    fingerprint.write_text(json.dumps(inputs, indent=1) + "\n", encoding="utf-8")
+
+
+def _digest(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror}") from error
 
 
 def read_trials(path: Path) -> dict[tuple[str, int], Trial]:
@@ -165,7 +199,8 @@ def read_trials(path: Path) -> dict[tuple[str, int], Trial]:
     for i, line in enumerate(lines[:-1]):
         try:
             values = json.loads(line)
-            values["predicted_std"] = [np.nan if v is None else v for v in values["predicted_std"]]
+            if values["predicted_std"] is not None:
+                values["predicted_std"] = [np.nan if v is None else v for v in values["predicted_std"]]
             trial = Trial(**values)
         except (ValueError, TypeError, KeyError) as error:
             raise BadDataset(

@@ -98,6 +98,8 @@ def view_part(
             f"{highest * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the camera's pose"
         )
 
+    if mask[[0, -1]].any() or mask[:, [0, -1]].any():
+        raise NoPartFound("the part is cut off by the border of the image; move it towards the middle")
     T_base_axes = _box_axes(T_base_camera)
     cos, sin = quat_to_matrix(T_base_axes.quat_wxyz)[:2, 0]
     pitch = float(np.median(depth[mask])) / np.array([intrinsics[0][0], intrinsics[1][1]])

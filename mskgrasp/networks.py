@@ -299,6 +299,7 @@ def save_model(folder: Path, models: Models) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     temporary = folder / (WEIGHTS + ".tmp")
     save_file({name: value.contiguous().cpu() for name, value in weights.items()}, temporary)
+    temporary.chmod(0o644)  # safetensors makes it readable for its owner alone
     os.replace(temporary, folder / WEIGHTS)
     temporary = folder / (DESCRIPTION + ".tmp")
     temporary.write_text(json.dumps(models.meta.model_dump(mode="json"), indent=2) + "\n", encoding="utf-8")

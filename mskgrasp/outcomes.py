@@ -35,6 +35,7 @@ def _numbers(trials: list[Trial]) -> dict[str, Any]:
     measured = [trial for trial in trials if trial.measured is not None]
     predicted = np.array([trial.predicted for trial in measured])
     true = np.array([trial.measured for trial in measured])
+    planning = [trial.planning_s for trial in trials if trial.planning_s is not None]
     n_success = sum(trial.success for trial in trials)
     reasons = sorted({trial.reason for trial in trials if trial.reason})
     return dict(
@@ -47,7 +48,7 @@ def _numbers(trials: list[Trial]) -> dict[str, Any]:
         rotation_rmse=rotation_rmse(predicted, true) if measured else None,
         translation_rmse_of_zero=translation_rmse(0 * true, true) if measured else None,
         rotation_rmse_of_zero=rotation_rmse(0 * true, true) if measured else None,
-        median_planning_s=float(np.median([trial.planning_s for trial in trials])) if trials else None,
+        median_planning_s=float(np.median(planning)) if planning else None,
         reasons={reason: sum(trial.reason == reason for trial in trials) for reason in reasons},
     )
 
@@ -72,7 +73,8 @@ def print_report(report: dict[str, Any], console: Console) -> None:
             ", ".join(f"{reason} {n}" for reason, n in row["reasons"].items()),
         )
     console.print(table)
-    console.print(f"median planning time {report['overall']['median_planning_s']:.2f} s")
+    if report["overall"]["median_planning_s"] is not None:
+        console.print(f"median planning time {report['overall']['median_planning_s']:.2f} s")
 
 
 def _unit(value: float | None, scale: float, unit: str) -> str:

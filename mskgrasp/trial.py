@@ -9,11 +9,8 @@ import numpy as np
 
 from hal import Cell, GraspResult, RgbdFrame, execute_grasp
 from mskgrasp.geometry import Pose
-from mskgrasp.grasp import object_displacement, pose_base_tcp
+from mskgrasp.grasp import EJECTED_DISTANCE, MIN_RISE, object_displacement, pose_base_tcp
 from mskgrasp.planner import GraspPlan, Planner
-
-MIN_RISE = 0.8
-"""Least share of the lift that a held part must have risen (DESIGN: success)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,12 +21,13 @@ class Trial:
         part: Name of the part.
         number: Which trial of the part.
         seed: The part's place, its turn and the candidates follow from it.
-        success: The part was lifted and held.
+        success: The part was lifted and held, as far as the cell can tell: the arm feels the gap of its
+            fingers, a tracker sees how far the part has risen; neither sees contact or penetration.
         reason: Why not; empty where it was.
-        grasp: (4,) the executed grasp.
+        grasp: (4,) the executed grasp; None, as all that follows, where no grasp was found.
         quality: Predicted.
         predicted: (4,) expected object displacement, metres and radians.
-        predicted_std: (4,) its standard deviations.
+        predicted_std: (4,) its standard deviations; NaN where the model predicts none.
         measured: (4,) object displacement; None where not successful or nothing measures it.
         tilt: Measured tilt, radians, or None.
         planning_s: Seconds that planning took.
@@ -40,18 +38,19 @@ class Trial:
     seed: int
     success: bool
     reason: str
-    grasp: list[float]
-    quality: float
-    predicted: list[float]
-    predicted_std: list[float]
+    grasp: list[float] | None
+    quality: float | None
+    predicted: list[float] | None
+    predicted_std: list[float] | None
     measured: list[float] | None
     tilt: float | None
-    planning_s: float
+    planning_s: float | None
 
     def to_json(self) -> dict[str, Any]:
         """Plain values; NaN (an unknown deviation) becomes None."""
         values = asdict(self)
-        values["predicted_std"] = [v if np.isfinite(v) else None for v in self.predicted_std]
+        if self.predicted_std is not None:
+            values["predicted_std"] = [v if np.isfinite(v) else None for v in self.predicted_std]
         return values
 
 
@@ -96,11 +95,13 @@ def run_trial(
 def _failure(result: GraspResult, before: Pose | None, after: Pose | None, lift: float) -> str:
     if result.aborted is not None:
         return "collided"
-    if not result.lifted:
-        return "missed"
-    if not result.holding:
-        return "slipped"
     if before is not None and after is not None:
-        if after.position[2] - before.position[2] < MIN_RISE * lift:
-            return "slipped"
-    return ""
+        moved = after.position - before.position
+        if result.holding and moved[2] >= MIN_RISE * lift:
+            return ""
+        if np.linalg.norm(moved[:2]) > EJECTED_DISTANCE:
+            return "ejected"
+        return "slipped" if result.lifted else "missed"
+    if result.holding:
+        return ""
+    return "slipped" if result.lifted else "missed"

@@ -30,6 +30,21 @@ class Overhead(Config):
         centre = (self.n_pixels - 1) / 2
         return np.array([[self.focal_px, 0, centre], [0, self.focal_px, centre], [0, 0, 1.0]])
 
+    def check_sees(self, region: tuple[float, float, float, float]) -> None:
+        """Refuses a region that the image does not show whole.
+
+        Raises:
+            ValueError: Says how much it shows.
+        """
+        x_min, x_max, y_min, y_max = region
+        if not (x_min < x_max and y_min < y_max):
+            raise ValueError(f"region must be x_min < x_max, y_min < y_max, got {list(region)}")
+        seen = self.n_pixels * self.height / self.focal_px
+        if max(x_max - x_min, y_max - y_min) > seen:
+            raise ValueError(
+                f"the camera sees {seen:.2f} m of the table, less than the region {list(region)}"
+            )
+
     def T_base_camera(self, centre_xy: tuple[float, float]) -> Pose:  # noqa: N802 (a pose's name)
         """The optical frame over ``centre_xy`` (base frame, m): the image's top is away from the base."""
         matrix = np.eye(4)

@@ -20,16 +20,21 @@ def render_backend() -> str:
     Raises:
         NoRenderer: Neither is there; the message names the package to install.
     """
-    problems = []
-    for backend, device in (("sapien_cuda", "cuda"), ("cpu", "cpu")):
-        try:
-            sapien.render.RenderSystem(sapien.Device(device))
-        except RuntimeError as error:
-            problems.append(str(error).splitlines()[0])
-        else:
-            return backend
+    problem = ""
+    sapien.render.set_log_level("off")  # one line from us instead of three from Vulkan
+    try:
+        for backend, device in (("sapien_cuda", "cuda"), ("cpu", "cpu")):
+            try:
+                sapien.render.RenderSystem(sapien.Device(device))
+            except RuntimeError as error:
+                problem = str(error).splitlines()[0]
+            else:
+                return backend
+    finally:
+        sapien.render.set_log_level("warn")
     raise NoRenderer(
-        f"no usable Vulkan driver ({problems[-1]}); install your GPU's driver, or Mesa 24.3 or newer: on "
-        "Debian 12 enable bookworm-backports, then run: apt-get install -t bookworm-backports "
-        "mesa-vulkan-drivers"
+        f"no usable Vulkan driver ({problem}); install your GPU's driver, or Mesa 24.3 or newer. On "
+        "Debian 12, as root: echo 'deb http://deb.debian.org/debian bookworm-backports main' > "
+        "/etc/apt/sources.list.d/bookworm-backports.list && apt-get update && apt-get install -y "
+        "-t bookworm-backports mesa-vulkan-drivers libvulkan1"
     )

@@ -8,7 +8,6 @@ import pytest
 from mskgrasp import dataset
 from mskgrasp.dataset import (
     Attempts,
-    check_shard,
     depth_to_u16,
     list_shards,
     read_shard,
@@ -130,7 +129,7 @@ def test_missing_and_empty_folders_are_told_apart(tmp_path):
 def test_a_truncated_shard_is_told(shard, share):
     data = shard.read_bytes()
     shard.write_bytes(data[: int(share * len(data))])
-    assert shard.name in complaint(lambda: check_shard(shard))
+    assert shard.name in complaint(lambda: read_shard(shard))
 
 
 def test_a_shard_with_a_damaged_image_is_told(shard):
@@ -139,7 +138,7 @@ def test_a_shard_with_a_damaged_image_is_told(shard):
     data = bytearray(shard.read_bytes())
     data[place.byte_offset + 20 : place.byte_offset + 60] = b"\0" * 40
     shard.write_bytes(bytes(data))
-    assert "damaged" in complaint(lambda: check_shard(shard))
+    assert "damaged" in complaint(lambda: read_shard(shard))
 
 
 def test_foreign_files_are_told(tmp_path):
@@ -147,8 +146,8 @@ def test_foreign_files_are_told(tmp_path):
     text.write_text("hello")
     with h5py.File(other, "w") as file:
         file["x"] = 1
-    assert "no HDF5" in complaint(lambda: check_shard(text))
-    assert "no grasp shard" in complaint(lambda: check_shard(other))
+    assert "no HDF5" in complaint(lambda: read_shard(text))
+    assert "no grasp shard" in complaint(lambda: read_shard(other))
 
 
 def edit(path, change):
@@ -166,22 +165,22 @@ def replace(name, array):
 
 def test_other_schema_versions_and_missing_arrays_are_told(shard):
     edit(shard, lambda file: file.attrs.__setitem__("schema_version", 99))
-    assert "schema version 99" in complaint(lambda: check_shard(shard))
+    assert "schema version 99" in complaint(lambda: read_shard(shard))
     edit(shard, lambda file: file.attrs.__setitem__("schema_version", dataset.SCHEMA_VERSION))
     edit(shard, lambda file: file.__delitem__("tilt"))
-    assert "lacks the array tilt" in complaint(lambda: check_shard(shard))
+    assert "lacks the array tilt" in complaint(lambda: read_shard(shard))
 
 
 def test_a_missing_attribute_is_told(shard):
     edit(shard, lambda file: file.attrs.__delitem__("region"))
-    assert "region" in complaint(lambda: check_shard(shard))
+    assert "region" in complaint(lambda: read_shard(shard))
 
 
 def test_a_wrong_type_or_shape_is_told(shard):
     edit(shard, replace("depth", np.zeros((12, 160, 160), np.float32)))
-    assert "depth is float32, must be uint16" in complaint(lambda: check_shard(shard))
+    assert "depth is float32, must be uint16" in complaint(lambda: read_shard(shard))
     edit(shard, replace("depth", np.zeros((11, 160, 160), np.uint16)))
-    assert "depth has shape" in complaint(lambda: check_shard(shard))
+    assert "depth has shape" in complaint(lambda: read_shard(shard))
 
 
 def broken(attempts: Attempts, name: str, row: int, value) -> Attempts:

@@ -14,7 +14,7 @@ from hal.errors import MotionAborted, OutOfWorkspace
 from hal.sim.world import SapienWorld
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import MAX_OPENING, MIN_GAP
-from tasks.kinematics import forward, track
+from tasks.kinematics import HOME, forward, track
 from tasks.motion import ease, ease_duration
 
 JOINT_SPEED = 2.0
@@ -34,6 +34,7 @@ class SapienArm(Arm):
         super().__init__(limits)
         self._world = world
         self._open = False
+        self._force = 0.0
 
     def connect(self) -> None:
         """Builds the world, if the camera has not."""
@@ -80,9 +81,7 @@ class SapienArm(Arm):
         n_waypoints = max(2, math.ceil(distance / _WAYPOINT_M), math.ceil(angle / 0.05))
         line = _straight(here, T_base_tcp, np.linspace(0, 1, n_waypoints + 1)[1:])
         joints, error = track(torch.as_tensor(line), start)
-        lower, upper = self.limits.joint_lower, self.limits.joint_upper
-        inside = ((joints.numpy() >= lower) & (joints.numpy() <= upper)).all()
-        if float(error.max()) > UNREACHED or not inside:
+        if float(error.max()) > UNREACHED or not self._within_limits(joints.numpy()):
             target = ", ".join(f"{value:.3f}" for value in T_base_tcp.position)
             raise OutOfWorkspace(f"no straight line from here to TCP ({target}) m within the joint limits")
         share = ease(self._world.env.motion.n_steps(seconds), start.device)
@@ -106,9 +105,7 @@ class SapienArm(Arm):
 
     def _reflex_force(self) -> float:
         """The reflex watches for surprises: the gripper's own force on what it holds is none."""
-        physics = self._world.physics
-        pressing = float(self._world.env.motion.finger_target[0]) < 0
-        return physics.reflex_force + (physics.finger_force * 1.5 if pressing else 0.0)
+        return self._world.physics.reflex_force + 1.5 * self._force
 
     def _target(self) -> Tensor:
         """(7,) where the drives point: a motion starts there, so that nothing jumps."""
@@ -118,17 +115,35 @@ class SapienArm(Arm):
         )
 
     def _move_gripper(self, width: float) -> None:
-        self._world.env.motion.move_fingers(width / 2)
+        self._force = 0.0
+        self._world.env.motion.move_fingers(width / 2, check=self._stop.is_set)
 
     def _grasp(self, force: float) -> GraspOutcome:
         env = self._world.env
         env.agent.set_finger_force(force)
-        env.motion.move_fingers(-MAX_OPENING / 2)
+        self._force = force
+        env.motion.move_fingers(-MAX_OPENING / 2, force=force, check=self._stop.is_set)
         width = self._state().gripper_width
         return GraspOutcome(width=width, holding=width > MIN_GAP)
 
     def _wait(self, seconds: float) -> None:
-        self._world.env.motion.step(self._world.env.motion.n_steps(seconds))
+        motion = self._world.env.motion
+        for _ in range(motion.n_steps(seconds)):
+            if self._stop.is_set():
+                return
+            motion.step()
+
+    def _forward(self, joints: np.ndarray) -> Pose:
+        return Pose.from_matrix(forward(torch.as_tensor(joints, dtype=torch.float64))[0].numpy())
+
+    def _reachable(self, T_base_tcp: Pose) -> bool:
+        # From the usual ready pose: the elbow up, the hand down, far from every joint limit.
+        target = torch.as_tensor(T_base_tcp.as_matrix())[None]
+        joints, error = track(target, torch.tensor(HOME, dtype=torch.float64), iterations=40)
+        return float(error[0]) < UNREACHED and self._within_limits(joints.numpy())
+
+    def _within_limits(self, joints: np.ndarray) -> bool:
+        return bool(((joints >= self.limits.joint_lower) & (joints <= self.limits.joint_upper)).all())
 
     def _halt(self) -> None:
         """The drives hold their last targets; a motion in progress sees the stop flag."""

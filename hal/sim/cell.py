@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
+import torch
+from pydantic import Field, model_validator
 
 from hal.arm import ArmLimits
 from hal.cell import Cell, Workspace
@@ -15,7 +16,7 @@ from hal.sim.world import SapienWorld
 from mskgrasp.config import Config
 from tasks import REGION, Overhead, Physics
 from tasks.attempt import TABLE_Z
-from tasks.kinematics import JOINT_LOWER, JOINT_UPPER
+from tasks.kinematics import JOINT_LOWER, JOINT_UPPER, top_down
 
 READY = (0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398)
 """The Panda's usual ready pose, radians: the hand is behind the camera's field of view."""
@@ -43,6 +44,17 @@ class SapienCellConfig(Config):
     """The simulation."""
     camera: Overhead = Overhead()
     """The overhead depth camera."""
+
+    @model_validator(mode="after")
+    def _check(self) -> SapienCellConfig:
+        self.camera.check_sees(self.region)
+        corners = [(x, y) for x in self.region[:2] for y in self.region[2:]]
+        grasps = torch.tensor(
+            [[x, y, z, t] for x, y in corners for z in (0.0105, 0.3) for t in (-1.57, 1.57)]
+        )
+        if not bool(top_down(grasps.double())[1].all()):
+            raise ValueError(f"region {list(self.region)} reaches beyond the arm")
+        return self
 
 
 def sapien_cell(config: SapienCellConfig) -> Cell:

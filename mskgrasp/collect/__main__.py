@@ -17,7 +17,7 @@ from mskgrasp.collect.shard import ShardTask
 from mskgrasp.collect.workers import Finished, Lost, Progress, make_shards
 from mskgrasp.config import read_config, write_config
 from mskgrasp.dataset import read_shard, shard_path
-from mskgrasp.errors import BadConfig, BadDataset, BadPart
+from mskgrasp.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.parts import Part, builtin_names, find_part
 
 DESCRIPTION = """Simulates random grasps of parts and records what happened.
@@ -89,23 +89,23 @@ def check_out(config: CollectConfig) -> None:
     """Refuses an output folder that holds something else; changes nothing.
 
     Raises:
-        BadDataset: A file is in the way, or the folder was begun with other settings, or is no dataset.
+        UsageError: A file is in the way, or the folder was begun with other settings, or is no dataset.
     """
     settings = config.out / "config.yaml"
     if config.out.exists() and not config.out.is_dir():
-        raise BadDataset(f"--out {config.out} is a file; choose a folder")
+        raise UsageError(f"--out {config.out} is a file; choose a folder")
     if not settings.exists():
         if config.out.is_dir() and any(config.out.iterdir()):
-            raise BadDataset(f"--out {config.out} holds other files; choose a new folder")
+            raise UsageError(f"--out {config.out} holds other files; choose a new folder")
         return
     try:
         before = read_config(CollectConfig, settings).identity()
     except BadConfig as error:
-        raise BadDataset(f"{error}; choose another --out") from error
+        raise UsageError(f"{error}; choose another --out") from error
     now = config.identity()
     changed = [key for key in now if now[key] != before[key]]
     if changed:
-        raise BadDataset(
+        raise UsageError(
             f"{config.out} was begun with other settings ({', '.join(changed)} differ); choose another "
             "--out, or the settings in its config.yaml"
         )
@@ -173,8 +173,9 @@ def _simulate(config: CollectConfig, tasks: list[ShardTask], total: int, done: i
                     successes += outcome == 1
                     bar.set_postfix_str(f"success {successes / max(attempts, 1):.1%}", refresh=False)
                     bar.update(1)
-                case Lost(undone=undone, exit_code=code):
+                case Lost(undone=undone, undone_successes=undone_successes, exit_code=code):
                     bar.update(-undone)
+                    attempts, successes = attempts - undone, successes - undone_successes
                     bar.write(f"a worker died (exit code {code}); its shard is made again", file=sys.stderr)
                 case Finished():
                     pass

@@ -9,8 +9,7 @@ import tyro
 from pydantic import Field, model_validator
 
 from mskgrasp.config import Config
-from tasks.camera import Overhead
-from tasks.physics import Physics
+from tasks import REGION, Overhead, Physics
 
 
 class PartFilter(Config):
@@ -52,6 +51,7 @@ class CollectConfig(Config):
     def _check(self) -> CollectConfig:
         if self.shard_size > 10_000:
             raise ValueError("shard_size is at most 10000")
+        self.camera.check_sees(REGION)
         return self
 
     def identity(self) -> dict:

@@ -8,13 +8,14 @@ import os
 import signal
 import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
 from typing import Any
 
+from mskgrasp.cli import explain_os_error
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.shard import ShardTask
 from mskgrasp.errors import MskgraspError
@@ -46,6 +47,7 @@ class Lost:
 
     task: ShardTask
     undone: int
+    undone_successes: int
     exit_code: int | None
 
 
@@ -55,6 +57,7 @@ class _Worker:
     connection: Connection
     task: ShardTask | None = None
     done: int = 0
+    successes: int = 0
 
 
 def make_shards(
@@ -91,7 +94,7 @@ def make_shards(
                         raise WorkerFailed(
                             f"shard {event.task.index} of part '{event.task.part}' killed its worker "
                             f"{MAX_TRIES} times (exit code {event.exit_code}); leave the part out with "
-                            "--parts, or run with --workers 1 to see more"
+                            "--parts"
                         )
                     waiting.appendleft(event.task)
                 if event is not None:
@@ -115,7 +118,7 @@ def _start(context: Any, config: CollectConfig) -> _Worker:
 
 
 def _give(worker: _Worker, task: ShardTask) -> None:
-    worker.task, worker.done = task, 0
+    worker.task, worker.done, worker.successes = task, 0, 0
     try:
         worker.connection.send(task)
     except OSError:
@@ -127,16 +130,21 @@ def _listen(worker: _Worker) -> Progress | Finished | Lost | None:
         kind, value = worker.connection.recv()
     except (EOFError, OSError):
         worker.process.join(timeout=5)
-        if worker.task is None:
-            return Lost(task=_NO_TASK, undone=0, exit_code=worker.process.exitcode)
-        return Lost(task=worker.task, undone=worker.done, exit_code=worker.process.exitcode)
+        return Lost(
+            task=worker.task or _NO_TASK,
+            undone=worker.done,
+            undone_successes=worker.successes,
+            exit_code=worker.process.exitcode,
+        )
     if kind == "error":
         raise WorkerFailed(value)
     if kind == "progress":
         worker.done += 1
+        worker.successes += value == 1
         return Progress(outcome=value)
-    task, worker.task = worker.task, None
+    task = worker.task
     assert task is not None
+    worker.task, worker.done, worker.successes = None, 0, 0
     return Finished(task=task)
 
 
@@ -168,9 +176,10 @@ def _work(connection: Connection, config: CollectConfig) -> None:
     except MskgraspError as error:
         connection.send(("error", str(error)))
     except OSError as error:
-        place = f" ({error.filename})" if error.filename else ""
-        remedy = f"free some space for {Path(config.out)}; what is finished is kept, run the command again"
-        connection.send(("error", f"{error.strerror or error}{place}: {remedy}"))
+        connection.send(("error", explain_os_error(error)))
+    except Exception as error:
+        traceback.print_exc()  # a defect: its place is wanted, once
+        connection.send(("error", f"a worker failed: {type(error).__name__}: {error}"))
 
 
 def _leave_with_parent() -> None:

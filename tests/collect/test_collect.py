@@ -84,7 +84,7 @@ def test_a_finished_run_has_nothing_left_to_do(undisturbed):
 
 def test_other_settings_are_refused_for_a_begun_dataset(undisturbed):
     done = collect(undisturbed, "--seed", "6")
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "seed differ" in done.stderr and len(done.stderr.strip().splitlines()) == 1
 
 
@@ -167,6 +167,8 @@ def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(undisturb
         ("[1, 2]", 2, "expected a mapping"),
         ("parts: [", 2, "not valid YAML"),
         ("parts: [no_such_part]", 1, "no_such_part"),
+        ("camera: {height: 0.31}", 2, "the camera sees 0.14 m"),
+        ("physics: {friction_table_part: 0.1}", 2, "at least half of friction_pad_part"),
         ("part_filter: {min_length: 1.0}\nparts: [hex_nut_m30]", 1, "no part is left"),
     ],
 )

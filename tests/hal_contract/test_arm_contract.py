@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import threading
 import time
 
 import numpy as np
 import pytest
 
-from hal import Cell, cell_from_yaml, execute_grasp
+from hal import Cell, cell_from_yaml, execute_grasp, go_home
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace
-from mskgrasp.geometry import Pose
+from mskgrasp.geometry import Pose, quat_multiply
 from mskgrasp.grasp import pose_base_tcp
 from tests.hal_contract.conftest import CELLS
 
@@ -81,7 +82,7 @@ def test_a_command_outside_the_limits_is_refused_and_nothing_moves(cell: Cell, c
 
 
 def test_stop_from_another_thread_ends_a_motion_and_nothing_moves_before_recover(cell: Cell):
-    far = cell.workspace.home + np.array([1.2, 0, 0, 0, 0, 0, 0])
+    far = cell.workspace.home + np.array([0.5, 0, 0, 0, 0, 0, 0])
     timer = threading.Timer(0.05, cell.arm.stop)
     timer.start()
     with pytest.raises((MotionAborted, NeedsRecovery), match="stop"):
@@ -149,3 +150,64 @@ def test_a_grasp_lifts_a_part_and_the_simulator_agrees(cell: Cell):
     rise = cell.tracker.part_pose().position[2] - before[2]
     assert rise == pytest.approx(cell.workspace.lift_height, abs=2e-3)
     assert 0.04 < result.width < 0.06
+
+
+@pytest.mark.parametrize("force", [5.0, 20.0, 70.0])
+def test_a_part_is_lifted_whatever_the_grip_force(cell: Cell, force: float):
+    """The reflex must not take the commanded grip for a collision."""
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("hex_nut_m30", 0)
+    before = cell.tracker.part_pose().position
+    firm = dataclasses.replace(cell, workspace=dataclasses.replace(cell.workspace, grasp_force=force))
+    result = execute_grasp(firm, np.array([before[0], before[1], 0.0115, 0.3]))
+    assert result.aborted is None and result.holding
+    go_home(firm)
+    assert cell.arm.state().joints == pytest.approx(cell.workspace.home, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        lambda arm: arm.move_gripper(0.02),
+        lambda arm: arm.grasp(20.0),
+        lambda arm: arm.wait(5.0),
+        lambda arm: arm.move_to_pose(over_the_table(0.3)),
+    ],
+)
+def test_stop_ends_every_kind_of_motion(cell: Cell, command):
+    timer = threading.Timer(0.005, cell.arm.stop)
+    timer.start()
+    with pytest.raises((MotionAborted, NeedsRecovery), match="stop"):
+        for _ in range(200):  # a simulated motion may be quicker than the timer
+            command(cell.arm)
+    timer.join()
+    with pytest.raises(NeedsRecovery):
+        command(cell.arm)
+
+
+def test_joints_that_bring_the_hand_into_the_table_are_refused(cell: Cell):
+    before = cell.arm.state().joints
+    with pytest.raises(OutOfWorkspace, match="table"):
+        cell.arm.move_to_joints(np.array([0.0, 0.9, 0.0, -1.9, 0.0, 2.8, 0.785]))
+    assert cell.arm.state().joints == pytest.approx(before, abs=1e-4)
+
+
+def test_a_tilted_hand_keeps_its_corners_off_the_table(cell: Cell):
+    level = pose_base_tcp(np.array([0.5, 0.0, 0.02, 0.0]))
+    tilted = Pose(
+        position=level.position,
+        quat_wxyz=quat_multiply(np.array([np.cos(0.3), np.sin(0.3), 0.0, 0.0]), level.quat_wxyz),
+    )
+    cell.arm.check_pose(level)
+    with pytest.raises(OutOfWorkspace, match="table"):
+        cell.arm.check_pose(tilted)
+
+
+def test_a_grasp_out_of_reach_is_refused_before_anything_moves(cell: Cell):
+    cell.arm.move_gripper(0.03)
+    before = cell.arm.state()
+    with pytest.raises(OutOfWorkspace, match="reach"):
+        execute_grasp(cell, np.array([0.74, 0.39, 0.02, 0.0]))
+    after = cell.arm.state()
+    assert after.joints == pytest.approx(before.joints, abs=1e-4)
+    assert after.gripper_width == pytest.approx(before.gripper_width, abs=1e-4)

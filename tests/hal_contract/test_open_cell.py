@@ -19,6 +19,9 @@ from mskgrasp.errors import BadConfig
         ("type: sapien\ngrasp_fource: 20", "unknown key 'grasp_fource'; legal keys here: camera"),
         ("type: sapien\ngrasp_force: 500", "'grasp_force': input should be less than or equal to 70"),
         ("type: sapien\nphysics: {gravity: 1}", "unknown key 'physics.gravity'"),
+        ("type: sapien\nregion: [0.62, 0.38, -0.12, 0.12]", "region must be x_min < x_max"),
+        ("type: sapien\nregion: [0.7, 0.9, -0.1, 0.1]", "reaches beyond the arm"),
+        ("type: sapien\nregion: [0.3, 0.7, -0.2, 0.2]", "the camera sees 0.35 m"),
         ("type: !!python/object/apply:os.system ['true']", "not valid YAML"),
     ],
 )
