@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.metadata
 import platform
 import zlib
@@ -60,6 +61,9 @@ class Simulator:
                 camera=self._camera.model_dump(),
                 render_backend=render_backend(),
             )
+            # ManiSkill collects garbage at every new scene; what is loaded by now is none.
+            gc.collect()
+            gc.freeze()
         else:
             self._env.reset(seed=0, options=dict(parts=[folder], reconfigure=True))
         env = self._env.unwrapped
