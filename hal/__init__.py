@@ -4,11 +4,11 @@ from hal.arm import Arm, ArmLimits, ArmState, GraspOutcome
 from hal.camera import Camera, RgbdFrame
 from hal.cell import Cell, PartFeeder, PartTracker, Workspace
 from hal.errors import HalError
-from hal.execute import GraspResult, execute_grasp, go_home
+from hal.execute import GraspResult, execute_grasp, go_home, put_down
 from hal.open_cell import cell_from_yaml, open_cell
 
 __all__ = [
     "Arm", "ArmLimits", "ArmState", "Camera", "Cell", "GraspOutcome", "GraspResult", "HalError",
     "PartFeeder", "PartTracker", "RgbdFrame", "Workspace", "cell_from_yaml", "execute_grasp", "go_home",
-    "open_cell",
+    "open_cell", "put_down",
 ]  # fmt: skip

@@ -18,6 +18,9 @@ APPROACH = 0.12
 RETREAT = 0.05
 """How far the open hand first rises on its way home, so that it does not drag the part along, m."""
 
+PUT_DOWN = 0.002
+"""A part is let go this much above the height at which it was grasped, m."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class GraspResult:
@@ -82,6 +85,17 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
         T_base_tcp=state.T_base_tcp,
         aborted=None,
     )
+
+
+def put_down(cell: Cell, grasp: np.ndarray) -> None:
+    """Lowers what was lifted to where it was grasped, and opens the fingers.
+
+    Raises:
+        MotionAborted: The part met the table early, because it hangs lower in the hand than it lay.
+    """
+    above = np.asarray(grasp, dtype=np.float64) + np.array([0.0, 0.0, PUT_DOWN, 0.0])
+    cell.arm.move_to_pose(pose_base_tcp(above), speed=0.15)
+    cell.arm.move_gripper(MAX_OPENING)
 
 
 def go_home(cell: Cell) -> None:

@@ -13,7 +13,7 @@ from pydantic import Field
 from rich.console import Console
 from tqdm import tqdm
 
-from hal import Cell, go_home, open_cell
+from hal import Cell, go_home, open_cell, put_down
 from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.cli import make_folder, parse, run
 from mskgrasp.config import Config, read_config, write_config
@@ -87,8 +87,7 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
                 # Stored before the arm moves again: what comes now must not cost what is known.
                 with (config.out / "trials.jsonl").open("a", encoding="utf-8") as file:
                     file.write(json.dumps(trial.to_json(), allow_nan=False) + "\n")
-                if trial.reason == "collided":
-                    cell.arm.recover()
+                finish(cell, trial)
             clear(cell)
     trials = [finished[key] for key in sorted(finished)]
     report = summarise(trials)
@@ -96,6 +95,17 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
     (config.out / "report.json").write_text(text + "\n", encoding="utf-8")
     draw_errors(trials, config.out / "errors.png")
     return report
+
+
+def finish(cell: Cell, trial: Trial) -> None:
+    """Puts a lifted part down again; after a contact the arm may move on, the trial is over."""
+    try:
+        if trial.reason == "collided":
+            cell.arm.recover()
+        elif trial.success and trial.grasp is not None:
+            put_down(cell, np.array(trial.grasp))
+    except MotionAborted:
+        cell.arm.recover()
 
 
 def clear(cell: Cell) -> None:

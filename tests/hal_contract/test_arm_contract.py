@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from hal import Cell, cell_from_yaml, execute_grasp, go_home
+from hal import Cell, cell_from_yaml, execute_grasp, go_home, put_down
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace
 from mskgrasp.geometry import Pose, quat_multiply
 from mskgrasp.grasp import pose_base_tcp
@@ -150,6 +150,9 @@ def test_a_grasp_lifts_a_part_and_the_simulator_agrees(cell: Cell):
     rise = cell.tracker.part_pose().position[2] - before[2]
     assert rise == pytest.approx(cell.workspace.lift_height, abs=2e-3)
     assert 0.04 < result.width < 0.06
+    put_down(cell, np.array([before[0], before[1], 0.0115, 0.3]))
+    go_home(cell)
+    assert cell.tracker.part_pose().position == pytest.approx(before, abs=2e-3)
 
 
 @pytest.mark.parametrize("force", [5.0, 20.0, 70.0])
