@@ -14,7 +14,7 @@ from mskgrasp.grasp import MAX_OPENING, MIN_GAP, lowest_grasp_z, object_displace
 from tasks.contacts import HandContacts
 from tasks.frames import base_pose
 from tasks.kinematics import top_down
-from tasks.motion import PandaMotion, ease, ease_duration
+from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration
 from tasks.outcome import MAX_DRIFT, MAX_TURN, MIN_PAD_FORCE, Observed, judge
 from tasks.panda import GraspPanda
 from tasks.physics import Physics
@@ -208,7 +208,7 @@ class Attempt:
     def _line(self, start: Tensor, goal: Tensor, speed: float) -> Tensor:
         """(steps, n, 7) joints along straight lines between grasps; as long as the longest line needs."""
         distance = float((goal - start)[:, :3].norm(dim=-1).max())
-        n_steps = self._motion.n_steps(ease_duration(distance, speed))
+        n_steps = self._motion.n_steps(ease_duration(distance, speed, PEAK_ACCELERATION))
         share = ease(n_steps, self._motion.device)[:, None, None]
         start, goal = start.double(), goal.double()
         return top_down(start + share * (goal - start))[0]

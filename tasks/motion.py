@@ -22,6 +22,8 @@ STILL_FINGER = 2e-3
 TGS solver reports the velocity of a pressed joint with the drive's impulse still in it."""
 STILL_S = 0.03
 """Fingers that did not move for this long have closed, s."""
+PEAK_ACCELERATION = 1.5
+"""Of the hand on straight lines, m/s^2: the drives then overshoot by less than 0.4 mm."""
 FINGER_TIMEOUT_S = 0.5
 """Fingers that never come to rest (the part slides through them) are given up after this, s."""
 _CHECK_EVERY = 5
@@ -37,9 +39,15 @@ def ease(n_steps: int, device: torch.device) -> Tensor:
     return t**3 * (10 - 15 * t + 6 * t**2)
 
 
-def ease_duration(distance: float, peak_speed: float) -> float:
-    """Seconds that `ease` needs over a distance at a peak speed (15/8 of the mean speed)."""
-    return max(15 / 8 * distance / peak_speed, 0.02)
+def ease_duration(distance: float, peak_speed: float, peak_acceleration: float) -> float:
+    """Seconds that `ease` needs over a distance without passing a peak speed and a peak acceleration.
+
+    The profile's peaks are 15/8 of the mean speed and 10/sqrt(3) distance / time^2. A short way needs the
+    second bound: at full speed its acceleration would make the arm overshoot.
+    """
+    return max(
+        15 / 8 * distance / peak_speed, math.sqrt(10 / math.sqrt(3) * distance / peak_acceleration), 0.02
+    )
 
 
 class PandaMotion:

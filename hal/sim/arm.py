@@ -15,10 +15,12 @@ from hal.sim.world import SapienWorld
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import MAX_OPENING, MIN_GAP
 from tasks.kinematics import HOME, forward, track
-from tasks.motion import ease, ease_duration
+from tasks.motion import PEAK_ACCELERATION, ease, ease_duration
 
 JOINT_SPEED = 2.0
 """Greatest joint speed, rad/s (Panda datasheet: 2.175 rad/s for joints 1 to 4)."""
+JOINT_ACCELERATION = 5.0
+"""Greatest acceleration of a joint, or of the hand's turn, rad/s^2 (Panda datasheet: 7.5 for joint 2)."""
 TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
 SETTLE_S = 0.15
@@ -68,7 +70,7 @@ class SapienArm(Arm):
     def _move_to_joints(self, joints: np.ndarray, speed: float) -> None:
         start = self._target()
         goal = torch.as_tensor(joints, dtype=torch.float64)
-        seconds = ease_duration(float((goal - start).abs().max()), speed * JOINT_SPEED)
+        seconds = ease_duration(float((goal - start).abs().max()), speed * JOINT_SPEED, JOINT_ACCELERATION)
         share = ease(self._world.env.motion.n_steps(seconds), start.device)[:, None]
         self._follow(start + share * (goal - start))
 
@@ -77,7 +79,10 @@ class SapienArm(Arm):
         here = Pose.from_matrix(forward(start)[0].numpy())
         distance = float(np.linalg.norm(T_base_tcp.position - here.position))
         angle = 2 * math.acos(min(1.0, abs(float(np.dot(here.quat_wxyz, T_base_tcp.quat_wxyz)))))
-        seconds = max(ease_duration(distance, speed), ease_duration(angle, TURN_SPEED))
+        seconds = max(
+            ease_duration(distance, speed, PEAK_ACCELERATION),
+            ease_duration(angle, TURN_SPEED, JOINT_ACCELERATION),
+        )
         n_waypoints = max(2, math.ceil(distance / _WAYPOINT_M), math.ceil(angle / 0.05))
         line = _straight(here, T_base_tcp, np.linspace(0, 1, n_waypoints + 1)[1:])
         joints, error = track(torch.as_tensor(line), start)
