@@ -28,7 +28,7 @@ _PATH_CHECKS = 16
 _HAND_CORNERS = np.array(
     [
         [x * half_x, y * half_y, z]
-        for half_x, half_y, z in ((0.011, 0.056, PAD_REACH), (0.032, 0.102, -0.045))
+        for half_x, half_y, z in ((0.011, 0.056, PAD_REACH), (0.032, 0.102, -0.0375))
         for x in (-1, 1)
         for y in (-1, 1)
     ]
