@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, assert_never
+from typing import Annotated, assert_never
 
 import tyro
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from mskgrasp.errors import BadPart, MskgraspError, UsageError
+from mskgrasp.errors import BadPart, UsageError
 from mskgrasp.parts import store
 from mskgrasp.parts.build import build_part, builtin_names, find_part, imported_names, is_built, unknown_part
-from mskgrasp.parts.part import Part
+from mskgrasp.parts.terminal import progress_bar
+from mskgrasp.parts.verb_import import Import, run_import
 
 PROG = "python -m mskgrasp.parts"
-USUAL_SIZE_M = (0.02, 0.15)
 PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 
 
@@ -32,29 +30,6 @@ class Build:
 
     names: tyro.conf.Positional[tuple[str, ...]] = ()
     """Names as `list` shows them; none means all."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Import:
-    """Make parts of mesh files (STL, OBJ, PLY).
-
-    A mesh must be a closed single body; the hulls come from CoACD, which takes from a second to a minute a
-    part. A file that is refused is explained in one line, the others are imported all the same.
-    Example: python -m mskgrasp.parts import clamp.stl --unit mm --density 2700
-    """
-
-    files: tyro.conf.Positional[tuple[Path, ...]]
-    """Mesh files: .stl, .obj or .ply."""
-    unit: Literal["mm", "m", "in"] = "mm"
-    """Unit of the files' coordinates; mesh files do not say it."""
-    density: float = 7850.0
-    """kg/m^3: steel 7850, aluminium 2700, brass 8500, ABS 1050."""
-    name: str | None = None
-    """Name of the part; by default the file's name in lower case. Only with a single file."""
-    family: str = "imported"
-    """Kind of part, for grouping in reports."""
-    licence: str = "NOASSERTION"
-    """SPDX identifier of the mesh's licence, for example CC-BY-4.0."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         case Build():
             return _build(verb)
         case Import():
-            return _import(verb)
+            return run_import(verb)
         case List():
             return _list()
         case Show():
@@ -111,7 +86,7 @@ def _build(verb: Build) -> int:
             raise unknown_part(name, builtin_only=True)
     names = tuple(dict.fromkeys(verb.names)) or known
     fresh = 0
-    with _progress() as progress:
+    with progress_bar() as progress:
         task = progress.add_task("", total=len(names))
         for name in names:
             progress.update(task, description=name)
@@ -120,63 +95,6 @@ def _build(verb: Build) -> int:
             progress.advance(task)
     print(f"{len(names)} parts ready, {fresh} built now, in {store.parts_folder()}")
     return 0
-
-
-def _import(verb: Import) -> int:
-    # CoACD is loaded here alone, so that the other verbs start without it.
-    from mskgrasp.parts.importing import import_part, legal_name
-
-    if not verb.files:
-        raise UsageError(f"no file given: {PROG} import FILE...")
-    if verb.name is not None and len(verb.files) > 1:
-        raise UsageError(
-            f"--name {verb.name} with {len(verb.files)} files: import them one by one to name them"
-        )
-    refused = 0
-    taken: dict[str, Path] = {}
-    with _progress() as progress:
-        task = progress.add_task("", total=len(verb.files))
-        for path in verb.files:
-            progress.update(task, description=path.name)
-            try:
-                name = legal_name(path.stem if verb.name is None else verb.name)
-                if name in taken:
-                    raise BadPart(
-                        f"{path} would replace the part {name!r} of {taken[name]}: import it with --name"
-                    )
-                part = import_part(
-                    path,
-                    name=name,
-                    family=verb.family,
-                    unit=verb.unit,
-                    density=verb.density,
-                    licence=verb.licence,
-                )
-                taken[name] = path
-                print(_imported(part))
-                if not USUAL_SIZE_M[0] <= part.longest_axis <= USUAL_SIZE_M[1]:
-                    print(_odd_size(part, verb.unit), file=sys.stderr)
-            except MskgraspError as error:
-                refused += 1
-                print(f"error: {error}", file=sys.stderr)
-            progress.advance(task)
-    print(f"{len(verb.files) - refused} of {len(verb.files)} files are parts now, in {store.parts_folder()}")
-    return 1 if refused else 0
-
-
-def _imported(part: Part) -> str:
-    hulls = "1 hull" if part.n_hulls == 1 else f"{part.n_hulls} hulls"
-    return (
-        f"{part.name}: {1e3 * part.longest_axis:.1f} mm, {1e3 * part.mass:.3g} g, {hulls}, "
-        f"hull error {1e3 * part.hull_error:.2f} mm"
-    )
-
-
-def _odd_size(part: Part, unit: str) -> str:
-    return (
-        f"warning: {part.name} is {1e3 * part.longest_axis:.4g} mm long; the cell is made for parts of "
-        f"{1e3 * USUAL_SIZE_M[0]:.0f} to {1e3 * USUAL_SIZE_M[1]:.0f} mm: is --unit {unit} right?"
-    )
 
 
 def _list() -> int:
@@ -227,16 +145,3 @@ def _show(verb: Show) -> int:
     draw_part(part, out)
     print(out)
     return 0
-
-
-def _progress() -> Progress:
-    """A bar on standard error that goes away at the end; nothing where nobody watches."""
-    return Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=Console(file=sys.stderr),
-        transient=True,
-        disable=not sys.stderr.isatty(),
-    )
