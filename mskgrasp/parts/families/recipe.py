@@ -25,7 +25,8 @@ class Recipe:
         source: The standard, or what stands in for one.
         density: kg/m^3.
         dimensions: What ``make`` gets: lengths in millimetres under names that end in ``_mm``, counts.
-        make: Turns the dimensions into a shape.
+        make: Turns the dimensions into a shape; without hulls, they are found by decomposition.
+        licence: SPDX identifier.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Recipe:
     density: float
     dimensions: dict[str, float]
     make: Maker
+    licence: str = "Apache-2.0"
 
 
 def table(file_name: str) -> list[dict[str, float]]:
