@@ -1,7 +1,7 @@
 """Shapes that carry their own convex pieces: a mesh body and the hulls that stand for it.
 
-Families build a part from a few of these, in millimetres. Whatever is added, cut away, moved or turned happens
-to the body and the hulls alike, so that a family need not think of collisions, unless it knows better.
+Families build a part from a few of these, in millimetres. What is added, cut away, moved or turned changes
+body and hulls alike, so that a family need not think of collisions, unless it knows better.
 """
 
 from __future__ import annotations
