@@ -48,11 +48,19 @@ class HullFit:
         largest: Largest distance found between the two surfaces, either way.
         p95: 95th percentile of the distance over both surfaces.
         volume_ratio: Volume of the union by that of the mesh.
+        outward_largest: Largest distance from the hulls' surface to the mesh.
+        outward_p95: 95th percentile of the same.
+        inward_largest: Largest distance from the mesh to the hulls' surface.
+        inward_p95: 95th percentile of the same.
     """
 
     largest: float
     p95: float
     volume_ratio: float
+    outward_largest: float
+    outward_p95: float
+    inward_largest: float
+    inward_p95: float
 
 
 def mass_properties(mesh_mm: trimesh.Trimesh, density: float) -> MassProperties:
@@ -112,13 +120,23 @@ def hull_fit(mesh_mm: trimesh.Trimesh, hulls_mm: Sequence[np.ndarray]) -> HullFi
         samples, weight = _samples(source)
         distances.append(_distance_to(target, samples))
         areas.append(weight)
-    distance, area = np.concatenate(distances), np.concatenate(areas)
+    outward, inward = distances
+    return HullFit(
+        largest=float(max(outward.max(), inward.max())),
+        p95=_p95(np.concatenate(distances), np.concatenate(areas)),
+        volume_ratio=float(union.volume() / mesh_mm.volume),
+        outward_largest=float(outward.max()),
+        outward_p95=_p95(outward, areas[0]),
+        inward_largest=float(inward.max()),
+        inward_p95=_p95(inward, areas[1]),
+    )
+
+
+def _p95(distance: np.ndarray, area: np.ndarray) -> float:
+    """The distance that 95 % of the area keeps."""
     order = np.argsort(distance)
     covered = np.cumsum(area[order]) / area.sum()
-    p95 = distance[order][min(int(np.searchsorted(covered, 0.95)), len(distance) - 1)]
-    return HullFit(
-        largest=float(distance.max()), p95=float(p95), volume_ratio=float(union.volume() / mesh_mm.volume)
-    )
+    return float(distance[order][min(int(np.searchsorted(covered, 0.95)), len(distance) - 1)])
 
 
 def oblongness(points: np.ndarray) -> float:
