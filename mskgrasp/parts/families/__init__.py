@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from mskgrasp.parts.families import brackets, fasteners, gears, pins, rings
+from mskgrasp.parts.families import angles, brackets, fasteners, gears, pins, rings
 from mskgrasp.parts.families.recipe import Recipe
 
 STARTER = (
@@ -40,5 +40,7 @@ STARTER = (
 @lru_cache(maxsize=1)
 def recipes() -> dict[str, Recipe]:
     """All built-in parts by name, sorted."""
-    found = [recipe for module in (brackets, fasteners, gears, pins, rings) for recipe in module.recipes()]
+    found = [
+        recipe for module in (angles, brackets, fasteners, gears, pins, rings) for recipe in module.recipes()
+    ]
     return {recipe.name: recipe for recipe in sorted(found, key=lambda recipe: recipe.name)}
