@@ -1,80 +1,128 @@
-"""Mesh files made into parts; what cannot be simulated truly is refused."""
+"""Files of a user's CAD made into parts; what cannot be simulated truly is refused."""
 
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import re
 import unicodedata
-import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import trimesh
 
 from mskgrasp.errors import BadPart
 from mskgrasp.parts import store
+from mskgrasp.parts.bodies import Bodies, mend
 from mskgrasp.parts.build import LEGAL_NAME, builtin_names, source_digest, write_solid
-from mskgrasp.parts.decompose import convex_pieces, is_manifold
+from mskgrasp.parts.decompose import convex_pieces
+from mskgrasp.parts.mesh_files import POSSIBLE_SIZE_MM, MeshFile, Unit, read_content, read_mesh
 from mskgrasp.parts.part import Part
+from mskgrasp.parts.simplify import for_collision
 from mskgrasp.parts.solid import Solid
 
-SUFFIXES = ("stl", "obj", "ply")
-MILLIMETRES = {"mm": 1.0, "m": 1000.0, "in": 25.4}
-USUAL_SIZE_MM = (20.0, 150.0)
+USUAL_DENSITY = (10.0, 25_000.0)
+"""Foam and osmium, kg/m^3."""
 
 _SPELLED = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "å": "aa", "æ": "ae"})
 
 
-def import_part(
+@dataclass(frozen=True, kw_only=True)
+class Imported:
+    """What became of one file.
+
+    Attributes:
+        parts: One, or with ``bodies="split"`` one a body.
+        unchanged: They were there already, made of the same file in the same way.
+        unit: That the file was read in; empty where it did not need to be read.
+        told: What was mended, one sentence each.
+    """
+
+    parts: tuple[Part, ...]
+    unchanged: bool
+    unit: str
+    told: tuple[str, ...]
+
+
+def import_file(
     path: Path,
     *,
     name: str | None = None,
     family: str = "imported",
-    unit: Literal["mm", "m", "in"] = "mm",
+    unit: Unit | None = None,
     density: float = 7850.0,
     licence: str = "NOASSERTION",
-) -> Part:
-    """Makes a part of a mesh file, replacing an imported part of the same name.
+    bodies: Bodies = "one",
+    may_take: Callable[[str], None] = lambda name: None,
+) -> Imported:
+    """Makes a part of a file, replacing an imported part of the same name.
 
     Args:
-        path: STL, OBJ or PLY.
+        path: STL, OBJ, PLY, GLB, 3MF or STEP.
         name: The part's name; by default the file's, made legal.
         family: Kind of part.
-        unit: Of the file's coordinates.
+        unit: Of the file's coordinates; None takes what the format says, and mm where it says nothing.
         density: kg/m^3.
         licence: SPDX identifier of the mesh's licence.
+        bodies: Several bodies in the file are refused, split into parts ``NAME-1``, ``NAME-2``, ... by
+            decreasing volume, or joined into one.
+        may_take: Called with each name before its part is written; raises BadPart to keep it free.
 
     Raises:
-        BadPart: The file is damaged, open, empty, or of several bodies, or the name is a built-in part's.
+        BadPart: The file cannot be made a part, or the name is a built-in part's; the message says why.
     """
-    if not (np.isfinite(density) and density > 0):
-        raise BadPart(f"density {density} kg/m^3 is not positive: steel has 7850, aluminium 2700, ABS 1050")
+    check_density(density)
     name = legal_name(path.stem if name is None else name)
-    if name in builtin_names():
-        raise BadPart(f"the name {name!r} belongs to a built-in part: choose another with --name")
-    content = _content(path)
-    recipe = [name, family, unit, density, licence, path.name, source_digest()]
-    recipe_hash = hashlib.sha256(json.dumps(recipe).encode() + content).hexdigest()
-    folder = store.parts_folder() / name
-    if store.recipe_hash(folder) == recipe_hash:
-        return store.load_part(folder)
-    mesh = read_mesh(path, content)
-    mesh.apply_scale(MILLIMETRES[unit])
-    return write_solid(
-        Solid(mesh=mesh, hulls=convex_pieces(mesh)),
-        name=name,
-        family=family,
-        source=f"imported from {path.name}",
-        licence=licence,
-        density=density,
-        dimensions={
-            f"extent_{axis}": float(size) / 1000 for axis, size in zip("xyz", mesh.extents, strict=True)
-        },
-        recipe_hash=recipe_hash,
-    )
+    content = read_content(path)
+    recipe = [family, unit, density, licence, bodies, path.name, source_digest(), _own_digest()]
+    digest = hashlib.sha256(json.dumps(recipe).encode() + hashlib.sha256(content).digest()).hexdigest()
+
+    if bodies != "split":
+        _check_name(name, may_take)
+        known = _known(name, digest)
+        if known is not None:
+            return Imported(parts=(known,), unchanged=True, unit="", told=())
+    file = read_mesh(path, content, unit)
+    del content  # up to a gigabyte, and mending needs room
+    try:
+        mended = mend(file.objects, bodies=bodies)
+    except BadPart as error:
+        raise BadPart(f"{path} {error}") from error
+    count = len(mended.bodies)
+    names = [name] if count == 1 else [f"{name[: 79 - len(str(count))]}-{i + 1}" for i in range(count)]
+    for each in names:
+        _check_name(each, may_take)
+    parts, unchanged = [], True
+    for number, (each, mesh) in enumerate(zip(names, mended.bodies, strict=True)):
+        recipe_hash = digest if count == 1 else f"{digest[:56]}-{number + 1:07d}"
+        known = _known(each, recipe_hash)
+        if known is None:
+            unchanged = False
+            known = _make(mesh, path, file, each, family, density, licence, recipe_hash)
+        parts.append(known)
+    return Imported(parts=tuple(parts), unchanged=unchanged, unit=file.unit, told=(*file.told, *mended.told))
+
+
+def import_part(path: Path, **options: object) -> Part:
+    """The part of a file that holds one; the options are those of import_file."""
+    return import_file(path, **options).parts[0]  # pyright: ignore[reportArgumentType]
+
+
+def check_density(density: float) -> None:
+    """Refuses what no material has.
+
+    Raises:
+        BadPart: The density is not that of any solid.
+    """
+    if not USUAL_DENSITY[0] <= density <= USUAL_DENSITY[1]:
+        grams = "; in kg/m^3, not g/cm^3" if 0 < density < USUAL_DENSITY[0] else ""
+        raise BadPart(
+            f"density {density:g} kg/m^3 is not between {USUAL_DENSITY[0]:g} and {USUAL_DENSITY[1]:g}: "
+            f"steel has 7850, aluminium 2700, ABS 1050{grams}"
+        )
 
 
 def legal_name(text: str) -> str:
@@ -91,78 +139,57 @@ def legal_name(text: str) -> str:
     return name
 
 
-def read_mesh(path: Path, content: bytes) -> trimesh.Trimesh:
-    """A closed single body from a mesh file, wound outwards, in the file's unit.
+def _check_name(name: str, may_take: Callable[[str], None]) -> None:
+    if name in builtin_names():
+        raise BadPart(f"the name {name!r} belongs to a built-in part: choose another with --name")
+    may_take(name)
 
-    Raises:
-        BadPart: It cannot be read, or is not a closed single body.
-    """
-    try:
-        # From memory and without materials, so that the file cannot make the reader open others.
-        options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
-            mesh = trimesh.load_mesh(
-                io.BytesIO(content), file_type=path.suffix.lower()[1:], process=False, **options
-            )
-    except Exception as error:  # the readers raise whatever they stumble over
-        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
+
+def _known(name: str, recipe_hash: str) -> Part | None:
+    folder = store.parts_folder() / name
+    return store.load_part(folder) if store.recipe_hash(folder) == recipe_hash else None
+
+
+def _make(
+    mesh: trimesh.Trimesh,
+    path: Path,
+    file: MeshFile,
+    name: str,
+    family: str,
+    density: float,
+    licence: str,
+    recipe_hash: str,
+) -> Part:
+    longest = float(np.max(mesh.extents))
+    if longest < POSSIBLE_SIZE_MM[0]:
         raise BadPart(
-            f"{path} is no readable {path.suffix[1:].upper()} ({reason}): export it again"
-        ) from error
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        raise BadPart(f"{path} holds no triangles: export it again from the CAD program as a mesh")
-    if len(mesh.vertices) <= int(np.max(mesh.faces)) or int(np.min(mesh.faces)) < 0:
-        raise BadPart(f"{path}: a face names a vertex that is not there (truncated?): export it again")
-    if not np.isfinite(mesh.vertices).all():
-        raise BadPart(f"{path} has coordinates that are not finite: export it again from the CAD program")
-    return _closed_body(path, mesh)
-
-
-def _content(path: Path) -> bytes:
-    if path.suffix.lower()[1:] not in SUFFIXES:
-        raise BadPart(
-            f"{path} has the suffix {path.suffix or '(none)'!r}; mesh files end in "
-            f"{', '.join('.' + suffix for suffix in SUFFIXES)}: convert it"
+            f"{path}: the body {name} is {longest:.3g} mm long, the least is {POSSIBLE_SIZE_MM[0]:g} mm: "
+            "remove it in the CAD program"
         )
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise BadPart(f"cannot read {path}: {error.strerror}: check the path") from error
-    if not content.strip():
-        raise BadPart(f"{path} is empty: export it again from the CAD program")
-    return content
+        return write_solid(
+            Solid(mesh=mesh, hulls=convex_pieces(for_collision(mesh))),
+            name=name,
+            family=family,
+            source=f"imported from {path.name}",
+            licence=licence,
+            density=density,
+            dimensions={
+                f"extent_{axis}": float(size) / 1000 for axis, size in zip("xyz", mesh.extents, strict=True)
+            },
+            recipe_hash=recipe_hash,
+        )
+    except BadPart as error:
+        raise BadPart(f"{path}: {error}") from error
 
 
-def _closed_body(path: Path, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    mesh = trimesh.Trimesh(np.asarray(mesh.vertices, dtype=np.float64), mesh.faces, process=False)
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
-    mesh.remove_unreferenced_vertices()
-    if (
-        len(mesh.faces) == 0
-        or np.ptp(mesh.vertices, axis=0).min() <= 1e-9 * np.ptp(mesh.vertices, axis=0).max()
-    ):
-        raise BadPart(f"{path} is flat, its volume is zero: give it a thickness in the CAD program")
-    if not mesh.is_watertight:
-        edges = np.sort(mesh.edges, axis=1)
-        _, count = np.unique(edges, axis=0, return_counts=True)
-        raise BadPart(
-            f"{path} is not watertight ({int((count != 2).sum())} of {len(count)} edges do not join "
-            "two faces): close the holes, for example with MeshLab's 'Close Holes', or export a solid"
-        )
-    if mesh.body_count > 1:
-        raise BadPart(
-            f"{path} has {mesh.body_count} separate bodies (a closed cavity counts as one): "
-            "join them, or export each to its own file"
-        )
-    trimesh.repair.fix_normals(mesh)
-    if mesh.volume < 0:
-        mesh.invert()
-    if mesh.volume <= 1e-7 * float(np.prod(mesh.extents)):
-        raise BadPart(f"{path} has the volume zero (two sheets back to back?): give it a thickness")
-    if not is_manifold(mesh):
-        raise BadPart(
-            f"{path} is no proper solid (its faces cannot all be wound outwards): repair and export it again"
-        )
-    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+@lru_cache(maxsize=1)
+def _own_digest() -> str:
+    """Digest of the code that reads and mends files: when it changes, parts are imported anew."""
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    for name in ("importing.py", "mesh_files.py", "repair.py", "bodies.py", "simplify.py", "surface.py"):
+        digest.update((here / name).read_bytes())
+    for path in sorted((here / "formats").glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
