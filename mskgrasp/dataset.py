@@ -246,14 +246,33 @@ def read_shard(path: Path) -> tuple[Attempts, ShardInfo]:
     Raises:
         BadDataset: The file is missing, truncated, foreign, of another schema, or contradicts it.
     """
+    arrays, info = _read(path, tuple(_COLUMNS))
+    attempts = Attempts(**arrays)
+    _check(attempts, str(path))
+    return attempts, info
+
+
+def read_success(path: Path) -> tuple[np.ndarray, ShardInfo]:
+    """Reads which attempts of a shard lifted the part, (n,) bool, without the images.
+
+    Raises:
+        BadDataset: The file is missing, truncated, foreign or of another schema.
+    """
+    arrays, info = _read(path, ("success",))
+    success = arrays["success"]
+    if success.dtype != np.bool_ or success.ndim != 1:
+        raise BadDataset(f"{path}: success is {success.dtype} {success.shape}, must be bool (n,); delete it")
+    return success, info
+
+
+def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], ShardInfo]:
     path = Path(path)
     if not path.is_file():
         raise BadDataset(f"no shard {path}; collect it: python -m mskgrasp.collect")
     try:
         with h5py.File(path, "r") as file:
             _check_header(file, path)
-            arrays = {name: np.asarray(file[name]) for name in _COLUMNS}
-            info = _read_info(file)
+            return {name: np.asarray(file[name]) for name in names}, _read_info(file)
     except BadDataset:
         raise
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
@@ -262,9 +281,6 @@ def read_shard(path: Path) -> tuple[Attempts, ShardInfo]:
         raise BadDataset(
             f"{path} is damaged or no HDF5 file ({problem}); delete it and collect again"
         ) from error
-    attempts = Attempts(**arrays)
-    _check(attempts, str(path))
-    return attempts, info
 
 
 def _check_header(file: h5py.File, path: Path) -> None:

@@ -21,6 +21,10 @@ class BadPart(MskgraspError):
     """A mesh or a part folder cannot be used as a part."""
 
 
+class UnknownPart(BadPart, UsageError):
+    """No part has that name."""
+
+
 class BadDataset(MskgraspError):
     """A dataset folder or one of its shards is missing, empty, truncated or foreign."""
 

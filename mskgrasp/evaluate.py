@@ -20,7 +20,7 @@ from mskgrasp.config import Config, read_config, write_config
 from mskgrasp.errors import BadDataset, NoGraspFound, NoPartFound, UsageError
 from mskgrasp.networks import Models, load_models
 from mskgrasp.outcomes import draw_errors, print_report, summarise
-from mskgrasp.parts import builtin_names, find_part
+from mskgrasp.parts import find_part, starter_names
 from mskgrasp.pictures import draw_plan
 from mskgrasp.plan import make_planner, present
 from mskgrasp.planner import Planner, PlannerConfig
@@ -147,7 +147,7 @@ def chosen_parts(config: EvaluateConfig, models: Models) -> list[str]:
         if name == "validation":
             names += models.meta.training.get("validation_parts", [])
         elif name == "all":
-            names += builtin_names()
+            names += starter_names()
         else:
             names.append(name)
     for name in names:

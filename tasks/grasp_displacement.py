@@ -20,7 +20,7 @@ from torch import Tensor
 from mskgrasp.config import check_config
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import MIN_RISE
-from mskgrasp.parts import Part, builtin_names, find_part
+from mskgrasp.parts import Part, find_part, starter_names
 from tasks.attempt import TABLE_Z, Attempt
 from tasks.camera import Overhead, camera_config
 from tasks.contacts import HandContacts
@@ -138,7 +138,7 @@ class GraspDisplacementEnv(BaseEnv):
     def _load_scene(self, options: dict) -> None:
         names = options.get("parts") or self._part_names
         if names is None:
-            names = [str(name) for name in self._batched_episode_rng.choice(list(builtin_names()))]
+            names = [str(name) for name in self._batched_episode_rng.choice(list(starter_names()))]
         self.parts = [find_part(names[i % len(names)]) for i in range(self.num_envs)]
         self._build_table()
         actors = []

@@ -39,13 +39,27 @@ def build_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: fl
     builder.set_scene_idxs([scene_index])
     actor = builder.build(name=f"{part.name}-{scene_index}")
     body = actor._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
-    if body is None or len(body.collision_shapes) != part.n_hulls:
-        loaded = 0 if body is None else len(body.collision_shapes)
-        raise BadPart(
-            f"part '{part.name}': PhysX loaded {loaded} of {part.n_hulls} hulls; "
-            f"rebuild it with: python -m mskgrasp.parts build {part.name}"
-        )
+    _check_cooked(part, body)
     return actor
+
+
+def _check_cooked(part: Part, body: PhysxRigidDynamicComponent | None) -> None:
+    """Refuses a body that is not the part: PhysX drops hulls and corners, and clamps, without a word."""
+    shapes = body.collision_shapes if body is not None else []
+    corners = sum(len(shape.vertices) for shape in shapes)
+    if (len(shapes), corners) != (part.n_hulls, part.n_hull_vertices):
+        raise BadPart(
+            f"part '{part.name}': PhysX took {len(shapes)} of {part.n_hulls} hulls and {corners} of "
+            f"{part.n_hull_vertices} corners; delete {part.folder} and build or import it again"
+        )
+    if body is not None and not (
+        np.isclose(body.mass, part.mass, rtol=1e-4)
+        and np.allclose(body.inertia, part.principal_inertia, rtol=1e-3)
+    ):
+        raise BadPart(
+            f"part '{part.name}': PhysX took a mass of {body.mass:.4g} kg and an inertia of {body.inertia} "
+            f"instead of {part.mass:.4g} kg and {part.principal_inertia}; use a part that is less extreme"
+        )
 
 
 def _visual(part: Part) -> sapien.render.RenderShapeTriangleMesh:

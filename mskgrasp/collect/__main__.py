@@ -18,7 +18,8 @@ from mskgrasp.collect.workers import Finished, Lost, Progress, make_shards
 from mskgrasp.config import read_config, write_config
 from mskgrasp.dataset import read_shard, shard_path
 from mskgrasp.errors import BadConfig, BadDataset, BadPart, UsageError
-from mskgrasp.parts import Part, builtin_names, find_part
+from mskgrasp.parts import Part, chosen_names, find_part
+from mskgrasp.parts.catalogue import ratings
 
 DESCRIPTION = """Simulates random grasps of parts and records what happened.
 
@@ -44,8 +45,15 @@ def main() -> int:
 
 def collect(config: CollectConfig) -> None:
     """Makes the shards that are missing and sums up the dataset."""
-    check_out(config)
+    # Sets of parts are written out: a catalogue that grows must not change a dataset that was begun.
+    config = config.model_copy(update={"parts": tuple(chosen_names(config.parts or ("starter",)))})
     parts = chosen_parts(config)
+    config = config.model_copy(update={"parts": tuple(word for word, _ in parts)})
+    check_out(config)
+    _collect(config, [part for _, part in parts])
+
+
+def _collect(config: CollectConfig, parts: list[Part]) -> None:
     begin(config)
     everything = plan_shards(config, parts)
     hashes = {part.name: part.content_hash for part in parts}
@@ -65,23 +73,30 @@ def collect(config: CollectConfig) -> None:
     print(f"wrote {config.out / 'summary.json'} and {draw_summary(config.out, config.seed)}")
 
 
-def chosen_parts(config: CollectConfig) -> list[Part]:
-    """The parts of the run, built where need be, without those of the wrong size."""
-    low, high = config.part_filter.min_length, config.part_filter.max_length
-    parts = []
-    for name in tqdm(config.parts or builtin_names(), desc="parts", unit="part", leave=False, disable=None):
+def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:
+    """The parts of the run, as they were asked for and built where need be, that pass the part filter."""
+    bounds = config.part_filter
+    rated = ratings() if bounds.min_success is not None or bounds.max_success is not None else {}
+    parts: list[tuple[str, Part]] = []
+    easy_or_hard = 0
+    for name in tqdm(config.parts, desc="parts", unit="part", leave=False, disable=None):
         part = find_part(name)
-        if (low is not None and part.longest_axis < low) or (high is not None and part.longest_axis > high):
+        rating = rated.get(part.content_hash)
+        if not bounds.takes_length(part.longest_axis):
             size = f"longest axis {part.longest_axis * 1e3:.0f} mm"
             print(f"left out {part.name}: {size} is outside the part filter", file=sys.stderr)
+        elif rating is not None and not bounds.takes_success(rating.rate):
+            easy_or_hard += 1
         else:
-            parts.append(part)
-    names = [part.name for part in parts]
+            parts.append((name, part))
+    if easy_or_hard:
+        print(f"left out {easy_or_hard} parts that were rated outside the part filter", file=sys.stderr)
+    names = [part.name for _, part in parts]
     doubles = sorted({name for name in names if names.count(name) > 1})
     if doubles:
         raise BadPart(f"two parts are called '{doubles[0]}'; give each its own name")
     if not parts:
-        raise BadPart("no part is left to collect; widen part_filter.min_length and max_length")
+        raise BadPart("no part is left to collect; widen the bounds of part_filter")
     return parts
 
 

@@ -20,9 +20,21 @@ class PartFilter(Config):
     max_length: float | None = None
     """Greatest length of a part's longest axis, m; longer parts are not collected."""
     min_success: float | None = Field(default=None, ge=0, le=1)
-    """Parts with a lower share of successful random grasps are marked as not kept."""
+    """Parts rated lower (`parts rate`) are not collected; others turning out lower are marked as not kept."""
     max_success: float | None = Field(default=None, ge=0, le=1)
-    """Parts with a higher share of successful random grasps are marked as not kept."""
+    """Parts rated higher are not collected; others turning out higher are marked as not kept."""
+
+    def takes_length(self, longest_axis: float) -> bool:
+        """Whether a part of this length, metres, is worth collecting."""
+        return _between(longest_axis, self.min_length, self.max_length)
+
+    def takes_success(self, rate: float) -> bool:
+        """Whether a part of which random grasps lift this share is worth collecting and learning from."""
+        return _between(rate, self.min_success, self.max_success)
+
+
+def _between(value: float, low: float | None, high: float | None) -> bool:
+    return (low is None or value >= low) and (high is None or value <= high)
 
 
 class CollectConfig(Config):
@@ -31,7 +43,7 @@ class CollectConfig(Config):
     out: Path = Path("data/demo")
     """Folder of the dataset; a run into a folder that was begun with the same settings goes on."""
     parts: tuple[str, ...] = ()
-    """Names or folders of parts; all built-in parts when empty."""
+    """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
     attempts_per_part: int = Field(default=200, ge=1)
     """Grasps for each part."""
     shard_size: int = Field(default=100, ge=1)

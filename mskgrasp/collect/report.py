@@ -69,7 +69,6 @@ def _sum_up(name: str, shards: list[tuple[Attempts, ShardInfo]], part_filter: Pa
     for _, info in shards:
         discarded.update(info.discarded)
     rate = float(success.mean()) if len(success) else 0.0
-    low, high = part_filter.min_success, part_filter.max_success
     return PartSummary(
         part=name,
         family=shards[0][1].family,
@@ -81,7 +80,7 @@ def _sum_up(name: str, shards: list[tuple[Attempts, ShardInfo]], part_filter: Pa
         median_tilt=_median(tilt),
         failures={FAILURES[code]: int(n) for code, n in enumerate(np.bincount(failure)) if code and n},
         discarded=dict(discarded),
-        kept=(low is None or rate >= low) and (high is None or rate <= high),
+        kept=part_filter.takes_success(rate),
     )
 
 

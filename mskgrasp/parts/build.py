@@ -6,8 +6,10 @@ import difflib
 import hashlib
 import json
 import re
-from functools import lru_cache
+import sys
+from functools import cache, lru_cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -16,32 +18,63 @@ from scipy.spatial import ConvexHull
 from trimesh.exchange.gltf import export_glb
 from trimesh.exchange.ply import export_ply
 
-from mskgrasp.errors import BadPart
-from mskgrasp.parts import families, store
+from mskgrasp.errors import BadPart, UnknownPart
+from mskgrasp.parts import cad, families, store
 from mskgrasp.parts.families.recipe import Recipe
-from mskgrasp.parts.measure import MOST_OBLONG, hull_fit, longest_axis, mass_properties, oblongness
+from mskgrasp.parts.measure import MOST_OBLONG, HullFit, hull_fit, longest_axis, mass_properties, oblongness
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
 from mskgrasp.parts.resting import stable_poses
 from mskgrasp.parts.solid import MAX_HULL_VERTICES, Solid
 
 MAX_HULL_FACES = 64
 LEGAL_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
+MANY_HULLS = 16
+"""From here on a grasp's time grows with every hull, and joining them is worth its while."""
+
+MOST_P95_MM = 0.7
+MOST_VOLUME_RATIO = 1.1
 
 
 def builtin_names() -> tuple[str, ...]:
-    """Names of the built-in parts, sorted."""
-    return tuple(families.recipes())
+    """Names of all parts that can be built here, sorted: the families, and with ``[cad]`` those from CAD."""
+    return tuple(sorted(_recipes()))
+
+
+def starter_names() -> tuple[str, ...]:
+    """Names of the starter set, sorted: 25 parts of 17 families, ready in some seconds."""
+    return families.STARTER
+
+
+@lru_cache(maxsize=1)
+def _recipes() -> dict[str, Recipe]:
+    found = dict(families.recipes())
+    if cad.available():
+        for recipe in cad.recipes():
+            if recipe.name in found:
+                raise BadPart(f"two recipes are called {recipe.name!r}: rename one")
+            found[recipe.name] = recipe
+    return found
+
+
+def recipe_of(name: str) -> Recipe:
+    """The recipe of a part that can be built here.
+
+    Raises:
+        BadPart: There is no such part.
+    """
+    recipe = _recipes().get(name)
+    if recipe is None:
+        raise unknown_part(name, builtin_only=True)
+    return recipe
 
 
 def build_part(name: str) -> Part:
-    """Builds a built-in part, unless it lies ready in the parts folder.
+    """Builds a part from its recipe, unless it lies ready in the parts folder.
 
     Raises:
-        BadPart: There is no such built-in part.
+        BadPart: There is no such recipe, or no hulls stand for the shape as closely as they must.
     """
-    recipe = families.recipes().get(name)
-    if recipe is None:
-        raise unknown_part(name, builtin_only=True)
+    recipe = recipe_of(name)
     if is_built(name):
         return store.load_part(store.parts_folder() / name)
     dimensions = {
@@ -49,30 +82,43 @@ def build_part(name: str) -> Part:
         for key, value in recipe.dimensions.items()
     }
     return write_solid(
-        recipe.make(recipe.dimensions),
+        _with_hulls(recipe.make(recipe.dimensions)),
         name=name,
         family=recipe.family,
         source=recipe.source,
-        licence="Apache-2.0",
+        licence=recipe.licence,
         density=recipe.density,
         dimensions=dimensions,
-        recipe_hash=_recipe_hash(recipe),
+        recipe_hash=recipe_hash(name),
     )
 
 
+def _with_hulls(solid: Solid) -> Solid:
+    """The family's own hulls, joined where they are many; where it has none, those of a decomposition."""
+    if solid.hulls and len(solid.hulls) <= MANY_HULLS:
+        return solid
+    # CoACD takes a while to load, and most parts do without it.
+    from mskgrasp.parts.decompose import convex_pieces, fewest_hulls
+
+    mesh = trimesh.Trimesh(np.array(solid.mesh.vertices), solid.mesh.faces, process=False)
+    hulls = fewest_hulls(mesh, solid.hulls) if solid.hulls else convex_pieces(mesh)
+    return Solid(mesh=solid.mesh, hulls=tuple(hulls))
+
+
 def is_built(name: str) -> bool:
-    """Whether a built-in part lies ready, sound and made by the present recipe."""
-    return store.recipe_hash(store.parts_folder() / name) == _recipe_hash(families.recipes()[name])
+    """Whether a part lies ready, sound and made by the present recipe."""
+    return store.recipe_hash(store.parts_folder() / name) == recipe_hash(name)
 
 
 def find_part(name_or_folder: str | Path) -> Part:
     """A part by its name or by its folder; a built-in one that is not there yet is built.
 
     Raises:
-        BadPart: There is no such part; the message lists similar names.
+        UnknownPart: There is no such part; the message lists similar names.
+        BadPart: Its folder is damaged, or it cannot be built.
     """
     text = str(name_or_folder)
-    if text in families.recipes():
+    if text in _recipes():
         return build_part(text)
     if LEGAL_NAME.fullmatch(text) and (store.parts_folder() / text).is_dir():
         return store.load_part(store.parts_folder() / text)
@@ -85,17 +131,17 @@ def imported_names() -> tuple[str, ...]:
     """Names of the parts in the parts folder that are not built in, sorted."""
     root = store.parts_folder()
     found = (path.name for path in root.iterdir() if path.is_dir()) if root.is_dir() else ()
-    builtin = families.recipes()
+    builtin = _recipes()
     return tuple(sorted(name for name in found if LEGAL_NAME.fullmatch(name) and name not in builtin))
 
 
-def unknown_part(name: str, *, builtin_only: bool = False) -> BadPart:
+def unknown_part(name: str, *, builtin_only: bool = False) -> UnknownPart:
     """The error for a name that no part has."""
     known = builtin_names() if builtin_only else (*builtin_names(), *imported_names())
     close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(close)}?" if close else "`python -m mskgrasp.parts list` shows the parts"
     kind = "built-in part" if builtin_only else "part or part folder"
-    return BadPart(f"no {kind} is called {name!r}: {hint}")
+    return UnknownPart(f"no {kind} is called {name!r}: {hint}")
 
 
 def write_solid(
@@ -118,6 +164,7 @@ def write_solid(
     for number, points in enumerate(hulls):
         _check_hull(name, number, points)
     fit = hull_fit(mesh, hulls)
+    _check_fit(name, fit)
     resting, probability = stable_poses(np.concatenate(hulls).astype(np.float64))
     record: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
@@ -136,9 +183,12 @@ def write_solid(
         "extents": mesh.extents / 1000,
         "longest_axis": longest_axis(mesh) / 1000,
         "n_hulls": len(hulls),
+        "n_hull_vertices": sum(map(len, hulls)),
         "hull_error": fit.largest / 1000,
         "hull_error_p95": fit.p95 / 1000,
         "hull_volume_ratio": fit.volume_ratio,
+        "hull_outward": {"largest": fit.outward_largest / 1000, "p95": fit.outward_p95 / 1000},
+        "hull_inward": {"largest": fit.inward_largest / 1000, "p95": fit.inward_p95 / 1000},
         "resting": {"position": resting.position, "quat_wxyz": resting.quat_wxyz},
         "resting_probability": probability,
         "recipe_hash": recipe_hash,
@@ -149,40 +199,72 @@ def write_solid(
 
 
 def source_digest() -> str:
-    """Digest of the code that makes parts: when it changes, parts are made anew."""
-    return _source_digest()
+    """Digest of the code that makes any part: when it changes, parts are made anew."""
+    return _digest_of(tuple(f"mskgrasp.parts.{name}" for name in _SHARED))
 
 
-@lru_cache(maxsize=1)
-def _source_digest() -> str:
-    here = Path(__file__).parent
+_SHARED = ("build", "measure", "resting", "solid", "pieces", "decompose")
+
+
+def recipe_hash(name: str) -> str:
+    """Digest of everything that decides how a part comes out: code, dimensions, versions."""
+    recipe = recipe_of(name)
+    text = [
+        SCHEMA_VERSION,
+        source_digest(),
+        _digest_of(_modules_behind(recipe.make.__module__)),
+        cad.versions() if recipe.make.__module__.startswith(cad.__name__) else "",
+        recipe.name,
+        recipe.family,
+        recipe.source,
+        recipe.licence,
+        recipe.density,
+        recipe.dimensions,
+    ]
+    return hashlib.sha256(json.dumps(text, sort_keys=True).encode()).hexdigest()
+
+
+@cache
+def _modules_behind(name: str) -> tuple[str, ...]:
+    """A family's module and the modules of this package that it uses, sorted."""
+    found: set[str] = set()
+    pending = [name]
+    while pending:
+        module = pending.pop()
+        if module in found or not module.startswith("mskgrasp.parts."):
+            continue
+        found.add(module)
+        for value in vars(sys.modules[module]).values():
+            used = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
+            if isinstance(used, str) and used in sys.modules:
+                pending.append(used)
+    # Bookkeeping that decides no shape.
+    return tuple(sorted(found - {"mskgrasp.parts.families", "mskgrasp.parts.cad"}))
+
+
+@cache
+def _digest_of(modules: tuple[str, ...]) -> str:
     digest = hashlib.sha256()
-    for name in ("build.py", "measure.py", "resting.py", "solid.py", "decompose.py"):
-        digest.update((here / name).read_bytes() if (here / name).exists() else b"")
-    for path in sorted((here / "families").glob("*.py")):
-        digest.update(path.read_bytes())
+    for module in modules:
+        path = Path(__file__).parent.parent.parent / (module.replace(".", "/") + ".py")
+        digest.update(path.read_bytes() if path.exists() else module.encode())
     return digest.hexdigest()
-
-
-def _recipe_hash(recipe: Recipe) -> str:
-    text = json.dumps(
-        [
-            SCHEMA_VERSION,
-            source_digest(),
-            recipe.name,
-            recipe.family,
-            recipe.source,
-            recipe.density,
-            recipe.dimensions,
-        ],
-        sort_keys=True,
-    )
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _corners(points: np.ndarray) -> np.ndarray:
     """The points that are corners of their convex hull."""
     return points[np.sort(ConvexHull(points.astype(np.float64)).vertices)]
+
+
+def _check_fit(name: str, fit: HullFit) -> None:
+    """Refuses hulls that are not the part: what they collide with would be another."""
+    least = 1 / MOST_VOLUME_RATIO
+    if fit.p95 > MOST_P95_MM or not least <= fit.volume_ratio <= MOST_VOLUME_RATIO:
+        raise BadPart(
+            f"{name}: the hulls are not the mesh: 95 % of the surface is within {fit.p95:.2f} mm (at most "
+            f"{MOST_P95_MM} mm), volume ratio {fit.volume_ratio:.2f} ({least:.2f} to {MOST_VOLUME_RATIO}): "
+            "simplify fine detail such as threads, grilles and thin walls"
+        )
 
 
 def _check_hull(name: str, number: int, points: np.ndarray) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mskgrasp.geometry import Pose
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +34,7 @@ class Part:
         extents: (3,) size of the bounding box in obj axes, metres.
         longest_axis: Longest edge of the oriented minimal box, metres.
         n_hulls: How many convex hulls ``hulls.glb`` holds.
+        n_hull_vertices: How many corners they have together.
         hull_error: Largest distance between the hulls' union and the mesh, metres.
         resting: ``T_table_obj`` of the k stable poses (z of the table is 0): position (k, 3) with
             x = y = 0, quat_wxyz (k, 4).
@@ -55,6 +56,7 @@ class Part:
     extents: np.ndarray
     longest_axis: float
     n_hulls: int
+    n_hull_vertices: int
     hull_error: float
     resting: Pose
     resting_probability: np.ndarray

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mskgrasp.parts import Part, build_part, builtin_names
+from mskgrasp.parts import Part, build_part, starter_names
 
 
 @pytest.fixture(scope="session")
@@ -21,7 +21,7 @@ def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def builtin_parts(shared_cache: Path) -> dict[str, Part]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(shared_cache))
-        return {name: build_part(name) for name in builtin_names()}
+        return {name: build_part(name) for name in starter_names()}
 
 
 @pytest.fixture(autouse=True)

@@ -10,7 +10,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from mskgrasp.geometry import quat_to_matrix
-from mskgrasp.parts import Part, builtin_names
+from mskgrasp.parts import Part, starter_names
 from mskgrasp.parts.families import recipes
 from mskgrasp.parts.families.recipe import TABLES, table
 from mskgrasp.parts.measure import oblongness
@@ -31,7 +31,7 @@ def test_there_are_at_least_16_parts_of_10_families_and_none_dominates(builtin_p
 
 
 def test_names_are_sorted_and_fit_for_a_folder():
-    names = builtin_names()
+    names = starter_names()
     assert list(names) == sorted(set(names))
     assert all(set(name) <= set("abcdefghijklmnopqrstuvwxyz0123456789_-") for name in names)
 

@@ -1,0 +1,333 @@
+"""The catalogue's index: what every part is, on which side of the split it is, how easily it is grasped.
+
+``catalogue.json`` in the parts folder is made from the part folders and may be deleted at any time, except
+for the ratings, which `parts rate` takes from a dataset.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from mskgrasp.errors import BadPart
+from mskgrasp.parts import store
+from mskgrasp.parts.build import builtin_names, recipe_hash, starter_names, unknown_part
+
+INDEX_VERSION = 1
+INDEX_NAME = "catalogue.json"
+USABLE_LENGTH = (0.020, 0.150)
+"""Longest axis of the catalogue's parts, metres: the paper's range."""
+THIN = 0.004
+"""Parts flatter than this are few: most of their grasps scrape the table."""
+NEIGHBOUR = 1.10
+"""Parts of a family whose sorted edges all differ by less than this factor are near-duplicates."""
+
+Split = Literal["train", "validation", "test"]
+SPLITS: tuple[Split, ...] = ("train", "validation", "test")
+_SHARES = {"train": 0.70, "validation": 0.15, "test": 0.15}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rating:
+    """How a part fared in random grasps.
+
+    Attributes:
+        attempts: How many were made.
+        successes: How many lifted the part.
+        interval: 95 % Wilson interval of the success rate.
+        part_hash: Content hash of the part that was grasped; a rating of another shape counts no more.
+        dataset: Folder that it was taken from.
+    """
+
+    attempts: int
+    successes: int
+    interval: tuple[float, float]
+    part_hash: str
+    dataset: str
+
+    @property
+    def rate(self) -> float:
+        """Share of the grasps that lifted the part."""
+        return self.successes / max(self.attempts, 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """One part of the catalogue; lengths in metres.
+
+    Attributes:
+        name: Of the part.
+        family: Kind of part.
+        source: Standard, or what stands in for one.
+        licence: SPDX identifier.
+        longest_axis: Of the oriented minimal box.
+        extents: Edges of the bounding box, sorted, the longest last.
+        volume: Cubic metres.
+        mass: kg.
+        n_hulls: How many convex hulls stand for the part.
+        hull_error: Largest distance between hulls and mesh.
+        hull_error_p95: 95th percentile of it.
+        hull_volume_ratio: Volume of the hulls' union by that of the mesh.
+        content_hash: Of the part.
+        recipe_hash: Of what made it.
+        group: Near-duplicates share one: the name of their first.
+        split: Side of the split, the same for all of a group.
+        rating: From a collected dataset; None until `parts rate` has seen one.
+    """
+
+    name: str
+    family: str
+    source: str
+    licence: str
+    longest_axis: float
+    extents: tuple[float, float, float]
+    volume: float
+    mass: float
+    n_hulls: int
+    hull_error: float
+    hull_error_p95: float
+    hull_volume_ratio: float
+    content_hash: str
+    recipe_hash: str
+    group: str = ""
+    split: Split = "train"
+    rating: Rating | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeftOut:
+    """Why a recipe is no part of the catalogue, and which recipe that was."""
+
+    reason: str
+    recipe_hash: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Index:
+    """The catalogue: its parts by name, and what was left out."""
+
+    parts: Mapping[str, Entry]
+    left_out: Mapping[str, LeftOut]
+
+    def families(self) -> Counter[str]:
+        """Number of parts by family."""
+        return Counter(entry.family for entry in self.parts.values())
+
+
+def index_path() -> Path:
+    """Where the index lies."""
+    return store.parts_folder() / INDEX_NAME
+
+
+def read_index() -> Index:
+    """The index as last written; empty where there is none.
+
+    Raises:
+        BadPart: The file is damaged.
+    """
+    path = index_path()
+    try:
+        text = path.read_bytes()
+    except FileNotFoundError:
+        return Index(parts={}, left_out={})
+    try:
+        record = json.loads(text)
+        if record["index_version"] != INDEX_VERSION:
+            return Index(parts={}, left_out={})
+        parts = {name: _entry(name, values) for name, values in record["parts"].items()}
+        left_out = {name: LeftOut(**values) for name, values in record["left_out"].items()}
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise BadPart(
+            f"{path} is damaged: delete it, then run: python -m mskgrasp.parts build --catalogue"
+        ) from error
+    return Index(parts=parts, left_out=left_out)
+
+
+def write_index(index: Index) -> None:
+    """Writes the index whole or not at all."""
+    record = {
+        "index_version": INDEX_VERSION,
+        "parts": {name: asdict(entry) for name, entry in sorted(index.parts.items())},
+        "left_out": {name: asdict(entry) for name, entry in sorted(index.left_out.items())},
+    }
+    path = index_path()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    try:
+        with open(temporary, "w", encoding="utf-8") as file:
+            json.dump(record, file, indent=1, sort_keys=True)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def entry_of(name: str) -> Entry:
+    """What the index says of a part that lies ready, from its ``part.json`` alone.
+
+    Raises:
+        BadPart: There is no such part folder, or its record is damaged.
+    """
+    folder = store.parts_folder() / name
+    record = store.read_record(folder)
+    try:
+        low, middle, high = sorted(float(edge) for edge in record["extents"])
+        return Entry(
+            name=name,
+            family=record["family"],
+            source=record["source"],
+            licence=record["licence"],
+            longest_axis=record["longest_axis"],
+            extents=(low, middle, high),
+            volume=record["volume"],
+            mass=record["mass"],
+            n_hulls=record["n_hulls"],
+            hull_error=record["hull_error"],
+            hull_error_p95=record["hull_error_p95"],
+            hull_volume_ratio=record["hull_volume_ratio"],
+            content_hash=record["content_hash"],
+            recipe_hash=record["recipe_hash"],
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise BadPart(
+            f"{folder / 'part.json'} is damaged ({error}): delete the folder and build again"
+        ) from error
+
+
+def make_index(entries: Iterable[Entry], failures: Mapping[str, str], before: Index) -> Index:
+    """Sorts the built parts into the catalogue: usable and distinct ones, grouped, split, with their ratings.
+
+    Args:
+        entries: Of all parts that could be built.
+        failures: Reason for each that could not.
+        before: The index until now; ratings of parts that have not changed are kept.
+    """
+    left_out = {name: LeftOut(reason=why, recipe_hash=recipe_hash(name)) for name, why in failures.items()}
+    kept: dict[str, Entry] = {}
+    seen: dict[tuple[float, ...], str] = {}
+    for entry in sorted(entries, key=lambda entry: entry.name):
+        low, high = USABLE_LENGTH
+        key = (*(round(edge, 4) for edge in entry.extents), round(entry.volume, 8))
+        reason = ""
+        if not low <= entry.longest_axis <= high:
+            reason = (
+                f"longest axis {1e3 * entry.longest_axis:.1f} mm, legal {1e3 * low:.0f} to {1e3 * high:.0f}"
+            )
+        elif key in seen:
+            reason = f"as large as {seen[key]}, edge by edge"
+        if reason:
+            left_out[entry.name] = LeftOut(reason=reason, recipe_hash=entry.recipe_hash)
+            continue
+        seen[key] = entry.name
+        old = before.parts.get(entry.name)
+        same = old is not None and old.rating is not None and old.rating.part_hash == entry.content_hash
+        kept[entry.name] = replace(entry, rating=old.rating if old and same else None)
+    groups = near_duplicates(kept.values())
+    parts = {
+        name: replace(entry, group=groups[name], split=split_of(groups[name])) for name, entry in kept.items()
+    }
+    return Index(parts=parts, left_out=left_out)
+
+
+def near_duplicates(entries: Iterable[Entry]) -> dict[str, str]:
+    """A group for every part: parts of a family with neighbouring sizes share one, also by a chain."""
+    by_family: dict[str, list[Entry]] = defaultdict(list)
+    for entry in entries:
+        by_family[entry.family].append(entry)
+    group: dict[str, str] = {}
+    for members in by_family.values():
+        members.sort(key=lambda entry: entry.name)
+        edges = np.log(np.array([entry.extents for entry in members]))
+        close = np.abs(edges[:, None] - edges[None]).max(axis=-1) < np.log(NEIGHBOUR)
+        for number, entry in enumerate(members):
+            if entry.name in group:
+                continue
+            pending = [number]
+            while pending:
+                current = pending.pop()
+                if members[current].name not in group:
+                    group[members[current].name] = entry.name
+                    pending += np.flatnonzero(close[current]).tolist()
+    return group
+
+
+def split_of(group: str) -> Split:
+    """The side of the split that a group stands on: decided by the hash of its name, so never moved."""
+    number = int.from_bytes(hashlib.sha256(f"split {group}".encode()).digest()[:8], "big") / 2**64
+    for side in SPLITS:
+        number -= _SHARES[side]
+        if number < 0:
+            return side
+    return SPLITS[-1]
+
+
+def chosen_names(words: Iterable[str]) -> list[str]:
+    """Names of parts from a user's words: names, folders, or one of the sets below.
+
+    ``starter``: the 25 parts that are ready in some seconds. ``catalogue``: all parts of the catalogue.
+    ``train``, ``validation``, ``test``: those of the catalogue on that side of the split.
+
+    Raises:
+        BadPart: A set of the catalogue is asked for before the catalogue was built.
+    """
+    names: list[str] = []
+    for word in words:
+        if word == "starter":
+            names += starter_names()
+        elif word == "catalogue" or word in SPLITS:
+            index = read_index()
+            if not index.parts:
+                raise BadPart(
+                    f"the set {word!r} needs the catalogue: python -m mskgrasp.parts build --catalogue"
+                )
+            names += [n for n, entry in index.parts.items() if word in ("catalogue", entry.split)]
+        else:
+            names.append(word)
+    return list(dict.fromkeys(names))
+
+
+def ratings() -> dict[str, Rating]:
+    """Ratings by content hash of the part, so that a part that has changed has none."""
+    return {e.content_hash: e.rating for e in read_index().parts.values() if e.rating is not None}
+
+
+def with_ratings(index: Index, found: Mapping[str, Rating]) -> Index:
+    """The index with new ratings, by name.
+
+    Raises:
+        BadPart: A part is not in the catalogue, or has changed since it was grasped.
+    """
+    parts = dict(index.parts)
+    for name, rating in found.items():
+        entry = parts.get(name)
+        if entry is None:
+            known = name in builtin_names()
+            raise (
+                BadPart(f"part {name!r} is not in the catalogue: build it first")
+                if known
+                else (unknown_part(name, builtin_only=True))
+            )
+        if entry.content_hash != rating.part_hash:
+            raise BadPart(f"part {name!r} has changed since the dataset was made: collect it again")
+        parts[name] = replace(entry, rating=rating)
+    return Index(parts=parts, left_out=index.left_out)
+
+
+def _entry(name: str, values: dict[str, Any]) -> Entry:
+    low, middle, high = (float(edge) for edge in values["extents"])
+    rating = values["rating"]
+    if rating is not None:
+        below, above = rating["interval"]
+        rating = Rating(**(rating | {"interval": (float(below), float(above))}))
+    if values["name"] != name or values["split"] not in SPLITS:
+        raise ValueError(name)
+    return Entry(**(values | {"extents": (low, middle, high), "rating": rating}))

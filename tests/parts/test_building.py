@@ -1,0 +1,126 @@
+"""Building many parts: on all cores, resumable, stopped at any time, and told what was left out."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+
+from mskgrasp.errors import BadPart, MskgraspError
+from mskgrasp.parts import build as build_module
+from mskgrasp.parts import build_part, load_part, starter_names
+from mskgrasp.parts.build import recipe_hash
+from mskgrasp.parts.building import build_parts
+from mskgrasp.parts.catalogue import Index, LeftOut, make_index, read_index, write_index
+from mskgrasp.parts.solid import Solid
+from mskgrasp.parts.verbs import main
+
+EMPTY = Index(parts={}, left_out={})
+NAMES = ("hex_nut_m20", "parallel_key_b20x12x80", "parallel_pin_12x60", "washer_m36")
+
+
+def test_two_workers_build_what_one_builds(builtin_parts):
+    found = {built.name: built for built in build_parts(NAMES, EMPTY, 2)}
+    assert set(found) == set(NAMES)
+    for name in NAMES:
+        assert found[name].entry is not None and found[name].seconds > 0
+        assert found[name].entry.content_hash == builtin_parts[name].content_hash
+
+
+def test_what_lies_ready_is_left_alone_and_what_is_missing_is_made(own_cache):
+    build_part("washer_m36")
+    before = (own_cache / "washer_m36" / "part.json").stat().st_mtime_ns
+    built = {built.name: built.seconds for built in build_parts(NAMES[2:], EMPTY, 1)}
+    assert built["washer_m36"] == 0 and built["parallel_pin_12x60"] > 0
+    assert (own_cache / "washer_m36" / "part.json").stat().st_mtime_ns == before
+
+
+def test_a_part_without_one_of_its_files_is_made_again(own_cache):
+    build_part("washer_m36")
+    (own_cache / "washer_m36" / "hulls.glb").unlink()
+    [built] = build_parts(["washer_m36"], EMPTY, 1)
+    assert built.seconds > 0 and load_part(own_cache / "washer_m36").n_hulls
+
+
+def test_a_recipe_that_failed_is_not_tried_again_until_it_changes():
+    failed = LeftOut(reason="too thin", recipe_hash=recipe_hash("washer_m36"))
+    [built] = build_parts(["washer_m36"], Index(parts={}, left_out={"washer_m36": failed}), 1)
+    assert built.entry is None and built.reason == "too thin"
+    changed = LeftOut(reason="too thin", recipe_hash="of an older recipe")
+    [built] = build_parts(["washer_m36"], Index(parts={}, left_out={"washer_m36": changed}), 1)
+    assert built.entry is not None
+
+
+def test_hulls_that_are_not_the_part_are_refused_with_both_numbers(monkeypatch):
+    recipe = build_module.recipe_of("bushing_20x26x30")
+
+    def plugged(size):
+        made = recipe.make(size)
+        return Solid(mesh=made.mesh, hulls=(made.mesh.convex_hull.vertices[::8],))
+
+    recipes = {"bushing_20x26x30": replace(recipe, make=plugged)}
+    monkeypatch.setattr(build_module, "_recipes", lambda: recipes)
+    with pytest.raises(BadPart, match=r"95 % of the surface is within .* mm .*volume ratio 2\.\d\d"):
+        build_part("bushing_20x26x30")
+
+
+def test_the_program_builds_lists_and_draws(capsys, tmp_path):
+    assert main(["build", *NAMES, "--workers", "1"]) == 0
+    assert "4 parts ready, 4 built now" in capsys.readouterr().out
+    entries = [built.entry for built in build_parts(NAMES, EMPTY, 1)]
+    write_index(make_index([entry for entry in entries if entry], {}, EMPTY))
+    assert main(["list", "--catalogue", "--csv", str(tmp_path / "catalogue.csv")]) == 0
+    out = capsys.readouterr().out
+    assert out.splitlines()[-1] == "4 parts"
+    assert "hex_nut" in out and "longest axis: 20-40 mm 1, 40-60 mm 0, 60-80 mm 2" in out
+    rows = (tmp_path / "catalogue.csv").read_text().splitlines()
+    assert len(rows) == 5 and rows[1].startswith("hex_nut_m20,hex_nut,ISO 4032,Apache-2.0,test,hex_nut_m20")
+    assert main(["list", "--family", "washer"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "1 parts"
+    assert main(["sheet", "--out", str(tmp_path / "new" / "sheet.png"), "--parts", "4"]) == 0
+    assert (tmp_path / "new" / "sheet.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "exit_code"),
+    [
+        (("build", "washer_m63"), 2),
+        (("build", "washer_m36", "--catalogue"), 2),
+        (("build", "--workers", "-1"), 2),
+        (("sheet", "--out", "sheet.doc"), 2),
+        (("list", "--catalogue"), 1),
+        (("list", "--family", "washer"), 1),
+        (("sheet",), 1),
+        (("rate", "--data", "nowhere"), 1),
+    ],
+)
+def test_mistakes_are_told_in_one_line(arguments, exit_code):
+    with pytest.raises(MskgraspError) as caught:
+        main(arguments)
+    assert caught.value.exit_code == exit_code and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
+    code = "from mskgrasp.cli import run; from mskgrasp.parts.verbs import main; run(main)"
+    build = subprocess.Popen(
+        [sys.executable, "-c", code, "build", "--workers", "2"],
+        start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 60
+    while not list(own_cache.glob("[a-z]*")) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    os.killpg(build.pid, how)  # as a terminal does: the program and its workers
+    _, said = build.communicate(timeout=30)
+    assert build.returncode in (130, -signal.SIGKILL)
+    if how == signal.SIGINT:
+        assert said.splitlines() == ["stopped by Ctrl-C; what was finished is kept"]
+    finished = [folder.name for folder in own_cache.glob("[a-z]*")]
+    assert 1 <= len(finished) < len(starter_names())
+    assert all(load_part(own_cache / name).name == name for name in finished)
+    some = [*finished[:2], "parallel_pin_20x100"]
+    seconds = {built.name: built.seconds for built in build_parts(some, read_index(), 1)}
+    assert all(seconds[name] == 0 for name in finished[:2])
