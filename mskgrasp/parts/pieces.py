@@ -111,9 +111,13 @@ def merge_hulls(hulls: Sequence[np.ndarray], slack: float = 0.002) -> list[np.nd
 
     def look(a: int, b: int) -> None:
         joined = _joined_hull(pieces[a], pieces[b])
-        if joined is not None and joined[1] - volumes[a] - volumes[b] < budget:
+        if joined is None or (added := joined[1] - volumes[a] - volumes[b]) >= budget:
+            return
+        # What two pieces share is in the sum of their volumes twice.
+        added += _common_volume(pieces[a], pieces[b])
+        if added < budget:
             joints[a, b] = joined
-            heapq.heappush(heap, (joined[1] - volumes[a] - volumes[b], a, b))
+            heapq.heappush(heap, (added, a, b))
 
     for a, b in combinations(sorted(pieces), 2):
         look(a, b)
@@ -335,6 +339,11 @@ def _joined_hull(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, float] | Non
     if len(hull.vertices) > s.MAX_HULL_VERTICES:
         return None
     return points[np.sort(hull.vertices)], float(hull.volume)
+
+
+def _common_volume(a: np.ndarray, b: np.ndarray) -> float:
+    bodies = [Manifold.hull_points(np.asarray(points, dtype=np.float64)) for points in (a, b)]
+    return (bodies[0] ^ bodies[1]).volume()
 
 
 def _counter_clockwise(polygon: np.ndarray) -> np.ndarray:
