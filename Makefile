@@ -5,11 +5,11 @@ READY := $(VENV)/.ready
 TESTABLE := $(VENV)/.testable
 RUN := $(VENV)/bin/python -m
 
-.PHONY: help setup collect train plan evaluate test check format clean
+.PHONY: help setup collect train plan evaluate test bench-parts check format clean
 .DEFAULT_GOAL := help
 
 help: ## Explain the targets
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1\t\2/' | expand -t 18
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 22
 
 setup: $(READY) ## Virtual environment in .venv with pinned packages, and a Vulkan driver
 
@@ -36,6 +36,9 @@ evaluate: $(READY) ## Plan and execute grasps in the simulated cell with models/
 
 test: $(TESTABLE) ## Run the tests
 	$(RUN) pytest
+
+bench-parts: $(TESTABLE) ## Seconds to make a part, by family and stage
+	$(RUN) tests.benchmarks.build_parts
 
 check: $(TESTABLE) ## Check style, types and the floors of the house
 	$(RUN) ruff format --check .

@@ -19,7 +19,7 @@ from mskgrasp.config import read_config, write_config
 from mskgrasp.dataset import read_shard, shard_path
 from mskgrasp.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.parts import Part, chosen_names, find_part
-from mskgrasp.parts.catalogue import ratings
+from mskgrasp.parts.catalogue import ratings, read_index, spread
 
 DESCRIPTION = """Simulates random grasps of parts and records what happened.
 
@@ -46,11 +46,27 @@ def main() -> int:
 def collect(config: CollectConfig) -> None:
     """Makes the shards that are missing and sums up the dataset."""
     # Sets of parts are written out: a catalogue that grows must not change a dataset that was begun.
-    config = config.model_copy(update={"parts": tuple(chosen_names(config.parts or ("starter",)))})
+    names = chosen_names(config.parts or ("starter",))
+    if config.sample:
+        names = sampled(names, config.sample)
+    config = config.model_copy(update={"parts": tuple(names), "sample": 0})
     parts = chosen_parts(config)
     config = config.model_copy(update={"parts": tuple(word for word, _ in parts)})
     check_out(config)
     _collect(config, [part for _, part in parts])
+
+
+def sampled(names: list[str], count: int) -> list[str]:
+    """Some parts of every family.
+
+    Raises:
+        UsageError: A name is not in the catalogue, which knows the families.
+    """
+    index = read_index()
+    unknown = [name for name in names if name not in index.parts]
+    if unknown:
+        raise UsageError(f"--sample: {unknown[0]!r} is not in the catalogue; sample of its sets or its parts")
+    return [entry.name for entry in spread((index.parts[name] for name in names), count)]
 
 
 def _collect(config: CollectConfig, parts: list[Part]) -> None:

@@ -44,6 +44,8 @@ class CollectConfig(Config):
     """Folder of the dataset; a run into a folder that was begun with the same settings goes on."""
     parts: tuple[str, ...] = ()
     """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
+    sample: int = Field(default=0, ge=0)
+    """About so many of the parts, of every family some; 0: all. Only of the catalogue's parts."""
     attempts_per_part: int = Field(default=200, ge=1)
     """Grasps for each part."""
     shard_size: int = Field(default=100, ge=1)

@@ -82,7 +82,7 @@ def build_part(name: str) -> Part:
         for key, value in recipe.dimensions.items()
     }
     return write_solid(
-        _with_hulls(recipe.make(recipe.dimensions)),
+        with_hulls(recipe.make(recipe.dimensions)),
         name=name,
         family=recipe.family,
         source=recipe.source,
@@ -93,7 +93,7 @@ def build_part(name: str) -> Part:
     )
 
 
-def _with_hulls(solid: Solid) -> Solid:
+def with_hulls(solid: Solid) -> Solid:
     """The family's own hulls, joined where they are many; where it has none, those of a decomposition."""
     if solid.hulls and len(solid.hulls) <= MANY_HULLS:
         return solid

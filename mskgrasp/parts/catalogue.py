@@ -295,6 +295,20 @@ def chosen_names(words: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
+def spread(entries: Iterable[Entry], count: int) -> list[Entry]:
+    """About so many parts: of every family in proportion to the root of its size, its sizes spread evenly."""
+    families: dict[str, list[Entry]] = defaultdict(list)
+    for entry in entries:
+        families[entry.family].append(entry)
+    scale = count / max(sum(np.sqrt(len(members)) for members in families.values()), 1.0)
+    chosen = []
+    for _, members in sorted(families.items()):
+        n = min(len(members), max(1, round(scale * np.sqrt(len(members)))))
+        members.sort(key=lambda entry: (entry.volume, entry.name))
+        chosen += [members[int((i + 0.5) * len(members) / n)] for i in range(n)]
+    return chosen
+
+
 def ratings() -> dict[str, Rating]:
     """Ratings by content hash of the part, so that a part that has changed has none."""
     return {e.content_hash: e.rating for e in read_index().parts.values() if e.rating is not None}

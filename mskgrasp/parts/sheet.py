@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from matplotlib.figure import Figure
 
 from mskgrasp.geometry import quat_to_matrix
 from mskgrasp.parts import store
-from mskgrasp.parts.catalogue import Entry, Index
+from mskgrasp.parts.catalogue import Entry, Index, spread
 from mskgrasp.parts.part import Part
 from mskgrasp.parts.render import Body, render
 
@@ -41,7 +40,7 @@ def draw_sheet(index: Index, out: Path, parts: int, tell: Callable[[int, int], N
         parts: About how many to draw.
         tell: Called with the number drawn and the number to draw.
     """
-    chosen = pick(index, parts)
+    chosen = spread(index.parts.values(), parts)
     rows = -(-len(chosen) // _COLUMNS)
     width, height = _COLUMNS * _TILE[0], rows * _TILE[1] + 0.62
     figure = Figure(figsize=(width, height), dpi=_DPI, facecolor="white")
@@ -66,21 +65,6 @@ def draw_sheet(index: Index, out: Path, parts: int, tell: Callable[[int, int], N
     tell(len(chosen), len(chosen))
     metadata = {"Software": None} if out.suffix.lower() == ".png" else None
     figure.savefig(out, dpi=_DPI, metadata=metadata)
-
-
-def pick(index: Index, parts: int) -> list[Entry]:
-    """About so many parts: every family in proportion to the root of its size, its sizes spread evenly."""
-    families: dict[str, list[Entry]] = defaultdict(list)
-    for entry in index.parts.values():
-        families[entry.family].append(entry)
-    weight = {family: np.sqrt(len(entries)) for family, entries in families.items()}
-    scale = parts / sum(weight.values())
-    chosen = []
-    for family, entries in sorted(families.items()):
-        count = min(len(entries), max(1, round(scale * weight[family])))
-        entries.sort(key=lambda entry: (entry.volume, entry.name))
-        chosen += [entries[int(place)] for place in np.linspace(0, len(entries) - 1, count + 2).round()[1:-1]]
-    return chosen
 
 
 def _picture(entry: Entry, width: int, height: int) -> np.ndarray:

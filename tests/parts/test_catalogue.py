@@ -22,6 +22,7 @@ from mskgrasp.parts.catalogue import (
     ratings,
     read_index,
     split_of,
+    spread,
     with_ratings,
     write_index,
 )
@@ -170,3 +171,14 @@ def test_recipes_have_legal_distinct_names_and_a_licence():
     for name in names:
         recipe = recipe_of(name)
         assert recipe.licence == "Apache-2.0" and recipe.source and recipe.density > 500, name
+
+
+def test_a_sample_has_some_of_every_family_spread_over_its_sizes():
+    entries = [*bars("bar", list(range(30, 150, 2))), *bars("rail", [50, 60]), *bars("rod", [90])]
+    chosen = spread(entries, 12)
+    families = [part.family for part in chosen]
+    assert {family: families.count(family) for family in set(families)} == {"bar": 9, "rail": 2, "rod": 1}
+    lengths = [part.longest_axis for part in chosen if part.family == "bar"]
+    assert max(np.diff(lengths)) < 0.02 and lengths == sorted(lengths)
+    assert spread(entries, 10_000) == sorted(entries, key=lambda e: (e.family, e.volume))
+    assert spread([], 5) == []
