@@ -173,6 +173,6 @@ def _check_size(path: Path, objects: list[Surface], unit: str, scale: float, *, 
         return
     remedy = size_hint(longest, unit, scale) if may_choose else "leave it out, or scale it in the CAD program"
     raise BadPart(
-        f"{path} is {length_text(longest)} long when read in {unit}; the cell takes parts of "
+        f"{path} is {length_text(longest)} long when read in {unit}; the cell takes "
         f"{POSSIBLE_SIZE_MM[0]:g} to {POSSIBLE_SIZE_MM[1]:g} mm: {remedy}"
     )

@@ -61,15 +61,16 @@ def close_surface(surface: Surface) -> tuple[Surface, Told]:
     """
     merged, count = _merge_equal(surface)
     _check_not_flat(merged)
-    welded, joined = _weld(merged)
-    # In the order of how little they change; the first that closes the surface is taken.
-    for candidate, known in ((merged, Told(merged=count)), (welded, Told(merged=count, welded=joined))):
-        if candidate is welded and not joined:
-            continue
+    # In the order of how little they change the surface; the first that closes it is taken.
+    for weld in (False, True):
+        candidate, joined = _weld(merged) if weld else (merged, 0)
         for keep_one in (False, True):
+            known = Told(merged=count, welded=joined)
             mended, told = _drop_faces(candidate, known, keep_one=keep_one)
             if len(mended.faces) and _open_edges(mended) == (0, 0):
                 return mended, told
+            if not told.doubled:
+                break
     surface, _ = _drop_faces(merged, Told(), keep_one=False)
     if len(surface.faces) == 0:
         raise BadPart(f"is {_SHEET}")
@@ -119,8 +120,8 @@ def turn_consistently(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray
         second = np.concatenate([second, crowded[:, 1]])
     piece = _components(first, second, count)
     surface = Surface(vertices=surface.vertices, faces=faces)
-    forward, backward = _directed(surface)
-    if not np.array_equal(forward, backward):
+    key, up = _edges(surface)
+    if not np.array_equal(np.sort(key[up]), np.sort(key[~up])):
         raise BadPart(
             "is no proper solid: its faces cannot all be wound outward where several meet at an edge; "
             "remove inner walls and export it again"
@@ -175,29 +176,33 @@ def _drop_faces(surface: Surface, told: Told, *, keep_one: bool) -> tuple[Surfac
     sound = (a != b) & (b != c) & (c != a)
     faces = faces[sound]
     degenerate = len(sound) - len(faces)
-    turn = np.argmin(faces, axis=1) if len(faces) else np.zeros(0, dtype=int)
-    rows = np.arange(len(faces))
-    low, mid, high = (faces[rows, (turn + step) % 3] for step in range(3))
-    forward = mid < high
-    middle, top = np.where(forward, mid, high), np.where(forward, high, mid)
-    order = np.lexsort((forward, top, middle, low))
+    keep = _without_doubles(faces, keep_one=keep_one)
+    told = replace(told, degenerate=degenerate, doubled=len(faces) - len(keep))
+    faces = faces[keep]
+    used = np.zeros(len(surface.vertices), dtype=bool)
+    used[faces] = True
+    compact = np.cumsum(used) - 1
+    return Surface(vertices=surface.vertices[used], faces=compact[faces]), told
+
+
+def _without_doubles(faces: np.ndarray, *, keep_one: bool) -> np.ndarray:
+    """Index of the faces to keep: of several alike the first."""
+    everything = np.arange(len(faces))
+    low, middle, top = np.sort(faces, axis=1).T
+    order = np.lexsort((top, middle, low))
     key = np.stack([low, middle, top], axis=1)[order]
-    starts = np.flatnonzero(np.r_[True, (key[1:] != key[:-1]).any(axis=1)]) if len(key) else np.zeros(0, int)
-    if len(starts) < len(faces):
-        group = np.cumsum(np.r_[1, (key[1:] != key[:-1]).any(axis=1)]) - 1
-        way = np.where(forward[order], 1, -1)
-        wanted = (np.sign(np.bincount(group, weights=way))[group] == way) | keep_one
-        first_wanted = np.zeros(len(order), dtype=bool)
-        candidates = np.flatnonzero(wanted)
-        _, leading = np.unique(group[candidates], return_index=True)
-        first_wanted[candidates[leading]] = True
-        keep = np.zeros(len(faces), dtype=bool)
-        keep[order[first_wanted]] = True
-        told = replace(told, doubled=int((~keep).sum()))
-        faces = faces[keep]
-    used, compact = np.unique(faces, return_inverse=True)
-    mended = Surface(vertices=surface.vertices[used], faces=compact.reshape(-1, 3))
-    return mended, replace(told, degenerate=degenerate)
+    fresh = np.r_[True, (key[1:] != key[:-1]).any(axis=1)] if len(key) else np.zeros(0, dtype=bool)
+    if fresh.all():
+        return everything
+    group = np.empty(len(faces), dtype=np.int64)
+    group[order] = np.cumsum(fresh) - 1
+    # Even permutations of the sorted triple run one way round, odd ones the other.
+    a, b, c = faces.T
+    way = np.where((a < b).astype(int) + (b < c) + (c < a) == 2, 1, -1)
+    wanted = (np.sign(np.bincount(group, weights=way))[group] == way) | keep_one
+    candidates = everything[wanted]
+    _, leading = np.unique(group[candidates], return_index=True)
+    return np.sort(candidates[leading])
 
 
 def _check_not_flat(surface: Surface) -> None:
@@ -206,26 +211,26 @@ def _check_not_flat(surface: Surface) -> None:
         raise BadPart(f"is {_SHEET}")
 
 
-def _directed(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Sorted keys of the edges (lower vertex, higher vertex) that run up, and of those that run down."""
+def _edges(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Keys of the edges of all faces (lower vertex, higher vertex); whether each runs up."""
     start, end = surface.faces.reshape(-1), np.roll(surface.faces, -1, axis=1).reshape(-1)
-    key = np.minimum(start, end) * len(surface.vertices) + np.maximum(start, end)
-    return np.sort(key[start < end]), np.sort(key[start > end])
+    return np.minimum(start, end) * len(surface.vertices) + np.maximum(start, end), start < end
 
 
 def _open_edges(surface: Surface) -> tuple[int, int]:
     """How many edges bound one face only, and how many join three, five, ... faces."""
-    forward, backward = _directed(surface)
-    _, count = np.unique(np.concatenate([forward, backward]), return_counts=True)
+    key = np.sort(_edges(surface)[0])
+    if len(key) % 2 == 0 and (key[::2] == key[1::2]).all():  # all in pairs: the rule
+        return 0, 0
+    count = np.diff(np.flatnonzero(np.r_[True, key[1:] != key[:-1], True]))
     return int((count == 1).sum()), int(((count % 2 == 1) & (count > 1)).sum())
 
 
 def _neighbours(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Faces (e,), (e,) at an edge of two; whether they run it the same way; pairs (f, 2) at other edges."""
-    start, end = surface.faces.reshape(-1), np.roll(surface.faces, -1, axis=1).reshape(-1)
-    key = np.minimum(start, end) * len(surface.vertices) + np.maximum(start, end)
+    key, up = _edges(surface)
     order = np.argsort(key, kind="stable")
-    key, face, up = key[order], order // 3, (start < end)[order]
+    key, face, up = key[order], order // 3, up[order]
     same = key[1:] == key[:-1]
     alone = np.r_[True, ~same][:-1] & same & np.r_[~same[1:], True]
     pair = np.flatnonzero(alone)

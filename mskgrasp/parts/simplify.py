@@ -25,7 +25,7 @@ COLLISION_TRIANGLES = 6_000
 COLLISION_TOLERANCES_MM = (0.01, 0.02, 0.05, 0.1)
 """Convex decomposition takes time by the triangle, and its pieces are tenths of a millimetre off anyway."""
 
-_SAMPLES = 20_000
+_SAMPLES = 40_000
 
 
 def thin_out(body: Manifold) -> tuple[Manifold, str | None]:
@@ -68,16 +68,13 @@ def for_collision(mesh_mm: trimesh.Trimesh) -> trimesh.Trimesh:
     return trimesh.Trimesh(coarse.vertices, coarse.faces, process=False)
 
 
-def surface_distance(one: Manifold, other: Manifold) -> float:
-    """Largest distance between two surfaces found at 40,000 points of both, mm."""
-    size = np.asarray(one.bounding_box()).reshape(2, 3)
-    step = float((size[1] - size[0]).max()) / 100
-    triangles = [surface_of(body.refine_to_length(step)).triangles for body in (one, other)]
-    return max(_distance(*triangles), _distance(*triangles[::-1]))
-
-
-def _distance(source: np.ndarray, target: np.ndarray) -> float:
-    chosen = source[:: -(-2 * len(source) // _SAMPLES)]
+def surface_distance(before: Manifold, after: Manifold) -> float:
+    """Largest distance of 40,000 points of a surface from its simplified one, mm."""
+    size = np.asarray(after.bounding_box()).reshape(2, 3)
+    # Cut finely, so that the nearest triangle is among those with the nearest centres.
+    target = surface_of(after.refine_to_length(float((size[1] - size[0]).max()) / 100)).triangles
+    surface = surface_of(before)
+    chosen = surface.vertices[surface.faces[:: max(1, 2 * len(surface.faces) // _SAMPLES)]]
     points = np.concatenate([chosen[:, 0], chosen.mean(axis=1)])
     near = KDTree(target.mean(axis=1)).query(points, k=min(24, len(target)))[1].reshape(len(points), -1)
     best = np.full(len(points), np.inf)

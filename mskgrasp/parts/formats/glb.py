@@ -101,6 +101,11 @@ def _check_header(tree: dict[str, Any]) -> None:
             raise Unreadable(
                 "has an array without data (sparse or compressed): export it without compression"
             )
+    # Section 3.5.2 of the glTF specification: nodes form trees.
+    children = [str(child) for node in _entries(tree, "nodes") for child in node.get("children", ())]
+    roots = {str(root) for scene in _entries(tree, "scenes") for root in scene.get("nodes", ())}
+    if len(set(children)) < len(children) or roots & set(children):
+        raise Unreadable("is no readable GLB (a node has two parents or is its own): export it again")
 
 
 def _entries(tree: dict[str, Any], key: str) -> list[dict[str, Any]]:

@@ -99,7 +99,7 @@ def load_3mf(content: bytes) -> Loaded:
     objects = {key: item for model in models for key, item in model.objects.items()}
     surfaces, skipped = _placed(root, objects)
     name, length = _UNITS[root.unit]
-    told = (f"left out {skipped} support objects",) if skipped else ()
+    told = (f"left out {skipped} support object{'s' if skipped > 1 else ''}",) if skipped else ()
     return Loaded(objects=tuple(surfaces), unit=name, unit_mm=length, told=told)
 
 
