@@ -7,64 +7,19 @@ from collections.abc import Iterator
 from mskgrasp.parts import shape as h
 from mskgrasp.parts import solid as s
 from mskgrasp.parts.families import outlines as o
-from mskgrasp.parts.families.recipe import ALUMINIUM, STEEL, Recipe
-from mskgrasp.parts.families.series import Series
+from mskgrasp.parts.families.listing import one_per_row
+from mskgrasp.parts.families.recipe import ALUMINIUM, Recipe
 
 
 def recipes() -> Iterator[Recipe]:
     """The built-in brackets besides the plain ones."""
-    for series in (
-        Series(
-            family="ribbed_bracket",
-            name="ribbed_bracket_{a_mm:g}x{b_mm:g}x{w_mm:g}",
-            table="ribbed_bracket.csv",
-            density=STEEL,
-            make=ribbed_bracket,
-        ),
-        Series(
-            family="profile_angle",
-            name="profile_angle_{a_mm:g}x{b_mm:g}x{w_mm:g}",
-            table="profile_angle.csv",
-            density=ALUMINIUM,
-            make=profile_angle,
-        ),
-        Series(
-            family="slotted_bracket",
-            name="slotted_bracket_{a_mm:g}x{b_mm:g}",
-            table="slotted_bracket.csv",
-            density=STEEL,
-            make=slotted_bracket,
-        ),
-        Series(
-            family="drilled_angle",
-            name="drilled_angle_{a_mm:g}x{b_mm:g}x{w_mm:g}",
-            table="drilled_angle.csv",
-            density=STEEL,
-            make=drilled_angle,
-        ),
-        Series(
-            family="z_bracket",
-            name="z_bracket_{a_mm:g}x{b_mm:g}x{c_mm:g}",
-            table="z_bracket.csv",
-            density=STEEL,
-            make=z_bracket,
-        ),
-        Series(
-            family="hat_bracket",
-            name="hat_bracket_{c_mm:g}x{b_mm:g}x{w_mm:g}",
-            table="hat_bracket.csv",
-            density=STEEL,
-            make=hat_bracket,
-        ),
-        Series(
-            family="fork_bracket",
-            name="fork_bracket_{a_mm:g}x{b_mm:g}x{w_mm:g}",
-            table="fork_bracket.csv",
-            density=ALUMINIUM,
-            make=fork_bracket,
-        ),
-    ):
-        yield from series.recipes()
+    yield from one_per_row("ribbed_bracket.csv", "ribbed_bracket_{a}x{b}x{w}", ribbed_bracket)
+    yield from one_per_row("profile_angle.csv", "profile_angle_{a}x{b}x{w}", profile_angle, density=ALUMINIUM)
+    yield from one_per_row("slotted_bracket.csv", "slotted_bracket_{a}x{b}", slotted_bracket)
+    yield from one_per_row("drilled_angle.csv", "drilled_angle_{a}x{b}x{w}", drilled_angle)
+    yield from one_per_row("z_bracket.csv", "z_bracket_{a}x{b}x{c}", z_bracket)
+    yield from one_per_row("hat_bracket.csv", "hat_bracket_{c}x{b}x{w}", hat_bracket)
+    yield from one_per_row("fork_bracket.csv", "fork_bracket_{a}x{b}x{w}", fork_bracket, density=ALUMINIUM)
 
 
 def ribbed_bracket(size: dict[str, float]) -> s.Solid:

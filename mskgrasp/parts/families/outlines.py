@@ -57,6 +57,13 @@ def rounded(x0: float, x1: float, y0: float, y1: float, radius: float) -> np.nda
     return belt(*inner)
 
 
+def blunted(x0: float, x1: float, y0: float, y1: float, radius: float) -> np.ndarray:
+    """A rectangle with corners cut off: how hulls draw one with rounded corners."""
+    c = 0.5 * radius
+    right = [(x0 + c, y0), (x1 - c, y0), (x1, y0 + c), (x1, y1 - c)]
+    return np.array([*right, (x1 - c, y1), (x0 + c, y1), (x0, y1 - c), (x0, y0 + c)])
+
+
 def arch(half_width: float, z0: float, z1: float) -> np.ndarray:
     """Upright sides from z0 to z1 with a half circle on top."""
     angle = np.linspace(0, np.pi, 2 * _QUARTER + 1)
