@@ -189,5 +189,5 @@ def _check_volume(surface: Surface) -> list[str]:
             "example with Blender's Remesh"
         )
     if share > 0:
-        return [f"crosses itself in {100 * share:.2g} % of its volume (kept)"]
+        return [f"crosses itself in {100 * share:.1g} % of its volume (kept)"]
     return []

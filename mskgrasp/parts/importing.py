@@ -77,7 +77,7 @@ def import_file(
     check_density(density)
     name = legal_name(path.stem if name is None else name)
     content = read_content(path)
-    recipe = [family, unit, density, licence, bodies, path.name, source_digest(), _own_digest()]
+    recipe = [family, unit, float(density), licence, bodies, path.name, source_digest(), _own_digest()]
     digest = hashlib.sha256(json.dumps(recipe).encode() + hashlib.sha256(content).digest()).hexdigest()
 
     if bodies != "split":
@@ -93,8 +93,14 @@ def import_file(
         raise BadPart(f"{path} {error}") from error
     count = len(mended.bodies)
     names = [name] if count == 1 else [f"{name[: 79 - len(str(count))]}-{i + 1}" for i in range(count)]
-    for each in names:
+    for each, mesh in zip(names, mended.bodies, strict=True):
         _check_name(each, may_take)
+        longest = float(np.max(mesh.extents))
+        if longest < POSSIBLE_SIZE_MM[0]:
+            raise BadPart(
+                f"{path}: the body {each} is {longest:.3g} mm long, the least is {POSSIBLE_SIZE_MM[0]:g} mm: "
+                "remove it in the CAD program"
+            )
     parts, unchanged = [], True
     for number, (each, mesh) in enumerate(zip(names, mended.bodies, strict=True)):
         recipe_hash = digest if count == 1 else f"{digest[:56]}-{number + 1:07d}"
@@ -160,12 +166,6 @@ def _make(
     licence: str,
     recipe_hash: str,
 ) -> Part:
-    longest = float(np.max(mesh.extents))
-    if longest < POSSIBLE_SIZE_MM[0]:
-        raise BadPart(
-            f"{path}: the body {name} is {longest:.3g} mm long, the least is {POSSIBLE_SIZE_MM[0]:g} mm: "
-            "remove it in the CAD program"
-        )
     try:
         return write_solid(
             Solid(mesh=mesh, hulls=convex_pieces(for_collision(mesh))),

@@ -10,6 +10,9 @@ from manifold3d import Error, Manifold, Mesh64
 
 from mskgrasp.errors import BadPart
 
+_MOST_CHANGE = 1e-4
+"""Of the volume: manifold3d tidies slivers away without asking, and with them folds that are not slivers."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Surface:
@@ -48,6 +51,11 @@ def manifold_of(surface: Surface) -> Manifold:
     )
     if body.status() != Error.NoError or body.is_empty():
         raise BadPart("is no proper solid: its faces do not bound a volume; repair and export it again")
+    if abs(body.volume() - surface.volume) > _MOST_CHANGE * abs(surface.volume):
+        raise BadPart(
+            "is no proper solid: some of its faces are folded over their neighbours; export it again, in "
+            "triangles (STL) where the format has polygons"
+        )
     return body
 
 

@@ -90,9 +90,10 @@ def run_import(verb: Import) -> int:
         raise UsageError(
             f"--name {verb.name} with {len(selected.files)} files: import them one by one to name them"
         )
-    rows = [_Row(file=str(path), result="refused", remarks=(why,)) for path, why in selected.refused]
-    for row in rows:
-        print(f"error: {row.remarks[0]}", file=sys.stderr)
+    rows: list[_Row] = []
+    for path, why in selected.refused:
+        rows.append(_Row(file=str(path), result="refused", remarks=(_without(why, path),)))
+        print(f"error: {why}", file=sys.stderr)
     try:
         _import_all(verb, selected.files, rows)
     finally:  # also when stopped: what was done is told

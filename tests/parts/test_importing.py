@@ -1,14 +1,15 @@
-"""Mesh files as they come: good ones become parts, others are refused in one line."""
+"""CAD files as they come: good ones become parts, others are refused in one line."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from build123d import Box, Cylinder, export_step
 
 from mskgrasp.errors import BadPart
 from mskgrasp.parts import find_part
-from mskgrasp.parts.importing import import_part, legal_name
+from mskgrasp.parts.importing import import_file, import_part, legal_name
 
 
 def bracket() -> trimesh.Trimesh:
@@ -112,18 +113,19 @@ def write_foreign_index(file: Path) -> None:
 @pytest.mark.parametrize(
     ("file_name", "write", "said"),
     [
-        ("open.stl", write_open, "not watertight"),
+        ("open.stl", write_open, "is open: 3 edges"),
         ("flat.stl", write_flat, "volume is zero"),
         ("two.stl", write_two_bodies, "2 separate bodies"),
-        ("half.stl", write_half, "export it again"),
+        ("half.stl", write_half, "is cut off"),
         ("half.ply", write_half, "no readable PLY"),
         ("infinite.ply", write_not_finite, "not finite"),
         ("letter.stl", write_text, "export it again"),
-        ("letter.ply", write_text, "export it again"),
+        ("letter.ply", write_text, "no readable PLY"),
         ("index.obj", write_foreign_index, "export it again"),
         ("empty.obj", lambda file: file.touch(), "is empty"),
         ("zeros.stl", lambda file: file.write_bytes(bytes(84)), "holds no triangles"),
-        ("part.step", write_text, "mesh files end in .stl, .obj, .ply"),
+        ("part.step", write_text, "is no STEP"),
+        ("part.iges", write_text, "CAD files end in .stl, .obj, .ply, .glb, .3mf, .step, .stp"),
         ("missing.stl", lambda file: None, "No such file"),
     ],
 )
@@ -142,11 +144,75 @@ def test_a_builtin_name_cannot_be_taken(tmp_path):
         import_part(tmp_path / "hex_nut_m20.stl")
 
 
-def test_a_density_must_be_positive(tmp_path):
+@pytest.mark.parametrize("density", [0.0, -1.0, float("nan"), float("inf"), 7.85, 1e6])
+def test_a_density_must_be_that_of_a_solid(tmp_path, density):
     trimesh.creation.box((40, 30, 20)).export(tmp_path / "box.stl")
-    for density in (0.0, -1.0, float("nan")):
-        with pytest.raises(BadPart, match="density"):
-            import_part(tmp_path / "box.stl", density=density)
+    with pytest.raises(BadPart, match="density") as caught:
+        import_part(tmp_path / "box.stl", density=density)
+    assert ("not g/cm^3" in str(caught.value)) == (density == 7.85)
+
+
+def test_a_step_part_has_the_mass_of_the_formula(tmp_path):
+    export_step(Box(40, 30, 20) - Cylinder(8, 30), tmp_path / "block.step")
+    imported = import_file(tmp_path / "block.step", density=2700)
+    part = imported.parts[0]
+    assert part.mass == pytest.approx(2700e-9 * (24_000 - np.pi * 64 * 20), rel=2e-4)
+    assert np.allclose(part.extents, [0.04, 0.03, 0.02], atol=1e-7)
+    assert imported.unit == "mm" and not imported.unchanged
+
+
+def test_a_cavity_makes_a_part_lighter_and_not_smaller(tmp_path):
+    outer, inner = trimesh.creation.box((40, 30, 20)), trimesh.creation.box((20, 10, 10))
+    inner.invert()
+    trimesh.util.concatenate([outer, inner]).export(tmp_path / "hollow.stl")
+    part = import_part(tmp_path / "hollow.stl", density=1000)
+    assert part.mass == pytest.approx(0.022)
+    full, hollow = np.array([20, 30, 40]) / 1000, np.array([10, 10, 20]) / 1000
+    about_x = 0.024 / 12 * (full[0] ** 2 + full[1] ** 2) - 0.002 / 12 * (hollow[0] ** 2 + hollow[1] ** 2)
+    assert part.inertia[0, 0] == pytest.approx(about_x, rel=1e-6)
+    assert np.allclose(part.extents, [0.04, 0.03, 0.02])
+
+
+def test_split_names_bodies_by_decreasing_volume_and_leaves_them_alone_the_next_time(tmp_path):
+    write_two_bodies(tmp_path / "pair.stl")
+    imported = import_file(tmp_path / "pair.stl", bodies="split", density=1000)
+    assert [part.name for part in imported.parts] == ["pair-1", "pair-2"]
+    assert [part.mass for part in imported.parts] == pytest.approx([0.024, 0.024])
+    assert imported.told == ("split into 2 parts",)
+    assert import_file(tmp_path / "pair.stl", bodies="split", density=1000).unchanged
+    trimesh.creation.box((40, 30, 20)).export(tmp_path / "single.stl")
+    assert [part.name for part in import_file(tmp_path / "single.stl", bodies="split").parts] == ["single"]
+
+
+def test_union_makes_one_part_of_bodies_that_overlap(tmp_path):
+    boxes = [trimesh.creation.box((40, 30, 20)) for _ in range(2)]
+    boxes[1].apply_translation((20, 0, 0))
+    trimesh.util.concatenate(boxes).export(tmp_path / "long.stl")
+    imported = import_file(tmp_path / "long.stl", bodies="union", density=1000)
+    assert imported.parts[0].mass == pytest.approx(0.036) and imported.parts[0].n_hulls == 1
+
+
+def test_dust_beside_a_body_is_refused_as_a_part_of_its_own(tmp_path, own_cache):
+    body, dust = trimesh.creation.box((40, 30, 20)), trimesh.creation.box((0.5, 0.5, 0.5))
+    dust.apply_translation((50, 0, 0))
+    trimesh.util.concatenate([body, dust]).export(tmp_path / "dusty.stl")
+    with pytest.raises(BadPart, match="dusty-2 is 0.5 mm long"):
+        import_file(tmp_path / "dusty.stl", bodies="split")
+    assert not own_cache.exists() or not any(own_cache.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("edge", "said"),
+    [
+        (1000.0, "is 1 m long when read in mm; the cell takes 2 to 500 mm"),
+        (0.05, "--unit m would make it 50 mm"),
+    ],
+)
+def test_a_part_of_a_metre_and_one_in_the_wrong_unit_are_refused(tmp_path, edge, said):
+    trimesh.creation.box((edge, edge / 20, edge / 20)).export(tmp_path / "bar.stl")
+    with pytest.raises(BadPart) as caught:
+        import_part(tmp_path / "bar.stl")
+    assert said in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -124,6 +124,26 @@ def test_backward_counts_of_an_obj_are_from_the_vertex_read_last():
     assert volume(read("box.obj", pieces.encode())) == pytest.approx(24_000)
 
 
+def test_a_concave_polygon_of_an_obj_is_cut_inside_its_outline():
+    outline = [(0, 0), (40, 0), (40, 40), (22, 40), (20, 5), (18, 40), (0, 40)]
+    n = len(outline)
+    lines = [f"v {x} {y} {z}" for z in (0, 10) for x, y in outline]
+    lines += [
+        "f " + " ".join(str(i) for i in range(n, 0, -1)),
+        "f " + " ".join(str(n + i + 1) for i in range(n)),
+    ]
+    lines += [f"f {i + 1} {(i + 1) % n + 1} {(i + 1) % n + n + 1} {i + n + 1}" for i in range(n)]
+    file = read("notch.obj", "\n".join(lines).encode())
+    assert volume(file) == pytest.approx(10 * (1600 - 4 * 35 / 2))
+    area = (
+        np.linalg.norm(np.cross(*np.diff(file.objects[0].triangles, axis=1).swapaxes(0, 1)), axis=1).sum() / 2
+    )
+    around = sum(
+        np.hypot(*np.subtract(a, b)) for a, b in zip(outline, outline[1:] + outline[:1], strict=True)
+    )
+    assert area == pytest.approx(2 * 1530 + 10 * around)
+
+
 def test_names_of_an_obj_may_be_in_any_encoding_and_its_materials_are_not_opened(tmp_path):
     secret = tmp_path / "secret.mtl"
     secret.symlink_to("/dev/zero")  # reading it would never end

@@ -5,17 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from mskgrasp.parts.formats import Loaded, Unreadable
+from mskgrasp.parts.formats.polygons import triangulated
 from mskgrasp.parts.surface import Surface
 
 
 def load_obj(content: bytes) -> Loaded:
-    """Reads an OBJ; its unit is unknown. Polygons become fans of triangles.
+    """Reads an OBJ; its unit is unknown. Polygons are cut into triangles.
 
     Raises:
         Unreadable: A line is damaged, or there are no vertices.
     """
     vertices: list[list[bytes]] = []
     faces: list[tuple[int, int, int]] = []
+    polygons: list[list[int]] = []
     # Names may be in any encoding; what counts is ASCII.
     lines = content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines()
     for number, line in enumerate(lines, start=1):
@@ -35,14 +37,13 @@ def load_obj(content: bytes) -> Loaded:
             ) from error
         # Counted from 1, or backwards from the vertex read last.
         corners = [corner - 1 if corner > 0 else len(vertices) + corner for corner in corners]
-        faces += [(corners[0], b, c) for b, c in zip(corners[1:-1], corners[2:], strict=True)]
+        if len(corners) == 3:
+            faces.append((corners[0], corners[1], corners[2]))
+        elif len(corners) > 3:
+            polygons.append(corners)
     if not vertices:
         raise Unreadable("holds no vertices (text of another kind?): export it again as OBJ")
-    return Loaded(
-        objects=(
-            Surface(
-                vertices=np.array(vertices, dtype="S").astype(np.float64),
-                faces=np.array(faces, dtype=np.int64).reshape(-1, 3),
-            ),
-        )
-    )
+    points = np.array(vertices, dtype="S").astype(np.float64)
+    pieces = [np.array(faces, dtype=np.int64).reshape(-1, 3)]
+    pieces += [triangulated(points, np.array(corners)) for corners in polygons]
+    return Loaded(objects=(Surface(vertices=points, faces=np.concatenate(pieces)),))
