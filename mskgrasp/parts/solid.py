@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 import trimesh
 from manifold3d import CrossSection, FillRule, Manifold
+from scipy.spatial import ConvexHull, QhullError
 
 CIRCLE_SEGMENTS = 128
 """Of round mesh surfaces: an inscribed 128-gon has 0.04 % less area than its circle."""
@@ -154,6 +155,33 @@ def cut(
             body = body.trim_by_plane(tuple(-np.asarray(normal, dtype=float)), -offset)
         result.append(np.asarray(body.to_mesh64().vert_properties)[:, :3])
     return result
+
+
+def few_corners(points: np.ndarray, most: int = MAX_HULL_VERTICES) -> np.ndarray:
+    """Corners of a convex body near the hull of the points: those that stand out farthest are kept."""
+    corners = points[np.sort(ConvexHull(points).vertices)]
+    if len(corners) <= most:
+        return corners
+    spread = np.linalg.norm(corners - corners.mean(axis=0), axis=1)
+    first = {int((sign * corners[:, axis]).argmax()) for axis in range(3) for sign in (1, -1)}
+    chosen = sorted(first | {int(spread.argmax())})
+    while len(chosen) < most:
+        try:
+            planes = ConvexHull(corners[chosen]).equations
+        except QhullError:  # the first few may lie in a plane
+            outside = _distance_off_plane(corners, corners[chosen])
+        else:
+            outside = (corners @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        outside[chosen] = -1
+        chosen.append(int(outside.argmax()))
+    return corners[sorted(chosen)]
+
+
+def _distance_off_plane(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
+    """How far points lie from the plane through nearly coplanar ones."""
+    centre = flat.mean(axis=0)
+    normal = np.linalg.svd(flat - centre)[2][-1]
+    return np.abs((points - centre) @ normal)
 
 
 def move(

@@ -6,6 +6,7 @@ import importlib.metadata
 import importlib.util
 from collections.abc import Iterator
 
+from mskgrasp.parts.cad import screws
 from mskgrasp.parts.families.recipe import Recipe
 
 VENDORS = ("build123d", "bd_warehouse")
@@ -23,4 +24,5 @@ def versions() -> dict[str, str]:
 
 def recipes() -> Iterator[Recipe]:
     """The parts of all modules here."""
-    yield from ()
+    for module in (screws,):
+        yield from module.recipes()
