@@ -183,7 +183,7 @@ def write_solid(
         "extents": mesh.extents / 1000,
         "longest_axis": longest_axis(mesh) / 1000,
         "n_hulls": len(hulls),
-        "n_hull_vertices": sum(map(len, hulls)),
+        "hulls_volume": 1e-9 * sum(ConvexHull(points.astype(np.float64)).volume for points in hulls),
         "hull_error": fit.largest / 1000,
         "hull_error_p95": fit.p95 / 1000,
         "hull_volume_ratio": fit.volume_ratio,

@@ -34,7 +34,7 @@ class Part:
         extents: (3,) size of the bounding box in obj axes, metres.
         longest_axis: Longest edge of the oriented minimal box, metres.
         n_hulls: How many convex hulls ``hulls.glb`` holds.
-        n_hull_vertices: How many corners they have together.
+        hulls_volume: Sum of their volumes, overlaps counted twice, cubic metres.
         hull_error: Largest distance between the hulls' union and the mesh, metres.
         resting: ``T_table_obj`` of the k stable poses (z of the table is 0): position (k, 3) with
             x = y = 0, quat_wxyz (k, 4).
@@ -56,7 +56,7 @@ class Part:
     extents: np.ndarray
     longest_axis: float
     n_hulls: int
-    n_hull_vertices: int
+    hulls_volume: float
     hull_error: float
     resting: Pose
     resting_probability: np.ndarray

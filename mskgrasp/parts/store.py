@@ -178,7 +178,7 @@ def _part_of(folder: Path, record: dict[str, Any]) -> Part:
         extents=_array(record, "extents", (3,)),
         longest_axis=_positive(record, "longest_axis"),
         n_hulls=int(_positive(record, "n_hulls")),
-        n_hull_vertices=int(_positive(record, "n_hull_vertices")),
+        hulls_volume=_positive(record, "hulls_volume"),
         hull_error=_finite(record, "hull_error"),
         resting=Pose(
             position=_array(record["resting"], "position", (count, 3)),
