@@ -206,7 +206,11 @@ def _core_radius(part: Any) -> float:
     for z in np.concatenate([levels[:-1] + step, levels[1:] - step]):
         line = part.intersection(shapely.LineString([(-1, z), (reach + 1, z)]))
         first = min(
-            (np.asarray(shapely.get_coordinates(piece))[:, 0] for piece in shapely.get_parts(line)),
+            (
+                np.asarray(shapely.get_coordinates(piece))[:, 0]
+                for piece in shapely.get_parts(line)
+                if not piece.is_empty
+            ),
             key=lambda radius: radius.min(),
             default=np.array([reach]),
         )

@@ -8,29 +8,76 @@ import numpy as np
 from manifold3d import Manifold
 
 from mskgrasp.parts import solid as s
+from mskgrasp.parts.families.listing import one
 from mskgrasp.parts.families.recipe import STEEL, Recipe, table_row
+from mskgrasp.parts.solid import Maker
+
+Lengths = dict[int, tuple[int, ...]]
+"""Nominal lengths for each thread diameter, millimetres."""
 
 CHAMFER_CIRCLE = 0.95
 """Diameter of the flat face of a chamfered hexagon, as a fraction of the width across flats."""
 
 
+HEX_BOLTS: Lengths = {
+    6: (35, 50, 60),
+    8: (35, 50, 65, 80),
+    10: (30, 45, 60, 80, 100),
+    12: (35, 50, 60, 80, 100, 120),
+    14: (45, 70, 90, 110),
+    16: (40, 60, 80, 100, 120, 130),
+    20: (50, 65, 80, 100, 120),
+    24: (50, 70, 90, 110, 130),
+    30: (70, 90, 110),
+}
+SOCKET_SCREWS: Lengths = {
+    6: (40, 60),
+    8: (35, 50, 65, 80),
+    10: (25, 40, 60, 80, 100),
+    12: (30, 50, 70, 90, 110),
+    14: (45, 65, 90, 120),
+    16: (35, 50, 70, 90, 110, 130),
+    20: (45, 60, 80, 100, 120),
+    24: (50, 70, 90, 110),
+    30: (60, 90),
+}
+HEX_NUTS = (16, 20, 24, 30, 36, 42, 48)
+THIN_NUTS = (24, 30, 36, 42)
+WASHERS = (20, 24, 30, 36)
+LARGE_WASHERS = (16, 20, 24)
+
+
 def recipes() -> Iterator[Recipe]:
-    """The built-in fasteners."""
-    for d, length in ((12, 60), (20, 50)):
-        dimensions = table_row("iso4017_hex_bolt.csv", d_mm=d) | {"l_mm": float(length)}
-        yield _recipe(f"hex_bolt_m{d}x{length}", "hex_bolt", "ISO 4017", dimensions, hex_bolt)
-    for d, length in ((10, 60), (16, 50)):
-        dimensions = table_row("iso4762_socket_screw.csv", d_mm=d) | {"l_mm": float(length)}
-        yield _recipe(f"socket_screw_m{d}x{length}", "socket_screw", "ISO 4762", dimensions, socket_screw)
-    for d in (20, 30):
-        yield _recipe(
-            f"hex_nut_m{d}", "hex_nut", "ISO 4032", table_row("iso4032_hex_nut.csv", d_mm=d), hex_nut
-        )
-    yield _recipe("washer_m36", "washer", "ISO 7089", table_row("iso7089_washer.csv", d_mm=36), washer)
+    """The built-in screws, nuts and washers of the commonest standards."""
+    yield from with_lengths("iso4017_hex_bolt.csv", HEX_BOLTS, "hex_bolt_m{d}x{l}", hex_bolt, "ISO 4017")
+    yield from with_lengths(
+        "iso4762_socket_screw.csv", SOCKET_SCREWS, "socket_screw_m{d}x{l}", socket_screw, "ISO 4762"
+    )
+    for file, sizes, name, make, source, family in (
+        ("iso4032_hex_nut.csv", HEX_NUTS, "hex_nut_m{d}", hex_nut, "ISO 4032", "hex_nut"),
+        ("iso4035_thin_nut.csv", THIN_NUTS, "thin_nut_m{d}", hex_nut, "ISO 4035", "thin_nut"),
+        ("iso7089_washer.csv", WASHERS, "washer_m{d}", washer, "ISO 7089", "washer"),
+        (
+            "iso7093_large_washer.csv",
+            LARGE_WASHERS,
+            "large_washer_m{d}",
+            washer,
+            "ISO 7093-1",
+            "large_washer",
+        ),
+    ):
+        for d in sizes:
+            yield one(table_row(file, d_mm=d), name, make, source=source, family=family)
 
 
-def _recipe(name: str, family: str, source: str, dimensions: dict[str, float], make: s.Maker) -> Recipe:
-    return Recipe(name=name, family=family, source=source, density=STEEL, dimensions=dimensions, make=make)
+def with_lengths(
+    file_name: str, lengths: Lengths, name: str, make: Maker, source: str, density: float = STEEL
+) -> Iterator[Recipe]:
+    """A recipe for each thread diameter of a table and each of its nominal lengths."""
+    for d, chosen in lengths.items():
+        for length in chosen:
+            row = table_row(file_name, d_mm=d) | {"l_mm": float(length)}
+            yield one(row, name, make, source=source, density=density)
 
 
 def hex_bolt(size: dict[str, float]) -> s.Solid:
