@@ -54,7 +54,7 @@ def _check_cooked(part: Part, body: PhysxRigidDynamicComponent | None) -> None:
     if len(shapes) != part.n_hulls or not np.isclose(volume, part.hulls_volume, rtol=LEAST_KEPT):
         raise BadPart(
             f"part '{part.name}': PhysX took {len(shapes)} of {part.n_hulls} hulls and "
-            f"{volume / part.hulls_volume:.2%} of their volume; delete {part.folder} and build or import it again"
+            f"{volume / part.hulls_volume:.2%} of their volume; delete {part.folder} and make it again"
         )
     if body is not None and not (
         np.isclose(body.mass, part.mass, rtol=1e-4)
