@@ -22,8 +22,11 @@ MOST_MOVED_MM = 0.05
 """How far the surface may be moved; common CAD tessellations are about as far from the true one."""
 
 COLLISION_TRIANGLES = 6_000
-COLLISION_TOLERANCES_MM = (0.01, 0.02, 0.05, 0.1)
+COLLISION_TOLERANCES_MM = (0.01, 0.02, 0.05, 0.1, 0.2)
 """Convex decomposition takes time by the triangle, and its pieces are tenths of a millimetre off anyway."""
+
+_FINE = 1 / 400
+"""Of the part's length: the coarsest tolerance for small parts."""
 
 _SAMPLES = 40_000
 
@@ -60,11 +63,13 @@ def thin_out(body: Manifold) -> tuple[Manifold, str | None]:
 
 
 def for_collision(mesh_mm: trimesh.Trimesh) -> trimesh.Trimesh:
-    """A coarser mesh for convex decomposition, at most 0.1 mm away; the same mesh where it is coarse."""
+    """A coarser mesh for convex decomposition, at most 0.2 mm away; the same mesh where it is coarse."""
     if len(mesh_mm.faces) <= COLLISION_TRIANGLES:
         return mesh_mm
     body = manifold_of(Surface(vertices=np.asarray(mesh_mm.vertices), faces=np.asarray(mesh_mm.faces)))
-    coarse = surface_of(_coarsened(body, COLLISION_TRIANGLES, COLLISION_TOLERANCES_MM))
+    limit = max(COLLISION_TOLERANCES_MM[0], _FINE * float(np.max(mesh_mm.extents)))
+    tolerances = tuple(tolerance for tolerance in COLLISION_TOLERANCES_MM if tolerance <= limit)
+    coarse = surface_of(_coarsened(body, COLLISION_TRIANGLES, tolerances))
     return trimesh.Trimesh(coarse.vertices, coarse.faces, process=False)
 
 

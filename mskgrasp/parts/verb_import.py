@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 _FLAG = tyro.conf.FlagCreatePairsOff
 
+_TABLE_WIDTH = 130
+_COLOURS = {"imported": "green", "repaired": "yellow", "refused": "red", "unchanged": "dim"}
+
 PAYLOAD_KG = 3.0
 """What a Panda carries (Franka Emika, Panda datasheet)."""
 
@@ -42,8 +45,7 @@ class Import:
     files: tyro.conf.Positional[tuple[Path, ...]]
     """Files (.stl .obj .ply .glb .3mf .step .stp), folders, quoted patterns."""
     unit: Literal["mm", "m", "in"] | None = None
-    """Unit of the coordinates. STL, OBJ and PLY do not say it: mm is assumed. GLB is in metres by its
-    standard; 3MF and STEP say it themselves."""
+    """Unit of STL, OBJ and PLY (else mm), and of a GLB not in metres; 3MF and STEP say it themselves."""
     density: float = 7850.0
     """kg/m^3: steel 7850, aluminium 2700, brass 8500, ABS 1050."""
     split: Annotated[bool, _FLAG] = False
@@ -182,22 +184,25 @@ def _warnings(part: Part, unit: str) -> list[str]:
 
 
 def _print_table(rows: Sequence[_Row]) -> None:
+    console = Console()
+    if console.is_terminal and console.width < _TABLE_WIDTH:
+        for row in rows:
+            _print_lines(console, row)
+        return
     table = Table(box=None, pad_edge=False, header_style="bold")
     for header in ("file", "part", "result"):
         table.add_column(header, overflow="fold")
     for header in ("size mm", "mass g", "hulls", "error p95 mm", "max mm"):
         table.add_column(header, justify="right", no_wrap=True)
     table.add_column("what was done, or why not", overflow="fold")
-    colours = {"imported": "green", "repaired": "yellow", "refused": "red", "unchanged": "dim"}
     for row in rows:
         remarks = "; ".join(row.remarks)
-        first = [Text(row.file), "", Text(row.result, style=colours[row.result]), *5 * [""], Text(remarks)]
+        first = [Text(row.file), "", Text(row.result, style=_COLOURS[row.result]), *5 * [""], Text(remarks)]
         for number, part in enumerate(row.parts):
             line = first if number == 0 else ["", "", "", *5 * [""], ""]
             table.add_row(line[0], part.name, line[2], *_figures(part), line[8])
         if not row.parts:
             table.add_row(*first)
-    console = Console()
     if console.is_terminal:
         console.print(table)
         return
@@ -205,6 +210,17 @@ def _print_table(rows: Sequence[_Row]) -> None:
     with wide.capture() as capture:
         wide.print(table)
     print("\n".join(line.rstrip() for line in capture.get().splitlines()))
+
+
+def _print_lines(console: Console, row: _Row) -> None:
+    """What the table says, for terminals too narrow for it."""
+    head = Text.assemble((row.file, "bold"), ": ", (row.result, _COLOURS[row.result]))
+    console.print(head.append("".join(f"; {remark}" for remark in row.remarks)))
+    for part in row.parts:
+        size, mass, hulls, p95, largest = _figures(part)
+        console.print(
+            Text(f"  {part.name}: {size} mm, {mass} g, hulls {hulls}, error p95 {p95} mm, max {largest} mm")
+        )
 
 
 def _figures(part: Part) -> tuple[str, ...]:
