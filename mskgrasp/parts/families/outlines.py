@@ -89,5 +89,49 @@ def tube(outer: float, inner: float, z0: float, z1: float) -> h.Shape:
     return h.turned([(inner, z0), (outer, z0), (outer, z1), (inner, z1)])
 
 
+def wedges(inner: float, outer: float, z0: float, z1: float, sectors: int) -> list[np.ndarray]:
+    """Convex pieces of a tube about z; the first is centred on the x axis.
+
+    Args:
+        inner: Radius at which the inner chords of the sectors end.
+        outer: Radius, drawn with 24 sides or more.
+        z0: Lower end.
+        z1: Upper end.
+        sectors: Number of pieces.
+    """
+    steps = -(-24 // sectors)
+    swell_in, swell_out = (2 / (1 + np.cos(np.pi / sides)) for sides in (sectors, sectors * steps))
+    pieces = []
+    for sector in range(sectors):
+        angles = 2 * np.pi * (sector - 0.5 + np.arange(steps + 1) / steps) / sectors
+        round_side = outer * swell_out * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        ends = angles[[-1, 0]]
+        chord = inner * swell_in * np.stack([np.cos(ends), np.sin(ends)], axis=1)
+        pieces.append(s.prism(np.concatenate([round_side, chord]), z0, z1))
+    return pieces
+
+
+def hollow(bore: float, outer: float, z0: float, z1: float) -> list[np.ndarray]:
+    """Convex pieces of a tube about z whose bore no finger enters: 8 to 12 of them."""
+    return wedges(bore, outer, z0, z1, s.sides_for(bore, 0.45, 2, 8, 12))
+
+
+def collar(bore: float, inner: float, outer: float, z0: float, z1: float) -> list[np.ndarray]:
+    """Convex pieces of a ring about a tube: the chords of its few sectors lie hidden in the tube's wall."""
+    sectors = next((n for n in (4, 6, 8) if inner * np.cos(np.pi / n) >= bore), 10)
+    # The corners lie on the tube's surface: no swelling, or the chords would leave a gap.
+    return wedges(inner * (1 + np.cos(np.pi / sectors)) / 2, outer, z0, z1, sectors)
+
+
+def hexagonal_collar(inner: float, across_flats: float, z0: float, z1: float) -> list[np.ndarray]:
+    """The same with a hexagonal outside, one piece for each flat."""
+    outside, inside = s.hexagon(across_flats), s.polygon(inner, 6)
+    pieces = []
+    for n in range(6):
+        m = (n + 1) % 6
+        pieces.append(s.prism(np.array([outside[n], outside[m], inside[m], inside[n]]), z0, z1))
+    return pieces
+
+
 def _corners(region: Any) -> np.ndarray:
     return np.asarray(shapely.get_coordinates(shapely.normalize(region).exterior))[:-1][::-1]
