@@ -51,6 +51,6 @@ STARTER = (
 @lru_cache(maxsize=1)
 def recipes() -> dict[str, Recipe]:
     """All built-in parts by name, sorted."""
-    modules = (angles, brackets, fasteners, gears, pins, pipe, plates, rings, screws, shafts)
+    modules = (angles, brackets, fasteners, gears, nuts, pins, pipe, plates, rings, screws, shafts)
     found = [recipe for module in modules for recipe in module.recipes()]
     return {recipe.name: recipe for recipe in sorted(found, key=lambda recipe: recipe.name)}

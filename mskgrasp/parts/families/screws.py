@@ -42,7 +42,7 @@ WING_SCREWS: Lengths = {6: (30, 50), 8: (30, 60), 10: (30, 50, 80), 12: (40, 70)
 def recipes() -> Iterator[Recipe]:
     """The built-in screws with special heads."""
     for file, lengths, name, make, source in (
-        ("en1665_flange_bolt.csv", FLANGE_BOLTS, "flange_bolt_m{d}x{l}", flange_bolt, "EN 1665"),
+        ("en1665_flange_bolt.csv", FLANGE_BOLTS, "heavy_flange_bolt_m{d}x{l}", heavy_flange_bolt, "EN 1665"),
         ("iso7380_button_screw.csv", BUTTON_SCREWS, "button_screw_m{d}x{l}", button_screw, "ISO 7380-1"),
         (
             "iso10642_countersunk_screw.csv",
@@ -78,7 +78,7 @@ def recipes() -> Iterator[Recipe]:
         yield from with_lengths(file, lengths, name, make, source)
 
 
-def flange_bolt(size: dict[str, float]) -> s.Solid:
+def heavy_flange_bolt(size: dict[str, float]) -> s.Solid:
     """A hexagon on a flange whose top slopes by 25 degrees."""
     d, k, width = size["d_mm"], size["k_mm"], size["s_mm"]
     head = flange(size["dc_mm"], size["c_mm"], width).mirrored("z") + h.hexagon_bar(width, -k, -size["c_mm"])
