@@ -9,6 +9,7 @@ from mskgrasp.parts.families import (
     brackets,
     fasteners,
     gears,
+    nuts,
     pins,
     pipe,
     plates,
