@@ -13,6 +13,7 @@ from mskgrasp.parts.families import (
     pins,
     pipe,
     plates,
+    profiles,
     rings,
     screws,
     shafts,
@@ -52,6 +53,6 @@ STARTER = (
 @lru_cache(maxsize=1)
 def recipes() -> dict[str, Recipe]:
     """All built-in parts by name, sorted."""
-    modules = (angles, brackets, fasteners, gears, nuts, pins, pipe, plates, rings, screws, shafts)
+    modules = (angles, brackets, fasteners, gears, nuts, pins, pipe, plates, profiles, rings, screws, shafts)
     found = [recipe for module in modules for recipe in module.recipes()]
     return {recipe.name: recipe for recipe in sorted(found, key=lambda recipe: recipe.name)}

@@ -122,7 +122,8 @@ def _elbow(first: h.Shape, second: h.Shape, bend: float, radius: float, bore: fl
     """
     angle = np.radians(180 - bend)
     directions = [np.array([1.0, 0, 0]), np.array([np.cos(angle), 0, np.sin(angle)])]
-    between = sum(directions) / np.linalg.norm(sum(directions))
+    middle = directions[0] + directions[1]
+    between = middle / np.linalg.norm(middle)
     across = (directions[0] - directions[1]) / np.linalg.norm(directions[0] - directions[1])
     reach = radius / np.tan(angle / 2)
     corner = h.tool(Manifold(), o.hollow(bore, radius, -reach, 0))
