@@ -7,6 +7,7 @@ from functools import lru_cache
 from mskgrasp.parts.families import (
     angles,
     brackets,
+    eyes,
     fasteners,
     gears,
     nuts,
@@ -17,6 +18,7 @@ from mskgrasp.parts.families import (
     rings,
     screws,
     shafts,
+    studs,
 )
 from mskgrasp.parts.families.recipe import Recipe
 
@@ -53,6 +55,21 @@ STARTER = (
 @lru_cache(maxsize=1)
 def recipes() -> dict[str, Recipe]:
     """All built-in parts by name, sorted."""
-    modules = (angles, brackets, fasteners, gears, nuts, pins, pipe, plates, profiles, rings, screws, shafts)
+    modules = (
+        angles,
+        brackets,
+        eyes,
+        fasteners,
+        gears,
+        nuts,
+        pins,
+        pipe,
+        plates,
+        profiles,
+        rings,
+        screws,
+        shafts,
+        studs,
+    )
     found = [recipe for module in modules for recipe in module.recipes()]
     return {recipe.name: recipe for recipe in sorted(found, key=lambda recipe: recipe.name)}
