@@ -33,8 +33,12 @@ def parts_folder() -> Path:
 
 
 def content_hash(mesh: bytes, hulls: bytes, record: dict[str, Any]) -> str:
-    """Hex digest of a part's mesh, hulls and physical data."""
-    physical = {key: value for key, value in record.items() if key not in ("content_hash", "recipe_hash")}
+    """Hex digest of a part's mesh, hulls and physical data: of what decides how it behaves in a grasp."""
+    physical = {
+        key: value
+        for key, value in record.items()
+        if key not in ("content_hash", "recipe_hash", "source", "licence") and not key.startswith("hull_")
+    }
     digest = hashlib.sha256()
     for block in (mesh, hulls, json.dumps(physical, sort_keys=True).encode()):
         digest.update(hashlib.sha256(block).digest())
