@@ -6,6 +6,7 @@ from functools import lru_cache
 
 from mskgrasp.parts.families import (
     angles,
+    bends,
     brackets,
     eyes,
     fasteners,
@@ -57,6 +58,7 @@ def recipes() -> dict[str, Recipe]:
     """All built-in parts by name, sorted."""
     modules = (
         angles,
+        bends,
         brackets,
         eyes,
         fasteners,
