@@ -15,6 +15,10 @@ class DriverMissing(HalError):
     """The vendor's package is not installed; the message names the extra."""
 
 
+class IncompatibleDriver(HalError):
+    """The installed driver speaks another version than the device."""
+
+
 class CommunicationLost(HalError):
     """The device stopped answering."""
 

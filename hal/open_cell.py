@@ -11,7 +11,7 @@ from hal.cell import Cell
 from mskgrasp.config import check_config, read_yaml
 from mskgrasp.errors import BadConfig
 
-CellType = Literal["sapien"]
+CellType = Literal["sapien", "devices"]
 
 
 @contextmanager
@@ -45,5 +45,9 @@ def cell_from_yaml(path: Path) -> Cell:
             from hal.sim import SapienCellConfig, sapien_cell
 
             return sapien_cell(check_config(SapienCellConfig, values, str(path)))
+        case "devices":
+            from hal.devices import devices_cell
+
+            return devices_cell(values, path)
         case _:
             assert_never(kind)

@@ -1,0 +1,172 @@
+"""A cell put together from an arm and a camera, each chosen by its ``driver``, and the table between."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal, assert_never, get_args
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from hal.arm import Arm, ArmLimits
+from hal.camera import Camera
+from hal.cell import Cell, PartFeeder, Workspace
+from hal.errors import OutOfWorkspace
+from hal.execute import APPROACH
+from mskgrasp.config import Config, check_config
+from mskgrasp.errors import BadConfig
+from mskgrasp.grasp import lowest_grasp_z, pose_base_tcp
+
+ArmDriver = Literal["franky", "panda_py"]
+CameraDriver = Literal["sapien"]
+
+Three = tuple[float, float, float]
+Seven = tuple[float, float, float, float, float, float, float]
+
+
+class WorkspaceConfig(Config):
+    """The table in front of the arm, and where the arm may be."""
+
+    table_z: float = Field(ge=-0.5, le=0.5)
+    """Height of the table in the robot's base frame, m; measure it: touch the table with closed fingers."""
+    region: tuple[float, float, float, float] = (0.38, 0.62, -0.12, 0.12)
+    """x_min, x_max, y_min, y_max where parts lie, base frame, m."""
+    home: Seven = (0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398)
+    """Joints at which the arm is out of the camera's sight, rad."""
+    box_lower: Three | None = None
+    """The TCP stays inside this box, base frame, m; by default 0.25, -0.4 and the table."""
+    box_upper: Three = (0.75, 0.4, 0.75)
+    """The other corner, m."""
+    min_height: float = Field(default=0.006, gt=0)
+    """What rises less over the table is taken for table, m; over the noise of a Kinect v2 (1.5 mm)."""
+    lift_height: float = Field(default=0.1, gt=0, le=0.3)
+    """How far a grasped part is lifted, m."""
+    grasp_force: float = Field(default=20.0, gt=0, le=70)
+    """N."""
+
+    @model_validator(mode="after")
+    def _check(self) -> WorkspaceConfig:
+        x_min, x_max, y_min, y_max = self.region
+        if not (x_min < x_max and y_min < y_max):
+            raise ValueError(f"region must be x_min < x_max, y_min < y_max, got {list(self.region)}")
+        lower, upper = self.lower(), np.array(self.box_upper)
+        if not (lower < upper).all():
+            raise ValueError(
+                f"box_lower {lower.tolist()} must be below box_upper {upper.tolist()} in x, y and z"
+            )
+        if not (lower[0] <= x_min and x_max <= upper[0] and lower[1] <= y_min and y_max <= upper[1]):
+            raise ValueError(
+                f"region {list(self.region)} reaches out of the box {lower.tolist()} .. {upper.tolist()}"
+            )
+        return self
+
+    def lower(self) -> np.ndarray:
+        """(3,) of the box, m."""
+        return np.array(self.box_lower if self.box_lower is not None else (0.25, -0.4, self.table_z))
+
+
+class DevicesConfig(Config):
+    """The sections of the file; ``arm`` and ``camera`` are checked by what their ``driver`` names."""
+
+    type: Literal["devices"]
+    arm: dict[str, Any]
+    camera: dict[str, Any]
+    workspace: WorkspaceConfig
+
+
+def devices_cell(values: dict[str, Any], path: Path) -> Cell:
+    """Builds the cell that a file of this type describes; nothing is connected yet.
+
+    Raises:
+        BadConfig: The file is not valid, or its parts do not fit each other.
+    """
+    config = check_config(DevicesConfig, values, str(path))
+    table = config.workspace
+    workspace = Workspace(
+        table_z=table.table_z,
+        region=table.region,
+        home=np.array(table.home),
+        min_height=table.min_height,
+        lift_height=table.lift_height,
+        grasp_force=table.grasp_force,
+    )
+    arm = _arm(config.arm, table, path)
+    _check_fit(arm, workspace, path)
+    camera, feeder = _camera(config.camera, workspace, path)
+    return Cell(camera=camera, arm=arm, workspace=workspace, feeder=feeder)
+
+
+def _driver(values: dict[str, Any], legal: tuple[str, ...], section: str, path: Path) -> Any:
+    if values.get("driver") not in legal:
+        raise BadConfig(f"{path}: '{section}.driver' is {values.get('driver')!r}; legal: {', '.join(legal)}")
+    return values["driver"]
+
+
+def _arm(values: dict[str, Any], table: WorkspaceConfig, path: Path) -> Arm:
+    driver: ArmDriver = _driver(values, get_args(ArmDriver), "arm", path)
+    source = f"{path}, arm"
+    match driver:
+        case "franky" | "panda_py":
+            from hal.franka import FrankaArm, FrankyArmConfig, PandaPyArmConfig
+
+            kind = FrankyArmConfig if driver == "franky" else PandaPyArmConfig
+            config = check_config(kind, values, source)
+            limits = ArmLimits(
+                joint_lower=config.joint_lower(),
+                joint_upper=config.joint_upper(),
+                box_lower=table.lower(),
+                box_upper=np.array(table.box_upper),
+                table_z=table.table_z,
+                max_force=config.max_grasp_force,
+            )
+            return FrankaArm(config, limits)
+        case _:
+            assert_never(driver)
+
+
+def _camera(values: dict[str, Any], workspace: Workspace, path: Path) -> tuple[Camera, PartFeeder | None]:
+    driver: CameraDriver = _driver(values, get_args(CameraDriver), "camera", path)
+    source = f"{path}, camera"
+    match driver:
+        case "sapien":
+            from hal.sim import SapienCameraConfig, sapien_camera
+
+            config = check_config(SapienCameraConfig, values, source)
+            try:
+                return sapien_camera(config, region=workspace.region, home=workspace.home)
+            except ValueError as error:
+                raise BadConfig(f"{source}: {error}") from error
+        case _:
+            assert_never(driver)
+
+
+def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
+    """Refuses what the arm would refuse later, with a part in its hand."""
+    if workspace.grasp_force > arm.limits.max_force:
+        raise BadConfig(
+            f"{path}: workspace.grasp_force {workspace.grasp_force:g} N is over the arm's "
+            f"{arm.limits.max_force:g} N (arm.max_grasp_force)"
+        )
+    outside = np.flatnonzero(
+        (workspace.home < arm.limits.joint_lower) | (workspace.home > arm.limits.joint_upper)
+    )
+    if len(outside):
+        i = int(outside[0])
+        raise BadConfig(
+            f"{path}: workspace.home puts joint {i + 1} at {workspace.home[i]:.3f} rad, outside "
+            f"{arm.limits.joint_lower[i]:.3f} .. {arm.limits.joint_upper[i]:.3f} rad"
+        )
+    lowest = lowest_grasp_z(workspace.table_z)
+    heights = (lowest, lowest + workspace.lift_height, workspace.table_z + APPROACH)
+    x_min, x_max, y_min, y_max = workspace.region
+    for x, y in ((x_min, y_min), (x_min, y_max), (x_max, y_min), (x_max, y_max)):
+        for z in heights:
+            for theta in (-np.pi / 2, np.pi / 2):
+                pose = pose_base_tcp(np.array([x, y, z, theta]))
+                try:
+                    arm.check_pose(pose)
+                except OutOfWorkspace as error:
+                    raise BadConfig(
+                        f"{path}: workspace.region {list(workspace.region)} cannot be grasped in whole, hand "
+                        f"turned by {theta:.2f} rad: {error}"
+                    ) from error

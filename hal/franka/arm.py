@@ -1,0 +1,251 @@
+"""A Panda or FR3 with the Franka Hand behind the interface of an arm, whichever driver moves it."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from dataclasses import asdict
+from typing import Any, NoReturn
+
+import numpy as np
+
+from hal.arm import JOINT_TOLERANCE, Arm, ArmLimits, ArmState, GraspOutcome
+from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery
+from hal.franka.config import JOINT_SPEED, FrankyArmConfig, PandaPyArmConfig
+from hal.franka.driver import DriverSettings, DriverState
+from hal.franka.frames import check_end_effector, pose_from_columns
+from hal.franka.kinematics import forward_pose, reachable
+from hal.franka.link import DriverLink
+from hal.franka.path import JointPath, joint_path, straight_path
+from mskgrasp.geometry import Pose
+
+TURN_SPEED = 1.0
+"""Greatest turning speed of the hand on a straight motion, rad/s."""
+WIDTH_TOLERANCE = 2e-3
+"""The pads have arrived within this, metres."""
+_GRIPPER_TIMEOUT_S = 15.0
+_STILL_WIDTH = 1e-4
+_POLL_S = 0.05
+
+
+class FrankaArm(Arm):
+    """Moves the arm through a driver in a process of its own; nothing recovers by itself.
+
+    Args:
+        config: Which driver, which robot, how fast, how firm.
+        limits: What every command is checked against.
+    """
+
+    def __init__(self, config: FrankyArmConfig | PandaPyArmConfig, limits: ArmLimits):
+        super().__init__(limits)
+        self._config = config
+        self._link: DriverLink | None = None
+
+    # ------------------------------------------------------------------ connection
+
+    def connect(self) -> None:
+        """Connects robot and gripper; nothing moves.
+
+        Raises:
+            DriverMissing: The extra [franka] is not installed.
+            IncompatibleDriver: The robot speaks another version than the installed wheel.
+            NotConnected: No robot there, another program holds it, or its end effector is another.
+        """
+        if self._link is None:
+            self._link = self._new_link()
+
+    def _new_link(self) -> DriverLink:
+        config = self._config
+        torque = isinstance(config, PandaPyArmConfig)
+        settings = DriverSettings(
+            host=config.host,
+            realtime=config.realtime,
+            contact_torque=[config.contact_torque] * 7,
+            contact_force=config.contact_force,
+            stiffness=list(config.stiffness) if torque else [],
+            damping=list(config.damping) if torque else [],
+            settle_s=config.settle_s,
+        )
+        link = DriverLink(config.driver, settings, config.connect_timeout_s)
+        try:
+            check_end_effector(link.state().f_t_ee)
+        except BaseException:
+            link.close()
+            raise
+        return link
+
+    def close(self) -> None:
+        """Stops the arm and closes its link; safe to call twice."""
+        if self._link is not None:
+            link, self._link = self._link, None
+            link.close()
+
+    def _connected(self) -> bool:
+        return self._link is not None
+
+    def _ask(self, op: str, *, timeout_s: float, **values: Any) -> Any:
+        link = self._link
+        if link is None:
+            raise CommunicationLost("the arm was closed during the command")
+        return link.ask(op, timeout_s=timeout_s, **values)
+
+    def _measure(self) -> DriverState:
+        return DriverState(**self._ask("state", timeout_s=3.0))
+
+    def _state(self) -> ArmState:
+        state = self._measure()
+        return ArmState(
+            joints=np.array(state.joints),
+            T_base_tcp=pose_from_columns(state.o_t_ee),
+            gripper_width=state.width,
+            timestamp_s=state.seconds,
+        )
+
+    # ------------------------------------------------------------------ motions
+
+    def _forward(self, joints: np.ndarray) -> Pose:
+        return forward_pose(joints)
+
+    def _reachable(self, T_base_tcp: Pose) -> bool:
+        return reachable(T_base_tcp, self.limits.joint_lower, self.limits.joint_upper)
+
+    def _move_to_joints(self, joints: np.ndarray, speed: float) -> None:
+        config = self._config
+        path = joint_path(
+            np.array(self._ready().joints),
+            joints,
+            speed=min(speed, config.max_joint_speed) * JOINT_SPEED,
+            acceleration=np.full(7, config.joint_acceleration),
+        )
+        self._follow(path)
+
+    def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
+        config = self._config
+        path = straight_path(
+            np.array(self._ready().joints),
+            T_base_tcp,
+            speed=min(speed, config.max_speed),
+            turn_speed=TURN_SPEED,
+            acceleration=config.acceleration,
+            turn_acceleration=config.joint_acceleration,
+            joint_speed=config.max_joint_speed * JOINT_SPEED,
+            lower=self.limits.joint_lower,
+            upper=self.limits.joint_upper,
+        )
+        self._follow(path)
+
+    def _follow(self, path: JointPath) -> None:
+        # A motion that its driver neither ends nor fails in several times its duration hangs.
+        timeout_s = 4 * path.duration_s + self._config.settle_s + 5.0
+        values = {name: array.tolist() for name, array in asdict(path).items()}
+        try:
+            self._ask("move", timeout_s=timeout_s, **values)
+        except MotionAborted as error:
+            self._raise_aborted(error)
+        goal = path.joints[-1]
+        deadline = time.monotonic() + self._config.settle_s
+        # Twice as near as the base class asks for, so that its check does not depend on the moment.
+        while np.abs(np.array(self._measure().joints) - goal).max() > JOINT_TOLERANCE / 4:
+            if time.monotonic() > deadline or self._stop.is_set():
+                return
+            time.sleep(_POLL_S)
+
+    def _wait(self, seconds: float) -> None:
+        self._stop.wait(seconds)
+        if not self._stop.is_set():
+            self._ready()
+
+    def _halt(self) -> None:
+        # The motion in progress reports what came of it; a link that is gone has stopped the robot.
+        with contextlib.suppress(HalError):
+            self._ask("stop", timeout_s=3.0)
+
+    def _recover(self) -> None:
+        state = self._measure()
+        if state.mode == "user_stopped":
+            self._refuse(state)
+        if not self._ask("recover", timeout_s=20.0):
+            self.close()
+            self._link = self._new_link()
+        self._refuse_unless_idle(self._measure())
+
+    def _ready(self) -> DriverState:
+        """A fresh state of an arm that may move: the drivers themselves would recover silently."""
+        state = self._measure()
+        self._refuse_unless_idle(state)
+        return state
+
+    def _refuse_unless_idle(self, state: DriverState) -> None:
+        if state.mode not in ("idle", "move"):
+            self._refuse(state)
+
+    def _refuse(self, state: DriverState) -> NoReturn:
+        remedies = {
+            "user_stopped": "release the user stop (external activation device)",
+            "guiding": "let go of the guiding button",
+            "reflex": "free the arm and look at it",
+        }
+        errors = f" with {state.errors}" if state.errors not in ("", "[]") else ""
+        remedy = remedies.get(state.mode, "look at Desk")
+        raise NeedsRecovery(
+            f"the robot is in mode {state.mode}{errors}, not idle: {remedy}, then call recover()"
+        )
+
+    def _raise_aborted(self, error: MotionAborted) -> NoReturn:
+        if self._stop.is_set():
+            raise MotionAborted("stop() was called; call recover() when it is safe") from error
+        raise error
+
+    # ------------------------------------------------------------------ gripper
+
+    def _homed(self) -> DriverState:
+        """Before homing the hand does not know its width and refuses to grasp."""
+        state = self._ready()
+        if state.max_width <= 0:
+            if not self._ask("home_gripper", timeout_s=2 * _GRIPPER_TIMEOUT_S):
+                raise MotionAborted("the gripper could not be homed; free the fingers, then call recover()")
+            state = self._measure()
+        return state
+
+    def _move_gripper(self, width: float) -> None:
+        # Homing finds a greatest width some tenths of a millimetre off the datasheet's 80 mm; the hand
+        # refuses more than it found.
+        target = min(width, self._homed().max_width)
+        try:
+            self._ask(
+                "move_gripper",
+                timeout_s=_GRIPPER_TIMEOUT_S,
+                width=target,
+                speed=self._config.gripper_speed,
+            )
+        except MotionAborted as error:
+            self._raise_aborted(error)
+        reached = self._still_width(target)
+        if not self._stop.is_set() and abs(reached - width) > WIDTH_TOLERANCE:
+            raise MotionAborted(
+                f"the pads stopped at {reached:.4f} m instead of {width:.4f} m; see what is between them, "
+                "then call recover()"
+            )
+
+    def _grasp(self, force: float) -> GraspOutcome:
+        self._homed()
+        try:
+            gripped = self._ask(
+                "grasp", timeout_s=_GRIPPER_TIMEOUT_S, speed=self._config.gripper_speed, force=force
+            )
+        except MotionAborted:
+            # "Command failed!" and "Command aborted!" are how some firmware reports that it met nothing.
+            gripped = False
+        width = self._still_width(None)
+        return GraspOutcome(width=width, holding=bool(gripped) and width > self._config.closed_width)
+
+    def _still_width(self, target: float | None) -> float:
+        """The width once the fingers are at rest; the hand reports success a moment before."""
+        deadline = time.monotonic() + self._config.settle_s
+        width = self._measure().width
+        while time.monotonic() < deadline and not self._stop.is_set():
+            time.sleep(2 * _POLL_S)
+            last, width = width, self._measure().width
+            if abs(width - last) < _STILL_WIDTH:
+                break
+        return width

@@ -1,0 +1,115 @@
+"""What the two vendor drivers have in common, and the names of what passes between the processes.
+
+A driver runs in a process of its own (`hal.franka.worker`), because both packages hold Python's global
+lock while they connect, and a robot that another program holds never answers: in this process that would
+freeze the whole program, Ctrl-C included. A process can be killed; the robot stops when its link closes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+
+from hal.franka.path import JointPath
+
+DriverName = Literal["franky", "panda_py"]
+
+Mode = Literal["other", "idle", "move", "guiding", "reflex", "user_stopped", "recovery"]
+"""libfranka's robot modes."""
+
+MODES: tuple[Mode, ...] = ("other", "idle", "move", "guiding", "reflex", "user_stopped", "recovery")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriverSettings:
+    """What a driver is told when it connects.
+
+    Attributes:
+        host: Name or address of the robot.
+        realtime: Insist on real-time scheduling.
+        contact_torque: (7,) N m over which a joint's reflex stops the arm.
+        contact_force: N (and N m for turns) at the TCP over which the reflex stops the arm.
+        stiffness: (7,) N m/rad, of drivers that control torques themselves.
+        damping: (7,) N m s/rad, of the same.
+        settle_s: Greatest time to come to rest at the goal of a motion, s.
+    """
+
+    host: str
+    realtime: bool
+    contact_torque: list[float]
+    contact_force: float
+    stiffness: list[float]
+    damping: list[float]
+    settle_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriverState:
+    """A fresh measurement, in libfranka's own terms.
+
+    Attributes:
+        joints: (7,) radians.
+        o_t_ee: (16,) pose of the end effector in the base, column-major, metres.
+        f_t_ee: (16,) pose of the end effector in the flange, column-major, metres.
+        width: Of the gripper, metres.
+        max_width: As homing found it, metres; 0 before homing.
+        mode: Of the robot.
+        errors: Names of libfranka's errors in force, empty where there are none.
+        seconds: On the monotonic clock.
+    """
+
+    joints: list[float]
+    o_t_ee: list[float]
+    f_t_ee: list[float]
+    width: float
+    max_width: float
+    mode: Mode
+    errors: str
+    seconds: float
+
+
+class Driver(Protocol):
+    """The vendor's package behind a few verbs; anything it raises is explained by `hal.franka.faults`."""
+
+    def connect(self, settings: DriverSettings) -> None:
+        """Opens robot and gripper; nothing moves."""
+        ...
+
+    def state(self) -> DriverState:
+        """Measures; may be called during a motion."""
+        ...
+
+    def move(self, path: JointPath) -> None:
+        """Follows a path to its end; returns when the arm is there, or raises."""
+        ...
+
+    def home_gripper(self) -> bool:
+        """Opens and closes the fingers to find their greatest width."""
+        ...
+
+    def move_gripper(self, width: float, speed: float) -> bool:
+        """Moves the pads to a width in metres, at m/s."""
+        ...
+
+    def grasp(self, speed: float, force: float) -> bool:
+        """Closes with N until the pads hold something or meet."""
+        ...
+
+    def stop(self) -> None:
+        """Ends a motion of arm and fingers, and any to come before `recover`; from another thread."""
+        ...
+
+    def recover(self) -> bool:
+        """Acknowledges the robot's errors, and a stop.
+
+        Returns:
+            False where a stopped gripper never answered: its link must be made anew.
+        """
+        ...
+
+
+def column_major(matrix: np.ndarray) -> list[float]:
+    """(16,) of (4, 4), in libfranka's order."""
+    return np.asarray(matrix, dtype=np.float64).flatten(order="F").tolist()

@@ -1,0 +1,58 @@
+"""What the vendors' exceptions mean: the name of one of our errors and one line.
+
+libfranka's texts are matched, because panda_py raises plain ``RuntimeError`` for most faults and franky
+for some; the texts are those of libfranka 0.9.2 and 0.21.2, and the tests provoke each with the real wheel.
+"""
+
+from __future__ import annotations
+
+from hal import errors
+from hal.franka.driver import DriverName
+
+EXTRA = "pip install 'mskgrasp[franka]'"
+_WHEELS: dict[DriverName, str] = {"franky": "franky-control", "panda_py": "panda-python"}
+_NO_ROBOT = ("connection to fci refused", "host not found", "connection error", "network is unreachable")
+_LOST = ("timeout", "connection", "socket", "network", "broken pipe", "reset by peer")
+_ABORTED = ("reflex", "aborted", "preempted", "rejected", "motion", "command", "control", "error")
+
+MESSAGES: dict[str, type[errors.HalError]] = {
+    kind.__name__: kind
+    for kind in (
+        errors.CommunicationLost,
+        errors.DriverMissing,
+        errors.IncompatibleDriver,
+        errors.MotionAborted,
+        errors.NeedsRecovery,
+        errors.NotConnected,
+    )
+}
+"""The errors that may come out of a driver's process, by name."""
+
+
+def explain(error: BaseException, driver: DriverName, host: str) -> errors.HalError:
+    """Our error for what a driver raised, one line with the remedy."""
+    if isinstance(error, errors.HalError):
+        return error
+    text = " ".join(str(error).removeprefix("libfranka:").split())
+    low = text.lower()
+    name = type(error).__name__
+    if isinstance(error, ImportError):
+        return errors.DriverMissing(
+            f"driver {driver} needs the package {_WHEELS[driver]} ({text}); run: {EXTRA}"
+        )
+    if name.startswith("IncompatibleVersion"):
+        return errors.IncompatibleDriver(
+            f"{host}: {text.rstrip('.')}; the installed {_WHEELS[driver]} is for another robot or system "
+            "version: docs/real_cell.md says which wheel fits"
+        )
+    if any(part in low for part in _NO_ROBOT):
+        return errors.NotConnected(
+            f"no robot at {host} ({text.rstrip('.')}); check 'host', the cable, "
+            "and that FCI is active in Desk"
+        )
+    if name in ("NetworkException", "ProtocolException") or any(part in low for part in _LOST):
+        return errors.CommunicationLost(
+            f"the link to {host} is lost ({text.rstrip('.')}); the robot has stopped: check cable and Desk, "
+            "then open the cell again"
+        )
+    return errors.MotionAborted(f"{text.rstrip('.') or name}; look at the arm, then call recover()")

@@ -1,0 +1,50 @@
+"""The one place where libfranka's poses become ours.
+
+libfranka writes homogeneous matrices as 16 numbers, columns first, in metres; its Python wrappers give
+quaternions as x y z w, which are not used: a matrix has no order to mistake.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from hal.errors import NotConnected
+from hal.franka.kinematics import TCP_OFFSET
+from mskgrasp.geometry import Pose
+
+_TURN = math.cos(math.pi / 4)
+F_T_EE = np.array([[_TURN, _TURN, 0, 0], [-_TURN, _TURN, 0, 0], [0, 0, 1, TCP_OFFSET], [0, 0, 0, 1.0]])
+"""The Franka Hand's TCP in the flange: turned by -45 degrees, 0.1034 m out (Franka Hand's datasheet)."""
+_POSITION_TOLERANCE = 0.5e-3
+_ROTATION_TOLERANCE = 2e-3
+
+
+def matrix_from_columns(values: Sequence[float]) -> np.ndarray:
+    """(4, 4) of libfranka's 16 numbers."""
+    return np.asarray(values, dtype=np.float64).reshape((4, 4), order="F")
+
+
+def pose_from_columns(values: Sequence[float]) -> Pose:
+    """``T_a_b`` of libfranka's 16 numbers, quaternion w x y z."""
+    return Pose.from_matrix(matrix_from_columns(values))
+
+
+def check_end_effector(f_t_ee: Sequence[float]) -> None:
+    """Refuses a robot whose end effector is not the Franka Hand's: every pose would be wrong by it.
+
+    Raises:
+        NotConnected: Says what is configured, and where to change it.
+    """
+    found = matrix_from_columns(f_t_ee)
+    distance = float(np.abs(found[:3, 3] - F_T_EE[:3, 3]).max())
+    if distance > _POSITION_TOLERANCE or np.abs(found[:3, :3] - F_T_EE[:3, :3]).max() > _ROTATION_TOLERANCE:
+        turn = math.degrees(math.atan2(found[1, 0], found[0, 0]))
+        where = ", ".join(f"{value:.4f}" for value in found[:3, 3])
+        raise NotConnected(
+            f"the robot's end effector is at ({where}) m turned by {turn:.0f} degrees; this program needs "
+            f"the Franka Hand at (0.0000, 0.0000, {TCP_OFFSET:.4f}) m, -45 degrees: choose it in Desk, "
+            "Settings, End Effector"
+        )

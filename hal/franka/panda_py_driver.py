@@ -1,0 +1,160 @@
+"""panda_py behind the verbs of a driver; runs in a driver's process."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, wait
+from concurrent.futures import TimeoutError as FutureTimeout
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from hal.franka.driver import MODES, DriverSettings, DriverState
+from hal.franka.path import JointPath
+
+_PERIOD_S = 1e-3
+_POLL_S = 0.02
+_OWED_S = 0.5
+_CORRECTION_HZ = 4.0
+"""How fast the error that is left at the goal is taken out, 1/s: well under the arm's own time constant."""
+_MAX_CORRECTION = 0.05
+"""Radians; more than friction and gravity explain means that something holds the arm."""
+_ARRIVED = 1e-3
+
+
+class PandaPyDriver:
+    """Moves with panda_py's joint impedance controller, whose goal follows the path.
+
+    The controller runs in C++ at 1 kHz; a late target here makes the arm lag, not stumble. It has no
+    integral part and friction leaves an error (panda-py issue 49), so the goal is shifted slowly until the
+    arm stands where it should. ``Panda.move_to_pose`` is not used: Cartesian impedance is off by millimetres.
+    """
+
+    def __init__(self) -> None:
+        import panda_py
+        import panda_py.controllers
+        import panda_py.libfranka
+
+        self._panda_py = panda_py
+        self._stopped = threading.Event()
+        self._moving = False
+        self._abandoned: list[Future[bool]] = []
+
+    def connect(self, settings: DriverSettings) -> None:
+        """Opens robot and gripper; nothing moves."""
+        libfranka = self._panda_py.libfranka
+        config = libfranka.RealtimeConfig.kEnforce if settings.realtime else libfranka.RealtimeConfig.kIgnore
+        self._settings = settings
+        self._panda = self._panda_py.Panda(settings.host, realtime_config=config)
+        self._robot = self._panda.get_robot()
+        torque, force = settings.contact_torque, [settings.contact_force] * 6
+        self._robot.set_collision_behavior(torque, torque, force, force)
+        self._gripper = libfranka.Gripper(settings.host)
+
+    def state(self) -> DriverState:
+        """Measures; may be called during a motion."""
+        # After a motion get_state() returns its last sample for ever; during one the link is taken.
+        robot = self._panda.get_state() if self._moving else self._robot.read_once()
+        gripper = self._gripper.read_once()
+        return DriverState(
+            joints=list(robot.q),
+            o_t_ee=list(robot.O_T_EE),
+            f_t_ee=list(robot.F_T_EE),
+            width=gripper.width,
+            max_width=gripper.max_width,
+            mode=MODES[int(robot.robot_mode)],
+            errors=str(robot.current_errors),
+            seconds=time.monotonic(),
+        )
+
+    def move(self, path: JointPath) -> None:
+        """Follows a path, then corrects what friction has left."""
+        self._check()
+        controller = self._panda_py.controllers.JointPosition(
+            np.array(self._settings.stiffness), np.array(self._settings.damping)
+        )
+        wanted = CubicHermiteSpline(path.seconds, path.joints, path.speeds)
+        speed = wanted.derivative()
+        self._panda.start_controller(controller)
+        self._moving = True
+        try:
+            # The robot's own clock: it knows of no pause of this process.
+            while (now := controller.get_time()) < path.duration_s:
+                self._check()
+                controller.set_control(wanted(now), speed(now))
+                time.sleep(_PERIOD_S)
+            self._settle(controller, path.joints[-1])
+        finally:
+            # Joins the control loop; without it is_moving() stays true and states stay old.
+            self._panda.stop_controller()
+            self._moving = False
+        self._panda.raise_error()
+
+    def _settle(self, controller, goal: np.ndarray) -> None:  # noqa: ANN001 (the package is imported late)
+        correction, still = np.zeros(7), np.zeros(7)
+        begin = last = time.monotonic()
+        while (now := time.monotonic()) - begin < self._settings.settle_s:
+            self._check()
+            state = self._panda.get_state()
+            error = goal - np.array(state.q)
+            if np.abs(error).max() < _ARRIVED and np.abs(state.dq).max() < 0.01:
+                return
+            correction = np.clip(
+                correction + _CORRECTION_HZ * (now - last) * error, -_MAX_CORRECTION, _MAX_CORRECTION
+            )
+            last = now
+            controller.set_control(goal + correction, still)
+            time.sleep(_PERIOD_S)
+
+    def _check(self) -> None:
+        # A reflex or a lost link ends the control loop; panda_py keeps the reason until asked.
+        self._panda.raise_error()
+        if self._stopped.is_set():
+            raise RuntimeError("Move command preempted!")
+
+    def home_gripper(self) -> bool:
+        """Opens and closes the fingers to find their greatest width."""
+        return self._wait(self._gripper.homing)
+
+    def move_gripper(self, width: float, speed: float) -> bool:
+        """Moves the pads to a width in metres, at m/s."""
+        return self._wait(lambda: self._gripper.move(width, speed))
+
+    def grasp(self, speed: float, force: float) -> bool:
+        """Closes with N until the pads hold something or meet; any width is within the tolerance."""
+        return self._wait(
+            lambda: self._gripper.grasp(0.0, speed, force, epsilon_inner=0.08, epsilon_outer=0.08)
+        )
+
+    def stop(self) -> None:
+        """Ends a motion of arm and fingers, and any to come before `recover`."""
+        self._stopped.set()
+
+    def recover(self) -> bool:
+        """Acknowledges the robot's errors, and a stop; False where the gripper still owes an answer."""
+        self._stopped.clear()
+        if MODES[int(self._robot.read_once().robot_mode)] == "reflex":
+            self._robot.automatic_error_recovery()
+        return not wait(self._abandoned, _OWED_S).not_done
+
+    def _wait(self, command: Callable[[], bool]) -> bool:
+        """Runs a command of the gripper, which stops it when asked to."""
+        result: Future[bool] = Future()
+
+        def run() -> None:
+            try:
+                result.set_result(command())
+            except BaseException as error:
+                result.set_exception(error)
+
+        threading.Thread(target=run, daemon=True).start()
+        while True:
+            try:
+                return result.result(_POLL_S)
+            except FutureTimeout:
+                if self._stopped.is_set():
+                    self._abandoned.append(result)
+                    self._gripper.stop()
+                    return False

@@ -1,0 +1,127 @@
+"""Paths of the arm: joint angles over time, without speed or acceleration at their ends."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from hal.errors import OutOfWorkspace
+from hal.franka.kinematics import forward_pose, solved, track, within
+from mskgrasp.geometry import Pose
+
+PERIOD_S = 0.05
+"""Time between two knots of a path, s: a cubic between them is off by less than 0.1 mm at 0.5 m/s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointPath:
+    """Knots of a motion, evenly spaced in time; the first is where the arm stands.
+
+    Attributes:
+        seconds: (k,) since the start.
+        joints: (k, 7) radians.
+        speeds: (k, 7) radians a second; zero at both ends.
+    """
+
+    seconds: np.ndarray
+    joints: np.ndarray
+    speeds: np.ndarray
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first knot to the last."""
+        return float(self.seconds[-1])
+
+
+def joint_path(
+    start: np.ndarray, goal: np.ndarray, *, speed: np.ndarray, acceleration: np.ndarray
+) -> JointPath:
+    """All joints from (7,) to (7,) radians together, under speeds (7,) rad/s and accelerations (7,)."""
+    way = goal - start
+    seconds = max(_duration(abs(way[i]), speed[i], acceleration[i]) for i in range(7))
+    share, rate = _profile(seconds)
+    times = np.linspace(0, seconds, len(share))
+    return JointPath(seconds=times, joints=start + share[:, None] * way, speeds=rate[:, None] * way)
+
+
+def straight_path(
+    start: np.ndarray,
+    goal: Pose,
+    *,
+    speed: float,
+    turn_speed: float,
+    acceleration: float,
+    turn_acceleration: float,
+    joint_speed: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> JointPath:
+    """The TCP on the straight line from where joints (7,) put it to ``goal``, turning at the same pace.
+
+    Args:
+        start: (7,) radians.
+        goal: ``T_base_tcp`` at the end.
+        speed: Of the TCP, m/s at most.
+        turn_speed: Of the hand, rad/s at most.
+        acceleration: Of the TCP, m/s^2 at most.
+        turn_acceleration: Of the hand, rad/s^2 at most.
+        joint_speed: (7,) no joint is faster, rad/s; the motion takes longer instead.
+        lower: (7,) joint limits, radians.
+        upper: (7,) the others.
+
+    Raises:
+        OutOfWorkspace: The line leaves the arm's reach or its joint limits; nothing moved.
+    """
+    here = forward_pose(start)
+    ends = Rotation.from_quat(np.stack([here.quat_wxyz, goal.quat_wxyz]), scalar_first=True)
+    distance = float(np.linalg.norm(goal.position - here.position))
+    angle = float((ends[0].inv() * ends[1]).magnitude())
+    seconds = max(_duration(distance, speed, acceleration), _duration(angle, turn_speed, turn_acceleration))
+    path = _along(start, here.position, goal.position, ends, seconds, lower, upper)
+    excess = float((np.abs(path.speeds) / joint_speed).max())
+    if excess > 1.0:
+        path = _along(start, here.position, goal.position, ends, 1.02 * excess * seconds, lower, upper)
+    return path
+
+
+def _along(
+    start: np.ndarray,
+    begin: np.ndarray,
+    end: np.ndarray,
+    turn: Rotation,
+    seconds: float,
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> JointPath:
+    share, _ = _profile(seconds)
+    line = np.tile(np.eye(4), (len(share), 1, 1))
+    line[:, :3, :3] = Slerp([0, 1], turn)(np.clip(share, 0, 1)).as_matrix()
+    line[:, :3, 3] = begin + share[:, None] * (end - begin)
+    joints, error = track(line, start)
+    if not solved(error) or not within(joints, lower, upper):
+        target = ", ".join(f"{value:.3f}" for value in end)
+        raise OutOfWorkspace(
+            f"no straight line from here to TCP ({target}) m within the joint limits; "
+            "move to other joints first"
+        )
+    joints[0] = start
+    speeds = np.gradient(joints, seconds / (len(share) - 1), axis=0)
+    speeds[0] = speeds[-1] = 0.0
+    return JointPath(seconds=np.linspace(0, seconds, len(share)), joints=joints, speeds=speeds)
+
+
+def _profile(seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the way and their rate at knots: minimum jerk (Flash and Hogan 1985, equation 5)."""
+    n = max(4, math.ceil(seconds / PERIOD_S))
+    t = np.arange(n + 1) / n
+    return t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2 / seconds
+
+
+def _duration(distance: float, peak_speed: float, peak_acceleration: float) -> float:
+    """Seconds for a minimum-jerk motion: its peaks are 15/8 and 10/sqrt(3) of the mean ones."""
+    return max(
+        15 / 8 * distance / peak_speed, math.sqrt(10 / math.sqrt(3) * distance / peak_acceleration), 0.1
+    )

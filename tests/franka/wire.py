@@ -1,0 +1,154 @@
+"""Messages of the Franka Control Interface, server version 5, little endian and packed."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+STATE = struct.Struct("<Q 96d d9d3d d9d3d 2d2d 56d 7d6d7d6d 7d6d6d6d3d 2d2d2d 16d6d6d 7d7d B B 41? 41? B d")
+GRIPPER_STATE = struct.Struct("<Idd?H")
+assert STATE.size == 2373 and GRIPPER_STATE.size == 23
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotState:
+    """What a tick of the robot tells; the rest of the message is zero."""
+
+    tick: int
+    pose: np.ndarray
+    f_t_ee: np.ndarray
+    q: np.ndarray
+    dq: np.ndarray
+    torque: np.ndarray
+    generator: int
+    controller: int
+    mode: int
+    reflexes: tuple[int, ...]
+
+    def pack(self) -> bytes:
+        pose, eye = self.pose.flatten(order="F"), np.eye(4).flatten()
+        tool = self.f_t_ee.flatten(order="F")
+        zeros = np.zeros(7)
+        numbers = np.concatenate(
+            [
+                *(pose, pose, tool, eye, tool, eye),
+                *(np.zeros(26), np.zeros(4)),
+                # The client limits the change of its torques against the last that it finds here.
+                *(self.torque, self.torque, zeros, self.q, self.q, self.dq, zeros, zeros),
+                *(np.zeros(26), np.zeros(28), np.zeros(6)),
+                *(pose, np.zeros(12), self.q, zeros),
+            ]
+        )
+        reason = [k in self.reflexes for k in range(41)]
+        return STATE.pack(
+            self.tick, *numbers, self.generator, self.controller, *[False] * 41, *reason, self.mode, 1.0
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class GripperState:
+    """What a tick of the hand tells."""
+
+    tick: int
+    width: float
+    max_width: float
+    grasped: bool
+
+    def pack(self) -> bytes:
+        return GRIPPER_STATE.pack(self.tick, self.width, self.max_width, self.grasped, 30)
+
+
+class Channel:
+    """One client at a time on a TCP port, and its UDP port; a second one waits for ever, as on a robot.
+
+    Attributes:
+        silent: Send nothing any more, as with the cable pulled.
+        left: The client has closed since this was last set to False.
+    """
+
+    def __init__(self, host: str, port: int, header: str):
+        self._header = struct.Struct(header)
+        self._listener = socket.create_server((host, port), backlog=1)
+        self._listener.setblocking(False)
+        self._client: socket.socket | None = None
+        self._udp: socket.socket | None = None
+        self._peer = ""
+        self._buffer = b""
+        self.silent = False
+        self.left = False
+
+    def requests(self) -> Iterator[tuple[int, int, bytes]]:
+        """Command, number and payload of every whole message that has come."""
+        if self._client is None:
+            with contextlib.suppress(BlockingIOError):
+                self._client, (self._peer, _) = self._listener.accept()
+                self._client.setblocking(False)
+                self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._buffer = b""
+        if self._client is None:
+            return
+        try:
+            data = self._client.recv(65536)
+            if not data:
+                self._hang_up()
+                return
+            self._buffer += data
+        except BlockingIOError:
+            pass
+        except ConnectionError:
+            self._hang_up()
+            return
+        while len(self._buffer) >= self._header.size:
+            command, number, size = self._header.unpack_from(self._buffer)
+            if len(self._buffer) < size:
+                return
+            message, self._buffer = self._buffer[:size], self._buffer[size:]
+            yield command, number, message[self._header.size :]
+
+    def datagrams(self) -> Iterator[bytes]:
+        """What has come by UDP."""
+        while self._udp is not None:
+            try:
+                yield self._udp.recv(4096)
+            except (BlockingIOError, ConnectionError):
+                return
+
+    def reply(self, command: int, number: int, payload: bytes) -> None:
+        """Answers a message."""
+        if self._client is None or self.silent:
+            return
+        message = self._header.pack(command, number, self._header.size + len(payload)) + payload
+        self._client.setblocking(True)
+        with contextlib.suppress(ConnectionError):
+            self._client.sendall(message)
+        self._client.setblocking(False)
+
+    def open_udp(self, port: int) -> None:
+        """Sends states to this port of the client from now on."""
+        self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._udp.connect((self._peer, port))
+        self._udp.setblocking(False)
+
+    def send_state(self, message: bytes) -> None:
+        """Sends a datagram to the client, if there is one."""
+        if self._udp is not None and not self.silent:
+            with contextlib.suppress(BlockingIOError, ConnectionError):
+                self._udp.send(message)
+
+    def wait_for_datagram(self, timeout_s: float) -> None:
+        """Returns when something has come by UDP."""
+        if self._udp is not None and not self.silent:
+            select.select([self._udp], [], [], timeout_s)
+
+    def _hang_up(self) -> None:
+        for one in (self._client, self._udp):
+            if one is not None:
+                one.close()
+        self._client = self._udp = None
+        self.left = True
