@@ -1,0 +1,54 @@
+"""The simulated camera beside another arm: tests and dry runs of a real arm over an empty table."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from hal.sim.camera import SapienCamera
+from hal.sim.noise import SensorNoise
+from hal.sim.world import SapienWorld
+from mskgrasp.config import Config
+from tasks import Overhead, Physics
+from tasks.placement import Region
+
+
+class SapienCameraConfig(Config):
+    """A rendered table with a part on it; what the arm does, the part does not notice."""
+
+    driver: Literal["sapien"]
+    part: str = "hex_nut_m30"
+    """What lies on the rendered table at first: a name or a folder."""
+    seed: int = Field(default=0, ge=0)
+    """Its place and turn follow from it."""
+    overhead: Overhead = Overhead()
+    """Where the camera hangs and what it sees."""
+    noise: SensorNoise = SensorNoise()
+    """How it errs: off, iid (3 mm) or kinect2; see docs/sensor_noise.md."""
+
+
+def sapien_camera(
+    config: SapienCameraConfig, *, region: Region, home: np.ndarray
+) -> tuple[SapienCamera, SapienWorld]:
+    """A rendered camera over the middle of a region, and its world, which lays parts on the table.
+
+    Args:
+        config: What it shows.
+        region: Where parts lie, base frame, metres.
+        home: (7,) where the rendered arm rests, radians; it does not move.
+
+    Raises:
+        ValueError: The camera does not see the region.
+    """
+    config.overhead.check_sees(region)
+    world = SapienWorld(
+        physics=Physics(),
+        overhead=config.overhead,
+        region=region,
+        home=home,
+        part=config.part,
+        seed=config.seed,
+    )
+    return SapienCamera(world, config.noise), world
