@@ -21,6 +21,7 @@ from mskgrasp.parts.families import (
     screws,
     shafts,
     studs,
+    supports,
 )
 from mskgrasp.parts.families.recipe import Recipe
 
@@ -74,6 +75,7 @@ def recipes() -> dict[str, Recipe]:
         screws,
         shafts,
         studs,
+        supports,
     )
     found = [recipe for module in modules for recipe in module.recipes()]
     return {recipe.name: recipe for recipe in sorted(found, key=lambda recipe: recipe.name)}

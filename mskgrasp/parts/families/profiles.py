@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import shapely
@@ -51,7 +52,7 @@ def slot_profile(size: dict[str, float]) -> s.Solid:
             (opening, 1),
         ]
     )
-    section = shapely.Polygon(s.rectangle(-a / 2, a / 2, -b / 2, b / 2))
+    section: Any = shapely.Polygon(s.rectangle(-a / 2, a / 2, -b / 2, b / 2))
     for side, width, height in ((0, a, b), (90, b, a), (180, a, b), (270, b, a)):
         for n in range(round(width / module)):
             x = (n + 0.5) * module - width / 2
@@ -127,7 +128,7 @@ def dovetail_rail(size: dict[str, float]) -> s.Solid:
 
 
 def linear_rail(size: dict[str, float]) -> s.Solid:
-    """A guide rail with a ball groove along either flank and counterbored screw holes, filled in the hulls."""
+    """A guide rail with a ball groove along either flank and counterbored holes, filled in the hulls."""
     a, b, length, groove = size["a_mm"] / 2, size["b_mm"], size["l_mm"], size["groove_mm"]
     low, high = 0.5 * b, 0.85 * b
     middle = (low + high) / 2
