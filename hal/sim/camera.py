@@ -8,21 +8,30 @@ import numpy as np
 
 from hal.camera import Camera, RgbdFrame
 from hal.errors import NotConnected
+from hal.sim.noise import SensorNoise, add_noise
 from hal.sim.world import SapienWorld
 from tasks.camera import FAR
 
 
 class SapienCamera(Camera):
-    """Renders what a camera over the table would see, the arm included."""
+    """Renders what a camera over the table would see, the arm included.
 
-    def __init__(self, world: SapienWorld):
+    Args:
+        world: What stands on the table.
+        noise: How the sensor errs; not at all by default.
+    """
+
+    def __init__(self, world: SapienWorld, noise: SensorNoise | None = None):
         self._world = world
+        self._noise = noise or SensorNoise()
+        self._rng = np.random.default_rng(self._noise.seed)
         self._open = False
 
     def connect(self) -> None:
-        """Builds the world, if the arm has not."""
+        """Builds the world, if the arm has not; the sensor's errors begin anew."""
         if not self._open:
             self._world.open()
+            self._rng = np.random.default_rng(self._noise.seed)
             self._open = True
 
     def close(self) -> None:
@@ -44,11 +53,12 @@ class SapienCamera(Camera):
         colour, depth = env.capture_rgbd(with_robot=True)
         metres = depth[0].cpu().numpy().astype(np.float32)
         metres[metres >= 0.99 * FAR] = np.nan
+        intrinsics = self._world.overhead.intrinsics()
         x_min, x_max, y_min, y_max = self._world.region
         return RgbdFrame(
             colour=colour[0].cpu().numpy(),
-            depth=metres,
-            intrinsics=self._world.overhead.intrinsics(),
+            depth=add_noise(metres, intrinsics, self._noise, self._rng),
+            intrinsics=intrinsics,
             T_base_camera=self._world.overhead.T_base_camera(((x_min + x_max) / 2, (y_min + y_max) / 2)),
             timestamp_s=taken,
             serial="sapien",

@@ -12,6 +12,7 @@ from hal.arm import ArmLimits
 from hal.cell import Cell, Workspace
 from hal.sim.arm import SapienArm
 from hal.sim.camera import SapienCamera
+from hal.sim.noise import SensorNoise
 from hal.sim.world import SapienWorld
 from mskgrasp.config import Config
 from tasks import REGION, Overhead, Physics
@@ -44,6 +45,8 @@ class SapienCellConfig(Config):
     """The simulation."""
     camera: Overhead = Overhead()
     """The overhead depth camera."""
+    noise: SensorNoise = SensorNoise()
+    """How the camera errs: off, iid (3 mm) or kinect2; see docs/sensor_noise.md."""
 
     @model_validator(mode="after")
     def _check(self) -> SapienCellConfig:
@@ -77,7 +80,7 @@ def sapien_cell(config: SapienCellConfig) -> Cell:
         max_force=70.0,
     )
     return Cell(
-        camera=SapienCamera(world),
+        camera=SapienCamera(world, config.noise),
         arm=SapienArm(world, limits),
         workspace=Workspace(
             table_z=TABLE_Z,
