@@ -135,6 +135,20 @@ def tapered(outline: np.ndarray, *levels: tuple[float, float]) -> h.Shape:
     return h.tool(body, hulls)
 
 
+def arm(z0: float, z1: float, *discs: tuple[float, float, float]) -> h.Shape:
+    """A flat bar from disc (x, y, radius) to disc; each stretch between two of them is one hull."""
+    shape = h.tool(Manifold())
+    for a, b in zip(discs[:-1], discs[1:], strict=True):
+        exact = shapely.union_all([shapely.Polygon(s.circle(r, (x, y))) for x, y, r in (a, b)]).convex_hull
+        coarse = [s.balanced_polygon(r, 12, np.pi / 12, centre=(x, y)) for x, y, r in (a, b)]
+        corners = np.asarray(shapely.get_coordinates(shapely.MultiPoint(np.concatenate(coarse)).convex_hull))[
+            :-1
+        ]
+        outline = np.asarray(shapely.get_coordinates(exact))[:-1][::-1]
+        shape += h.tool(s.extrude(outline, z0, z1), [s.prism(corners, z0, z1)])
+    return shape
+
+
 def _coarse_step(outer_radius: float) -> float:
     """Largest angle of a chord that stays within the tolerance of a bend's outer side."""
     share = BEND_TOLERANCE_MM / outer_radius
