@@ -109,7 +109,8 @@ def hull_fit(mesh_mm: trimesh.Trimesh, hulls_mm: Sequence[np.ndarray]) -> HullFi
     union = Manifold.batch_boolean(
         [Manifold.hull_points(np.asarray(points, dtype=np.float64)) for points in hulls_mm], OpType.Add
     )
-    mesh = Manifold(Mesh64(np.asarray(mesh_mm.vertices, np.float64), np.asarray(mesh_mm.faces, np.uint64)))
+    # Copies: manifold3d takes neither a read-only array nor a view with strides.
+    mesh = Manifold(Mesh64(np.array(mesh_mm.vertices, np.float64), np.array(mesh_mm.faces, np.uint64)))
     step = float(np.max(mesh_mm.extents)) / 40
     surfaces = [
         _outer_triangles(_triangles(union.refine_to_length(step)), hulls_mm),

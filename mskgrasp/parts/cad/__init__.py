@@ -6,7 +6,7 @@ import importlib.metadata
 import importlib.util
 from collections.abc import Iterator
 
-from mskgrasp.parts.cad import screws
+from mskgrasp.parts.cad import drawn, screws, stock
 from mskgrasp.parts.families.recipe import Recipe
 
 VENDORS = ("build123d", "bd_warehouse")
@@ -24,5 +24,5 @@ def versions() -> dict[str, str]:
 
 def recipes() -> Iterator[Recipe]:
     """The parts of all modules here."""
-    for module in (screws,):
+    for module in (drawn, screws, stock):
         yield from module.recipes()

@@ -34,16 +34,25 @@ def turned_hulls(mesh: trimesh.Trimesh, *, filled: bool = False) -> list[np.ndar
     return merge_hulls(_thick(pieces))
 
 
-def extruded_hulls(mesh: trimesh.Trimesh, at: float | None = None) -> list[np.ndarray]:
-    """Pieces of an outline extruded along z, its small holes filled.
+def extruded_hulls(
+    mesh: trimesh.Trimesh,
+    *,
+    filled_mm: float = FILLED_BORE_MM,
+    detail_mm: float = HULL_DETAIL_MM,
+    slack: float = 0.002,
+) -> list[np.ndarray]:
+    """Pieces of an outline extruded along z, as it is half way up.
 
     Args:
         mesh: Of the shape.
-        at: Height at which the outline is read; half way up by default.
+        filled_mm: Radius of the largest holes that are filled.
+        detail_mm: Finer corners of the outline are left out.
+        slack: Share of the volume that joining pieces may add.
     """
-    low, high = mesh.bounds[:, 2]
-    outline = plane_section(mesh, float(low + high) / 2 if at is None else at)
-    return [s.prism(piece, float(low), float(high)) for piece in convex_polygons(_without_detail(outline))]
+    low, high = (float(z) for z in mesh.bounds[:, 2])
+    outline = _without_detail(plane_section(mesh, (low + high) / 2), filled_mm, detail_mm)
+    pieces = merge_hulls([s.prism(piece, low, high) for piece in convex_polygons(outline)], slack)
+    return [part for points in pieces for part in _cut_to_length(points, low, high)]
 
 
 def headed_hulls(mesh: trimesh.Trimesh) -> list[np.ndarray]:
@@ -90,6 +99,17 @@ def plane_section(mesh: trimesh.Trimesh, z: float) -> Any:
     return region
 
 
+def _cut_to_length(points: np.ndarray, low: float, high: float) -> list[np.ndarray]:
+    """A prism along z cut across until PhysX takes its parts."""
+    ends = points[np.abs(points[:, 2] - low) < 1e-6, :2]
+    for count in range(1, 5):
+        levels = np.linspace(low, high, count + 1)
+        parts = [s.prism(ends, float(a), float(b)) for a, b in zip(levels[:-1], levels[1:], strict=True)]
+        if oblongness(parts[0]) <= 0.9 * MOST_OBLONG:
+            return parts
+    return []  # a sliver of less than 0.8 mm
+
+
 def _thick(pieces: list[np.ndarray]) -> list[np.ndarray]:
     """Pieces without the slivers that a fillet's facets leave between two others."""
     return [points for points in pieces if oblongness(points) <= 0.9 * MOST_OBLONG]
@@ -106,17 +126,17 @@ def _filled(section: Any) -> Any:
     return shapely.set_precision(shapely.union_all(swept), _NOISE_MM)
 
 
-def _without_detail(region: Any) -> Any:
+def _without_detail(region: Any, filled_mm: float, detail_mm: float) -> Any:
     """A region without small holes and corners."""
     kept = []
     for polygon in shapely.get_parts(region):
         holes = [
             np.asarray(hole.coords)
             for hole in polygon.interiors
-            if shapely.Polygon(hole).area > np.pi * FILLED_BORE_MM**2
+            if shapely.Polygon(hole).area > np.pi * filled_mm**2
         ]
         kept.append(shapely.Polygon(polygon.exterior, holes))
-    return shapely.union_all(kept).simplify(HULL_DETAIL_MM)
+    return shapely.union_all(kept).simplify(detail_mm)
 
 
 def _outer(region: Any) -> list[tuple[float, float]]:
