@@ -36,19 +36,23 @@ def convex_polygons(region: Any, most_corners: int = _MOST_CORNERS) -> list[np.n
     ]
     pieces: dict[int, np.ndarray] = {n: _counter_clockwise(t) for n, t in enumerate(triangles)}
     sides: dict[int, list[int]] = {n: _neighbours(n, pieces) for n in pieces}
+    # Joints of pairs that no later joint has touched need no second look.
+    known: dict[tuple[int, int], tuple[float, np.ndarray] | None] = {}
     while True:
         best: tuple[float, int, int, np.ndarray] | None = None
         for a, others in sides.items():
             for b in others:
                 if a < b:
-                    joined = _joined(pieces[a], pieces[b], most_corners)
-                    if joined is not None:
-                        area = _area(joined)
-                        if best is None or area > best[0] + 1e-9:
-                            best = (area, a, b, joined)
+                    if (a, b) not in known:
+                        joined = _joined(pieces[a], pieces[b], most_corners)
+                        known[a, b] = None if joined is None else (_area(joined), joined)
+                    found = known[a, b]
+                    if found is not None and (best is None or found[0] > best[0] + 1e-9):
+                        best = (found[0], a, b, found[1])
         if best is None:
             return list(pieces.values())
         _, a, b, joined = best
+        known = {pair: found for pair, found in known.items() if not {a, b} & set(pair)}
         del pieces[b]
         pieces[a] = joined
         for n in sides.pop(b):
