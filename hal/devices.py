@@ -17,8 +17,8 @@ from mskgrasp.config import Config, check_config
 from mskgrasp.errors import BadConfig
 from mskgrasp.grasp import lowest_grasp_z, pose_base_tcp
 
-ArmDriver = Literal["franky", "panda_py"]
-CameraDriver = Literal["sapien"]
+ArmDriver = Literal["franky", "panda_py", "replay"]
+CameraDriver = Literal["kinect2", "replay", "sapien"]
 
 Three = tuple[float, float, float]
 Seven = tuple[float, float, float, float, float, float, float]
@@ -90,8 +90,7 @@ def devices_cell(values: dict[str, Any], path: Path) -> Cell:
         lift_height=table.lift_height,
         grasp_force=table.grasp_force,
     )
-    arm = _arm(config.arm, table, path)
-    _check_fit(arm, workspace, path)
+    arm = _arm(config.arm, table, workspace, path)
     camera, feeder = _camera(config.camera, workspace, path)
     return Cell(camera=camera, arm=arm, workspace=workspace, feeder=feeder)
 
@@ -102,7 +101,7 @@ def _driver(values: dict[str, Any], legal: tuple[str, ...], section: str, path: 
     return values["driver"]
 
 
-def _arm(values: dict[str, Any], table: WorkspaceConfig, path: Path) -> Arm:
+def _arm(values: dict[str, Any], table: WorkspaceConfig, workspace: Workspace, path: Path) -> Arm:
     driver: ArmDriver = _driver(values, get_args(ArmDriver), "arm", path)
     source = f"{path}, arm"
     match driver:
@@ -119,7 +118,14 @@ def _arm(values: dict[str, Any], table: WorkspaceConfig, path: Path) -> Arm:
                 table_z=table.table_z,
                 max_force=config.max_grasp_force,
             )
-            return FrankaArm(config, limits)
+            arm = FrankaArm(config, limits)
+            _check_fit(arm, workspace, path)
+            return arm
+        case "replay":
+            from hal.replay import ReplayArm, ReplayArmConfig
+
+            # Checked when it was recorded; now it knows the poses alone that it was asked for then.
+            return ReplayArm(check_config(ReplayArmConfig, values, source))
         case _:
             assert_never(driver)
 
@@ -128,6 +134,14 @@ def _camera(values: dict[str, Any], workspace: Workspace, path: Path) -> tuple[C
     driver: CameraDriver = _driver(values, get_args(CameraDriver), "camera", path)
     source = f"{path}, camera"
     match driver:
+        case "kinect2":
+            from hal.kinect2 import Kinect2Camera, Kinect2Config
+
+            return Kinect2Camera(check_config(Kinect2Config, values, source)), None
+        case "replay":
+            from hal.replay import ReplayCamera, ReplayCameraConfig
+
+            return ReplayCamera(check_config(ReplayCameraConfig, values, source)), None
         case "sapien":
             from hal.sim import SapienCameraConfig, sapien_camera
 

@@ -37,3 +37,11 @@ class MotionAborted(HalError):
 
 class NeedsRecovery(HalError):
     """An error happened before; nothing moves until recover() is called."""
+
+
+class BadRecording(HalError):
+    """A recording is missing, damaged, or made by another version."""
+
+
+class NotRecorded(HalError):
+    """A replayed cell is asked for something that did not happen at this point of its recording."""

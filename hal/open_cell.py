@@ -11,7 +11,7 @@ from hal.cell import Cell
 from mskgrasp.config import check_config, read_yaml
 from mskgrasp.errors import BadConfig
 
-CellType = Literal["sapien", "devices"]
+CellType = Literal["sapien", "devices", "recorded", "replay"]
 
 
 @contextmanager
@@ -49,5 +49,16 @@ def cell_from_yaml(path: Path) -> Cell:
             from hal.devices import devices_cell
 
             return devices_cell(values, path)
+        case "recorded":
+            from hal.replay import RecordedCellConfig, recorded_cell
+
+            recorded = check_config(RecordedCellConfig, values, str(path))
+            if read_yaml(recorded.cell).get("type") == kind:
+                raise BadConfig(f"{path}: 'cell' is {recorded.cell}, which is recorded itself; name another")
+            return recorded_cell(cell_from_yaml(recorded.cell), recorded.out)
+        case "replay":
+            from hal.replay import ReplayCellConfig, replay_cell
+
+            return replay_cell(check_config(ReplayCellConfig, values, str(path)))
         case _:
             assert_never(kind)

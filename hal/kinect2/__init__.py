@@ -1,0 +1,6 @@
+"""The Kinect v2 behind the interface of a camera; the vendor's package is imported in its own process."""
+
+from hal.kinect2.camera import Kinect2Camera
+from hal.kinect2.config import Kinect2Config, PinholeIntrinsics
+
+__all__ = ["Kinect2Camera", "Kinect2Config", "PinholeIntrinsics"]

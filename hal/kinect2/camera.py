@@ -1,0 +1,149 @@
+"""A Kinect v2 over the table."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from dataclasses import asdict
+
+import numpy as np
+
+from hal.calibration import Calibration, read_calibration
+from hal.camera import Camera, RgbdFrame
+from hal.errors import CaptureFailed, CommunicationLost, NotConnected
+from hal.kinect2.config import Kinect2Config
+from hal.kinect2.driver import Kinect2Settings
+from hal.kinect2.images import HEIGHT, WIDTH, metric_depth, rgb_colour, unmirrored_intrinsics
+from hal.kinect2.link import ProcessEnded, WorkerLink
+
+_log = logging.getLogger(__name__)
+_GRACE_S = 1.0
+"""The driver ends a request itself; if it has not this much later it hangs, s."""
+
+
+class Kinect2Camera(Camera):
+    """Frames of a Kinect v2, upright, metric and in the base frame.
+
+    Args:
+        config: Which camera, its calibration, its corrections.
+    """
+
+    def __init__(self, config: Kinect2Config):
+        self._config = config
+        self._lock = threading.Lock()
+        self._link: WorkerLink | None = None
+        self._lost: str | None = None
+        self._serial = ""
+        self._intrinsics = np.eye(3)
+        self._calibration: Calibration | None = None
+
+    def connect(self) -> None:
+        """Opens the camera and waits for its first frame.
+
+        Raises:
+            BadConfig: The calibration file is missing, or another camera's.
+            DriverMissing, IncompatibleDriver: pylibfreenect2 is not there, or cannot be used.
+            NotConnected: No such camera, or another program holds it.
+            CaptureFailed: It is open, but no frame came within ``connect_timeout_s``.
+        """
+        if self._link is not None:
+            return
+        config = self._config
+        # Before the camera is opened, so that a wrong file does not cost its starting time.
+        self._calibration = read_calibration(config.calibration, serial=config.serial)
+        settings = Kinect2Settings(
+            serial=config.serial,
+            pipeline=config.pipeline,
+            latency_s=config.latency_s,
+            max_skew_s=config.max_skew_s,
+            timeout_s=config.connect_timeout_s,
+        )
+        link = WorkerLink()
+        try:
+            # Opening and starting take up to ten seconds of their own.
+            reply, _ = link.ask(
+                {"op": "connect", "settings": asdict(settings)}, timeout_s=config.connect_timeout_s + 10
+            )
+            self._serial = reply["serial"]
+            if config.serial is None:
+                self._calibration = read_calibration(config.calibration, serial=self._serial)
+        except ProcessEnded as error:
+            link.close()
+            name = f"camera {config.serial}" if config.serial else "the camera"
+            raise NotConnected(
+                f"{name} could not be opened: {error}; end other programs that use it, check its cable, and "
+                "try again"
+            ) from error
+        except BaseException:
+            link.close()
+            raise
+        self._link, self._lost = link, None
+        self._intrinsics = self._choose_intrinsics(unmirrored_intrinsics(**reply["intrinsics"]))
+        if config.warm_up_s > 0:
+            _log.warning(
+                "camera %s has just been started: its depth drifts by millimetres for the first %.0f minutes",
+                self._serial,
+                config.warm_up_s / 60,
+            )
+
+    def close(self) -> None:
+        """Stops the stream and releases the camera; safe to call twice."""
+        if self._link is not None:
+            link, self._link = self._link, None
+            link.close()
+
+    def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
+        """Takes a frame that is exposed after this call.
+
+        Raises:
+            NotConnected: Outside the camera's context.
+            CaptureFailed: No complete, fresh and filled frame came within ``timeout_s``.
+            CommunicationLost: The camera was unplugged, or its driver crashed or hung; open it again.
+        """
+        with self._lock:
+            if self._link is None or self._calibration is None:
+                raise NotConnected("Kinect2Camera is not connected; use it inside its context (with ...)")
+            if self._lost is not None:
+                raise CommunicationLost(self._lost)
+            if not 0 < timeout_s < 3600:
+                raise CaptureFailed(f"timeout {timeout_s:g} s is outside 0 .. 3600 s")
+            n_pixels = WIDTH * HEIGHT
+            try:
+                reply, data = self._link.ask(
+                    {"op": "capture", "timeout_s": timeout_s},
+                    timeout_s=timeout_s + _GRACE_S,
+                    n_bytes=8 * n_pixels,
+                )
+            except ProcessEnded as error:
+                self._lost = f"camera {self._serial} was lost: {error}; open the cell again"
+                raise CommunicationLost(self._lost) from error
+            except CommunicationLost as error:
+                self._lost = str(error)
+                raise
+        depth = metric_depth(
+            np.frombuffer(data, np.float32, n_pixels).reshape(HEIGHT, WIDTH), self._config.depth_offset
+        )
+        valid = float(np.isfinite(depth).mean())
+        if valid < self._config.min_valid:
+            raise CaptureFailed(
+                f"camera {self._serial} measured {valid:.1%} of its depth image, less than "
+                f"{self._config.min_valid:.1%} (min_valid); uncover it, and keep it 0.5 to 4.5 m away"
+            )
+        return RgbdFrame(
+            colour=rgb_colour(
+                np.frombuffer(data, np.uint8, 4 * n_pixels, offset=4 * n_pixels).reshape(HEIGHT, WIDTH, 4)
+            ),
+            depth=depth,
+            intrinsics=self._intrinsics.copy(),
+            T_base_camera=self._calibration.T_base_camera,
+            timestamp_s=reply["exposed_s"],
+            serial=self._serial,
+        )
+
+    def _choose_intrinsics(self, factory: np.ndarray) -> np.ndarray:
+        override = self._config.intrinsics.get(self._serial)
+        if override is not None:
+            return override.matrix()
+        assert self._calibration is not None
+        calibrated = self._calibration.intrinsics
+        return factory if calibrated is None else np.asarray(calibrated, dtype=np.float64)

@@ -1,0 +1,94 @@
+"""Program: write down what happens on a cell. Run ``python -m hal.record --help``."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import yaml
+from pydantic import Field
+
+from hal.open_cell import cell_from_yaml
+from hal.replay import read_recording
+from hal.replay.cell import recorded_cell
+from mskgrasp.cli import parse, run
+from mskgrasp.config import Config
+from mskgrasp.errors import UsageError
+
+DESCRIPTION = """Writes the frames of a cell's camera, or a whole run on the cell, into one file.
+
+The file plays back as a cell (type: replay), a camera or an arm (driver: replay): see docs/replay.md.
+Without --run the arm is asked for its state with every frame and does not move."""
+
+
+class RecordConfig(Config):
+    """Settings of a recording."""
+
+    cell: Path
+    """YAML file of the cell, for example configs/cells/sapien.yaml."""
+    out: Path
+    """The recording, an HDF5 file; must not exist yet."""
+    frames: int = Field(default=10, ge=1, le=100_000)
+    """How many frames are taken."""
+    interval: float = Field(default=0.5, ge=0, le=3600)
+    """Time from one frame to the next, s."""
+    run: str | None = None
+    """A program and its options instead, without --cell: "mskgrasp.evaluate --models models/demo"."""
+
+
+def main() -> int:
+    """Records, and says what is in the file."""
+    config = parse(RecordConfig, prog="python -m hal.record", description=DESCRIPTION)
+    code = _frames(config) if config.run is None else _run(config, config.run)
+    if not config.out.exists():
+        return code or 1  # the program has said why
+    recording = read_recording(config.out)
+    moved = sum(event.after is not None for event in recording.events)
+    print(
+        f"wrote {config.out}: {recording.n_frames} frames, {moved} commands to the arm, "
+        f"{len(recording.events)} calls in all"
+    )
+    return code
+
+
+def _frames(config: RecordConfig) -> int:
+    """Takes frames; each with the arm's state, so that they can be brought together later."""
+    with recorded_cell(cell_from_yaml(config.cell), config.out).connected() as cell:
+        due_s = time.monotonic()
+        for _ in range(config.frames):
+            time.sleep(max(0.0, due_s - time.monotonic()))
+            due_s += config.interval
+            cell.arm.state()
+            cell.camera.capture()
+    return 0
+
+
+def _run(config: RecordConfig, command: str) -> int:
+    """Runs a program of this project on the recorded cell, and returns its exit code."""
+    words = shlex.split(command)
+    if not words or words[0].split(".")[0] not in ("mskgrasp", "hal"):
+        raise UsageError(f"--run {command!r}: begin with a program of this project, such as mskgrasp.plan")
+    if any(word.split("=")[0] == "--cell" for word in words):
+        raise UsageError("--run: leave --cell away, the recorded cell takes its place")
+    cell_from_yaml(config.cell)  # a wrong file is told here, not by the program
+    if config.out.exists():
+        raise UsageError(f"{config.out} exists already; move it away or choose another --out")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "recorded.yaml"
+        values = dict(type="recorded", cell=str(config.cell.resolve()), out=str(config.out.resolve()))
+        path.write_text(yaml.safe_dump(values), encoding="utf-8")
+        arguments = [sys.executable, "-m", words[0], "--cell", str(path), *words[1:]]
+        process = subprocess.Popen(arguments)
+        while True:
+            try:
+                return process.wait()
+            except KeyboardInterrupt:
+                continue  # Ctrl-C reaches the program, too, which stops the arm and ends
+
+
+if __name__ == "__main__":
+    run(main)

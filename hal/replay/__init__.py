@@ -1,0 +1,13 @@
+"""Recordings of cells, and cells that play them back: a run at the cell, debugged at a desk."""
+
+from hal.replay.arm import ReplayArm
+from hal.replay.camera import ReplayCamera
+from hal.replay.cell import recorded_cell, replay_cell
+from hal.replay.config import RecordedCellConfig, ReplayArmConfig, ReplayCameraConfig, ReplayCellConfig
+from hal.replay.reader import Recording, read_recording
+from hal.replay.writer import RecordingWriter
+
+__all__ = [
+    "RecordedCellConfig", "Recording", "RecordingWriter", "ReplayArm", "ReplayArmConfig", "ReplayCamera",
+    "ReplayCameraConfig", "ReplayCellConfig", "read_recording", "recorded_cell", "replay_cell",
+]  # fmt: skip

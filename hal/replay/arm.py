@@ -1,0 +1,133 @@
+"""An arm that answers as the recorded one did."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from hal.arm import Arm, ArmState, GraspOutcome
+from hal.errors import MotionAborted, NeedsRecovery, NotRecorded
+from hal.replay.config import ReplayArmConfig
+from hal.replay.events import COMMANDS, arm_state, plain
+from hal.replay.playback import Playback
+from hal.replay.reader import read_recording
+from mskgrasp.geometry import Pose
+
+
+class ReplayArm(Arm):
+    """Compares each command with the recorded one and gives the recorded answer, errors included.
+
+    A command that differs by more than the tolerances is refused (`NotRecorded`): nobody knows what the
+    arm would have done. What the recorded arm checked, it checked then; nothing moves here.
+
+    Args:
+        config: Which recording, and how exact.
+        playback: Shared with the camera of the same recording, so that both stay in step.
+
+    Raises:
+        BadRecording: The file cannot be used.
+    """
+
+    def __init__(self, config: ReplayArmConfig, playback: Playback | None = None):
+        calls = [call for call in COMMANDS if call not in ("capture", "present")]
+        self._playback = playback or Playback(read_recording(config.recording), calls, config.tolerances)
+        super().__init__(self._playback.recording.limits)
+        self._open = False
+
+    def connect(self) -> None:
+        """Goes to the beginning of the recording."""
+        if not self._open:
+            self._playback.open()
+            self._stop.clear()
+            self._fault = None
+            self._open = True
+
+    def close(self) -> None:
+        """Releases the recording; safe to call twice."""
+        if self._open:
+            self._open = False
+            self._playback.close()
+
+    def state(self) -> ArmState:
+        """The state that was read at this point, or the last one known; its time is that of this call.
+
+        Raises:
+            NotConnected: Outside the arm's context.
+            NotRecorded: The recording has not read any state until here.
+        """
+        self._require_connection()
+        event = self._playback.answer("state")
+        values = event.result if event is not None else self._playback.last_state()
+        if values is None:
+            raise NotRecorded(f"{self._playback.recording.path} holds no state of the arm until here")
+        return arm_state(values, time.monotonic())
+
+    def move_to_joints(self, joints: np.ndarray, *, speed: float = 0.3) -> None:
+        """See `Arm.move_to_joints`."""
+        self._replay("move_to_joints", joints=joints, speed=speed)
+
+    def move_to_pose(self, T_base_tcp: Pose, *, speed: float = 0.1) -> None:
+        """See `Arm.move_to_pose`."""
+        self._replay("move_to_pose", T_base_tcp=T_base_tcp, speed=speed)
+
+    def move_gripper(self, width: float) -> None:
+        """See `Arm.move_gripper`."""
+        self._replay("move_gripper", width=width)
+
+    def grasp(self, force: float) -> GraspOutcome:
+        """See `Arm.grasp`."""
+        return GraspOutcome(**self._replay("grasp", force=force))
+
+    def wait(self, seconds: float) -> None:
+        """Does not wait; see `Arm.wait`."""
+        self._replay("wait", seconds=seconds)
+
+    def recover(self) -> None:
+        """Acknowledges a recorded error, or that the program did something else than was recorded."""
+        self._require_connection()
+        if self._fault is None:
+            self._replay("recover")
+        self._fault = None
+        self._stop.clear()
+
+    def check_pose(self, T_base_tcp: Pose) -> None:
+        """Refuses what the recorded arm refused.
+
+        Raises:
+            OutOfWorkspace: It did.
+            NotRecorded: It was not asked.
+        """
+        self._playback.same_question("check_pose", {"T_base_tcp": plain(T_base_tcp)})
+
+    def _replay(self, call: str, **arguments: Any) -> Any:
+        self._require_connection()
+        following = self._playback.peek()
+        if self._fault is not None:
+            raise NeedsRecovery(f"the arm stopped before ({self._fault}); look at it, then call recover()")
+        # A recorded stop ended a recorded motion; one that comes now ends this one.
+        if self._stop.is_set() and call != "recover" and (following is None or following.error is None):
+            raise MotionAborted("stop() was called; call recover() when it is safe")
+        try:
+            return self._playback.command(
+                call, {key: plain(value) for key, value in arguments.items()}
+            ).result
+        except NotRecorded as error:
+            self._fault = str(error)
+            raise
+
+    def _connected(self) -> bool:
+        return self._open
+
+    def _halt(self) -> None:
+        """Nothing moves."""
+
+    def _reachable(self, T_base_tcp: Pose) -> bool:
+        return True  # what the recorded arm could not reach, it refused
+
+    def _beneath(self, *_: Any, **__: Any) -> Any:
+        raise AssertionError("a recording answers above the backend")
+
+    _state = _forward = _move_to_joints = _move_to_pose = _move_gripper = _grasp = _beneath
+    _wait = _recover = _beneath

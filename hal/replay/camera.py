@@ -1,0 +1,54 @@
+"""A camera that plays back recorded frames."""
+
+from __future__ import annotations
+
+import time
+
+from hal.camera import Camera, RgbdFrame
+from hal.errors import NotConnected
+from hal.replay.config import ReplayCameraConfig
+from hal.replay.playback import Playback
+from hal.replay.reader import read_recording
+
+
+class ReplayCamera(Camera):
+    """Delivers the recorded frames one after the other, errors included.
+
+    Args:
+        config: Which recording.
+        playback: Shared with the arm of the same recording, so that both stay in step.
+
+    Raises:
+        BadRecording: The file cannot be used.
+    """
+
+    def __init__(self, config: ReplayCameraConfig, playback: Playback | None = None):
+        self._playback = playback or Playback(
+            read_recording(config.recording), ("capture",), loop=config.loop
+        )
+        self._open = False
+
+    def connect(self) -> None:
+        """Goes to the beginning of the recording."""
+        if not self._open:
+            self._playback.open()
+            self._open = True
+
+    def close(self) -> None:
+        """Releases the recording; safe to call twice."""
+        if self._open:
+            self._open = False
+            self._playback.close()
+
+    def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
+        """The next recorded frame, at once; its time is that of this call, so that it counts as fresh.
+
+        Raises:
+            NotConnected: Outside the camera's context.
+            CaptureFailed: It failed when recorded, or there are no frames left.
+            NotRecorded: The program does something else than when it was recorded.
+        """
+        if not self._open:
+            raise NotConnected("ReplayCamera is not connected; use it inside its context (with ...)")
+        event = self._playback.command("capture", {})
+        return self._playback.recording.frame(event.result, time.monotonic())

@@ -1,0 +1,87 @@
+"""Cells that are recorded, and cells that are played back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hal.cell import Cell
+from hal.errors import NotRecorded
+from hal.replay.arm import ReplayArm
+from hal.replay.camera import ReplayCamera
+from hal.replay.config import ReplayArmConfig, ReplayCameraConfig, ReplayCellConfig
+from hal.replay.events import pose
+from hal.replay.playback import Playback
+from hal.replay.reader import read_recording
+from hal.replay.recorder import RecordingArm, RecordingCamera, RecordingFeeder, RecordingTracker
+from hal.replay.writer import RecordingWriter
+from mskgrasp.geometry import Pose
+
+
+def recorded_cell(cell: Cell, out: Path) -> Cell:
+    """A cell, not connected yet, on which everything that happens is written down.
+
+    Raises:
+        UsageError: The file exists already.
+    """
+    writer = RecordingWriter(out, cell.workspace, cell.arm)
+    return Cell(
+        camera=RecordingCamera(cell.camera, writer),
+        arm=RecordingArm(cell.arm, writer),
+        workspace=cell.workspace,
+        feeder=None if cell.feeder is None else RecordingFeeder(cell.feeder, writer),
+        tracker=None if cell.tracker is None else RecordingTracker(cell.tracker, writer),
+    )
+
+
+def replay_cell(config: ReplayCellConfig) -> Cell:
+    """A cell that answers as the recorded one did, as long as the program does the same.
+
+    Raises:
+        BadRecording: The file cannot be used.
+    """
+    recording = read_recording(config.recording)
+    playback = Playback(recording, tolerances=config.tolerances)
+    calls = {event.call for event in recording.events}
+    return Cell(
+        camera=ReplayCamera(ReplayCameraConfig(driver="replay", recording=config.recording), playback),
+        arm=ReplayArm(ReplayArmConfig(driver="replay", recording=config.recording), playback),
+        workspace=recording.workspace,
+        feeder=ReplayFeeder(playback) if "present" in calls else None,
+        tracker=ReplayTracker(playback) if "part_pose" in calls else None,
+    )
+
+
+class ReplayFeeder:
+    """Lays nothing on the table: the part lies there in the recorded frames."""
+
+    def __init__(self, playback: Playback):
+        self._playback = playback
+
+    def present(self, part: str, seed: int) -> None:
+        """Checks that it is the recorded part and seed.
+
+        Raises:
+            NotRecorded: It is not.
+        """
+        self._playback.command("present", {"part": part, "seed": seed})
+
+
+class ReplayTracker:
+    """Knows the poses that were read at this point of the recording."""
+
+    def __init__(self, playback: Playback):
+        self._playback = playback
+
+    def part_pose(self) -> Pose:
+        """``T_base_obj`` as recorded.
+
+        Raises:
+            NotRecorded: It was not asked for at this point.
+        """
+        event = self._playback.answer("part_pose")
+        if event is None:
+            raise NotRecorded(
+                f"{self._playback.recording.path} holds no pose of the part at this point; the program does "
+                "something else than when it was recorded"
+            )
+        return pose(event.result)

@@ -1,0 +1,105 @@
+"""One call on a cell, as plain values: what was asked, what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from hal import errors as hal_errors
+from hal.arm import ArmState, GraspOutcome
+from hal.errors import HalError, MotionAborted
+from mskgrasp import errors as base_errors
+from mskgrasp.errors import MskgraspError
+from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply
+
+SCHEMA = 1
+KIND = "mskgrasp cell recording"
+
+Command = Literal[
+    "capture", "present", "move_to_joints", "move_to_pose", "move_gripper", "grasp", "wait", "recover"
+]  # fmt: skip
+Query = Literal["state", "check_pose", "part_pose", "stop"]
+COMMANDS: tuple[str, ...] = get_args(Command)
+"""Calls that happen one after the other; what comes between them only asks."""
+
+_ERRORS: dict[str, type[MskgraspError]] = {
+    name: kind
+    for module in (base_errors, hal_errors)
+    for name, kind in vars(module).items()
+    if isinstance(kind, type) and issubclass(kind, MskgraspError)
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event:
+    """One call.
+
+    Attributes:
+        call: Which.
+        arguments: What was asked, plain values; poses as x y z qw qx qy qz.
+        result: What came of it, plain values; of a capture the index of the frame.
+        error: Type and message of what was raised; None where nothing was.
+        at_s: When it was called, seconds since the recording began.
+        took_s: How long it took, s.
+        after: The arm's state after a command; None where it could not be read.
+    """
+
+    call: str
+    arguments: dict[str, Any] = field(default_factory=dict)
+    result: Any = None
+    error: tuple[str, str] | None = None
+    at_s: float = 0.0
+    took_s: float = 0.0
+    after: dict[str, Any] | None = None
+
+
+def plain(value: Any) -> Any:
+    """Plain values of what goes in and out of a cell's verbs."""
+    match value:
+        case Pose():
+            return np.asarray(value.as_vector(), dtype=np.float64).tolist()
+        case ArmState():
+            return dict(
+                joints=plain(value.joints),
+                T_base_tcp=plain(value.T_base_tcp),
+                width=float(value.gripper_width),
+            )
+        case GraspOutcome():
+            return dict(width=float(value.width), holding=bool(value.holding))
+        case np.ndarray() | np.generic():
+            return value.tolist()
+        case _:
+            return value
+
+
+def arm_state(values: dict[str, Any], timestamp_s: float) -> ArmState:
+    """The state that `plain` wrote."""
+    return ArmState(
+        joints=np.array(values["joints"]),
+        T_base_tcp=pose(values["T_base_tcp"]),
+        gripper_width=values["width"],
+        timestamp_s=timestamp_s,
+    )
+
+
+def pose(values: list[float]) -> Pose:
+    """The pose that `plain` wrote."""
+    return Pose.from_vector(np.array(values, dtype=np.float64))
+
+
+def rebuild(error: tuple[str, str]) -> MskgraspError:
+    """The error that was raised when it was recorded."""
+    name, message = error
+    if name == KeyboardInterrupt.__name__:
+        return MotionAborted("at this point of the recording Ctrl-C was pressed; call recover()")
+    return _ERRORS.get(name, HalError)(message)
+
+
+def distances(one: list[float], other: list[float]) -> tuple[float, float]:
+    """How far two poses are apart: metres and radians."""
+    a, b = pose(one), pose(other)
+    turn = quat_multiply(quat_conjugate(a.quat_wxyz), b.quat_wxyz)
+    angle = 2 * float(np.arctan2(np.linalg.norm(turn[1:]), abs(turn[0])))
+    return float(np.linalg.norm(a.position - b.position)), angle

@@ -1,0 +1,118 @@
+"""Reads a recording; whatever is wrong with the file is one line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from hal.arm import ArmLimits
+from hal.camera import RgbdFrame
+from hal.cell import Workspace
+from hal.errors import BadRecording
+from hal.replay.events import KIND, SCHEMA, Event, pose
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """What happened on a cell; frames are read from the file when they are asked for.
+
+    Attributes:
+        path: The file.
+        made: When it was recorded, local time.
+        workspace: The cell's table.
+        limits: The arm's limits.
+        events: All calls, in the order in which they ended.
+        n_frames: How many frames it holds.
+    """
+
+    path: Path
+    made: str
+    workspace: Workspace
+    limits: ArmLimits
+    events: tuple[Event, ...]
+    n_frames: int
+
+    def frame(self, index: int, timestamp_s: float) -> RgbdFrame:
+        """A frame, as if it had been exposed at ``timestamp_s``.
+
+        Raises:
+            BadRecording: The file was damaged or taken away meanwhile.
+        """
+        try:
+            with h5py.File(self.path, "r") as file:
+                group: Any = file["frames"]
+                return RgbdFrame(
+                    colour=group["colour"][index],
+                    depth=group["depth"][index],
+                    intrinsics=group["intrinsics"][index],
+                    T_base_camera=pose(group["T_base_camera"][index]),
+                    timestamp_s=timestamp_s,
+                    serial=str(group.attrs["serial"]),
+                )
+        except (OSError, KeyError, IndexError, ValueError) as error:
+            raise BadRecording(
+                f"{self.path}: frame {index} cannot be read ({error}); record again"
+            ) from error
+
+
+def read_recording(path: Path) -> Recording:
+    """Reads all of a recording but its images.
+
+    Raises:
+        BadRecording: The file is missing, damaged, no recording, or of another version.
+    """
+    if not path.is_file():
+        raise BadRecording(f"there is no recording {path}; make one with python -m hal.record")
+    try:
+        with h5py.File(path, "r") as file:
+            kind, schema = file.attrs.get("kind"), file.attrs.get("schema")
+            if kind != KIND:
+                raise BadRecording(f"{path} is no recording of a cell; make one with python -m hal.record")
+            if schema != SCHEMA:
+                raise BadRecording(f"{path} has schema {schema}, this version reads {SCHEMA}; record again")
+            return _read(path, file)
+    except (OSError, KeyError, ValueError, TypeError, AttributeError) as error:
+        raise BadRecording(f"{path} is damaged or no recording ({error}); record again") from error
+
+
+def _read(path: Path, file: Any) -> Recording:
+    table = json.loads(file.attrs["workspace"])
+    limits: dict[str, Any] = {
+        key: np.array(value) if isinstance(value, list) else value
+        for key, value in json.loads(file.attrs["limits"]).items()
+    }
+    events = tuple(_event(text) for text in file["events"].asstr()[:])
+    n_frames = _check_frames(file["frames"]) if "frames" in file else 0
+    for event in events:
+        if event.call == "capture" and event.error is None and not 0 <= event.result < n_frames:
+            raise ValueError(f"frame {event.result} is missing")
+    return Recording(
+        path=path,
+        made=str(file.attrs["made"]),
+        workspace=Workspace(**{**table, "region": tuple(table["region"]), "home": np.array(table["home"])}),
+        limits=ArmLimits(**limits),
+        events=events,
+        n_frames=n_frames,
+    )
+
+
+def _event(text: str) -> Event:
+    values = json.loads(text)
+    error = values["error"]
+    return Event(**{**values, "error": None if error is None else (str(error[0]), str(error[1]))})
+
+
+def _check_frames(group: Any) -> int:
+    n, h, w = group["depth"].shape
+    shapes = dict(colour=(n, h, w, 3), intrinsics=(n, 3, 3), T_base_camera=(n, 7), exposed_s=(n,))
+    for key, shape in shapes.items():
+        if group[key].shape != shape:
+            raise ValueError(f"frames/{key} is {group[key].shape}, expected {shape}")
+    if group["depth"].dtype != np.float32 or group["colour"].dtype != np.uint8:
+        raise ValueError(f"depth is {group['depth'].dtype}, colour {group['colour'].dtype}")
+    return n

@@ -1,0 +1,175 @@
+"""Devices that pass everything on and write it down."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Any
+
+import numpy as np
+
+from hal.arm import Arm, ArmState, GraspOutcome
+from hal.camera import Camera, RgbdFrame
+from hal.cell import PartFeeder, PartTracker
+from hal.errors import HalError
+from hal.replay.events import plain
+from hal.replay.writer import RecordingWriter
+from mskgrasp.geometry import Pose
+
+
+class RecordingCamera(Camera):
+    """A camera whose frames are written down.
+
+    Args:
+        camera: The one that takes them.
+        writer: Where they go.
+    """
+
+    def __init__(self, camera: Camera, writer: RecordingWriter):
+        self._camera, self._writer = camera, writer
+        self._open = False
+
+    def connect(self) -> None:
+        """Opens the recording and the camera."""
+        if not self._open:
+            self._writer.open()
+            try:
+                self._camera.connect()
+            except BaseException:
+                self._writer.close()
+                raise
+            self._open = True
+
+    def close(self) -> None:
+        """Releases the camera and the recording; safe to call twice."""
+        if self._open:
+            self._open = False
+            try:
+                self._camera.close()
+            finally:
+                self._writer.close()
+
+    def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
+        """See `Camera.capture`."""
+        return self._writer.call(
+            "capture", {}, lambda: self._camera.capture(timeout_s), result=self._writer.frame
+        )
+
+
+class RecordingArm(Arm):
+    """An arm whose commands and answers are written down.
+
+    Args:
+        arm: The one that moves, and checks.
+        writer: Where they go.
+    """
+
+    def __init__(self, arm: Arm, writer: RecordingWriter):
+        super().__init__(arm.limits)
+        self._arm, self._writer = arm, writer
+        self._open = False
+
+    def connect(self) -> None:
+        """Opens the recording and the arm."""
+        if not self._open:
+            self._writer.open()
+            try:
+                self._arm.connect()
+            except BaseException:
+                self._writer.close()
+                raise
+            self._open = True
+
+    def close(self) -> None:
+        """Releases the arm and the recording; safe to call twice."""
+        if self._open:
+            self._open = False
+            try:
+                self._arm.close()
+            finally:
+                self._writer.close()
+
+    def state(self) -> ArmState:
+        """See `Arm.state`."""
+        return self._writer.call("state", {}, self._arm.state)
+
+    def move_to_joints(self, joints: np.ndarray, *, speed: float = 0.3) -> None:
+        """See `Arm.move_to_joints`."""
+        self._record("move_to_joints", joints=joints, speed=speed)
+
+    def move_to_pose(self, T_base_tcp: Pose, *, speed: float = 0.1) -> None:
+        """See `Arm.move_to_pose`."""
+        self._record("move_to_pose", T_base_tcp=T_base_tcp, speed=speed)
+
+    def move_gripper(self, width: float) -> None:
+        """See `Arm.move_gripper`."""
+        self._record("move_gripper", width=width)
+
+    def grasp(self, force: float) -> GraspOutcome:
+        """See `Arm.grasp`."""
+        return self._record("grasp", force=force)
+
+    def wait(self, seconds: float) -> None:
+        """See `Arm.wait`."""
+        self._record("wait", seconds=seconds)
+
+    def stop(self) -> None:
+        """See `Arm.stop`: first stopped, then written down."""
+        self._arm.stop()
+        self._writer.call("stop", {}, lambda: None)
+
+    def recover(self) -> None:
+        """See `Arm.recover`."""
+        self._record("recover")
+
+    def check_pose(self, T_base_tcp: Pose) -> None:
+        """See `Arm.check_pose`."""
+        self._writer.call("check_pose", dict(T_base_tcp=T_base_tcp), lambda: self._arm.check_pose(T_base_tcp))
+
+    def _record(self, call: str, **arguments: Any) -> Any:
+        return self._writer.call(
+            call, arguments, lambda: getattr(self._arm, call)(**arguments), after=self._after
+        )
+
+    def _after(self) -> dict[str, Any] | None:
+        with contextlib.suppress(HalError):  # an arm that is gone has no state; the command's error says so
+            return plain(self._arm.state())
+        return None
+
+    def _connected(self) -> bool:
+        return self._open
+
+    def _halt(self) -> None:
+        self._arm.stop()
+
+    def _reachable(self, T_base_tcp: Pose) -> bool:
+        return self._arm._reachable(T_base_tcp)
+
+    def _forward(self, joints: np.ndarray) -> Pose:
+        return self._arm._forward(joints)
+
+    def _beneath(self, *_: Any, **__: Any) -> Any:
+        raise AssertionError("everything is passed on above the backend")
+
+    _state = _move_to_joints = _move_to_pose = _move_gripper = _grasp = _wait = _recover = _beneath
+
+
+class RecordingFeeder:
+    """A feeder whose presentations are written down."""
+
+    def __init__(self, feeder: PartFeeder, writer: RecordingWriter):
+        self._feeder, self._writer = feeder, writer
+
+    def present(self, part: str, seed: int) -> None:
+        """See `PartFeeder.present`."""
+        self._writer.call("present", dict(part=part, seed=seed), lambda: self._feeder.present(part, seed))
+
+
+class RecordingTracker:
+    """A tracker whose poses are written down."""
+
+    def __init__(self, tracker: PartTracker, writer: RecordingWriter):
+        self._tracker, self._writer = tracker, writer
+
+    def part_pose(self) -> Pose:
+        """See `PartTracker.part_pose`."""
+        return self._writer.call("part_pose", {}, self._tracker.part_pose)

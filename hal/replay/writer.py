@@ -1,0 +1,167 @@
+"""Writes a recording: one HDF5 file, described in docs/replay.md."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, TypeVar
+
+import h5py
+import numpy as np
+
+from hal.arm import Arm
+from hal.camera import RgbdFrame
+from hal.cell import Workspace
+from hal.replay.events import KIND, SCHEMA, Event, plain
+from mskgrasp.errors import UsageError
+
+T = TypeVar("T")
+
+
+class RecordingWriter:
+    """Writes calls as they happen; ``FILE.part`` becomes ``FILE`` when the last user closes it.
+
+    Args:
+        path: The recording; must not exist yet.
+        workspace: The table of the recorded cell.
+        arm: The recorded arm; its limits are stored.
+
+    Raises:
+        UsageError: The file exists, or its folder cannot be written.
+    """
+
+    def __init__(self, path: Path, workspace: Workspace, arm: Arm):
+        if path.exists():
+            raise UsageError(f"{path} exists already; move it away or choose another file")
+        self._path = path
+        self._table = {key: plain(value) for key, value in asdict(workspace).items()}
+        self._limits = {key: plain(value) for key, value in vars(arm.limits).items()}
+        self._lock = threading.Lock()
+        self._users = 0
+        self._file: h5py.File | None = None
+        self._start_s = 0.0
+
+    @property
+    def part(self) -> Path:
+        """The file while it is being written."""
+        return self._path.with_name(self._path.name + ".part")
+
+    def open(self) -> None:
+        """Begins the file for its first user."""
+        self._users += 1
+        if self._file is None:
+            try:
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                self._file = h5py.File(self.part, "w")
+            except OSError as error:
+                self._users -= 1
+                raise UsageError(f"cannot write {self.part}: {error}; choose another file") from error
+            self._start_s = time.monotonic()
+            self._file.attrs.update(
+                kind=KIND,
+                schema=SCHEMA,
+                made=time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+                units="metres, radians, newtons, seconds; poses x y z qw qx qy qz in the base frame",
+                workspace=json.dumps(self._table),
+                limits=json.dumps(self._limits),
+            )
+            self._file.create_dataset("events", (0,), h5py.string_dtype(), maxshape=(None,), chunks=(64,))
+            self._file.flush()
+
+    def close(self) -> None:
+        """Ends the file after its last user."""
+        self._users = max(0, self._users - 1)
+        if self._users == 0 and self._file is not None:
+            with self._lock:
+                self._file.close()
+                self._file = None
+            os.replace(self.part, self._path)
+
+    def call(
+        self,
+        name: str,
+        arguments: dict[str, Any],
+        do: Callable[[], T],
+        *,
+        result: Callable[[T], Any] = plain,
+        after: Callable[[], dict[str, Any] | None] = lambda: None,
+    ) -> T:
+        """Does something and writes down what came of it, an error too.
+
+        Args:
+            name: The verb.
+            arguments: Its arguments.
+            do: Calls it.
+            result: Makes plain values of what it returns.
+            after: Reads the arm's state once it is over.
+        """
+        begun_s = time.monotonic()
+        error: tuple[str, str] | None = None
+        value = None
+        try:
+            answer = do()
+            value = result(answer)
+            return answer
+        except BaseException as raised:
+            error = (type(raised).__name__, str(raised))
+            raise
+        finally:
+            took_s = time.monotonic() - begun_s
+            self._append(
+                Event(
+                    call=name,
+                    arguments={key: plain(argument) for key, argument in arguments.items()},
+                    result=value,
+                    error=error,
+                    at_s=begun_s - self._start_s,
+                    took_s=took_s,
+                    after=after(),
+                )
+            )
+
+    def frame(self, frame: RgbdFrame) -> int:
+        """Stores a frame and returns its index."""
+        with self._lock:
+            if self._file is None:
+                return -1
+            values = dict(
+                colour=frame.colour,
+                depth=frame.depth,
+                intrinsics=frame.intrinsics,
+                T_base_camera=np.asarray(frame.T_base_camera.as_vector(), dtype=np.float64),
+                exposed_s=np.float64(frame.timestamp_s - self._start_s),
+            )
+            group = self._file.require_group("frames")
+            if not group.keys():
+                group.attrs["serial"] = frame.serial
+                for key, value in values.items():
+                    array = np.asarray(value)
+                    packed: dict[str, Any] = dict(compression="gzip", compression_opts=1, shuffle=True)
+                    group.create_dataset(
+                        key,
+                        (0, *array.shape),
+                        array.dtype,
+                        maxshape=(None, *array.shape),
+                        chunks=(1, *array.shape),
+                        **(packed if array.ndim > 1 else {}),
+                    )
+            index = group["depth"].shape[0]  # pyright: ignore[reportAttributeAccessIssue]
+            for key, value in values.items():
+                dataset: Any = group[key]
+                dataset.resize(index + 1, axis=0)
+                dataset[index] = value
+            return index
+
+    def _append(self, event: Event) -> None:
+        with self._lock:
+            if self._file is None:
+                return
+            events: Any = self._file["events"]
+            events.resize(len(events) + 1, axis=0)
+            events[-1] = json.dumps(asdict(event))
+            self._file.flush()  # what is known must survive the program
