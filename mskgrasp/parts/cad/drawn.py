@@ -7,7 +7,9 @@ from typing import Any
 
 from mskgrasp.parts import solid as s
 from mskgrasp.parts.cad.brep import lengths, mesh_of, needs_cad, table
+from mskgrasp.parts.cad.hulls import turned_hulls
 from mskgrasp.parts.families.recipe import ALUMINIUM, STEEL, Recipe
+from mskgrasp.parts.pieces import merge_hulls
 
 CAST_IRON = 7200.0
 POLYAMIDE = 1140.0
@@ -25,17 +27,18 @@ def recipes() -> Iterator[Recipe]:
             source="own dimensions, drawn with build123d 0.13",
             density=density,
             dimensions=lengths(row),
-            make=_maker(draw),
+            make=_maker(draw, turned=row["family"] == "nozzle"),
         )
 
 
-def _maker(draw: Callable[[Any, Size], Any]) -> Callable[[dict[str, float]], s.Solid]:
+def _maker(draw: Callable[[Any, Size], Any], *, turned: bool) -> Callable[[dict[str, float]], s.Solid]:
     @needs_cad
     def make(size: dict[str, float]) -> s.Solid:
         import build123d
 
         a, b, c, d, e, f = (size[f"{letter}_mm"] for letter in "abcdef")
-        return s.Solid(mesh=mesh_of(draw(build123d, (a, b, c, d, e, f))), hulls=())
+        mesh = mesh_of(draw(build123d, (a, b, c, d, e, f)))
+        return s.Solid(mesh=mesh, hulls=tuple(merge_hulls(turned_hulls(mesh), 0.03)) if turned else ())
 
     return make
 
@@ -51,24 +54,6 @@ def lever(b: Any, size: Size) -> Any:
     body = b.chamfer(body.edges().group_by(b.Axis.Z)[-1] + body.edges().group_by(b.Axis.Z)[0], 0.8)
     pin = small * 0.25
     return body - b.Cylinder(bore / 2, 2 * height) - b.Pos(distance, 0) * b.Cylinder(pin, 2 * height)
-
-
-def rod(b: Any, size: Size) -> Any:
-    """A connecting rod: two eyes on a shank with a hollow on either side."""
-    distance, large, small, thickness, bore, pin = size
-    plan = b.make_hull(
-        [*b.Circle(large * 0.3).edges(), *(b.Pos(distance, 0) * b.Circle(small * 0.36)).edges()]
-    )
-    body = b.extrude(plan, thickness * 0.35, both=True)
-    body += b.Cylinder(large / 2, thickness) + b.Pos(distance, 0) * b.Cylinder(small / 2, thickness)
-    start, end = large / 2 + 4, distance - small / 2 - 4
-    if end - start > 12:
-        pocket = b.Pos((start + end) / 2, 0) * b.SlotOverall(end - start, small * 0.32)
-        for side in (1, -1):
-            body -= b.extrude(b.Pos(0, 0, side * thickness * 0.2) * pocket, side * thickness)
-    return (
-        body - b.Cylinder(bore / 2, 2 * thickness) - b.Pos(distance, 0) * b.Cylinder(pin / 2, 2 * thickness)
-    )
 
 
 def nozzle(b: Any, size: Size) -> Any:
@@ -163,7 +148,6 @@ FAMILIES: dict[str, tuple[float, Callable[[Any, Size], Any]]] = {
     "lever": (CAST_IRON, lever),
     "nozzle": (POLYAMIDE, nozzle),
     "port_block": (ALUMINIUM, port_block),
-    "rod": (STEEL, rod),
     "yoke": (STEEL, yoke),
 }
 """Density in kg/m^3 and the drawing of each family."""

@@ -1,4 +1,4 @@
-"""Pipes, rails, racks, rings and machine parts that bd_warehouse draws."""
+"""Pipes, rails, rings and machine parts that bd_warehouse draws."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ FAMILIES = {
     "gantry_part": ("OpenBuilds", ALUMINIUM),
     "o_ring": ("ISO 3601", RUBBER),
     "pipe": ("ASME B36.10", STEEL),
-    "rack": ("ISO 53 teeth, own lengths", STEEL),
     "slot_rail": ("OpenBuilds", ALUMINIUM),
 }
 """The standard and the density in kg/m^3 of each family."""
@@ -53,8 +52,6 @@ def _maker(row: Row) -> Callable[[dict[str, float]], s.Solid]:
                 hulls = extruded_hulls(mesh, filled_mm=0.5, detail_mm=0.4, slack=0.03)
             case "ORing":
                 hulls = _torus_pieces(mesh.extents)
-            case "RackGear":
-                hulls = _along_y(mesh)
             case _:
                 hulls = []
         return s.Solid(mesh=mesh, hulls=tuple(hulls))
@@ -65,7 +62,7 @@ def _maker(row: Row) -> Callable[[dict[str, float]], s.Solid]:
 def _drawn(row: Row, size: dict[str, float]) -> Any:
     """The vendor's shape."""
     import build123d as b
-    from bd_warehouse import fastener, gear, o_rings, open_builds
+    from bd_warehouse import fastener, o_rings, open_builds
 
     match row["class"]:
         case "Pipe":
@@ -74,8 +71,6 @@ def _drawn(row: Row, size: dict[str, float]) -> Any:
             return b.Cylinder(outer, length) - b.Cylinder(outer - size["wall_mm"], 2 * length)
         case "VSlotLinearRail":
             return open_builds.VSlotLinearRail(row["a"], size["length_mm"])  # pyright: ignore[reportArgumentType]
-        case "RackGear":
-            return gear.RackGear(size["module_mm"], int(size["teeth_count"]), 20, size["width_mm"])
         case "ORing":
             return o_rings.ORing(row["a"])
         case "AluminumSpacer":
@@ -98,10 +93,3 @@ def _torus_pieces(extents: np.ndarray, segments: int = 18, sides: int = 10) -> l
         radius = swell * (middle + profile[:, 0])
         rings.append(np.column_stack([radius * np.cos(angle), radius * np.sin(angle), profile[:, 1]]))
     return [np.concatenate(pair) for pair in zip(rings[:-1], rings[1:], strict=True)]
-
-
-def _along_y(mesh: Any) -> list[np.ndarray]:
-    """Pieces of an outline in the xz-plane that is extruded along y."""
-    turned = mesh.copy()
-    turned.vertices = np.asarray(mesh.vertices)[:, [0, 2, 1]] * [1, 1, -1]
-    return [points[:, [0, 2, 1]] * [1, -1, 1] for points in extruded_hulls(turned)]
