@@ -35,8 +35,7 @@ def recipes() -> Iterator[Recipe]:
         yield one(table_row("din1587_cap_nut.csv", d_mm=d), "cap_nut_m{d}", cap_nut, source="DIN 1587")
     for row in table("din315_wing_nut.csv"):
         yield one(row, "wing_nut_m{d}", wing_nut, source="DIN 315; outline own dimensions")
-    for row in table("din464_thumb_screw.csv"):
-        yield one(row | {"d1_mm": 0.82 * row["d_mm"]}, "knurled_nut_m{d}", knurled_nut, source="DIN 466")
+    yield from one_per_row("din464_thumb_screw.csv", "knurled_nut_m{d}", knurled_nut, source="DIN 466")
     for d in T_NUTS:
         yield one(table_row("din508_t_nut.csv", d_mm=d), "t_nut_m{d}x{a}", t_nut, source="DIN 508")
     yield from one_per_row("long_t_nut.csv", "long_t_nut_m{d}x{l}", long_t_nut)
