@@ -15,6 +15,7 @@ from hal.kinect2.config import Kinect2Config
 from hal.kinect2.driver import Kinect2Settings
 from hal.kinect2.images import HEIGHT, WIDTH, metric_depth, rgb_colour, unmirrored_intrinsics
 from hal.kinect2.link import ProcessEnded, WorkerLink
+from mskgrasp.geometry import Pose
 
 _log = logging.getLogger(__name__)
 _GRACE_S = 1.0
@@ -135,7 +136,7 @@ class Kinect2Camera(Camera):
             ),
             depth=depth,
             intrinsics=self._intrinsics.copy(),
-            T_base_camera=self._calibration.T_base_camera,
+            T_base_camera=Pose.from_vector(self._calibration.T_base_camera.as_vector()),
             timestamp_s=reply["exposed_s"],
             serial=self._serial,
         )

@@ -198,7 +198,7 @@ def import_vendor() -> Any:
     """
     if importlib.util.find_spec("pylibfreenect2") is None:
         raise DriverMissing(
-            "pylibfreenect2 is not installed; build libfreenect2 first (docs/cells.md), then "
+            "pylibfreenect2 is not installed; build libfreenect2 first (docs/kinect2.md), then "
             "pip install 'mskgrasp[kinect2]'"
         )
     if importlib.util.find_spec("pkg_resources") is None:

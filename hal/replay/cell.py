@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from hal.cell import Cell
@@ -24,10 +25,10 @@ def recorded_cell(cell: Cell, out: Path) -> Cell:
         UsageError: The file exists already.
     """
     writer = RecordingWriter(out, cell.workspace, cell.arm)
-    return Cell(
+    return replace(
+        cell,
         camera=RecordingCamera(cell.camera, writer),
         arm=RecordingArm(cell.arm, writer),
-        workspace=cell.workspace,
         feeder=None if cell.feeder is None else RecordingFeeder(cell.feeder, writer),
         tracker=None if cell.tracker is None else RecordingTracker(cell.tracker, writer),
     )

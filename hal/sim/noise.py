@@ -111,14 +111,14 @@ def _kinect2(
     nearest, farthest = _extremes(depth)
     # A steep wall is no edge: across one pixel it falls by its slope.
     pixel = depth / min(intrinsics[0, 0], intrinsics[1, 1])
-    edge = farthest - nearest > noise.edge_jump + 3 * pixel * np.tan(np.minimum(incidence, 1.4))
+    edge = farthest - nearest > noise.edge_jump + 3 * pixel * np.tan(np.minimum(incidence, 1.5))
     flying = edge & (chosen < noise.flying)
     seen = np.where(flying, nearest + share * (farthest - nearest), depth)
     sigma = axial_sigma(depth, np.minimum(incidence, np.radians(noise.hole_to)))
     lower, upper = np.radians(noise.hole_from), np.radians(noise.hole_to)
     blind = hole < (incidence - lower) / (upper - lower)
     result = seen + sigma * axial + noise.offset
-    return np.where(blind & ~edge, np.nan, result).astype(np.float32)
+    return np.where(blind, np.nan, result).astype(np.float32)
 
 
 def _rays(shape: tuple[int, ...], intrinsics: np.ndarray) -> np.ndarray:
