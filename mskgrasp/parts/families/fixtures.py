@@ -112,7 +112,7 @@ def p_clip(size: dict[str, float]) -> s.Solid:
 
 
 def pipe_clamp(size: dict[str, float]) -> s.Solid:
-    """A clamp block of two halves, closed, with a gap between, its bore along y, two bolt holes from above."""
+    """A clamp block of two halves, a gap between them, its bore along y, two bolt holes from above."""
     a, b, w, d, gap = size["a_mm"] / 2, size["b_mm"] / 2, size["w_mm"] / 2, size["d_mm"] / 2, 0.6
     web = 0.3 * w
     halves = h.plate(o.blunted(-a, a, -b, b, 0.3 * b), -w, w, [(0, 0, d)])
