@@ -220,7 +220,7 @@ class FrankaArm(Arm):
             )
         except MotionAborted as error:
             self._raise_aborted(error)
-        reached = self._still_width(target)
+        reached = self._still_width()
         if not self._stop.is_set() and abs(reached - width) > WIDTH_TOLERANCE:
             raise MotionAborted(
                 f"the pads stopped at {reached:.4f} m instead of {width:.4f} m; see what is between them, "
@@ -236,16 +236,15 @@ class FrankaArm(Arm):
         except MotionAborted:
             # "Command failed!" and "Command aborted!" are how some firmware reports that it met nothing.
             gripped = False
-        width = self._still_width(None)
+        width = self._still_width()
         return GraspOutcome(width=width, holding=bool(gripped) and width > self._config.closed_width)
 
-    def _still_width(self, target: float | None) -> float:
+    def _still_width(self) -> float:
         """The width once the fingers are at rest; the hand reports success a moment before."""
         deadline = time.monotonic() + self._config.settle_s
-        width = self._measure().width
-        while time.monotonic() < deadline and not self._stop.is_set():
+        width, quiet = self._measure().width, 0
+        while quiet < 2 and time.monotonic() < deadline and not self._stop.is_set():
             time.sleep(2 * _POLL_S)
             last, width = width, self._measure().width
-            if abs(width - last) < _STILL_WIDTH:
-                break
+            quiet = quiet + 1 if abs(width - last) < _STILL_WIDTH else 0
         return width

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from hal.franka.driver import MODES, DriverSettings, DriverState, column_major
 from hal.franka.path import JointPath
+
+if TYPE_CHECKING:
+    import franky
 
 _POLL_S = 0.02
 _OWED_S = 0.5
@@ -65,16 +70,16 @@ class FrankyDriver:
 
     def home_gripper(self) -> bool:
         """Opens and closes the fingers to find their greatest width."""
-        return self._wait(self._gripper.homing_async())
+        return self._wait(self._gripper.homing_async)
 
     def move_gripper(self, width: float, speed: float) -> bool:
         """Moves the pads to a width in metres, at m/s."""
-        return self._wait(self._gripper.move_async(width, speed))
+        return self._wait(lambda: self._gripper.move_async(width, speed))
 
     def grasp(self, speed: float, force: float) -> bool:
         """Closes with N until the pads hold something or meet; any width is within the tolerance."""
         return self._wait(
-            self._gripper.grasp_async(0.0, speed, force, epsilon_inner=0.08, epsilon_outer=0.08)
+            lambda: self._gripper.grasp_async(0.0, speed, force, epsilon_inner=0.08, epsilon_outer=0.08)
         )
 
     def stop(self) -> None:
@@ -89,11 +94,16 @@ class FrankyDriver:
             RuntimeError: The robot did not recover.
         """
         self._stopped.clear()
-        if self._robot.has_errors and not self._robot.recover_from_errors():
+        # A reflex without an error in force is a mode, which has_errors does not see.
+        stuck = self._robot.has_errors or MODES[int(self._robot.state.robot_mode)] == "reflex"
+        if stuck and not self._robot.recover_from_errors():
             raise RuntimeError("automatic error recovery failed")
         return all(result.wait(_OWED_S) for result in self._abandoned)
 
-    def _wait(self, result) -> bool:  # noqa: ANN001 (a franky.BoolFuture; the package is imported late)
+    def _wait(self, start: Callable[[], franky.BoolFuture]) -> bool:
+        if self._stopped.is_set():
+            return False
+        result = start()
         while not result.wait(_POLL_S):
             if self._stopped.is_set():
                 # A future that is destroyed waits for its command, which a stopped gripper need not answer.

@@ -11,17 +11,24 @@ from concurrent.futures import TimeoutError as FutureTimeout
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from hal.errors import CommunicationLost
 from hal.franka.driver import MODES, DriverSettings, DriverState
+from hal.franka.faults import explain
 from hal.franka.path import JointPath
 
 _PERIOD_S = 1e-3
 _POLL_S = 0.02
 _OWED_S = 0.5
+_SILENCE_S = 2.0
 _CORRECTION_HZ = 4.0
 """How fast the error that is left at the goal is taken out, 1/s: well under the arm's own time constant."""
 _MAX_CORRECTION = 0.05
 """Radians; more than friction and gravity explain means that something holds the arm."""
 _ARRIVED = 1e-3
+
+
+class LinkLost(RuntimeError):
+    """The robot does not answer any more."""
 
 
 class PandaPyDriver:
@@ -40,6 +47,8 @@ class PandaPyDriver:
         self._panda_py = panda_py
         self._stopped = threading.Event()
         self._moving = False
+        # libfranka refuses a read while a controller starts or ends.
+        self._use = threading.Lock()
         self._abandoned: list[Future[bool]] = []
 
     def connect(self, settings: DriverSettings) -> None:
@@ -56,7 +65,8 @@ class PandaPyDriver:
     def state(self) -> DriverState:
         """Measures; may be called during a motion."""
         # After a motion get_state() returns its last sample for ever; during one the link is taken.
-        robot = self._panda.get_state() if self._moving else self._robot.read_once()
+        with self._use:
+            robot = self._panda.get_state() if self._moving else self._robot.read_once()
         gripper = self._gripper.read_once()
         return DriverState(
             joints=list(robot.q),
@@ -77,26 +87,32 @@ class PandaPyDriver:
         )
         wanted = CubicHermiteSpline(path.seconds, path.joints, path.speeds)
         speed = wanted.derivative()
-        self._panda.start_controller(controller)
-        self._moving = True
+        with self._use:
+            self._panda.start_controller(controller)
+            self._moving = True
+        self._ticks = (0.0, time.monotonic())
         try:
             # The robot's own clock: it knows of no pause of this process.
             while (now := controller.get_time()) < path.duration_s:
                 self._check()
+                self._check_clock(now)
                 controller.set_control(wanted(now), speed(now))
                 time.sleep(_PERIOD_S)
             self._settle(controller, path.joints[-1])
-        finally:
-            # Joins the control loop; without it is_moving() stays true and states stay old.
-            self._panda.stop_controller()
-            self._moving = False
-        self._panda.raise_error()
+        except LinkLost:
+            raise  # whoever asks a robot that is gone to stop waits for ever
+        except BaseException:
+            self._end()
+            raise
+        self._end()
+        self._raise_error()
 
     def _settle(self, controller, goal: np.ndarray) -> None:  # noqa: ANN001 (the package is imported late)
         correction, still = np.zeros(7), np.zeros(7)
         begin = last = time.monotonic()
         while (now := time.monotonic()) - begin < self._settings.settle_s:
             self._check()
+            self._check_clock(controller.get_time())
             state = self._panda.get_state()
             error = goal - np.array(state.q)
             if np.abs(error).max() < _ARRIVED and np.abs(state.dq).max() < 0.01:
@@ -108,9 +124,32 @@ class PandaPyDriver:
             controller.set_control(goal + correction, still)
             time.sleep(_PERIOD_S)
 
+    def _end(self) -> None:
+        """Joins the control loop; without it is_moving() stays true and states stay old."""
+        with self._use:
+            self._panda.stop_controller()
+            self._moving = False
+
+    def _raise_error(self) -> None:
+        """A reflex or a lost link ends the control loop; panda_py keeps the reason until asked."""
+        try:
+            self._panda.raise_error()
+        except RuntimeError as error:
+            fault = explain(error, "panda_py", self._settings.host)
+            if isinstance(fault, CommunicationLost):
+                raise LinkLost(str(error)) from error
+            raise
+
+    def _check_clock(self, now: float) -> None:
+        """The robot's clock stands still with its link, before libfranka gives up and without its word."""
+        seen, when = self._ticks
+        if now > seen:
+            self._ticks = (now, time.monotonic())
+        elif time.monotonic() - when > _SILENCE_S:
+            raise LinkLost(f"no state from the robot for {_SILENCE_S:g} s: timeout")
+
     def _check(self) -> None:
-        # A reflex or a lost link ends the control loop; panda_py keeps the reason until asked.
-        self._panda.raise_error()
+        self._raise_error()
         if self._stopped.is_set():
             raise RuntimeError("Move command preempted!")
 
@@ -135,12 +174,15 @@ class PandaPyDriver:
     def recover(self) -> bool:
         """Acknowledges the robot's errors, and a stop; False where the gripper still owes an answer."""
         self._stopped.clear()
-        if MODES[int(self._robot.read_once().robot_mode)] == "reflex":
-            self._robot.automatic_error_recovery()
+        with self._use:
+            if MODES[int(self._robot.read_once().robot_mode)] == "reflex":
+                self._robot.automatic_error_recovery()
         return not wait(self._abandoned, _OWED_S).not_done
 
     def _wait(self, command: Callable[[], bool]) -> bool:
         """Runs a command of the gripper, which stops it when asked to."""
+        if self._stopped.is_set():
+            return False
         result: Future[bool] = Future()
 
         def run() -> None:

@@ -5,7 +5,7 @@ have inertia and dry friction, and a hand that can hold a part. Written from the
 the tests: it knows external torque control alone, which is what panda_py uses. MODEL is the shared object
 that the client loads for its dynamics. Faults are commanded on standard input, one a line:
 
-    reflex | silent | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | unhomed
+    reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | unhomed | q
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 
 from hal.franka.frames import F_T_EE
 from hal.franka.kinematics import forward
-from tests.franka.wire import Channel, GripperState, RobotState
+from tests.franka.wire import Channel, GripperState, RobotState, ask_for_priority
 
 VERSION, GRIPPER_VERSION = 5, 3
 CONNECT, MOVE, STOP_MOVE, RECOVER, LOAD_MODEL = 0, 1, 2, 12, 13
@@ -101,7 +101,7 @@ class Robot:
             self.controller, self.generator = controller, generator + 1
             reply(command, number, b"\x01")
         elif command == STOP_MOVE:
-            self.finish(2, IDLE)
+            self.finish(2, IDLE if self.mode == MOVING else self.mode)
             reply(command, number, b"\x00")
         elif command == RECOVER:
             if self.mode == REFLEX:
@@ -218,6 +218,7 @@ def main() -> None:
     hand = Hand(channel=Channel(host, 1338, "<HII"))
     orders = selectors.DefaultSelector()
     orders.register(sys.stdin, selectors.EVENT_READ)
+    ask_for_priority()
     print("ready", flush=True)
     due = time.monotonic()
     while True:
@@ -231,11 +232,9 @@ def main() -> None:
             if not line:
                 return
             words = line.split()
-            if words[0] == "silent":
-                robot.channel.silent = hand.channel.silent = True
             robot.fault(words)
             hand.fault(words)
-            print("done", flush=True)
+            print(" ".join(map(str, robot.q)) if words == ["q"] else "done", flush=True)
         due = max(due + TICK, time.monotonic() - 0.005)
         if due - time.monotonic() > 1e-4:
             time.sleep(due - time.monotonic())

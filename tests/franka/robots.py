@@ -5,16 +5,21 @@ from __future__ import annotations
 import itertools
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+import numpy as np
 import pytest
+import yaml
+
+from hal.franka.driver import DriverName
 
 _HOSTS = (f"127.{os.getpid() >> 8 & 255}.{os.getpid() & 255}.{k}" for k in itertools.count(1))
 _SYMBOLS = [
@@ -37,29 +42,76 @@ class FakeRobot:
     host: str
     process: subprocess.Popen[str]
 
-    def order(self, line: str) -> None:
-        """Makes a fault happen and returns when it has."""
+    def order(self, line: str) -> str:
+        """Makes a fault happen, returns when it has, with the answer."""
         stdin, stdout = self.process.stdin, self.process.stdout
         assert stdin is not None and stdout is not None
         stdin.write(line + "\n")
         stdin.flush()
-        assert stdout.readline().strip() == "done"
+        return stdout.readline().strip()
+
+    def joints(self) -> np.ndarray:
+        """(7,) where the arm truly is, radians."""
+        return np.array([float(value) for value in self.order("q").split()])
+
+    def freeze(self) -> None:
+        """Answers nothing any more, as with the cable pulled."""
+        self.process.send_signal(signal.SIGSTOP)
 
 
 @contextmanager
-def franky_sim(part_width: float = 0.0) -> Iterator[FakeRobot]:
+def franky_sim(host: str | None = None) -> Iterator[FakeRobot]:
     """An FR3 that franky can drive: franky-sim, in MuJoCo."""
-    with _serve("tests.franka.franky_sim_server", [str(part_width)]) as robot:
+    with _serve("tests.franka.franky_sim_server", host or next(_HOSTS), []) as robot:
         yield robot
 
 
 @contextmanager
-def fci5(version: int = 5) -> Iterator[FakeRobot]:
+def fci5(host: str | None = None, version: int = 5) -> Iterator[FakeRobot]:
     """A Panda that panda_py can drive: our own server."""
     with tempfile.TemporaryDirectory() as folder:
         model = build_model(Path(folder))
-        with _serve("tests.franka.fci5_server", [str(model), str(version)]) as robot:
+        arguments = [str(model), str(version)]
+        with _serve("tests.franka.fci5_server", host or next(_HOSTS), arguments) as robot:
             yield robot
+
+
+def robot_for(driver: DriverName, host: str | None = None) -> AbstractContextManager[FakeRobot]:
+    """The robot that a driver can drive, at a new address or a given one."""
+    return franky_sim(host) if driver == "franky" else fci5(host)
+
+
+def write_cell(
+    folder: Path,
+    driver: DriverName,
+    host: str,
+    camera: dict[str, str] | None = None,
+    **arm: object,
+) -> Path:
+    """A cell's file with that arm, quick, and a camera, by default one that is not there."""
+    settings = {
+        "driver": driver,
+        "host": host,
+        "robot": "fr3" if driver == "franky" else "panda",
+        "max_speed": 1.0,
+        "max_joint_speed": 1.0,
+        "acceleration": 3.0,
+        "joint_acceleration": 6.0,
+        "gripper_speed": 0.1,
+        # A busy machine simulates several times slower than real time.
+        "settle_s": 8.0,
+        "connect_timeout_s": 30.0,
+        **arm,
+    }
+    path = folder / f"{driver}.yaml"
+    values = {
+        "type": "devices",
+        "arm": settings,
+        "camera": camera or {"driver": "kinect2", "calibration": "none.yaml"},
+        "workspace": {"table_z": 0.0, "min_height": 0.002},
+    }
+    path.write_text(yaml.safe_dump(values))
+    return path
 
 
 def build_model(folder: Path) -> Path:
@@ -74,8 +126,7 @@ def build_model(folder: Path) -> Path:
 
 
 @contextmanager
-def _serve(module: str, arguments: list[str]) -> Iterator[FakeRobot]:
-    host = next(_HOSTS)
+def _serve(module: str, host: str, arguments: list[str]) -> Iterator[FakeRobot]:
     with tempfile.TemporaryFile("w+") as log:
         process = subprocess.Popen(
             [sys.executable, "-m", module, host, *arguments],
@@ -92,6 +143,8 @@ def _serve(module: str, arguments: list[str]) -> Iterator[FakeRobot]:
                 pytest.fail(f"{module} did not start: {_text(log)}")
             yield FakeRobot(host=host, process=process)
         finally:
+            if process.poll():
+                print(f"{module} had ended: {_text(log)}")
             process.kill()
             process.wait()
             for pipe in (process.stdin, process.stdout):

@@ -1,0 +1,80 @@
+"""What the simulated arm does beyond the contract: it meets parts, and the simulator knows the truth."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hal import Cell, execute_grasp, go_home, put_down
+from hal.errors import MotionAborted, NeedsRecovery
+from mskgrasp.grasp import pose_base_tcp
+
+
+@pytest.mark.parametrize("theta", [0.0, 1.2, -1.5])
+def test_a_straight_motion_arrives_to_a_millimetre(cell: Cell, theta: float):
+    target = pose_base_tcp(np.array([0.5, 0.05, 0.15, theta]))
+    cell.arm.move_to_pose(target)
+    reached = cell.arm.state().T_base_tcp
+    assert reached.position == pytest.approx(target.position, abs=1e-3)
+    assert abs(np.dot(reached.quat_wxyz, target.quat_wxyz)) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_a_straight_motion_is_straight(cell: Cell, monkeypatch):
+    begin, target = cell.arm.state().T_base_tcp.position, pose_base_tcp(np.array([0.5, 0.1, 0.15, 0.0]))
+    seen: list[np.ndarray] = []
+    step = cell.feeder.env.motion.step  # type: ignore[union-attr]  # the feeder is the simulated world
+
+    def watched(*args: object) -> None:
+        step(*args)
+        seen.append(cell.arm.state().T_base_tcp.position)
+
+    monkeypatch.setattr(cell.feeder.env.motion, "step", watched)  # type: ignore[union-attr]
+    cell.arm.move_to_pose(target, speed=0.3)
+    way = (target.position - begin) / np.linalg.norm(target.position - begin)
+    offsets = [p - begin - way * np.dot(p - begin, way) for p in seen]
+    assert len(seen) > 50
+    assert max(float(np.linalg.norm(offset)) for offset in offsets) < 1e-3
+
+
+def test_a_descent_onto_a_part_stops_like_a_reflex(cell: Cell):
+    """A finger over the rim of the nut: the arm must not push through it."""
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("hex_nut_m30", 0)
+    x, y, _ = cell.tracker.part_pose().position
+    cell.arm.move_to_pose(pose_base_tcp(np.array([x, y - 0.065, 0.12, 0.0])))
+    with pytest.raises(MotionAborted, match="contact force"):
+        cell.arm.move_to_pose(pose_base_tcp(np.array([x, y - 0.065, 0.0115, 0.0])))
+    assert cell.arm.state().T_base_tcp.position[2] > 0.02
+    with pytest.raises(NeedsRecovery):
+        cell.arm.move_gripper(0.05)
+    cell.arm.recover()
+    cell.arm.move_to_pose(pose_base_tcp(np.array([x, y - 0.065, 0.12, 0.0])))
+
+
+def test_a_grasp_lifts_a_part_and_the_simulator_agrees(cell: Cell):
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("hex_nut_m30", 0)
+    before = cell.tracker.part_pose().position
+    result = execute_grasp(cell, np.array([before[0], before[1], 0.0115, 0.3]))
+    assert result.holding and result.aborted is None
+    rise = cell.tracker.part_pose().position[2] - before[2]
+    assert rise == pytest.approx(cell.workspace.lift_height, abs=2e-3)
+    assert 0.04 < result.width < 0.06
+    put_down(cell, np.array([before[0], before[1], 0.0115, 0.3]))
+    go_home(cell)
+    assert cell.tracker.part_pose().position == pytest.approx(before, abs=2e-3)
+
+
+@pytest.mark.parametrize("force", [5.0, 20.0, 70.0])
+def test_a_part_is_lifted_whatever_the_grip_force(cell: Cell, force: float):
+    """The reflex must not take the commanded grip for a collision."""
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("hex_nut_m30", 0)
+    before = cell.tracker.part_pose().position
+    firm = dataclasses.replace(cell, workspace=dataclasses.replace(cell.workspace, grasp_force=force))
+    result = execute_grasp(firm, np.array([before[0], before[1], 0.0115, 0.3]))
+    assert result.aborted is None and result.holding
+    go_home(firm)
+    assert cell.arm.state().joints == pytest.approx(cell.workspace.home, abs=5e-3)
