@@ -74,13 +74,18 @@ class RecordingWriter:
             self._file.flush()
 
     def close(self) -> None:
-        """Ends the file after its last user."""
+        """Ends the file after its last user; one without any call, of a cell that did not open, goes away."""
         self._users = max(0, self._users - 1)
         if self._users == 0 and self._file is not None:
             with self._lock:
+                events: Any = self._file["events"]
+                n_events = len(events)
                 self._file.close()
                 self._file = None
-            os.replace(self.part, self._path)
+            if n_events:
+                os.replace(self.part, self._path)
+            else:
+                self.part.unlink()
 
     def call(
         self,

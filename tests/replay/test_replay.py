@@ -221,6 +221,16 @@ def change(path: Path, how) -> None:
         how(file)
 
 
+def test_a_cell_that_does_not_open_leaves_no_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def refuse(_: object) -> None:
+        raise NotConnected("no robot there")
+
+    monkeypatch.setattr(ToyArm, "connect", refuse)
+    with pytest.raises(NotConnected), recorded_cell(toy_cell(), tmp_path / "run.h5").connected():
+        pass
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_recording_is_not_overwritten(recording: Path):
     with pytest.raises(UsageError, match="exists already"):
         recorded_cell(toy_cell(), recording)
