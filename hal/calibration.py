@@ -145,6 +145,11 @@ def read_calibration(path: Path, *, serial: str | None) -> Calibration:
     return calibration
 
 
+def calibration_path(path: str | Path, cell_file: Path) -> Path:
+    """Where a cell file's ``camera.calibration`` is: a relative path starts beside the cell file."""
+    return cell_file.parent / path
+
+
 def _quoted_serial(values: dict[str, Any], path: Path) -> dict[str, Any]:
     # YAML reads 012345678901 without quotes as a number, in octal even, and the zero is lost.
     if isinstance(values.get("serial"), int):

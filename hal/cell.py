@@ -51,6 +51,20 @@ class PartTracker(Protocol):
         ...
 
 
+class BoardHolder(Protocol):
+    """Puts a calibration board into the hand: a simulator by itself, on a real cell an operator."""
+
+    def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
+        """Fixes a flat board to the hand until the next part is presented.
+
+        Args:
+            image: (h, w) grey levels of its printed side, uint8.
+            size: Its width and height, metres.
+            T_tcp_board: Origin in its middle, x right and y down as it is read, z into it.
+        """
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class Cell:
     """Everything a program needs; a context manager that connects camera and arm.
@@ -61,6 +75,7 @@ class Cell:
         workspace: The table.
         feeder: Lays parts on the table; None where nobody does.
         tracker: Knows the part's pose; None where nothing does.
+        board_holder: Puts a calibration board into the hand; None where an operator does.
     """
 
     camera: Camera
@@ -68,6 +83,7 @@ class Cell:
     workspace: Workspace
     feeder: PartFeeder | None = None
     tracker: PartTracker | None = None
+    board_holder: BoardHolder | None = None
 
     @contextmanager
     def connected(self) -> Iterator[Cell]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal, assert_never, get_args
+from typing import Any, Literal, assert_never, get_args
 
 from hal.cell import Cell
 from mskgrasp.config import check_config, read_yaml
@@ -35,7 +35,15 @@ def cell_from_yaml(path: Path) -> Cell:
     Raises:
         BadConfig: The file is missing or not valid.
     """
-    values = read_yaml(path)
+    return cell_from_values(read_yaml(path), path)
+
+
+def cell_from_values(values: dict[str, Any], path: Path) -> Cell:
+    """Builds the cell that plain values describe; ``path`` is the file they come from.
+
+    Raises:
+        BadConfig: The values are not valid.
+    """
     if values.get("type") not in get_args(CellType):
         legal = ", ".join(get_args(CellType))
         raise BadConfig(f"{path}: 'type' is {values.get('type')!r}; legal: {legal}")

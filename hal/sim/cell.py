@@ -92,4 +92,5 @@ def sapien_cell(config: SapienCellConfig) -> Cell:
         ),
         feeder=world,
         tracker=world,
+        board_holder=world,
     )

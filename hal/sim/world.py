@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from hal.errors import NotConnected
+from hal.sim.board import show_board
 from mskgrasp.geometry import Pose
 from mskgrasp.parts import find_part
 from tasks import GraspDisplacementEnv, Overhead, Physics
@@ -96,6 +97,18 @@ class SapienWorld:
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
         self.env.motion.place(self._home)
         self.env.motion.step(self.env.motion.n_steps(self.physics.settle_s))
+
+    def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
+        """Fixes a flat board to the hand, to be looked at: it weighs nothing and touches nothing.
+
+        Args:
+            image: (h, w) grey levels of its printed side, uint8.
+            size: Its width and height, metres.
+            T_tcp_board: Origin in its middle, x right and y down as it is read, z into it.
+        """
+        hand = self.env.agent.tcp
+        assert hand is not None
+        show_board(hand._objs[0].entity, image, size, T_tcp_board)
 
     def part_pose(self) -> Pose:
         """``T_base_obj`` of the part, the simulator's truth."""
