@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from hal.arm import Arm, ArmLimits
+from hal.calibration import calibration_path
 from hal.camera import Camera
 from hal.cell import Cell, PartFeeder, Workspace
 from hal.errors import OutOfWorkspace
@@ -137,7 +138,9 @@ def _camera(values: dict[str, Any], workspace: Workspace, path: Path) -> tuple[C
         case "kinect2":
             from hal.kinect2 import Kinect2Camera, Kinect2Config
 
-            return Kinect2Camera(check_config(Kinect2Config, values, source)), None
+            config = check_config(Kinect2Config, values, source)
+            beside = calibration_path(config.calibration, path)
+            return Kinect2Camera(config.model_copy(update={"calibration": beside})), None
         case "replay":
             from hal.replay import ReplayCamera, ReplayCameraConfig
 
