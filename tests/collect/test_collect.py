@@ -166,7 +166,7 @@ def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(undisturb
         ("physics: {rate_hz: 100}", 2, "'physics.rate_hz'"),
         ("[1, 2]", 2, "expected a mapping"),
         ("parts: [", 2, "not valid YAML"),
-        ("parts: [no_such_part]", 1, "no_such_part"),
+        ("parts: [no_such_part]", 2, "no_such_part"),
         ("camera: {height: 0.31}", 2, "the camera sees 0.14 m"),
         ("physics: {friction_table_part: 0.1}", 2, "at least half of friction_pad_part"),
         ("part_filter: {min_length: 1.0}\nparts: [hex_nut_m30]", 1, "no part is left"),
