@@ -13,7 +13,7 @@ from concurrent.futures import TimeoutError as FutureTimeout
 from dataclasses import asdict
 from typing import Any
 
-from hal.errors import CommunicationLost, HalError, NotConnected
+from hal.errors import CommunicationLost, HalError, MotionAborted, NotConnected
 from hal.franka.driver import DriverName, DriverSettings, DriverState
 from hal.franka.faults import MESSAGES
 
@@ -60,6 +60,9 @@ class DriverLink:
                 f"{settings.host} did not accept the connection within {connect_timeout_s:g} s: another "
                 f"program may hold the robot (it serves one at a time), or the address is wrong ({error})"
             ) from error
+        except MotionAborted as error:
+            self.close()
+            raise NotConnected(f"{settings.host}: connecting failed: {error}") from error
         except BaseException:
             self.close()
             raise

@@ -236,8 +236,9 @@ def main() -> None:
             hand.fault(words)
             print(" ".join(map(str, robot.q)) if words == ["q"] else "done", flush=True)
         due = max(due + TICK, time.monotonic() - 0.005)
-        if due - time.monotonic() > 1e-4:
-            time.sleep(due - time.monotonic())
+        ahead = due - time.monotonic()
+        if ahead > 1e-4:
+            time.sleep(ahead)
 
 
 if __name__ == "__main__":

@@ -207,7 +207,7 @@ def test_a_driver_process_that_dies_is_told_and_the_arm_stops(
 def test_a_program_that_is_ended_in_mid_motion_leaves_an_arm_at_rest(
     driver: DriverName, robot: FakeRobot, tmp_path: Path, ending: signal.Signals
 ):
-    """Ctrl-C and a killed process; the motion would take half a minute more."""
+    """Ctrl-C and a killed process; the motion would take ten seconds more."""
     path = write_cell(tmp_path, driver, robot.host)
     code = (
         "import sys, numpy as np\n"
@@ -215,22 +215,23 @@ def test_a_program_that_is_ended_in_mid_motion_leaves_an_arm_at_rest(
         "with cell_from_yaml(__import__('pathlib').Path(sys.argv[1])).arm as arm:\n"
         "    q = arm.state().joints\n"
         "    print('moving', flush=True)\n"
-        "    arm.move_to_joints(q + np.array([0.5, 0, 0, 0, 0, 0, 0]), speed=0.02)\n"
+        "    arm.move_to_joints(np.array([-0.5 if q[0] > 0 else 0.5, *q[1:]]), speed=0.05)\n"
     )
     program = subprocess.Popen(
         [sys.executable, "-c", code, path], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert program.stdout is not None
     assert program.stdout.readline().strip() == "moving"
-    begin = robot.joints()
-    time.sleep(1.5)
+    begin, deadline = robot.joints(), time.monotonic() + 60
+    while np.abs(robot.joints() - begin).max() < 0.01:
+        assert time.monotonic() < deadline and program.poll() is None, "it never moved"
+        time.sleep(0.05)
     program.send_signal(ending)
-    _, error = program.communicate(timeout=10)
+    _, error = program.communicate(timeout=20)
     assert program.returncode != 0
     if ending is signal.SIGINT:
         assert "KeyboardInterrupt" in error
     time.sleep(1.5)
-    assert np.abs(robot.joints() - begin).max() > 1e-3, "it never moved"
     assert_at_rest(robot)
     with arm_at(tmp_path, driver, robot.host) as arm:
         arm.move_gripper(0.05)
@@ -284,7 +285,7 @@ def test_no_robot_at_the_address_is_told(driver: DriverName, tmp_path: Path):
 
 def test_a_missing_package_is_told_with_its_extra(driver: DriverName, tmp_path: Path, monkeypatch):
     name = {"franky": "franky", "panda_py": "panda_py"}[driver]
-    (tmp_path / f"{name}.py").write_text(f"raise ModuleNotFoundError('No module named {name!r}')")
+    (tmp_path / f"{name}.py").write_text(f"raise ModuleNotFoundError('No module named {name}')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(DriverMissing, match=r"pip install 'mskgrasp\[franka\]'"):
         arm_at(tmp_path, driver, "127.0.0.250").connect()
@@ -302,7 +303,7 @@ def test_pads_that_meet_something_on_their_way_are_told(tmp_path: Path):
 
 def test_leaving_the_context_in_mid_motion_stops_the_arm(tmp_path: Path):
     with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
-        with once_moving(robot, arm.close), pytest.raises(CommunicationLost):
+        with once_moving(robot, arm.close), pytest.raises((MotionAborted, CommunicationLost)):
             slow(arm)
         assert_at_rest(robot)
 
