@@ -1,0 +1,64 @@
+"""Wrong input to the programs: one line, the remedy, exit code 2 or 1."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from hal import calibrate, doctor
+from hal.charuco import Board, detect
+from mskgrasp import cli
+
+CELLS = Path(__file__).parents[2] / "configs" / "cells"
+
+
+def run(monkeypatch: pytest.MonkeyPatch, capsys, program, *arguments: str) -> tuple[int, str]:
+    monkeypatch.setattr("sys.argv", ["program", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        cli.run(program.main)
+    return int(str(ended.value.code)), capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments", "message"),
+    [
+        (calibrate, [], "give --cell FILE"),
+        (calibrate, ["--cell", "none.yaml"], "No such file"),
+        (calibrate, ["--from", "nowhere"], "holds no pictures"),
+        (calibrate, ["--print-board", "board.doc"], "must end in .pdf or .png"),
+        (calibrate, ["--poses", "3"], "greater than or equal to 8"),
+        (calibrate, ["--board.marker", "0.05", "--print-board", "b.pdf"], "0.4 to 0.9 times the square"),
+        (calibrate, ["--board.columns", "12", "--board.rows", "12"], "columns * rows"),
+        (calibrate, ["--cell", str(CELLS / "panda_kinect2.yaml")], "--camera-at X Y Z"),
+        (
+            calibrate,
+            ["--cell", str(CELLS / "sapien.yaml"), "--camera-at", "0", "0", "1"],
+            "knows where it is",
+        ),
+        (doctor, ["--cell", "none.yaml"], "No such file"),
+    ],
+)
+def test_wrong_input_is_one_line_and_exit_code_2(
+    monkeypatch: pytest.MonkeyPatch, capsys, tmp_path: Path, program, arguments: list[str], message: str
+):
+    monkeypatch.chdir(tmp_path)
+    code, printed = run(monkeypatch, capsys, program, *arguments)
+    assert code == 2 and message in printed
+    assert printed.startswith("error: ") and printed.count("\n") == 1
+
+
+def test_the_printed_board_is_the_board_at_its_true_size(tmp_path: Path, monkeypatch, capsys):
+    path = tmp_path / "board.png"
+    code, _ = run(monkeypatch, capsys, calibrate, "--print-board", str(path))
+    assert code == 0
+    page = (matplotlib.image.imread(path)[::4, ::4, :3] * 255).astype(np.uint8)  # 600 dpi to 150
+    assert page.shape[1] == pytest.approx(0.297 / 0.0254 * 150, abs=1)
+    board = Board()
+    found = detect(board, page)
+    assert len(found.ids) == board.n_corners
+    metres = found.pixels * 0.0254 / 150
+    expected = board.corners()[found.ids, :2]
+    assert metres - metres.mean(0) == pytest.approx(expected - expected.mean(0), abs=2e-4)
