@@ -35,7 +35,8 @@ Half of the bundled shapes are done after the first; a part of 100 mm is not cut
 
 CLOSE_P95_MM = 0.35
 CLOSE_VOLUME_RATIO = 1.05
-"""What joining may cost where exact pieces were given."""
+CLOSE_LARGEST_MM = 0.75
+"""What joining may cost where exact pieces were given; no hull may stand out farther than the last."""
 
 _SLACKS = (0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04)
 """Shares of the volume that joining may add."""
@@ -72,7 +73,10 @@ def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
 
 def fewest_hulls(mesh_mm: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
     """Exact pieces joined where that changes little: within ``CLOSE_P95_MM`` and ``CLOSE_VOLUME_RATIO``."""
-    return tuple(_join(mesh_mm, hulls, CLOSE_P95_MM, CLOSE_VOLUME_RATIO))
+    exact = hull_fit(mesh_mm, hulls)
+    # Holes that are filled on purpose stand out already.
+    most_largest = max(CLOSE_LARGEST_MM, exact.outward_largest + 0.01)
+    return tuple(_join(mesh_mm, hulls, CLOSE_P95_MM, CLOSE_VOLUME_RATIO, most_largest))
 
 
 def is_manifold(mesh_mm: trimesh.Trimesh) -> bool:
@@ -104,7 +108,11 @@ def _cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
 
 
 def _join(
-    mesh_mm: trimesh.Trimesh, hulls: Sequence[np.ndarray], most_p95: float, most_ratio: float
+    mesh_mm: trimesh.Trimesh,
+    hulls: Sequence[np.ndarray],
+    most_p95: float,
+    most_ratio: float,
+    most_largest: float = np.inf,
 ) -> list[np.ndarray]:
     """Pieces joined with the largest slack that keeps the bounds; as they are where none does."""
     best = list(hulls)
@@ -115,7 +123,8 @@ def _join(
         # The largest slack first: most parts take it, and the rest are found by halving.
         joined = merge_hulls(hulls, _SLACKS[middle])
         stout = max(oblongness(points) for points in joined) <= most_oblong
-        if stout and _within(hull_fit(mesh_mm, joined), most_p95, most_ratio):
+        fit = hull_fit(mesh_mm, joined)
+        if stout and _within(fit, most_p95, most_ratio) and fit.outward_largest <= most_largest:
             best, low = joined, middle + 1
         else:
             high = middle

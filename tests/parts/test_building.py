@@ -108,9 +108,10 @@ def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
     code = "from mskgrasp.cli import run; from mskgrasp.parts.verbs import main; run(main)"
     build = subprocess.Popen(
         [sys.executable, "-c", code, "build", "--workers", "2"],
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # where the tests' own is ignored
         start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while not list(own_cache.glob("[a-z]*")) and time.monotonic() < deadline:
         time.sleep(0.01)
     os.killpg(build.pid, how)  # as a terminal does: the program and its workers
