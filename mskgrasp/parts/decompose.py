@@ -73,9 +73,10 @@ def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
 
 def fewest_hulls(mesh_mm: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
     """Exact pieces joined where that changes little: within ``CLOSE_P95_MM`` and ``CLOSE_VOLUME_RATIO``."""
-    exact = hull_fit(mesh_mm, hulls)
-    # Holes that are filled on purpose stand out already.
-    most_largest = max(CLOSE_LARGEST_MM, exact.outward_largest + 0.01)
+    most_largest = np.inf  # more than PhysX should take have to be joined, whatever stands out
+    if len(hulls) <= MOST_HULLS:
+        # Holes that are filled on purpose stand out already.
+        most_largest = max(CLOSE_LARGEST_MM, hull_fit(mesh_mm, hulls).outward_largest + 0.01)
     return tuple(_join(mesh_mm, hulls, CLOSE_P95_MM, CLOSE_VOLUME_RATIO, most_largest))
 
 
