@@ -210,7 +210,9 @@ def test_a_program_that_is_ended_in_mid_motion_leaves_an_arm_at_rest(
     """Ctrl-C and a killed process; the motion would take ten seconds more."""
     path = write_cell(tmp_path, driver, robot.host)
     code = (
-        "import sys, numpy as np\n"
+        "import signal, sys, numpy as np\n"
+        # A shell's background job ignores Ctrl-C, and so would all that it starts.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from hal import cell_from_yaml\n"
         "with cell_from_yaml(__import__('pathlib').Path(sys.argv[1])).arm as arm:\n"
         "    q = arm.state().joints\n"
