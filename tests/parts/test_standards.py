@@ -1,7 +1,6 @@
 """Our tables of dimensions against those of bd_warehouse, where both know the size."""
 
 import csv
-import importlib.util
 import math
 from collections.abc import Iterator
 from importlib import resources
@@ -9,9 +8,6 @@ from importlib import resources
 import pytest
 
 from mskgrasp.parts.families.recipe import table
-
-if importlib.util.find_spec("bd_warehouse") is None:
-    pytest.skip("the extra [cad] is not installed", allow_module_level=True)
 
 # Our table, theirs, their standard, {our column: their column}, how much larger theirs may be, least count.
 COMPARED = [
