@@ -6,12 +6,13 @@ search, SIGGRAPH 2022.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import coacd
 import numpy as np
 import trimesh
 from manifold3d import Manifold
+from scipy.spatial import ConvexHull
 
 from mskgrasp.errors import BadPart
 from mskgrasp.parts.measure import MOST_OBLONG, HullFit, hull_fit, oblongness
@@ -43,6 +44,9 @@ _SLACKS = (0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04)
 
 _MOST_AFTER_SPLITTING = 96
 _SLIVER_MM = 0.2
+_CONVEX_RATIO = 1.001
+_OVERLAP_MM = 0.1
+_LOST_SHARE = 0.4
 
 
 def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
@@ -54,15 +58,20 @@ def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
     Raises:
         BadPart: Pieces as fine as they may be are too far from the mesh, or too thin for PhysX.
     """
+    # CoACD looks for concavity between the facets of a fine ball, for minutes.
+    convex = mesh_mm.convex_hull.volume <= _CONVEX_RATIO * mesh_mm.volume
     tried: list[tuple[float, int, HullFit]] = []
     for concavity_mm in LADDER_MM:
-        pieces = _stout(_cut_up(mesh_mm, concavity_mm))
-        fit = hull_fit(mesh_mm, pieces)
-        if _within(fit, MOST_P95_MM, MOST_VOLUME_RATIO):
-            pieces = _join(mesh_mm, pieces, MOST_P95_MM, MOST_VOLUME_RATIO)
-            if len(pieces) <= MOST_HULLS:
-                return tuple(pieces)
-        tried.append((fit.p95, len(pieces), fit))
+        cut_up = [np.asarray(mesh_mm.vertices)] if convex else _cut_up(mesh_mm, concavity_mm)
+        for pieces in _with_few_corners(cut_up, _LOST_SHARE * concavity_mm):
+            fit = hull_fit(mesh_mm, pieces)
+            if _within(fit, MOST_P95_MM, MOST_VOLUME_RATIO):
+                joined = _join(mesh_mm, pieces, MOST_P95_MM, MOST_VOLUME_RATIO, finish=_stout)
+                if len(joined) <= MOST_HULLS:
+                    return tuple(joined)
+            tried.append((fit.p95, len(pieces), fit))
+        if len(cut_up) >= MOST_HULLS:
+            break  # with as many pieces as there may be, a finer cut comes no closer, and takes minutes
     _, count, fit = min(tried, key=lambda item: item[0])
     raise BadPart(
         f"no few convex pieces stand for the mesh: with {count} (at most {MOST_HULLS}), 95 % of the surface "
@@ -104,8 +113,34 @@ def _cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
         mcts_max_depth=3,
         seed=0,
     )
+    return [np.asarray(vertices, dtype=float) for vertices, _ in pieces]
+
+
+def _with_few_corners(pieces: Sequence[np.ndarray], most_lost_mm: float) -> Iterator[list[np.ndarray]]:
+    """Pieces with no more corners than PhysX takes; where those lose much, again with the worst cut up.
+
+    A ball is one convex piece; but with 32 corners it lacks 6 % of its diameter.
+    """
     # CoACD's own decimation cuts the ends off: 6.7 mm of a bent round bar, where this loses 1.8 mm.
-    return [few_corners(np.asarray(vertices, dtype=float)) for vertices, _ in pieces]
+    few = [few_corners(points) for points in pieces]
+    yield few
+    pending, close = list(zip(pieces, few, strict=True)), []
+    if all(_lost_mm(points, kept) <= most_lost_mm for points, kept in pending):
+        return
+    while pending and len(pending) + len(close) <= _MOST_AFTER_SPLITTING:
+        points, kept = pending.pop(0)
+        if _lost_mm(points, kept) <= most_lost_mm:
+            close.append(kept)
+        else:
+            # Where halves lose corners along the cut, a slit would be left between them.
+            pending += [(half, few_corners(half)) for half in _halves(points, _OVERLAP_MM)]
+    yield close + [kept for _, kept in pending]
+
+
+def _lost_mm(points: np.ndarray, kept: np.ndarray) -> float:
+    """How far the farthest of the points lies outside the hull of those that were kept."""
+    planes = ConvexHull(kept).equations
+    return float((points @ planes[:, :3].T + planes[:, 3]).max())
 
 
 def _join(
@@ -114,15 +149,24 @@ def _join(
     most_p95: float,
     most_ratio: float,
     most_largest: float = np.inf,
+    *,
+    finish: Callable[[list[np.ndarray]], list[np.ndarray]] = list,
 ) -> list[np.ndarray]:
-    """Pieces joined with the largest slack that keeps the bounds; as they are where none does."""
-    best = list(hulls)
+    """Pieces joined with the largest slack that keeps the bounds; as they are where none does.
+
+    ``finish`` is done to them last of all: joining takes up many a sliver that it would have to cut.
+    """
+    best: list[np.ndarray] | None = None
     # A piece that is thin from the start stays so; the caller sees to it.
     most_oblong = max([0.9 * MOST_OBLONG, *(oblongness(points) for points in hulls)])
     low, high, middle = 0, len(_SLACKS), len(_SLACKS) - 1
     while low < high:
         # The largest slack first: most parts take it, and the rest are found by halving.
         joined = merge_hulls(hulls, _SLACKS[middle])
+        if len(joined) == len(hulls):
+            low, middle = middle + 1, (middle + 1 + high) // 2
+            continue
+        joined = finish(joined)
         stout = max(oblongness(points) for points in joined) <= most_oblong
         fit = hull_fit(mesh_mm, joined)
         if stout and _within(fit, most_p95, most_ratio) and fit.outward_largest <= most_largest:
@@ -130,7 +174,7 @@ def _join(
         else:
             high = middle
         middle = (low + high) // 2
-    return best
+    return finish(list(hulls)) if best is None else best
 
 
 def _within(fit: HullFit, most_p95: float, most_ratio: float) -> bool:
@@ -161,11 +205,9 @@ def _stout(pieces: Sequence[np.ndarray]) -> list[np.ndarray]:
     return done
 
 
-def _halves(points: np.ndarray) -> list[np.ndarray]:
-    """A convex piece cut across its greatest length."""
+def _halves(points: np.ndarray, overlap: float = 0.0) -> list[np.ndarray]:
+    """A convex piece cut across its greatest length; the halves may share a slice of some thickness."""
     _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     along = points @ axes[0]
     middle = float(along.min() + along.max()) / 2
-    return [
-        cut([points], [normal], [offset])[0] for normal, offset in ((axes[0], middle), (-axes[0], -middle))
-    ]
+    return [cut([points], [sign * axes[0]], [sign * middle + overlap / 2])[0] for sign in (1, -1)]

@@ -121,3 +121,24 @@ def test_exact_pieces_of_a_tee_are_joined_within_the_closer_bound():
     assert 1 / 1.05 <= fit.volume_ratio <= 1.05
     again = fewest_hulls(exact.mesh, exact.hulls)
     assert all(np.array_equal(a, b) for a, b in zip(joined, again, strict=True))
+
+
+def test_a_ball_is_cut_up_until_few_corners_are_round_enough():
+    ball = trimesh.creation.icosphere(4, 20)
+    with_one_hull = hull_fit(ball, [s.few_corners(ball.vertices)])
+    assert with_one_hull.p95 > 0.7
+    pieces = convex_pieces(ball)
+    assert len(pieces) <= 12
+    assert max(map(len, pieces)) <= 32
+    assert hull_fit(ball, pieces).p95 <= 0.7
+
+
+def test_a_sliver_is_taken_up_by_its_neighbour_instead_of_being_cut_to_pieces():
+    boxes = [
+        trimesh.creation.box(bounds=[[x0, 0, 0], [x1, 30, 20]])
+        for x0, x1 in ((0, 29.7), (29.7, 30), (30, 60))
+    ]
+    pieces = [np.asarray(box.vertices) for box in boxes]
+    mesh = trimesh.creation.box(bounds=[[0, 0, 0], [60, 30, 20]])
+    assert len(decompose._stout(pieces)) > 3
+    assert len(decompose._join(mesh, pieces, 0.7, 1.1, finish=decompose._stout)) == 1

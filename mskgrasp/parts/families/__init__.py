@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+from mskgrasp.errors import BadPart
 from mskgrasp.parts.families import (
     angles,
     bends,
@@ -97,5 +98,9 @@ def recipes() -> dict[str, Recipe]:
         studs,
         supports,
     )
-    found = [recipe for module in modules for recipe in module.recipes()]
-    return {recipe.name: recipe for recipe in sorted(found, key=lambda recipe: recipe.name)}
+    found: dict[str, Recipe] = {}
+    for recipe in (recipe for module in modules for recipe in module.recipes()):
+        if recipe.name in found:
+            raise BadPart(f"two recipes are called {recipe.name!r}: rename one")
+        found[recipe.name] = recipe
+    return dict(sorted(found.items()))

@@ -77,7 +77,7 @@ def toothing(module: float, teeth: int, face: float, core: sh.Shape, helix: floa
     # A thin rim carries the teeth; the core fills it, whatever its own shape.
     rim = s.circle(transverse * teeth / 2 - DEDENDUM * module - 0.4 * module)
     section = CrossSection([outline, rim], FillRule.EvenOdd)
-    body = section.extrude(face, 9 * steps if twist else 0, float(np.degrees(twist)))
+    body = section.extrude(face, 4 * steps if twist else 0, float(np.degrees(twist)))
     levels = np.linspace(0, 1, steps + 1)
     hulls = []
     for number in range(teeth):
