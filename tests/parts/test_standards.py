@@ -42,6 +42,38 @@ COMPARED = [
         0.01,
         4,
     ),
+    (
+        "en1661_flange_nut.csv",
+        "hex_nut_with_flange_parameters.csv",
+        "din1665",  # so they call it
+        {"dc_mm": "dc", "s_mm": "s", "c_mm": "c", "m_mm": "m"},
+        0.01,
+        4,
+    ),
+    (
+        "din1587_cap_nut.csv",
+        "domed_cap_nut_parameters.csv",
+        "din1587",
+        {"dk_mm": "dk", "s_mm": "s", "m_mm": "m"},
+        0.01,
+        3,
+    ),
+    (
+        "iso7093_large_washer.csv",
+        "plain_washer_parameters.csv",
+        "iso7093",
+        {"d1_mm": "d1", "d2_mm": "d2"},
+        0.01,
+        2,
+    ),
+    (
+        "iso10642_countersunk_screw.csv",
+        "countersunk_head_parameters.csv",
+        "iso10642",
+        {"dk_mm": "dk", "t_mm": "t"},
+        0.01,
+        4,
+    ),
     # Ours is the nominal height or thickness, theirs the largest that the tolerance allows.
     ("iso4017_hex_bolt.csv", "hex_head_parameters.csv", "iso4017", {"k_mm": "k"}, 0.6, 6),
     ("iso7089_washer.csv", "plain_washer_parameters.csv", "iso7089", {"h_mm": "h"}, 0.6, 6),
