@@ -93,18 +93,10 @@ def link_plate(size: dict[str, float]) -> s.Solid:
 def offset_bar(size: dict[str, float]) -> s.Solid:
     """A joggled flat bar along x: two level ends, one higher by b, a slope of 45 degrees between them."""
     length, b, w, t = size["l_mm"] / 2, size["b_mm"], size["w_mm"] / 2, size["t_mm"]
-    rise = b / 2
-    skew = 0.414 * t
-    section = [
-        (-length, 0),
-        (-rise, 0),
-        (rise + skew / 2, b + skew / 2),
-        (length, b + skew / 2),
-        (length, b + skew / 2 + t),
-        (rise - skew / 2, b + skew / 2 + t),
-        (-rise - skew, t),
-        (-length, t),
-    ]
+    rise, skew = b / 2, 0.414 * t  # tan(22.5 degrees): the slope is as thick as the ends
+    lower = [(-length, 0), (-rise, 0), (rise, b), (length, b)]
+    upper = [(length, b + t), (rise - skew, b + t), (-rise - skew, t), (-length, t)]
+    section = [*lower, *upper]
     hole, reach = size["hole_mm"] / 2, length - w
     bar = o.along_y(section, -w, w)
     return bar.drilled(*(s.drill(hole, (x, 0, -1), "z", b + 3 * t) for x in (-reach, reach))).solid()
