@@ -18,6 +18,7 @@ from mskgrasp.metrics import wilson_interval
 from mskgrasp.parts.catalogue import Entry, Index, Rating
 
 NEIGHBOURS = 7
+_MOST_COLUMNS = 4
 _SAME_FAMILY = 0.35
 """Added to the distance of parts of another family: as much as edges that differ by 40 %."""
 
@@ -129,31 +130,42 @@ def report(index: Index, bounds: tuple[float, float]) -> None:
 
 
 def draw_ratings(index: Index, bounds: tuple[float, float], path: Path) -> Path:
-    """Success of random grasps over the longest axis, a dot a part, families in rows beside it."""
+    """Success of random grasps over the longest axis, a dot a part; below, the same by family."""
     rated = [entry for entry in index.parts.values() if entry.rating is not None]
-    families = sorted({entry.family for entry in rated})
-    order = sorted(
-        families, key=lambda f: np.mean([e.rating.rate for e in rated if e.family == f and e.rating])
-    )
-    figure = Figure(figsize=(13, max(5.0, 0.17 * len(order) + 1.2)), layout="constrained")
-    FigureCanvasAgg(figure)
-    left, right = figure.subplots(1, 2, width_ratios=(1, 1))
-    low, high = bounds
-    for axes in (left, right):
-        axes.spines[["top", "right"]].set_visible(False)
-    left.axhspan(100 * low, 100 * high, color="#d9ead9", lw=0)
-    right.axvspan(100 * low, 100 * high, color="#d9ead9", lw=0)
+    by_family: dict[str, list[float]] = defaultdict(list)
     for entry in rated:
         assert entry.rating is not None
-        rate, (below, above) = entry.rating.rate, entry.rating.interval
+        by_family[entry.family].append(entry.rating.rate)
+    families = sorted(by_family, key=lambda family: float(np.mean(by_family[family])))
+    columns = max(1, min(_MOST_COLUMNS, len(families) // 15))
+    rows = -(-len(families) // columns)
+    figure = Figure(figsize=(13, 4.5 + 0.15 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(2, columns, height_ratios=(4.0, 0.15 * rows))
+    above = figure.add_subplot(grid[0, :])
+    low, high = bounds
+    above.axhspan(100 * low, 100 * high, color="#d9ead9", lw=0)
+    for entry in rated:
+        assert entry.rating is not None
+        rate, interval = entry.rating.rate, entry.rating.interval
         colour = "#2f7d4f" if low <= rate <= high else "#8a94a0"
-        left.plot([1e3 * entry.longest_axis] * 2, [100 * below, 100 * above], color=colour, lw=0.6, alpha=0.5)
-        left.plot(1e3 * entry.longest_axis, 100 * rate, "o", ms=3.5, color=colour)
-        right.plot(100 * rate, order.index(entry.family), "o", ms=4, color=colour, alpha=0.8)
-    left.set(xlabel="longest axis, mm", ylabel="random grasps that lift the part, %", ylim=(-2, 102))
-    left.set_title(f"{len(rated)} rated parts, bars: 95 % intervals", loc="left", fontsize=11)
-    right.set_yticks(range(len(order)), order, fontsize=6.5)
-    right.set(xlabel="random grasps that lift the part, %", xlim=(-2, 102), ylim=(-1, len(order)))
-    right.set_title("by family", loc="left", fontsize=11)
+        x = 1e3 * entry.longest_axis
+        above.plot([x, x], [100 * end for end in interval], color=colour, lw=0.6, alpha=0.5)
+        above.plot(x, 100 * rate, "o", ms=3.5, color=colour)
+    above.set(xlabel="longest axis, mm", ylabel="random grasps that lift the part, %", ylim=(-2, 102))
+    above.set_title(f"{len(rated)} rated parts, bars: 95 % intervals", loc="left", fontsize=11)
+    above.spines[["top", "right"]].set_visible(False)
+    for column in range(columns):
+        # The hardest families stand at the top of the first column.
+        shown = families[column * rows : (column + 1) * rows]
+        axes = figure.add_subplot(grid[1, column])
+        axes.axvspan(100 * low, 100 * high, color="#d9ead9", lw=0)
+        for row, family in enumerate(shown):
+            for rate in by_family[family]:
+                colour = "#2f7d4f" if low <= rate <= high else "#8a94a0"
+                axes.plot(100 * rate, row, "o", ms=3.5, color=colour, alpha=0.8)
+        axes.set_yticks(range(len(shown)), [family.replace("_", " ") for family in shown], fontsize=6.5)
+        axes.set(xlabel="success, %", xlim=(-3, 103), ylim=(rows - 0.5, -0.5))
+        axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=130)
     return path

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 import time
 from collections.abc import Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -106,6 +107,15 @@ def _stop_at_once() -> None:
     # Ctrl-C reaches the workers, too: one that is deep in a decomposition would not hear it for long, and
     # what it leaves behind is a temporary folder at most.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    threading.Thread(target=_follow_the_parent, daemon=True).start()
+
+
+def _follow_the_parent() -> None:
+    # The workers of a killed pool wait for work for ever: each holds the writing end of the queue, too.
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _build_one(name: str) -> Built:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -125,3 +126,32 @@ def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
     some = [*finished[:2], "parallel_pin_20x100"]
     seconds = {built.name: built.seconds for built in build_parts(some, read_index(), 1)}
     assert all(seconds[name] == 0 for name in finished[:2])
+
+
+def test_workers_of_a_killed_build_end_too(own_cache):
+    code = "from mskgrasp.cli import run; from mskgrasp.parts.verbs import main; run(main)"
+    build = subprocess.Popen(
+        [sys.executable, "-c", code, "build", "--workers", "2"],
+        start_new_session=True, stdout=subprocess.DEVNULL,
+    )  # fmt: skip
+    deadline = time.monotonic() + 300
+    while not list(own_cache.glob("[a-z]*")) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    build.kill()  # it alone, as the system does when memory is short
+    build.wait(30)
+    deadline = time.monotonic() + 60
+    while (left := processes_of_group(build.pid)) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not left
+
+
+def processes_of_group(group: int) -> list[int]:
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            state, _, its_group = (folder / "stat").read_text().rsplit(")", 1)[1].split()[:3]
+        except OSError:
+            continue
+        if int(its_group) == group and state != "Z":
+            found.append(int(folder.name))
+    return found
