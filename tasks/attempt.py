@@ -10,7 +10,15 @@ from mani_skill.utils.structs.actor import Actor
 from torch import Tensor
 
 from mskgrasp.geometry import Pose
-from mskgrasp.grasp import MAX_OPENING, MIN_GAP, lowest_grasp_z, object_displacement, pose_base_tcp
+from mskgrasp.grasp import (
+    MAX_OPENING,
+    MIN_GAP,
+    lowest_grasp_z,
+    object_displacement,
+    pose_base_grasp,
+    pose_base_tcp,
+)
+from tasks.clearance import hand_clearance
 from tasks.contacts import HandContacts
 from tasks.frames import base_pose
 from tasks.kinematics import top_down
@@ -18,6 +26,7 @@ from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration
 from tasks.outcome import MAX_DRIFT, MAX_TURN, MIN_PAD_FORCE, Observed, judge
 from tasks.panda import GraspPanda
 from tasks.physics import Physics
+from tasks.watch import SpeedWatch
 
 TABLE_Z = 0.0
 """Height of the table, base frame, m."""
@@ -25,6 +34,10 @@ SPEED_WINDOW_S = 0.02
 """The last part of the hold, over which the part's speed in the hand is measured, s."""
 AFTERMATH_S = 0.3
 """How long a part that was not lifted may fall, roll and come to rest before it is judged, s."""
+REST_WINDOW_S = 0.06
+"""A part that did not move for so long has come to rest, s."""
+RUN_UP = 0.008
+"""Way of each finger to the first contact, m: enough to reach the speed of the ramp."""
 LEFT_BEHIND = 0.04
 """The hand this much higher than the part it should carry has lost it, m."""
 
@@ -35,7 +48,7 @@ class Attempt:
     Args:
         agent: The Panda of n sub-scenes.
         part: The part of each.
-        vertices: For each sub-scene the vertices (k, 3) of its part's hulls, obj frame, metres.
+        hulls: For each sub-scene the corners (k, 3) of each hull of its part, obj frame, metres.
         motion: Moves arm and fingers.
         contacts: What touches the hand.
         physics: Speeds, forces and times of the attempt.
@@ -45,17 +58,19 @@ class Attempt:
         self,
         agent: GraspPanda,
         part: Actor,
-        vertices: list[np.ndarray],
+        hulls: list[list[np.ndarray]],
         motion: PandaMotion,
         contacts: HandContacts,
         physics: Physics,
     ):
         self._agent = agent
         self._part = part
-        self._vertices = [torch.as_tensor(v, dtype=torch.float32, device=motion.device) for v in vertices]
+        self._hulls = hulls
         self._motion = motion
         self._contacts = contacts
         self._physics = physics
+        self._speed = SpeedWatch(part, gpu=motion.gpu)
+        motion.watch = self._speed.look
 
     def run(self, grasp: Tensor) -> dict[str, Tensor]:
         """Executes one grasp in every sub-scene; all of them wait for the slowest.
@@ -66,19 +81,26 @@ class Attempt:
         Returns:
             success (n) bool; failure (n) uint8; displacement (n, 4) and tilt (n), NaN where not
             successful; width_after (n) m; pose_base_obj, pose_tcp_obj_before, pose_tcp_obj_after (n, 7);
-            penetration (n) m, NaN where unknown; seconds (n) of simulated time.
+            penetration (n) m, NaN where unknown; fastest (n), greatest speed of the part, m/s; seconds (n) of
+            simulated time.
 
         Raises:
             ValueError: A grasp is too low or out of the arm's reach.
         """
         physics, motion = self._physics, self._motion
-        pre_grasp, lifted = self._pre_grasp(grasp), grasp.clone()
+        start, free, reach = self._approach(grasp)
+        lifted = grasp.clone()
         lifted[:, 2] += physics.lift_height
-        for pose in (grasp, pre_grasp, lifted):
+        for pose in (grasp, start, lifted):
             check_grasps(pose)
         began = motion.seconds
-        down = self._line(pre_grasp, grasp, physics.descend_speed)
-        motion.place(down[0])
+        empty = free & (reach == 0)
+        # Fingers that have only air to close through begin where their speed is still that of the ramp.
+        ahead = (2 * (reach + RUN_UP)).clamp(max=MAX_OPENING)
+        width = torch.where(free & ~empty, ahead, torch.full_like(reach, MAX_OPENING))
+        down = self._line(start, grasp, physics.descend_speed)
+        motion.place(down[0], width)
+        self._speed.start(motion.seconds)
         laid = base_pose(self._part)
         motion.step(motion.n_steps(physics.settle_s))
         rest = base_pose(self._part)
@@ -89,23 +111,59 @@ class Attempt:
             force = self._contacts.hand_force().to(motion.device)
             collided.logical_or_(force > physics.reflex_force)
             touched.logical_or_(force > 0)
-            return bool((collided | ~settled).all())
+            return bool((collided | ~settled | free).all())
 
-        motion.follow(down, check=reflex, frozen=collided)
+        if not bool(free.all()):
+            motion.follow(down, check=reflex, frozen=collided)
         # A part that moved although nothing touched it was still toppling.
         settled = settled & (touched | at_rest(rest, base_pose(self._part)))
         held, penetration = torch.zeros_like(settled), torch.zeros(motion.n, device=motion.device)
-        alive = settled & ~collided
+        alive = settled & ~collided & ~empty
         if bool(alive.any()):
-            motion.move_fingers(-MAX_OPENING / 2, frozen=collided)
+            motion.move_fingers(-MAX_OPENING / 2, frozen=collided | empty)
             held, penetration = self.grip()
         carried = bool((alive & held).any())
         if carried:
             carried = self._lift(grasp, lifted, alive & held, collided, penetration)
         if not carried and bool(alive.any()):
-            # Judged in flight, a part would be called missed or ejected by the moment of the look.
-            motion.step(motion.n_steps(AFTERMATH_S))
+            self._wait_for_rest()
         return self._outcome(grasp, rest, settled, collided, held, penetration, began)
+
+    def _approach(self, grasp: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Where the descent begins (n, 4), whether it meets nothing (n,), and what stands between the pads.
+
+        Returns:
+            start: The grasp itself where the hand can be put there; else over it, pads clear of the part's
+                top by the approach clearance.
+            free: (n,) bool.
+            reach: (n,) greatest distance from the middle of what stands between the pads, m.
+        """
+        start, free, reach = grasp.clone(), [], []
+        pose = base_pose(self._part)
+        position, quat_wxyz = pose.position.cpu().numpy(), pose.quat_wxyz.cpu().numpy()
+        for i, hulls in enumerate(self._hulls):
+            own = Pose(position=position[i].astype(float), quat_wxyz=quat_wxyz[i].astype(float))
+            seen = pose_base_grasp(grasp[i].cpu().numpy().astype(float)).inverse() @ own
+            corners = [seen.apply(hull) for hull in hulls]
+            clearance = hand_clearance(corners)
+            free.append(clearance.free)
+            reach.append(clearance.reach)
+            if not clearance.free:
+                top = max(float(hull[:, 2].max()) for hull in corners)
+                start[i, 2] += max(0.0, top + lowest_grasp_z(0.0) + self._physics.approach_clearance)
+        device = grasp.device
+        return start, torch.tensor(free, device=device), torch.tensor(reach, device=device, dtype=grasp.dtype)
+
+    def _wait_for_rest(self) -> None:
+        """Lets parts that were not lifted fall and roll: in flight, a look would call them by its moment."""
+        motion = self._motion
+        before = base_pose(self._part)
+        for _ in range(round(AFTERMATH_S / REST_WINDOW_S)):
+            motion.step(motion.n_steps(REST_WINDOW_S))
+            now = base_pose(self._part)
+            if bool(at_rest(before, now).all()):
+                return
+            before = now
 
     def _lift(
         self, grasp: Tensor, lifted: Tensor, alive: Tensor, collided: Tensor, penetration: Tensor
@@ -124,7 +182,7 @@ class Attempt:
 
         up = self._line(grasp, lifted, physics.lift_speed)
         # An arm that its reflex has stopped stays where it is.
-        if not motion.follow(up, check=all_lost, check_every=25, frozen=collided):
+        if not motion.follow(up, check=all_lost, check_every=self._motion.n_steps(0.05), frozen=collided):
             return False
         motion.step(motion.n_steps(physics.hold_s - SPEED_WINDOW_S))
         return True
@@ -170,6 +228,7 @@ class Attempt:
             pose_tcp_obj_before=before.as_vector(),
             pose_tcp_obj_after=after.as_vector(),
             penetration=deepest,
+            fastest=self._speed.fastest(deepest),
             seconds=torch.full_like(deepest, self._motion.seconds - began),
         )
 
@@ -192,18 +251,6 @@ class Attempt:
 
     def _gap(self) -> Tensor:
         return self._agent.robot.get_qpos()[:, 7:9].sum(dim=-1)
-
-    def _pre_grasp(self, grasp: Tensor) -> Tensor:
-        """The hand above the grasp, pads clear of the part's top by the approach clearance."""
-        pose = base_pose(self._part)
-        tops = [
-            Pose(position=pose.position[i], quat_wxyz=pose.quat_wxyz[i]).apply(vertices)[:, 2].max()
-            for i, vertices in enumerate(self._vertices)
-        ]
-        clear = torch.stack(tops) + lowest_grasp_z(0.0) + self._physics.approach_clearance
-        raised = grasp.clone()
-        raised[:, 2] = torch.maximum(clear, grasp[:, 2])
-        return raised
 
     def _line(self, start: Tensor, goal: Tensor, speed: float) -> Tensor:
         """(steps, n, 7) joints along straight lines between grasps; as long as the longest line needs."""

@@ -27,7 +27,7 @@ from tasks.contacts import HandContacts
 from tasks.frames import BASE_IN_WORLD, base_pose, to_world
 from tasks.motion import PandaMotion
 from tasks.panda import GraspPanda, panda_for
-from tasks.part_actor import build_part, hull_vertices
+from tasks.part_actor import build_part, hull_corners
 from tasks.physics import Physics
 from tasks.placement import Region, random_resting_pose
 
@@ -148,7 +148,7 @@ class GraspDisplacementEnv(BaseEnv):
             actors.append(actor)
         self.part = Actor.merge(actors, name="part")
         self.add_to_state_dict_registry(self.part)
-        self._vertices = [hull_vertices(part) for part in self.parts]
+        self._hulls = [hull_corners(part) for part in self.parts]
 
     def _build_table(self) -> None:
         builder = self.scene.create_actor_builder()
@@ -166,9 +166,7 @@ class GraspDisplacementEnv(BaseEnv):
         self._laid_z = torch.zeros(self.num_envs, device=self.device)
         self.motion = PandaMotion(self.scene, self.agent, self.physics)
         self.contacts = HandContacts(self.scene, self.agent, self.part)
-        self.attempt = Attempt(
-            self.agent, self.part, self._vertices, self.motion, self.contacts, self.physics
-        )
+        self.attempt = Attempt(self.agent, self.part, self._hulls, self.motion, self.contacts, self.physics)
 
     def _initialize_episode(self, env_idx: Tensor, options: dict) -> None:
         self._outcome = None
@@ -176,7 +174,10 @@ class GraspDisplacementEnv(BaseEnv):
         if given is None:
             rows = [
                 random_resting_pose(
-                    self.parts[i], self._vertices[i], self.region, self._batched_episode_rng[i]
+                    self.parts[i],
+                    np.concatenate(self._hulls[i]),
+                    self.region,
+                    self._batched_episode_rng[i],
                 )
                 for i in env_idx.tolist()
             ]

@@ -26,7 +26,8 @@ PEAK_ACCELERATION = 1.5
 """Of the hand on straight lines, m/s^2: the drives then overshoot by less than 0.4 mm."""
 FINGER_TIMEOUT_S = 0.5
 """Fingers that never come to rest (the part slides through them) are given up after this, s."""
-_CHECK_EVERY = 5
+CHECK_S = 0.02
+"""Time between two looks at fingers that close, and at the part's speed, s."""
 
 
 def ease(n_steps: int, device: torch.device) -> Tensor:
@@ -63,66 +64,83 @@ class PandaMotion:
         self._scene = scene
         self._agent = agent
         self._physics = physics
-        self._gpu = scene.gpu_sim_enabled
+        self.gpu = scene.gpu_sim_enabled
         self.device = agent.device
         self.n = scene.num_envs
         self._arm_drives = [joint._objs[0] for joint in agent.arm_joints]
         self._finger_drives = [joint._objs[0] for joint in agent.finger_joints]
         self.finger_target = torch.full((self.n,), MAX_OPENING / 2, device=self.device)
         self.seconds = 0.0
+        self.watch: Callable[[float], None] | None = None
+        """Told of the simulated time, s, every ``CHECK_S``."""
+        self._steps = 0
+        self._watch_every = self.n_steps(CHECK_S)
+        self._driven: list[tuple[float, float] | None] = [None] * 7
 
     def n_steps(self, seconds: float) -> int:
         """Simulation steps in a time, at least one."""
         return max(1, round(seconds * self._physics.rate_hz))
 
-    def place(self, q: Tensor, width: float = MAX_OPENING) -> None:
-        """Puts the arm at joints (n, 7) at once, at rest, fingers open by ``width`` metres."""
-        fingers = torch.full((self.n, 2), width / 2, device=self.device)
+    def place(self, q: Tensor, width: Tensor | None = None) -> None:
+        """Puts the arm at joints (n, 7) at once, at rest, fingers open by ``width`` (n,) metres or wholly."""
+        opening = torch.full((self.n,), MAX_OPENING, device=self.device) if width is None else width
+        fingers = (opening.to(torch.float32) / 2)[:, None].expand(-1, 2)
         qpos = torch.cat([q.to(torch.float32), fingers], dim=-1)
         self._agent.robot.set_qpos(qpos)
         self._agent.robot.set_qvel(torch.zeros_like(qpos))
-        if self._gpu:
+        if self.gpu:
             self._scene._gpu_apply_all()
             self._scene.px.gpu_update_articulation_kinematics()
             self._scene._gpu_fetch_all()
         self.set_fingers(fingers[:, 0])
+        self._driven = [None] * 7  # others may have written to the drives since
         self.set_arm(q, torch.zeros_like(q))
 
     def set_arm(self, q: Tensor, qd: Tensor) -> None:
         """Drive targets of the arm: (n, 7) radians and radians a second."""
-        if self._gpu:
+        if self.gpu:
             robot = self._agent.robot
             robot.set_joint_drive_targets(q.to(torch.float32), self._agent.arm_joints)
             robot.set_joint_drive_velocity_targets(qd.to(torch.float32), self._agent.arm_joints)
         else:
-            self._drive_arm(q[0].tolist(), qd[0].tolist())
+            self._drive_arm(list(zip(q[0].tolist(), qd[0].tolist(), strict=True)))
 
-    def _drive_arm(self, positions: list[float], velocities: list[float]) -> None:
-        for drive, position, velocity in zip(self._arm_drives, positions, velocities, strict=True):
-            drive.set_drive_target(position)
-            drive.set_drive_velocity_target(velocity)
+    def _drive_arm(self, targets: list[tuple[float, float]]) -> None:
+        # Four joints stand still on a vertical line, and a call costs a fiftieth of a simulation step.
+        for number, target in enumerate(targets):
+            if target != self._driven[number]:
+                self._arm_drives[number].set_drive_target(target[0])
+                self._arm_drives[number].set_drive_velocity_target(target[1])
+                self._driven[number] = target
 
     def set_fingers(self, target: Tensor) -> None:
         """Drive targets of both fingers: (n,) metres from the middle, negative to press."""
         self.finger_target = target
-        if self._gpu:
+        if self.gpu:
             pair = target[:, None].expand(-1, 2)
             self._agent.robot.set_joint_drive_targets(pair, self._agent.finger_joints)
         else:
-            value = float(target[0])
-            for drive in self._finger_drives:
-                drive.set_drive_target(value)
+            self._drive_fingers(float(target[0]))
+
+    def _drive_fingers(self, target: float) -> None:
+        for drive in self._finger_drives:
+            drive.set_drive_target(target)
 
     def step(self, n_steps: int = 1) -> None:
         """Advances the simulation with the targets as they are."""
-        if self._gpu:
+        if self.gpu:
             self._scene.px.gpu_apply_articulation_target_position()
             self._scene.px.gpu_apply_articulation_target_velocity()
         for _ in range(n_steps):
             self._scene.step()
-        self.seconds += n_steps / self._physics.rate_hz
-        if self._gpu:
+            self._steps += 1
+            self.seconds = self._steps / self._physics.rate_hz
+            if not self.gpu and self._steps % self._watch_every == 0 and self.watch is not None:
+                self.watch(self.seconds)
+        if self.gpu:
             self._scene._gpu_fetch_all()
+            if self.watch is not None and self._steps % self._watch_every < n_steps:
+                self.watch(self.seconds)
 
     def follow(
         self,
@@ -147,12 +165,15 @@ class PandaMotion:
         speed = torch.zeros_like(path)
         speed[1:] = (path[1:] - path[:-1]) * rate
         # One environment: plain numbers, once; a tensor a step would cost as much as the physics.
-        rows = None if self._gpu else list(zip(path[:, 0].tolist(), speed[:, 0].tolist(), strict=True))
+        rows = None
+        if not self.gpu:
+            pairs = torch.stack([path[:, 0], speed[:, 0]], dim=-1).tolist()
+            rows = [[(position, velocity) for position, velocity in row] for row in pairs]
         still = torch.zeros_like(path[0])
         last = path[0]
         for i in range(len(path)):
             if rows is not None:
-                self._drive_arm(*rows[i])
+                self._drive_arm(rows[i])
                 last = path[i]
             else:
                 stop = torch.zeros(self.n, dtype=torch.bool, device=self.device) if frozen is None else frozen
@@ -198,12 +219,16 @@ class PandaMotion:
         # A held part stops the fingers before their targets; wait until the drives press in full.
         lag = (force or self._physics.finger_force) / self._physics.finger_stiffness
         last = self._agent.robot.get_qpos()[:, 7:9]
-        far = STILL_FINGER * _CHECK_EVERY / self._physics.rate_hz
+        every = self.n_steps(CHECK_S)
+        far = STILL_FINGER * every / self._physics.rate_hz
+        rows = None if self.gpu else ramp[:, 0].tolist()
         for i in range(n_ramp + self.n_steps(FINGER_TIMEOUT_S)):
-            if i < n_ramp:
+            if i < n_ramp and rows is not None:
+                self._drive_fingers(rows[i])
+            elif i < n_ramp:
                 self.set_fingers(ramp[i])
             self.step()
-            if i % _CHECK_EVERY != _CHECK_EVERY - 1:
+            if i % every != every - 1:
                 continue
             if check is not None and check():
                 self.set_fingers(self._agent.robot.get_qpos()[:, 7:9].mean(dim=-1))
@@ -214,7 +239,7 @@ class PandaMotion:
             middle = fingers.mean(dim=-1)
             pressing = (middle - ramp[min(i, n_ramp - 1)]).abs() > lag
             arrived = (middle - goal).abs() < 1e-3
-            quiet = torch.where(still & (pressing | arrived), quiet + _CHECK_EVERY, 0)
+            quiet = torch.where(still & (pressing | arrived), quiet + every, 0)
             if bool((quiet >= self.n_steps(STILL_S)).all()):
                 break
         self.set_fingers(goal)

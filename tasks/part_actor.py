@@ -82,8 +82,8 @@ def _visual(part: Part) -> sapien.render.RenderShapeTriangleMesh:
     )
 
 
-def hull_vertices(part: Part) -> np.ndarray:
-    """(k, 3) vertices of all collision hulls, obj frame, metres."""
+def hull_corners(part: Part) -> list[np.ndarray]:
+    """Vertices (k, 3) of each collision hull, obj frame, metres."""
     loaded = trimesh.load(part.hulls_path)
     meshes = loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]
-    return np.concatenate([np.asarray(mesh.vertices) for mesh in meshes]) * 1e-3
+    return [np.asarray(mesh.vertices) * 1e-3 for mesh in meshes]

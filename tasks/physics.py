@@ -15,8 +15,8 @@ from mskgrasp.grasp import HOLD_S
 class Physics(Config):
     """Settings of the simulated cell; SI units."""
 
-    rate_hz: int = Field(default=500, ge=250)
-    """Simulation steps a second. Under 250 Hz light parts creep out of the fingers."""
+    rate_hz: int = Field(default=500, ge=100)
+    """Simulation steps a second. Under 250 Hz light parts creep out of the fingers: data is not collected."""
     position_iterations: int = Field(default=15, ge=4)
     """Solver iterations a step."""
     contact_offset: float = Field(default=0.003, gt=0, le=0.02)

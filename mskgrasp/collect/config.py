@@ -11,6 +11,8 @@ from pydantic import Field, model_validator
 from mskgrasp.config import Config
 from tasks import REGION, Overhead, Physics
 
+LEAST_RATE_HZ = 250
+
 
 class PartFilter(Config):
     """Which parts are worth collecting and learning from; null switches a bound off."""
@@ -65,6 +67,8 @@ class CollectConfig(Config):
     def _check(self) -> CollectConfig:
         if self.shard_size > 10_000:
             raise ValueError("shard_size is at most 10000")
+        if self.physics.rate_hz < LEAST_RATE_HZ:
+            raise ValueError(f"physics.rate_hz is at least {LEAST_RATE_HZ}: labels made with less are wrong")
         self.camera.check_sees(REGION)
         return self
 

@@ -22,6 +22,7 @@ from mskgrasp.grasp import sample_grasps
 from mskgrasp.images import view_part
 from tasks import REGION, GraspDisplacementEnv, Overhead, Physics
 from tasks.attempt import TABLE_Z
+from tasks.outcome import MAX_DISPLACEMENT, MAX_PENETRATION, MAX_SPEED
 from tasks.renderer import render_backend
 
 FIELDS = (
@@ -84,23 +85,16 @@ class Simulator:
         rows: list[dict[str, np.ndarray]] = []
         discarded: Counter[str] = Counter()
         for attempt in range(task.first, task.first + task.n):
-            sequence = np.random.SeedSequence([task.seed, zlib.crc32(task.part.encode()), attempt])
-            episode_seed, grasp_seed = sequence.generate_state(2) >> 1
-            self._env.reset(seed=int(episode_seed))  # type: ignore[union-attr]
-            depth = depth_to_u16(env.capture_depth()[0].cpu().numpy())
-            try:
-                view = view_part(
-                    u16_to_depth(depth), intrinsics, T_base_camera, table_z=TABLE_Z, region=REGION
-                )
-            except NoPartFound:
+            depth, grasp = draw_attempt(env, task.part, task.seed, attempt)
+            if grasp is None:
                 discarded["part_not_seen"] += 1
                 report(-1)
                 continue
-            grasp = sample_grasps(view, 1, np.random.default_rng(grasp_seed)).astype(np.float32)
             outcome = env.attempt.run(torch.as_tensor(grasp, device=env.device))
             row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
-            if not all(np.isfinite(row[name]).all() for name in FIELDS if name.startswith("pose")):
-                discarded["not_finite"] += 1
+            reason = impossible(outcome, row)
+            if reason:
+                discarded[reason] += 1
                 report(-1)
                 continue
             rows.append(dict(row, depth=depth, grasp=grasp[0]))
@@ -126,6 +120,45 @@ class Simulator:
         """Frees the simulation."""
         if self._env is not None:
             self._env.close()
+
+
+def draw_attempt(
+    env: GraspDisplacementEnv, part: str, seed: int, attempt: int
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Lays the part as a seed and a number say, looks at it and draws a grasp.
+
+    Returns:
+        The depth image (h, w), uint16 in 0.1 mm, and the grasp (1, 4), float32, base frame; None where the
+        camera does not see the part.
+    """
+    sequence = np.random.SeedSequence([seed, zlib.crc32(part.encode()), attempt])
+    episode_seed, grasp_seed = sequence.generate_state(2) >> 1
+    env.reset(seed=int(episode_seed))
+    depth = depth_to_u16(env.capture_depth()[0].cpu().numpy())
+    try:
+        view = view_part(
+            u16_to_depth(depth),
+            env.overhead.intrinsics(),
+            env.overhead.T_base_camera(env.region_centre),
+            table_z=TABLE_Z,
+            region=REGION,
+        )
+    except NoPartFound:
+        return depth, None
+    return depth, sample_grasps(view, 1, np.random.default_rng(grasp_seed)).astype(np.float32)
+
+
+def impossible(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> str:
+    """Why an attempt cannot have happened; empty where it can."""
+    if not all(np.isfinite(row[name]).all() for name in FIELDS if name.startswith("pose")):
+        return "not_finite"
+    if float(outcome["penetration"][0]) > MAX_PENETRATION:
+        return "penetrated"
+    if float(outcome["fastest"][0]) > MAX_SPEED:
+        return "too_fast"
+    if row["success"] and np.linalg.norm(row["displacement"][:3]) > MAX_DISPLACEMENT:
+        return "displaced_too_far"
+    return ""
 
 
 def _stack(rows: list[dict[str, np.ndarray]], shape: tuple[int, int]) -> Attempts:

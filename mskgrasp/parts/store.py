@@ -9,6 +9,9 @@ import os
 import shutil
 import time
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +27,24 @@ _ABANDONED_S = 3600.0
 """Temporary folders older than this were left by a killed build."""
 
 
+_ELSEWHERE: ContextVar[Path | None] = ContextVar("elsewhere", default=None)
+
+
+@contextmanager
+def kept_in(folder: Path) -> Iterator[None]:
+    """Keeps parts in another folder for as long as the context lasts."""
+    token = _ELSEWHERE.set(folder)
+    try:
+        yield
+    finally:
+        _ELSEWHERE.reset(token)
+
+
 def parts_folder() -> Path:
     """Where parts are kept: ``$XDG_CACHE_HOME/mskgrasp/parts`` or ``~/.cache/mskgrasp/parts``."""
+    elsewhere = _ELSEWHERE.get()
+    if elsewhere is not None:
+        return elsewhere
     base = os.environ.get("XDG_CACHE_HOME", "")
     # The XDG specification says that a relative path there is to be ignored.
     root = Path(base) if os.path.isabs(base) else Path.home() / ".cache"

@@ -92,8 +92,8 @@ def test_maniskills_demo_finds_and_runs_the_task():
 
 
 def test_wrong_settings_are_named(boxes):
-    with pytest.raises(BadConfig, match=r"rate_hz.*greater than or equal to 250"):
-        make(boxes, physics=dict(rate_hz=100))
+    with pytest.raises(BadConfig, match=r"rate_hz.*greater than or equal to 100"):
+        make(boxes, physics=dict(rate_hz=90))
     with pytest.raises(BadConfig, match="unknown key 'gravitiy'"):
         make(boxes, physics=dict(gravitiy=9.8))
     with pytest.raises(BadPart, match="no_such_part"):

@@ -1,0 +1,1 @@
+"""Evidence that simulated labels are right: ``python -m mskgrasp.validate``."""

@@ -1,0 +1,107 @@
+"""How far outcomes under one setting are from those under the finest, beside the intrinsic floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from scipy import stats
+
+from mskgrasp.geometry import wrap_angle
+from mskgrasp.validate.convergence import Outcomes
+
+MOST_DISAGREEMENT = 0.03
+"""By how much S may agree less often than at the floor."""
+MOST_TIMES_FLOOR = 1.5
+"""How many times the floor's differences of displacement may be."""
+MOST_RATE_DIFFERENCE = 0.02
+"""By how much the success rate may differ from that of the finest setting."""
+LEAST_P = 0.05
+"""Under this the distributions of displacements count as different (after Bonferroni over the axes)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """One setting against the finest; differences are over grasps that succeeded under both.
+
+    Attributes:
+        success_rate: Under this setting.
+        agreement: Share of grasps whose S is the same.
+        shift_median: Median length of the difference of the displacements' translations, m.
+        shift_p90: Its 90th percentile, m.
+        turn_median: Median difference of the displacements' turns, rad.
+        turn_p90: Its 90th percentile, rad.
+        p_value: Least p of two-sample Kolmogorov-Smirnov tests of dx, dy, dz, dtheta, times four.
+        cpu_ms: Processor time of a grasp, ms.
+        n: Grasps.
+        n_both: Grasps that succeeded under both.
+    """
+
+    success_rate: float
+    agreement: float
+    shift_median: float
+    shift_p90: float
+    turn_median: float
+    turn_p90: float
+    p_value: float
+    cpu_ms: float
+    n: int
+    n_both: int
+
+    def as_dict(self) -> dict[str, float]:
+        """For JSON."""
+        return asdict(self)
+
+
+def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:
+    """One setting against another, grasp by grasp and as distributions."""
+    both = outcomes.success & reference.success
+    difference = outcomes.displacement[both] - reference.displacement[both]
+    shift = np.linalg.norm(difference[:, :3], axis=1)
+    turn = np.abs(wrap_angle(difference[:, 3]))
+    ours, theirs = (one.displacement[one.success] for one in (outcomes, reference))
+    p = min(float(stats.ks_2samp(ours[:, axis], theirs[:, axis]).pvalue) for axis in range(4))
+    return Comparison(
+        success_rate=float(outcomes.success.mean()),
+        agreement=float((outcomes.success == reference.success).mean()),
+        shift_median=_percentile(shift, 50),
+        shift_p90=_percentile(shift, 90),
+        turn_median=_percentile(turn, 50),
+        turn_p90=_percentile(turn, 90),
+        p_value=min(1.0, 4 * p),
+        cpu_ms=1e3 * float(outcomes.cpu_seconds.mean()),
+        n=len(both),
+        n_both=int(both.sum()),
+    )
+
+
+def complaints(found: Comparison, floor: Comparison, reference_rate: float) -> list[str]:
+    """Why a setting adds something to the floor; empty where it adds nothing."""
+    said = []
+    if found.agreement < floor.agreement - MOST_DISAGREEMENT:
+        said.append(f"S agrees in {found.agreement:.1%}, at the floor in {floor.agreement:.1%}")
+    for name, unit, scale in (
+        ("shift_median", "mm", 1e3), ("shift_p90", "mm", 1e3),
+        ("turn_median", "deg", np.degrees(1)), ("turn_p90", "deg", np.degrees(1)),
+    ):  # fmt: skip
+        value, least = getattr(found, name), getattr(floor, name)
+        if value > MOST_TIMES_FLOOR * least:
+            said.append(f"{name.replace('_', ' ')} {scale * value:.2f} {unit}, floor {scale * least:.2f}")
+    if abs(found.success_rate - reference_rate) > MOST_RATE_DIFFERENCE:
+        said.append(f"success rate {found.success_rate:.1%} instead of {reference_rate:.1%}")
+    if found.p_value < LEAST_P:
+        said.append(f"displacements are distributed differently (p = {found.p_value:.3f})")
+    return said
+
+
+def cheapest(
+    found: dict[str, Comparison], floor: Comparison, reference_rate: float, candidates: Sequence[str]
+) -> str | None:
+    """The candidate of least processor time that adds nothing to the floor."""
+    fit = [name for name in candidates if not complaints(found[name], floor, reference_rate)]
+    return min(fit, key=lambda name: found[name].cpu_ms, default=None)
+
+
+def _percentile(values: np.ndarray, share: float) -> float:
+    return float(np.percentile(values, share)) if len(values) else float("nan")

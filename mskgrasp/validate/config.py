@@ -1,0 +1,81 @@
+"""What a validation is: settings, parts, and against which finer settings they are held."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from pydantic import Field, model_validator
+
+from mskgrasp.config import Config
+from mskgrasp.validate.convergence import Setting
+from tasks import Physics
+
+SHIFT = 1e-5
+"""By how much the starts of the floor are moved, m: less than any camera or arm could tell."""
+
+
+class ValidateConfig(Config):
+    """Settings of a validation."""
+
+    out: Path = Path("out/validate")
+    """Folder of the report; outcomes are kept there, too, so that a stopped run goes on."""
+    parts: tuple[str, ...] = ()
+    """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
+    grasps_per_part: int = Field(default=40, ge=1)
+    """Grasps of each part that are tried under every setting."""
+    seed: int = Field(default=0, ge=0)
+    """The starts and grasps follow from it."""
+    workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
+    """Processes; 0: one for each core."""
+    rates_hz: tuple[int, ...] = (125, 250, 500, 1000)
+    """Simulation rates; the highest belongs to the finest setting."""
+    iterations: tuple[int, ...] = (8, 15, 25, 50)
+    """Solver iterations; the highest belong to the finest setting."""
+    convergence: bool = True
+    """Whether grasps are compared under all rates and iterations; without, the checks take a minute."""
+    physics: Physics = Physics()
+    """The settings under test; rate and iterations mark the production setting in the grid."""
+
+    @model_validator(mode="after")
+    def _check(self) -> ValidateConfig:
+        if not self.rates_hz or not self.iterations:
+            raise ValueError("rates_hz and iterations need at least one value each")
+        for rate in self.rates_hz:
+            self.at(rate, self.iterations[0])
+        return self
+
+    def at(self, rate_hz: int, iterations: int) -> Physics:
+        """The settings under test at another rate and other iterations."""
+        values = self.physics.model_dump() | {"rate_hz": rate_hz, "position_iterations": iterations}
+        return Physics.model_validate(values)
+
+    @property
+    def finest(self) -> str:
+        """Name of the finest setting."""
+        return setting_name(max(self.rates_hz), max(self.iterations))
+
+    @property
+    def production(self) -> str:
+        """Name of the setting under test."""
+        return setting_name(self.physics.rate_hz, self.physics.position_iterations)
+
+    def settings(self) -> list[Setting]:
+        """The grid, the production setting, and the finest one with moved starts: the floor."""
+        pairs = {(rate, count) for rate in self.rates_hz for count in self.iterations}
+        pairs.add((self.physics.rate_hz, self.physics.position_iterations))
+        grid = [
+            Setting(name=setting_name(rate, count), physics=self.at(rate, count))
+            for rate, count in sorted(pairs)
+        ]
+        finest = self.at(max(self.rates_hz), max(self.iterations))
+        return [*grid, Setting(name=FLOOR, physics=finest, shift=SHIFT)]
+
+
+FLOOR = "floor"
+
+
+def setting_name(rate_hz: int, iterations: int) -> str:
+    """How tables call a setting."""
+    return f"{rate_hz} Hz, {iterations} it"

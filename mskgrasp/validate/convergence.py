@@ -1,0 +1,248 @@
+"""The same grasps under coarser and finer settings, against the finest."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import torch
+
+import tasks
+from mskgrasp.collect.shard import draw_attempt
+from mskgrasp.errors import MskgraspError
+from mskgrasp.parts import load_part
+from tasks import GraspDisplacementEnv, Physics
+from tasks.renderer import render_backend
+
+KEPT = ("success", "failure", "displacement", "tilt", "penetration", "fastest", "seconds")
+
+
+class ValidationFailed(MskgraspError):
+    """The validation could not be carried out."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """One way to simulate.
+
+    Attributes:
+        name: For tables and files.
+        physics: What differs.
+        shift: By how much the parts' starts are moved on the table, m: 0, or the 10 um of the floor.
+    """
+
+    name: str
+    physics: Physics
+    shift: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcomes:
+    """What became of n grasps under one setting, in the order of the grasps.
+
+    Attributes:
+        success: (n,) bool.
+        failure: (n,) index into `mskgrasp.grasp.FAILURES`.
+        displacement: (n, 4) object displacement, NaN where not successful.
+        tilt: (n,) rad.
+        penetration: (n,) deepest overlap of finger and part, m.
+        fastest: (n,) greatest speed of the part, m/s.
+        seconds: (n,) simulated time.
+        cpu_seconds: (n,) processor time.
+        part: (n,) name of the part.
+    """
+
+    success: np.ndarray
+    failure: np.ndarray
+    displacement: np.ndarray
+    tilt: np.ndarray
+    penetration: np.ndarray
+    fastest: np.ndarray
+    seconds: np.ndarray
+    cpu_seconds: np.ndarray
+    part: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawn:
+    """A part and the grasps that were drawn for it.
+
+    Attributes:
+        folder: The part's folder.
+        file: npz with ``pose`` (n, 7), ``T_base_obj`` at the start, and ``grasp`` (n, 4), base frame.
+    """
+
+    folder: Path
+    file: Path
+
+
+def draw_grasps(
+    folders: Sequence[Path], n: int, seed: int, out: Path, workers: int, report: Callable[[int], None]
+) -> list[Drawn]:
+    """Draws n starts and grasps of each part as the collector does; those that were drawn before are kept.
+
+    Raises:
+        ValidationFailed: A worker died.
+    """
+    drawn = []
+    for folder in folders:
+        part = load_part(folder)
+        name = f"{part.name}-{part.content_hash[:12]}-{seed}-{n}.npz"
+        drawn.append(Drawn(folder=folder, file=out / "grasps" / name))
+    jobs = [(str(one.folder), n, seed, str(one.file)) for one in drawn if not one.file.exists()]
+    _in_parallel(_draw, jobs, workers, report)
+    return drawn
+
+
+def run_settings(
+    settings: Sequence[Setting],
+    drawn: Sequence[Drawn],
+    out: Path,
+    workers: int,
+    report: Callable[[int], None],
+) -> dict[str, Outcomes]:
+    """Tries the drawn grasps under every setting; what lies in ``out`` already is not made again.
+
+    Args:
+        settings: Tried in parallel with the parts.
+        drawn: The grasps.
+        out: Where outcomes are kept.
+        workers: Processes.
+        report: Told how many grasps were tried.
+
+    Raises:
+        ValidationFailed: A worker died.
+    """
+    jobs = []
+    for setting in settings:
+        for one in drawn:
+            file = _outcome_file(out, setting, one)
+            if file.exists():
+                with np.load(file) as stored:
+                    report(len(stored["success"]))
+            else:
+                jobs.append((setting, one, file))
+    # The finest first: what takes longest must not be begun last.
+    jobs.sort(key=lambda job: -job[0].physics.rate_hz * job[0].physics.position_iterations)
+    _in_parallel(_try_grasps, jobs, workers, report)
+    return {setting.name: _read(out, setting, drawn) for setting in settings}
+
+
+def _in_parallel(
+    function: Callable[..., int], jobs: Sequence[tuple], workers: int, report: Callable[[int], None]
+) -> None:
+    if not jobs:
+        return
+    context = multiprocessing.get_context("spawn")  # a forked simulator shares the parent's driver state
+    threads = os.environ.get("OMP_NUM_THREADS")
+    os.environ["OMP_NUM_THREADS"] = "1"
+    pool = ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context)
+    try:
+        for future in as_completed([pool.submit(function, *job) for job in jobs]):
+            report(future.result())
+    except BrokenProcessPool as error:
+        raise ValidationFailed(
+            "a worker died (out of memory?): run again with fewer --workers; what was finished is kept"
+        ) from error
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+        if threads is None:
+            del os.environ["OMP_NUM_THREADS"]
+        else:
+            os.environ["OMP_NUM_THREADS"] = threads
+
+
+def _make_env(folder: str, physics: Physics, renderer: str) -> tuple[gymnasium.Env, GraspDisplacementEnv]:
+    logging.getLogger("mani_skill").setLevel(logging.ERROR)
+    made = gymnasium.make(
+        "GraspDisplacement-v1",
+        parts=[folder],
+        obs_mode="none",
+        render_backend=renderer,
+        physics=physics.model_dump(),
+    )
+    env = made.unwrapped
+    assert isinstance(env, GraspDisplacementEnv)
+    return made, env
+
+
+def _draw(folder: str, n: int, seed: int, file: str) -> int:
+    made, env = _make_env(folder, Physics(), render_backend())
+    poses, grasps = [], []
+    attempt = 0
+    while len(grasps) < n and attempt < 2 * n:
+        _, grasp = draw_attempt(env, env.parts[0].name, seed, attempt)
+        attempt += 1
+        if grasp is not None:
+            grasps.append(grasp[0])
+            poses.append(env.part_pose().as_vector()[0].numpy())
+    made.close()
+    _write(Path(file), pose=np.stack(poses), grasp=np.stack(grasps))
+    return len(grasps)
+
+
+def _try_grasps(setting: Setting, drawn: Drawn, file: Path) -> int:
+    torch.set_num_threads(1)
+    with np.load(drawn.file) as stored:
+        poses, grasps = stored["pose"].astype(np.float64), stored["grasp"]
+    # The direction of the shift is the same under every setting: it is part of the start.
+    angle = np.random.default_rng([len(grasps), 1]).uniform(0, 2 * np.pi, len(grasps))
+    poses[:, 0] += setting.shift * np.cos(angle)
+    poses[:, 1] += setting.shift * np.sin(angle)
+    made, env = _make_env(str(drawn.folder), setting.physics, "none")
+    rows: dict[str, list[np.ndarray]] = {name: [] for name in (*KEPT, "cpu_seconds")}
+    for pose, grasp in zip(poses, grasps, strict=True):
+        began = time.process_time()
+        env.reset(seed=0, options=dict(pose_base_obj=pose[None]))
+        outcome = env.attempt.run(torch.as_tensor(grasp[None]))
+        rows["cpu_seconds"].append(np.asarray(time.process_time() - began))
+        for name in KEPT:
+            rows[name].append(outcome[name][0].numpy())
+    made.close()
+    _write(file, **{name: np.stack(values) for name, values in rows.items()})
+    return len(grasps)
+
+
+def _write(file: Path, **arrays: np.ndarray) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    temporary = file.with_suffix(f".{os.getpid()}.tmp.npz")
+    np.savez(temporary, **arrays)
+    temporary.rename(file)
+
+
+def _outcome_file(out: Path, setting: Setting, drawn: Drawn) -> Path:
+    grasps = hashlib.sha256(drawn.file.read_bytes()).hexdigest()
+    part = load_part(drawn.folder)
+    text = json.dumps([setting.physics.model_dump(), setting.shift, part.content_hash, grasps, _code()])
+    return out / "outcomes" / f"{part.name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
+
+
+@cache
+def _code() -> str:
+    """Digest of what simulates: outcomes of other code are not taken for this one's."""
+    files = sorted(Path(tasks.__file__).parent.glob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+def _read(out: Path, setting: Setting, drawn: Sequence[Drawn]) -> Outcomes:
+    pieces: dict[str, list[np.ndarray]] = {name: [] for name in (*KEPT, "cpu_seconds")}
+    parts: list[str] = []
+    for one in drawn:
+        with np.load(_outcome_file(out, setting, one)) as stored:
+            for name, values in pieces.items():
+                values.append(stored[name])
+            parts += [one.folder.name] * len(stored["success"])
+    joined = {name: np.concatenate(values) for name, values in pieces.items()}
+    return Outcomes(**joined, part=np.array(parts))

@@ -1,0 +1,79 @@
+"""What the engine made of parts: surface, mass and inertia, against their meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import trimesh
+
+from mskgrasp.parts import Part
+from mskgrasp.parts.decompose import MOST_P95_MM, MOST_VOLUME_RATIO
+from mskgrasp.parts.measure import hull_fit
+from mskgrasp.validate.bench import Bench
+
+MOST_MASS_ERROR = 1e-4
+MOST_INERTIA_ERROR = 1e-2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fidelity:
+    """How true a part is in the engine.
+
+    Attributes:
+        part: Its name.
+        hulls: Number of cooked shapes.
+        surface_p95: Distance of hulls and mesh that 95 % of both surfaces keep, m.
+        volume_ratio: Volume of the hulls by that of the mesh.
+        mass_error: Of the engine's mass against density times the mesh's volume, as a share.
+        inertia_error: The worst principal inertia against the mesh's, as a share.
+    """
+
+    part: str
+    hulls: int
+    surface_p95: float
+    volume_ratio: float
+    mass_error: float
+    inertia_error: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether all errors are within their bounds."""
+        return bool(
+            self.surface_p95 <= 1e-3 * MOST_P95_MM
+            and 1 / MOST_VOLUME_RATIO <= self.volume_ratio <= MOST_VOLUME_RATIO
+            and self.mass_error <= MOST_MASS_ERROR
+            and self.inertia_error <= MOST_INERTIA_ERROR
+        )
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON."""
+        return asdict(self) | {"passed": self.passed}
+
+
+def check_parts(bench: Bench, parts: Sequence[Part], report: Callable[[], None]) -> list[Fidelity]:
+    """Loads every part into the engine and compares."""
+    found = []
+    for part in parts:
+        bench.lay(part, (*bench.env.region_centre, 0.5))
+        found.append(_compare(part, bench))
+        report()
+    return found
+
+
+def _compare(part: Part, bench: Bench) -> Fidelity:
+    mesh = trimesh.load_mesh(part.mesh_path)
+    mesh.density = part.density
+    body = bench.body
+    expected = np.sort(np.linalg.eigvalsh(mesh.moment_inertia))
+    cooked = [1e3 * shape.vertices * shape.scale for shape in body.collision_shapes]
+    fit = hull_fit(trimesh.Trimesh(1e3 * mesh.vertices, mesh.faces, process=False), cooked)
+    return Fidelity(
+        part=part.name,
+        hulls=len(body.collision_shapes),
+        surface_p95=1e-3 * fit.p95,
+        volume_ratio=fit.volume_ratio,
+        mass_error=float(abs(body.mass / mesh.mass - 1)),
+        inertia_error=float(np.abs(np.sort(body.inertia) / expected - 1).max()),
+    )

@@ -1,0 +1,213 @@
+"""The validation's tables, picture and JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from rich.console import Console
+from rich.table import Table
+
+from mskgrasp.collect.shard import versions
+from mskgrasp.validate.by_hand import Check
+from mskgrasp.validate.compare import MOST_DISAGREEMENT, MOST_TIMES_FLOOR, Comparison, complaints
+from mskgrasp.validate.config import FLOOR, ValidateConfig
+from mskgrasp.validate.convergence import Outcomes
+from mskgrasp.validate.fidelity import Fidelity
+from tasks.outcome import MAX_DISPLACEMENT, MAX_PENETRATION, MAX_SPEED
+
+_GOOD, _BAD, _INK = "#2b8a3e", "#c92a2a", "#22252b"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Impossible:
+    """Worst values among the labels of the setting under test, and how many attempts the collector drops.
+
+    Attributes:
+        attempts: Number of attempts.
+        penetration: Deepest overlap of finger and part in what is kept, m.
+        fastest: Greatest speed of a part in what is kept, m/s.
+        displaced: Largest displacement of what is called a success and kept, m.
+        dropped: Number of attempts by reason.
+    """
+
+    attempts: int
+    penetration: float
+    fastest: float
+    displaced: float
+    dropped: dict[str, int]
+
+
+def impossible(outcomes: Outcomes) -> Impossible:
+    """Counts what cannot have happened among outcomes."""
+    way = np.linalg.norm(outcomes.displacement[:, :3], axis=1)
+    reasons = {
+        "penetrated": outcomes.penetration > MAX_PENETRATION,
+        "too_fast": outcomes.fastest > MAX_SPEED,
+        "displaced_too_far": outcomes.success & (way > MAX_DISPLACEMENT),
+        "not_finite": outcomes.success & ~np.isfinite(outcomes.displacement).all(axis=1),
+    }
+    kept = ~np.any(list(reasons.values()), axis=0)
+    return Impossible(
+        attempts=len(kept),
+        penetration=float(outcomes.penetration[kept].max(initial=0.0)),
+        fastest=float(outcomes.fastest[kept].max(initial=0.0)),
+        displaced=float(way[kept & outcomes.success].max(initial=0.0)),
+        dropped={name: int(which.sum()) for name, which in reasons.items()},
+    )
+
+
+def console() -> Console:
+    """For tables: as wide as they need where the output is no terminal."""
+    found = Console()
+    return found if found.is_terminal else Console(width=170)
+
+
+def print_checks(checks: Sequence[Check]) -> None:
+    """Closed-form physics, a line each."""
+    table = Table(
+        box=None,
+        pad_edge=False,
+        header_style="bold",
+        title="against closed-form physics",
+        title_justify="left",
+    )
+    table.add_column("", no_wrap=True, min_width=3)
+    for header in ("what", "formula"):
+        table.add_column(header, no_wrap=True)
+    for header in ("expected", "measured", "tolerance", "unit"):
+        table.add_column(header, justify="right", no_wrap=True)
+    for check in checks:
+        table.add_row(
+            _mark(check.passed), check.name, check.formula, f"{check.expected:.4g}", f"{check.measured:.4g}",
+            f"{check.low:.4g} .. {check.high:.4g}", check.unit,
+        )  # fmt: skip
+    console().print(table)
+
+
+def print_fidelity(found: Sequence[Fidelity]) -> None:
+    """The parts' worst numbers, and every part that fails."""
+    ratios = [f.volume_ratio for f in found]
+    worst = {
+        "95 % of hull and mesh surfaces within": f"{1e3 * max(f.surface_p95 for f in found):.2f} mm",
+        "volume of hulls by mesh": f"{min(ratios):.3f} .. {max(ratios):.3f}",
+        "mass in the engine off by": f"{max(f.mass_error for f in found):.1e}",
+        "inertia in the engine off by": f"{max(f.inertia_error for f in found):.1e}",
+    }
+    print(f"\n{len(found)} parts as the engine cooked them, against their meshes")
+    for name, value in worst.items():
+        print(f"  {name:40s} {value}")
+    for fidelity in found:
+        if not fidelity.passed:
+            print(f"  {fidelity.part} is not its mesh: {fidelity.as_dict()}")
+
+
+def print_convergence(config: ValidateConfig, found: dict[str, Comparison], chosen: str | None) -> None:
+    """The settings against the finest, and what each adds to the floor."""
+    table = Table(
+        box=None,
+        pad_edge=False,
+        header_style="bold",
+        title=f"\nagainst {config.finest}",
+        title_justify="left",
+    )
+    table.add_column("setting", no_wrap=True)
+    for header in (
+        "success", "S agrees", "shift median, mm", "90 %", "turn median, deg", "90 %", "p", "CPU ms a grasp",
+    ):  # fmt: skip
+        table.add_column(header, justify="right")
+    table.add_column("adds to the floor", no_wrap=True)
+    floor, reference = found[FLOOR], found[config.finest].success_rate
+    for name, c in sorted(found.items(), key=lambda item: (item[0] != FLOOR, item[1].cpu_ms)):
+        said = [] if name in (FLOOR, config.finest) else complaints(c, floor, reference)
+        label = f"{name} (under test)" if name == config.production else name
+        table.add_row(
+            label, f"{c.success_rate:.1%}", f"{c.agreement:.1%}",
+            f"{1e3 * c.shift_median:.3f}", f"{1e3 * c.shift_p90:.2f}",
+            f"{math.degrees(c.turn_median):.3f}", f"{math.degrees(c.turn_p90):.2f}",
+            f"{c.p_value:.2f}", f"{c.cpu_ms:.0f}", "; ".join(said) or "nothing",
+        )  # fmt: skip
+    Console(width=None if console().is_terminal else 230).print(table)
+    print(f"cheapest setting that adds nothing to the floor: {chosen or 'none of these'}")
+
+
+def print_impossible(found: Impossible) -> None:
+    """What the collector would drop, and the worst of what it would keep."""
+    dropped = ", ".join(f"{count} {name}" for name, count in found.dropped.items() if count) or "none"
+    print(
+        f"\nof {found.attempts} attempts dropped as impossible: {dropped}; in the others the deepest overlap "
+        f"is {1e3 * found.penetration:.2f} mm, the fastest part {found.fastest:.2f} m/s, "
+        f"the largest displacement of a success {1e3 * found.displaced:.1f} mm"
+    )
+
+
+def write_json(path: Path, config: ValidateConfig, results: dict[str, Any]) -> None:
+    """Everything that was found, for programs."""
+    record = {"settings": config.model_dump(mode="json"), "versions": versions()} | results
+    path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+def draw(
+    path: Path, checks: Sequence[Check], config: ValidateConfig, found: dict[str, Comparison] | None
+) -> Path:
+    """Left: errors of the closed-form checks in units of their tolerance. Right: what accuracy costs."""
+    figure = Figure(figsize=(13 if found else 7.5, 0.32 * len(checks) + 1.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(
+        1, 3 if found else 1, squeeze=False, width_ratios=(1.3, 1, 1) if found else None
+    )[0]
+    _draw_checks(panels[0], checks)
+    if found:
+        _draw_cost(panels[1], found, config, "agreement", "grasps with the same success, %", 100.0)
+        _draw_cost(panels[2], found, config, "shift_p90", "90 % of displacements differ by less, mm", 1e3)
+        panels[2].set_yscale("log")
+    figure.savefig(path, dpi=140)
+    return path
+
+
+def _draw_checks(axes: Any, checks: Sequence[Check]) -> None:
+    axes.axvspan(-1, 1, color="#e3efe5", lw=0)
+    for row, check in enumerate(checks):
+        middle, half = (check.high + check.low) / 2, (check.high - check.low) / 2
+        error = max(-2.0, min(2.0, (check.measured - middle) / half))
+        axes.plot(error, row, "o", ms=6, color=_GOOD if check.passed else _BAD)
+    axes.set_yticks(range(len(checks)), [check.name for check in checks], fontsize=7.5)
+    axes.set(xlim=(-2.2, 2.2), ylim=(len(checks) - 0.5, -0.5), xlabel="measured, in units of the tolerance")
+    axes.set_title("closed-form physics", loc="left", fontsize=11)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _draw_cost(
+    axes: Any, found: dict[str, Comparison], config: ValidateConfig, name: str, label: str, scale: float
+) -> None:
+    floor = scale * getattr(found[FLOOR], name)
+    if name == "agreement":
+        axes.axhspan(floor - scale * MOST_DISAGREEMENT, 100, color="#e3efe5", lw=0)
+    else:
+        axes.axhspan(0, MOST_TIMES_FLOOR * floor, color="#e3efe5", lw=0)
+    axes.axhline(floor, color=_INK, lw=0.8, ls=":")
+    for setting, comparison in found.items():
+        if setting in (FLOOR, config.finest):
+            continue
+        value = scale * getattr(comparison, name)
+        fine = not complaints(comparison, found[FLOOR], found[config.finest].success_rate)
+        axes.plot(comparison.cpu_ms, value, "o", ms=6, color=_GOOD if fine else _BAD)
+        text = setting.replace(" Hz, ", "/").replace(" it", "")
+        weight = "bold" if setting == config.production else "normal"
+        axes.annotate(
+            text, (comparison.cpu_ms, value), (5, 4), textcoords="offset points", fontsize=7.5, weight=weight
+        )
+    axes.set(xlabel="processor time of a grasp, ms", ylabel=label, xscale="log")
+    axes.set_title("dotted: the floor; green: adds nothing", loc="left", fontsize=9)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _mark(passed: bool) -> str:
+    return "[green]ok[/]" if passed else "[red]BAD[/]"
