@@ -18,7 +18,7 @@ from mskgrasp.grasp import (
     pose_base_grasp,
     pose_base_tcp,
 )
-from tasks.clearance import hand_clearance
+from tasks.clearance import Clearance, hand_clearance
 from tasks.contacts import HandContacts
 from tasks.frames import base_pose
 from tasks.kinematics import top_down
@@ -145,7 +145,9 @@ class Attempt:
             own = Pose(position=position[i].astype(float), quat_wxyz=quat_wxyz[i].astype(float))
             seen = pose_base_grasp(grasp[i].cpu().numpy().astype(float)).inverse() @ own
             corners = [seen.apply(hull) for hull in hulls]
-            clearance = hand_clearance(corners)
+            clearance = (
+                hand_clearance(corners) if self._physics.skip_air else Clearance(free=False, reach=0.0)
+            )
             free.append(clearance.free)
             reach.append(clearance.reach)
             if not clearance.free:

@@ -1,7 +1,7 @@
 """Where the hand can be without touching a part: what need not be simulated.
 
 A descent beside which nothing stands, and the first way of fingers that close through air, change nothing
-but the time that they take. Both are read off the part's hulls: exact seen from above, conservative in height.
+but the time that they take. Both are read off the part's hulls: exact seen from above, careful in height.
 """
 
 from __future__ import annotations

@@ -49,6 +49,8 @@ class Physics(Config):
     """How long a part may settle on the table before it is grasped, s."""
     approach_clearance: float = Field(default=0.01, gt=0, le=0.1)
     """Height of the pads over the part's top at which the straight descent begins, m."""
+    skip_air: bool = True
+    """Whether the hand is put where it gets through nothing but air, instead of being moved there."""
     reflex_force: float = Field(default=20.0, gt=0)
     """Contact force on the hand that ends a descent, N, as the robot's reflex would."""
 

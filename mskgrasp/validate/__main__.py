@@ -15,7 +15,7 @@ from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.validate.bench import Bench
 from mskgrasp.validate.by_hand import Check, run_checks
 from mskgrasp.validate.compare import Comparison, cheapest, compare, complaints
-from mskgrasp.validate.config import FLOOR, ValidateConfig
+from mskgrasp.validate.config import FLOOR, NOTHING_SKIPPED, REFERENCE, ValidateConfig
 from mskgrasp.validate.convergence import draw_grasps, run_settings
 from mskgrasp.validate.fidelity import check_parts
 from mskgrasp.validate.report import (
@@ -67,7 +67,7 @@ def validate(config: ValidateConfig) -> int:
     found = None
     if config.convergence:
         found = _convergence(config, parts, results)
-        reference = found[config.finest].success_rate
+        reference = found[REFERENCE].success_rate
         failed += [
             f"{config.production}: {said}"
             for said in complaints(found[config.production], found[FLOOR], reference)
@@ -111,13 +111,14 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
         )
     with tqdm(total=n * len(settings), desc="grasps", unit="grasp", **patient) as bar:
         outcomes = run_settings(settings, drawn, config.out, workers, lambda k: bar.update(k) and None)
-    found = {name: compare(one, outcomes[config.finest]) for name, one in outcomes.items()}
+    found = {name: compare(one, outcomes[REFERENCE]) for name, one in outcomes.items()}
     candidates = [
         setting.name
         for setting in settings
-        if setting.physics.rate_hz >= LEAST_RATE_HZ and setting.name not in (FLOOR, config.finest)
+        if setting.physics.rate_hz >= LEAST_RATE_HZ
+        and setting.name not in (FLOOR, REFERENCE, NOTHING_SKIPPED)
     ]
-    chosen = cheapest(found, found[FLOOR], found[config.finest].success_rate, candidates)
+    chosen = cheapest(found, found[FLOOR], found[REFERENCE].success_rate, candidates)
     print_convergence(config, found, chosen)
     seen = impossible(outcomes[config.production])
     print_impossible(seen)

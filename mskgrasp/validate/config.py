@@ -52,28 +52,31 @@ class ValidateConfig(Config):
         return Physics.model_validate(values)
 
     @property
-    def finest(self) -> str:
-        """Name of the finest setting."""
-        return setting_name(max(self.rates_hz), max(self.iterations))
-
-    @property
     def production(self) -> str:
         """Name of the setting under test."""
         return setting_name(self.physics.rate_hz, self.physics.position_iterations)
 
     def settings(self) -> list[Setting]:
-        """The grid, the production setting, and the finest one with moved starts: the floor."""
+        """The grid with the setting under test, what it is held against, the floor, and the former in full."""
         pairs = {(rate, count) for rate in self.rates_hz for count in self.iterations}
         pairs.add((self.physics.rate_hz, self.physics.position_iterations))
         grid = [
             Setting(name=setting_name(rate, count), physics=self.at(rate, count))
             for rate, count in sorted(pairs)
         ]
-        finest = self.at(max(self.rates_hz), max(self.iterations))
-        return [*grid, Setting(name=FLOOR, physics=finest, shift=SHIFT)]
+        whole = {"skip_air": False}
+        finest = self.at(max(self.rates_hz), max(self.iterations)).model_copy(update=whole)
+        return [
+            *grid,
+            Setting(name=REFERENCE, physics=finest),
+            Setting(name=FLOOR, physics=finest, shift=SHIFT),
+            Setting(name=NOTHING_SKIPPED, physics=self.physics.model_copy(update=whole)),
+        ]
 
 
-FLOOR = "floor"
+REFERENCE = "the finest, nothing skipped"
+FLOOR = "the same, starts moved by 10 um"
+NOTHING_SKIPPED = "under test, nothing skipped"
 
 
 def setting_name(rate_hz: int, iterations: int) -> str:

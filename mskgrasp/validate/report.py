@@ -18,7 +18,7 @@ from rich.table import Table
 from mskgrasp.collect.shard import versions
 from mskgrasp.validate.by_hand import Check
 from mskgrasp.validate.compare import MOST_DISAGREEMENT, MOST_TIMES_FLOOR, Comparison, complaints
-from mskgrasp.validate.config import FLOOR, ValidateConfig
+from mskgrasp.validate.config import FLOOR, NOTHING_SKIPPED, REFERENCE, ValidateConfig
 from mskgrasp.validate.convergence import Outcomes
 from mskgrasp.validate.fidelity import Fidelity
 from tasks.outcome import MAX_DISPLACEMENT, MAX_PENETRATION, MAX_SPEED
@@ -115,7 +115,7 @@ def print_convergence(config: ValidateConfig, found: dict[str, Comparison], chos
         box=None,
         pad_edge=False,
         header_style="bold",
-        title=f"\nagainst {config.finest}",
+        title=f"\nagainst {REFERENCE}",
         title_justify="left",
     )
     table.add_column("setting", no_wrap=True)
@@ -124,9 +124,9 @@ def print_convergence(config: ValidateConfig, found: dict[str, Comparison], chos
     ):  # fmt: skip
         table.add_column(header, justify="right")
     table.add_column("adds to the floor", no_wrap=True)
-    floor, reference = found[FLOOR], found[config.finest].success_rate
+    floor, reference = found[FLOOR], found[REFERENCE].success_rate
     for name, c in sorted(found.items(), key=lambda item: (item[0] != FLOOR, item[1].cpu_ms)):
-        said = [] if name in (FLOOR, config.finest) else complaints(c, floor, reference)
+        said = [] if name in (FLOOR, REFERENCE) else complaints(c, floor, reference)
         label = f"{name} (under test)" if name == config.production else name
         table.add_row(
             label, f"{c.success_rate:.1%}", f"{c.agreement:.1%}",
@@ -194,10 +194,10 @@ def _draw_cost(
         axes.axhspan(0, MOST_TIMES_FLOOR * floor, color="#e3efe5", lw=0)
     axes.axhline(floor, color=_INK, lw=0.8, ls=":")
     for setting, comparison in found.items():
-        if setting in (FLOOR, config.finest):
+        if setting in (FLOOR, REFERENCE, NOTHING_SKIPPED):
             continue
         value = scale * getattr(comparison, name)
-        fine = not complaints(comparison, found[FLOOR], found[config.finest].success_rate)
+        fine = not complaints(comparison, found[FLOOR], found[REFERENCE].success_rate)
         axes.plot(comparison.cpu_ms, value, "o", ms=6, color=_GOOD if fine else _BAD)
         text = setting.replace(" Hz, ", "/").replace(" it", "")
         weight = "bold" if setting == config.production else "normal"

@@ -1,0 +1,276 @@
+"""How fast grasps are simulated. Run: python -m tests.benchmarks.collect_speed --help.
+
+In one run, on one core, with the same parts, physics, starts and grasps, attempt by attempt in turn:
+(a) a plain ManiSkill loop, ``pd_ee_pose`` at 20 Hz and ``obs_mode="depth"``; (b) a raw SAPIEN script
+that runs every attempt to its end; (c) the collector. Then the collector with one worker and with two.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("LP_NUM_THREADS", "0")  # the software renderer stays in the thread that asks it
+
+import gymnasium
+import numpy as np
+import torch
+from mani_skill.envs.scene import ManiSkillScene
+from rich.console import Console
+from rich.table import Table
+from tqdm import tqdm
+
+from mskgrasp.collect.config import CollectConfig
+from mskgrasp.collect.shard import Simulator, draw_attempt
+from mskgrasp.collect.workers import Progress, make_shards
+from mskgrasp.images import view_part
+from mskgrasp.parts import Part, find_part, starter_names
+from tasks import REGION, GraspDisplacementEnv, Overhead, Physics
+from tasks.attempt import TABLE_Z
+from tasks.renderer import render_backend
+from tests.benchmarks.raw_sapien import RawSapien
+
+Draw = tuple[np.ndarray, np.ndarray]
+
+
+def main() -> None:
+    """Prints a table and, last, one JSON object."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--parts", type=int, default=9, help="parts of the starter set (default 9)")
+    parser.add_argument("--attempts", type=int, default=8, help="attempts a part (default 8)")
+    parser.add_argument(
+        "--shards", type=int, default=2, help="shards of 25 attempts a part for the scaling (default 2)"
+    )
+    options = parser.parse_args()
+    logging.getLogger("mani_skill").setLevel(logging.ERROR)
+    torch.set_num_threads(1)
+    names = starter_names()
+    chosen = [names[int(i)] for i in np.linspace(0, len(names) - 1, min(options.parts, len(names)))]
+    parts = [find_part(name) for name in chosen]
+    found = side_by_side(parts, options.attempts)
+    rates = {workers: throughput(parts, options.shards, workers) for workers in (1, 2)}
+    report(found, rates)
+
+
+def side_by_side(parts: list[Part], n: int) -> dict[str, dict[str, float]]:
+    """Processor time of n attempts a part in the three programs, and their success."""
+    programs = {"maniskill": PlainManiSkill(parts[0]), "raw": Raw(), "ours": Ours()}
+    seconds: dict[str, float] = defaultdict(float)
+    lifted: dict[str, int] = defaultdict(int)
+    with tqdm(total=len(parts) * n * 3, unit="grasp", file=sys.stderr, disable=None) as bar:
+        for number, part in enumerate(parts):
+            programs["ours"].load(part)
+            drawn = programs["ours"].draw(n)
+            for name, program in programs.items():
+                program.load(part)
+                if number == 0:
+                    program.attempt(*drawn[0])  # shaders are compiled, caches filled
+                    program.load(part)
+                    program.forget()
+                began = time.process_time()
+                for pose, grasp in drawn:
+                    lifted[name] += program.attempt(pose, grasp)
+                    bar.update()
+                seconds[name] += time.process_time() - began
+    total = len(parts) * n
+    found = {
+        name: {"grasps_per_s": total / seconds[name], "success": lifted[name] / total} for name in programs
+    }
+    found["ours"]["engine_share"] = programs["ours"].engine / seconds["ours"]
+    return found
+
+
+class PlainManiSkill:
+    """What a user of ManiSkill writes first."""
+
+    def __init__(self, part: Part):
+        self.env = gymnasium.make(
+            "GraspDisplacement-v1", parts=[str(part.folder)], control_mode="pd_ee_pose", obs_mode="depth",
+            render_backend=render_backend(),
+        )  # fmt: skip
+
+    def load(self, part: Part) -> None:
+        """A fresh scene with this part."""
+        self.env.reset(seed=0, options=dict(parts=[str(part.folder)], reconfigure=True))
+
+    def forget(self) -> None:
+        """Nothing is counted here."""
+
+    def attempt(self, pose: np.ndarray, grasp: np.ndarray) -> bool:
+        """Approach, descend, close, lift, hold: 2.45 s at 20 Hz."""
+        self.env.reset(seed=0, options=dict(pose_base_obj=pose[None]))
+        above, top = grasp.copy(), grasp.copy()
+        above[2] += 0.06
+        top[2] += 0.1
+        waypoints = [
+            (above, above, 12, 1),
+            (above, grasp, 8, 1),
+            (grasp, grasp, 10, -1),
+            (grasp, top, 15, -1),
+            (top, top, 4, -1),
+        ]
+        info: dict = {}
+        for start, goal, steps, gripper in waypoints:
+            for k in range(1, steps + 1):
+                x, y, z, theta = start + (goal - start) * k / steps
+                info = self.env.step(np.array([x, y, z, np.pi, 0, -theta, gripper], dtype=np.float32))[-1]
+        return bool(info["success"])
+
+
+class Raw:
+    """Plain SAPIEN."""
+
+    def __init__(self) -> None:
+        x_min, x_max, y_min, y_max = REGION
+        self.sim = RawSapien(Physics(), Overhead(), ((x_min + x_max) / 2, (y_min + y_max) / 2))
+
+    def load(self, part: Part) -> None:
+        """A fresh scene with this part."""
+        self.sim.load(part)
+
+    def forget(self) -> None:
+        """Nothing is counted here."""
+
+    def attempt(self, pose: np.ndarray, grasp: np.ndarray) -> bool:
+        """One attempt."""
+        return self.sim.attempt(pose, grasp)
+
+
+class Ours:
+    """The collector's own loop, with a clock around PhysX and the renderer."""
+
+    def __init__(self) -> None:
+        self.simulator = Simulator(Physics(), Overhead())
+        self.engine = 0.0
+        self._clock(ManiSkillScene, "step")
+        self._clock(GraspDisplacementEnv, "capture_depth")
+
+    def _clock(self, owner: type, name: str) -> None:
+        inner = getattr(owner, name)
+
+        def timed(*args: object, **kwargs: object) -> object:
+            began = time.process_time()
+            result = inner(*args, **kwargs)
+            self.engine += time.process_time() - began
+            return result
+
+        setattr(owner, name, timed)
+
+    def load(self, part: Part) -> None:
+        """A fresh scene with this part."""
+        self.env = self.simulator._load(str(part.folder))
+
+    def forget(self) -> None:
+        """Sets the clock back."""
+        self.engine = 0.0
+
+    def draw(self, n: int) -> list[Draw]:
+        """Starts (7,) and grasps (4,) as the collector draws them."""
+        drawn: list[Draw] = []
+        attempt = 0
+        while len(drawn) < n:
+            _, grasp = draw_attempt(self.env, self.env.parts[0].name, 0, attempt)
+            attempt += 1
+            if grasp is not None:
+                drawn.append((self.env.part_pose().as_vector()[0].double().numpy(), grasp[0].astype(float)))
+        return drawn
+
+    def attempt(self, pose: np.ndarray, grasp: np.ndarray) -> bool:
+        """Image, box of the part, attempt, as in a shard; the grasp is the given one."""
+        env = self.env
+        env.reset(seed=0, options=dict(pose_base_obj=pose[None]))
+        depth = env.capture_depth()[0].cpu().numpy()
+        view_part(
+            depth, env.overhead.intrinsics(), env.overhead.T_base_camera(env.region_centre),
+            table_z=TABLE_Z, region=REGION,
+        )  # fmt: skip
+        outcome = env.attempt.run(torch.as_tensor(grasp[None], dtype=torch.float32))
+        return bool(outcome["success"][0])
+
+
+def throughput(parts: list[Part], shards: int, workers: int) -> dict[str, float]:
+    """Grasps a second of the collector in its steady state, and the memory of its largest worker, GiB."""
+    from mskgrasp.collect.__main__ import plan_shards
+
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        (out / "shards").mkdir()
+        config = CollectConfig(
+            out=out, parts=tuple(part.name for part in parts), attempts_per_part=25 * shards, shard_size=25
+        )
+        tasks = plan_shards(config, parts)
+        total = sum(task.n for task in tasks)
+        # Workers start one after the other, and end so: neither end belongs to the steady state.
+        first, last = 10 * workers, total - 25 * workers
+        done, began, ended, most = 0, 0.0, 0.0, 0.0
+        with tqdm(total=total, unit="grasp", desc=f"{workers} workers", file=sys.stderr, disable=None) as bar:
+            for event in make_shards(config, tasks, workers):
+                if not isinstance(event, Progress):
+                    continue
+                done += 1
+                bar.update()
+                if done == first:
+                    began = time.perf_counter()
+                if done == last:
+                    ended = time.perf_counter()
+                    most = largest_child()
+        return {"grasps_per_s": (last - first) / (ended - began), "gib": most}
+
+
+def largest_child() -> float:
+    """Greatest resident memory of this process's children, GiB."""
+    most = 0.0
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            status = (folder / "status").read_text()
+        except OSError:
+            continue
+        fields = dict(line.split(":", 1) for line in status.splitlines() if ":" in line)
+        if int(fields["PPid"]) == os.getpid() and "VmHWM" in fields:
+            most = max(most, int(fields["VmHWM"].split()[0]) / 2**20)
+    return most
+
+
+def report(found: dict[str, dict[str, float]], rates: dict[int, dict[str, float]]) -> None:
+    """A table, and the numbers for programs."""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for header in ("one core", "grasps/s", "against ours", "lifted"):
+        table.add_column(header, justify="left" if header == "one core" else "right")
+    labels = {
+        "maniskill": "(a) plain ManiSkill loop",
+        "raw": "(b) raw SAPIEN script",
+        "ours": "(c) the collector",
+    }
+    ours = found["ours"]["grasps_per_s"]
+    for name, label in labels.items():
+        rate = found[name]["grasps_per_s"]
+        table.add_row(label, f"{rate:.2f}", f"{ours / rate:.2f}", f"{found[name]['success']:.0%}")
+    Console(width=100).print(table)
+    share = found["ours"]["engine_share"]
+    print(f"share of (c) inside PhysX and the renderer: {share:.0%}")
+    one, two = rates[1], rates[2]
+    print(
+        f"collector, steady state: {one['grasps_per_s']:.2f} grasps/s with 1 worker, "
+        f"{two['grasps_per_s']:.2f} with 2; largest worker {max(one['gib'], two['gib']):.2f} GiB"
+    )
+    result = {
+        "ours_over_maniskill": round(ours / found["maniskill"]["grasps_per_s"], 2),
+        "ours_over_raw": round(ours / found["raw"]["grasps_per_s"], 2),
+        "engine_share": round(share, 3),
+        "scaling_2": round(two["grasps_per_s"] / one["grasps_per_s"], 2),
+        "worker_gib": round(max(one["gib"], two["gib"]), 2),
+        "grasps_per_s_core": round(ours, 2),
+    }
+    print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()

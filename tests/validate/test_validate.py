@@ -1,0 +1,155 @@
+"""The validation says ok where the simulation is right, and not where it is wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mskgrasp.errors import BadConfig
+from mskgrasp.parts import find_part
+from mskgrasp.validate.by_hand import run_checks
+from mskgrasp.validate.compare import cheapest, compare, complaints
+from mskgrasp.validate.config import FLOOR, REFERENCE, ValidateConfig
+from mskgrasp.validate.convergence import Outcomes, Setting, draw_grasps, run_settings
+from mskgrasp.validate.report import impossible
+from tasks import Physics
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+def outcomes(n: int = 200, **changes: np.ndarray) -> Outcomes:
+    """Made-up outcomes: half succeed, displacements of some millimetres."""
+    rng = np.random.default_rng(5)
+    success = np.arange(n) % 2 == 0
+    displacement = np.where(success[:, None], rng.normal(0, 0.004, (n, 4)), np.nan)
+    plain = Outcomes(
+        success=success, failure=(~success).astype(int), displacement=displacement, tilt=np.zeros(n),
+        penetration=np.zeros(n), fastest=np.full(n, 0.3), seconds=np.ones(n), cpu_seconds=np.full(n, 0.1),
+        part=np.repeat("box", n),
+    )  # fmt: skip
+    return dataclasses.replace(plain, **changes)
+
+
+def test_the_production_settings_pass_every_closed_form_check():
+    checks = run_checks(Physics(), lambda _: None)
+    assert len(checks) >= 13
+    assert [check.name for check in checks if not check.passed] == []
+
+
+def test_a_coarse_simulation_fails():
+    checks = run_checks(Physics(rate_hz=100, position_iterations=4), lambda _: None)
+    failed = [check.name for check in checks if not check.passed]
+    assert "fall in 0.2 s" in failed and len(failed) >= 3
+
+
+def test_differences_are_those_that_were_put_in():
+    before = outcomes()
+    moved = before.displacement + np.array([0.003, 0.0, 0.004, 0.02])
+    one = before.success.copy()
+    one[:10] = ~one[:10]
+    found = compare(
+        dataclasses.replace(before, displacement=np.where(one[:, None], moved, np.nan), success=one), before
+    )
+    assert found.agreement == pytest.approx(0.95)
+    assert found.n_both == 95
+    assert found.shift_median == pytest.approx(0.005) and found.shift_p90 == pytest.approx(0.005)
+    assert found.turn_median == pytest.approx(0.02)
+
+
+def test_a_turn_over_half_a_circle_is_measured_the_short_way():
+    before, after = outcomes(), outcomes()
+    before.displacement[:, 3], after.displacement[:, 3] = np.pi - 0.01, -np.pi + 0.01
+    assert compare(after, before).turn_median == pytest.approx(0.02)
+
+
+def test_a_setting_is_told_what_it_adds_to_the_floor():
+    reference = outcomes()
+    floor = compare(dataclasses.replace(reference, displacement=reference.displacement + 1e-4), reference)
+    same = compare(reference, reference)
+    assert complaints(same, floor, same.success_rate) == []
+    shifted = compare(dataclasses.replace(reference, displacement=reference.displacement + 0.01), reference)
+    said = complaints(shifted, floor, same.success_rate)
+    assert any("shift median" in text for text in said) and any("distributed" in text for text in said)
+    flipped = compare(dataclasses.replace(reference, success=~reference.success), reference)
+    assert any("S agrees in 0.0%" in text for text in complaints(flipped, floor, same.success_rate))
+    quick, slow = (dataclasses.replace(same, cpu_ms=ms) for ms in (40.0, 90.0))
+    assert (
+        cheapest({"bad": shifted, "slow": slow, "quick": quick}, floor, 0.5, ["bad", "slow", "quick"])
+        == "quick"
+    )
+    assert cheapest({"bad": shifted}, floor, 0.5, ["bad"]) is None
+
+
+def test_what_cannot_be_is_counted_by_reason():
+    sick = outcomes()
+    sick.penetration[3], sick.fastest[5], sick.displacement[8, 0] = 0.002, 4.0, 0.06
+    found = impossible(sick)
+    assert found.dropped == {"penetrated": 1, "too_fast": 1, "displaced_too_far": 1, "not_finite": 0}
+    assert found.penetration == 0 and found.fastest == pytest.approx(0.3) and found.displaced < 0.05
+
+
+def test_grasps_are_tried_once_and_read_afterwards(tmp_path):
+    folders = [find_part("hex_nut_m20").folder]
+    settings = [
+        Setting(name="plain", physics=Physics()),
+        Setting(name="moved", physics=Physics(), shift=1e-5),
+        Setting(name="again", physics=Physics()),
+    ]
+    drawn = draw_grasps(folders, 3, 0, tmp_path, 1, lambda _: None)
+    told: list[int] = []
+    first = run_settings(settings[:2], drawn, tmp_path, 2, told.append)
+    assert told == [3, 3] and len(first["plain"].success) == 3
+    times = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.npz")}
+    second = run_settings(settings, drawn, tmp_path, 1, told.append)
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.npz")} == times
+    np.testing.assert_array_equal(first["plain"].displacement, second["again"].displacement)
+    assert draw_grasps(folders, 3, 0, tmp_path, 1, lambda _: None) == drawn
+
+
+def test_the_grid_holds_the_setting_under_test_and_the_floor():
+    config = ValidateConfig(rates_hz=(250, 1000), iterations=(8, 50), physics=Physics(rate_hz=500))
+    settings = {setting.name: setting for setting in config.settings()}
+    assert {"250 Hz, 8 it", "1000 Hz, 50 it", "500 Hz, 15 it"} < set(settings)
+    assert settings[FLOOR].shift == 1e-5 and settings[FLOOR].physics == settings[REFERENCE].physics
+    assert settings[REFERENCE].physics.rate_hz == 1000 and not settings[REFERENCE].physics.skip_air
+
+
+def test_the_program_reports_in_numbers_and_a_picture(tmp_path):
+    done = validate("--no-convergence", "--parts", "hex_nut_m20", "--out", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-1] == "all checks passed"
+    record = json.loads((tmp_path / "out" / "validate.json").read_text())
+    assert record["failed"] == [] and len(record["closed_form"]) >= 13
+    assert record["parts"][0]["part"] == "hex_nut_m20" and record["parts"][0]["mass_error"] < 1e-4
+    assert (tmp_path / "out" / "validate.png").stat().st_size > 20_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["--parts", "no_such_part"], 2, "no_such_part"),
+        (["--rates-hz", "50"], 2, "greater than or equal to 100"),
+        (["--config", "no_such.yaml"], 2, "no_such.yaml"),
+    ],
+)
+def test_mistakes_are_one_line(tmp_path, arguments, code, message):
+    done = validate(*arguments, "--out", str(tmp_path / "out"))
+    assert done.returncode == code
+    assert message in done.stderr.strip().splitlines()[-1] and "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_empty_lists_are_refused():
+    with pytest.raises((BadConfig, ValueError), match="at least one value"):
+        ValidateConfig(rates_hz=())
+
+
+def validate(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "mskgrasp.validate", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, cwd=REPOSITORY, timeout=300)
