@@ -16,8 +16,9 @@ from hal.board_views import Picture, picture_paths, read_picture
 from hal.calibrate import CalibrateConfig, capture, solve
 from hal.calibration import read_calibration
 from hal.charuco import Board
-from hal.hand_eye import HandEye, angle_between, solve_hand_eye
+from hal.hand_eye import HandEye, solve_hand_eye
 from mskgrasp.errors import UsageError
+from mskgrasp.geometry import pose_distance
 
 SAPIEN = Path(__file__).parents[2] / "configs" / "cells" / "sapien.yaml"
 BOARD = Board()
@@ -37,9 +38,8 @@ def pictures(folder: Path) -> list[Picture]:
 
 def error(found: HandEye, pictures: list[Picture]) -> tuple[float, float]:
     """mm and degrees from the simulator's truth."""
-    truth = pictures[0].T_base_camera
-    apart = float(np.linalg.norm(found.T_base_camera.position - truth.position))
-    return apart * 1e3, float(np.degrees(angle_between(found.T_base_camera, truth)))
+    apart, turn = pose_distance(found.T_base_camera, pictures[0].T_base_camera)
+    return apart * 1e3, float(np.degrees(turn))
 
 
 def test_the_camera_is_found_within_a_millimetre_and_a_tenth_of_a_degree(pictures: list[Picture]):

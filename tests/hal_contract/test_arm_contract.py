@@ -14,7 +14,7 @@ import pytest
 from hal import Cell, cell_from_yaml, execute_grasp
 from hal.arm import JOINT_TOLERANCE, POSITION_TOLERANCE, ROTATION_TOLERANCE
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace
-from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply
+from mskgrasp.geometry import Pose, pose_distance, quat_multiply
 from mskgrasp.grasp import pose_base_tcp
 from tests.franka.robots import robot_for, write_cell
 from tests.hal_contract.conftest import CELLS
@@ -67,11 +67,6 @@ def over_the_table(z: float = 0.3, theta: float = 0.0) -> Pose:
     return pose_base_tcp(np.array([0.42, 0.05, z, theta]))
 
 
-def angle_between(a: Pose, b: Pose) -> float:
-    turn = quat_multiply(quat_conjugate(a.quat_wxyz), b.quat_wxyz)
-    return 2 * float(np.arctan2(np.linalg.norm(turn[1:]), abs(turn[0])))
-
-
 def test_state_has_units_and_shapes(cell: Cell):
     state = cell.arm.state()
     assert state.joints.shape == (7,) and np.abs(state.joints).max() < 3.8
@@ -99,8 +94,8 @@ def test_a_straight_motion_arrives(cell: Cell, theta: float):
     target = over_the_table(theta=theta)
     cell.arm.move_to_pose(target, speed=0.5)
     reached = cell.arm.state().T_base_tcp
-    assert np.linalg.norm(reached.position - target.position) < POSITION_TOLERANCE
-    assert angle_between(reached, target) < ROTATION_TOLERANCE
+    distance, angle = pose_distance(reached, target)
+    assert distance < POSITION_TOLERANCE and angle < ROTATION_TOLERANCE
 
 
 @pytest.mark.parametrize("name", ["franky", "panda_py"], indirect=True, scope="module")
