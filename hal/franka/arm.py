@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any, NoReturn
 
 import numpy as np
 
-from hal.arm import JOINT_TOLERANCE, Arm, ArmLimits, ArmState, GraspOutcome
+from hal.arm import JOINT_TOLERANCE, Arm, ArmState, GraspOutcome
 from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery
 from hal.franka.config import JOINT_SPEED, FrankyArmConfig, PandaPyArmConfig
 from hal.franka.driver import DriverSettings, DriverState
@@ -17,13 +18,14 @@ from hal.franka.frames import check_end_effector, pose_from_columns
 from hal.franka.kinematics import forward_pose, reachable
 from hal.franka.link import DriverLink
 from hal.franka.path import JointPath, joint_path, straight_path
+from hal.limits import ArmLimits
 from mskgrasp.geometry import Pose
 
 TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
-WIDTH_TOLERANCE = 2e-3
-"""The pads have arrived within this, metres."""
 _GRIPPER_TIMEOUT_S = 15.0
+_STATE_TIMEOUT_S = 5.0
+_MODE_S = 2.0
 _STILL_WIDTH = 1e-4
 _POLL_S = 0.05
 
@@ -68,7 +70,7 @@ class FrankaArm(Arm):
         )
         link = DriverLink(config.driver, settings, config.connect_timeout_s)
         try:
-            check_end_effector(link.state().f_t_ee)
+            check_end_effector(_state_of(link).f_t_ee)
         except BaseException:
             link.close()
             raise
@@ -83,14 +85,17 @@ class FrankaArm(Arm):
     def _connected(self) -> bool:
         return self._link is not None
 
-    def _ask(self, op: str, *, timeout_s: float, **values: Any) -> Any:
+    def _connected_link(self) -> DriverLink:
         link = self._link
         if link is None:
-            raise CommunicationLost("the arm was closed during the command")
-        return link.ask(op, timeout_s=timeout_s, **values)
+            raise CommunicationLost("the arm was closed during the command; open the cell again")
+        return link
+
+    def _ask(self, op: str, *, timeout_s: float, **values: Any) -> Any:
+        return self._connected_link().ask(op, timeout_s=timeout_s, **values)
 
     def _measure(self) -> DriverState:
-        return DriverState(**self._ask("state", timeout_s=3.0))
+        return _state_of(self._connected_link())
 
     def _state(self) -> ArmState:
         state = self._measure()
@@ -144,7 +149,7 @@ class FrankaArm(Arm):
             self._raise_aborted(error)
         goal = path.joints[-1]
         deadline = time.monotonic() + self._config.settle_s
-        # Twice as near as the base class asks for, so that its check does not depend on the moment.
+        # Nearer than the base class asks for, so that its check does not depend on the moment.
         while np.abs(np.array(self._measure().joints) - goal).max() > JOINT_TOLERANCE / 4:
             if time.monotonic() > deadline or self._stop.is_set():
                 return
@@ -158,16 +163,23 @@ class FrankaArm(Arm):
     def _halt(self) -> None:
         # The motion in progress reports what came of it; a link that is gone has stopped the robot.
         with contextlib.suppress(HalError):
-            self._ask("stop", timeout_s=3.0)
+            self._ask("stop", timeout_s=_STATE_TIMEOUT_S)
 
     def _recover(self) -> None:
-        state = self._measure()
+        state = self._once(lambda state: state.mode != "user_stopped")
         if state.mode == "user_stopped":
             self._refuse(state)
         if not self._ask("recover", timeout_s=20.0):
             self.close()
             self._link = self._new_link()
-        self._refuse_unless_idle(self._measure())
+        self._refuse_unless_idle(self._once(_is_idle))
+
+    def _once(self, good: Callable[[DriverState], bool]) -> DriverState:
+        """The first good state, or the last: the mode follows a release or a recovery a moment later."""
+        deadline = time.monotonic() + _MODE_S
+        while not good(state := self._measure()) and time.monotonic() < deadline:
+            time.sleep(_POLL_S)
+        return state
 
     def _ready(self) -> DriverState:
         """A fresh state of an arm that may move: the drivers themselves would recover silently."""
@@ -176,7 +188,7 @@ class FrankaArm(Arm):
         return state
 
     def _refuse_unless_idle(self, state: DriverState) -> None:
-        if state.mode not in ("idle", "move"):
+        if not _is_idle(state):
             self._refuse(state)
 
     def _refuse(self, state: DriverState) -> NoReturn:
@@ -220,12 +232,7 @@ class FrankaArm(Arm):
             )
         except MotionAborted as error:
             self._raise_aborted(error)
-        reached = self._still_width()
-        if not self._stop.is_set() and abs(reached - width) > WIDTH_TOLERANCE:
-            raise MotionAborted(
-                f"the pads stopped at {reached:.4f} m instead of {width:.4f} m; see what is between them, "
-                "then call recover()"
-            )
+        self._still_width()
 
     def _grasp(self, force: float) -> GraspOutcome:
         self._homed()
@@ -248,3 +255,11 @@ class FrankaArm(Arm):
             last, width = width, self._measure().width
             quiet = quiet + 1 if abs(width - last) < _STILL_WIDTH else 0
         return width
+
+
+def _state_of(link: DriverLink) -> DriverState:
+    return DriverState(**link.ask("state", timeout_s=_STATE_TIMEOUT_S))
+
+
+def _is_idle(state: DriverState) -> bool:
+    return state.mode in ("idle", "move")
