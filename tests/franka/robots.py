@@ -22,7 +22,7 @@ import yaml
 
 from hal.franka.driver import DriverName
 
-_HOSTS = (f"127.{os.getpid() >> 8 & 255}.{os.getpid() & 255}.{k}" for k in itertools.count(1))
+HOSTS = (f"127.{os.getpid() >> 8 & 255}.{os.getpid() & 255}.{k}" for k in itertools.count(1))
 TIMEOUT_S = 120.0
 """For what takes a second on an idle machine."""
 _SYMBOLS = [
@@ -79,7 +79,7 @@ class FakeRobot:
 @contextmanager
 def franky_sim(host: str | None = None) -> Iterator[FakeRobot]:
     """An FR3 that franky can drive: franky-sim, in MuJoCo."""
-    with _serve("tests.franka.franky_sim_server", host or next(_HOSTS), []) as robot:
+    with _serve("tests.franka.franky_sim_server", host or next(HOSTS), []) as robot:
         yield robot
 
 
@@ -89,7 +89,7 @@ def fci5(host: str | None = None, version: int = 5) -> Iterator[FakeRobot]:
     with tempfile.TemporaryDirectory() as folder:
         model = build_model(Path(folder))
         arguments = [str(model), str(version)]
-        with _serve("tests.franka.fci5_server", host or next(_HOSTS), arguments) as robot:
+        with _serve("tests.franka.fci5_server", host or next(HOSTS), arguments) as robot:
             yield robot
 
 

@@ -5,14 +5,17 @@ The drivers are the real wheels over the real wire protocol; the faults are made
 
 from __future__ import annotations
 
+import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -28,9 +31,9 @@ from hal.errors import (
     NotConnected,
 )
 from hal.franka import FrankaArm
-from hal.franka.driver import DriverName
+from hal.franka.driver import DriverName, DriverSettings
 from mskgrasp.geometry import Pose
-from tests.franka.robots import TIMEOUT_S, FakeRobot, fci5, robot_for, write_cell
+from tests.franka.robots import HOSTS, TIMEOUT_S, FakeRobot, fci5, robot_for, write_cell
 
 
 def arm_at(folder: Path, driver: DriverName, host: str, **settings: object) -> FrankaArm:
@@ -312,6 +315,47 @@ def test_a_missing_package_is_told_with_its_extra(driver: DriverName, tmp_path: 
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(DriverMissing, match=r"pip install 'mskgrasp\[franka\]'"):
         arm_at(tmp_path, driver, "127.0.0.250").connect()
+
+
+def test_another_end_effector_in_desk_is_told(tmp_path: Path):
+    """Our server alone: franky-sim's hand cannot be taken off."""
+    with fci5() as robot:
+        robot.order("flange")
+        with pytest.raises(NotConnected, match=r"end effector is at \(0.0000, .*choose it in Desk"):
+            arm_at(tmp_path, "panda_py", robot.host).connect()
+
+
+def test_a_driver_that_hangs_is_ended_and_told_even_where_it_reads_no_request(tmp_path: Path):
+    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
+        link = arm._link
+        assert link is not None
+        os.kill(link.pid, signal.SIGSTOP)
+        begin = time.monotonic()
+        with pytest.raises(CommunicationLost, match="no answer from .* to 'move' within 1.0 s"):
+            link.ask("move", timeout_s=1.0, seconds=[0.0] * 100_000)  # more than a pipe holds
+        assert time.monotonic() - begin < 30
+        with pytest.raises(CommunicationLost, match="ended by signal 9"):
+            arm.state()
+
+
+def test_a_driver_whose_program_was_killed_while_it_connected_ends_by_itself(driver: DriverName):
+    """It must not take the robot later, when another program has left it."""
+    host = next(HOSTS)
+    settings = DriverSettings(
+        host=host, realtime=False, contact_torque=[20.0] * 7, contact_force=20.0,
+        stiffness=[], damping=[], settle_s=1.0,
+    )  # fmt: skip
+    request = {"id": 1, "op": "connect", "settings": asdict(settings), "alarm_s": 3}
+    with socket.create_server((host, 1337)):  # takes the call and says nothing
+        worker = subprocess.Popen(
+            [sys.executable, "-m", "hal.franka.worker", driver],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+        )
+        assert worker.stdin is not None
+        worker.stdin.write(json.dumps(request).encode() + b"\n")
+        worker.stdin.close()
+        assert worker.wait(TIMEOUT_S) in (0, -signal.SIGALRM)
 
 
 def test_pads_that_meet_something_on_their_way_are_told(tmp_path: Path):
