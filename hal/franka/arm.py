@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any, NoReturn
 
@@ -25,7 +24,8 @@ TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
 _GRIPPER_TIMEOUT_S = 15.0
 _STATE_TIMEOUT_S = 5.0
-_MODE_S = 2.0
+_RECOVERY_S = 2.0
+"""The robot's mode may follow its recovery this much later, s."""
 _STILL_WIDTH = 1e-4
 _POLL_S = 0.05
 
@@ -166,20 +166,17 @@ class FrankaArm(Arm):
             self._ask("stop", timeout_s=_STATE_TIMEOUT_S)
 
     def _recover(self) -> None:
-        state = self._once(lambda state: state.mode != "user_stopped")
+        # Not waited for: a release must not set an arm in motion whose program was recovering meanwhile.
+        state = self._measure()
         if state.mode == "user_stopped":
             self._refuse(state)
         if not self._ask("recover", timeout_s=20.0):
             self.close()
             self._link = self._new_link()
-        self._refuse_unless_idle(self._once(_is_idle))
-
-    def _once(self, good: Callable[[DriverState], bool]) -> DriverState:
-        """The first good state, or the last: the mode follows a release or a recovery a moment later."""
-        deadline = time.monotonic() + _MODE_S
-        while not good(state := self._measure()) and time.monotonic() < deadline:
+        deadline = time.monotonic() + _RECOVERY_S
+        while not _is_idle(state := self._measure()) and time.monotonic() < deadline:
             time.sleep(_POLL_S)
-        return state
+        self._refuse_unless_idle(state)
 
     def _ready(self) -> DriverState:
         """A fresh state of an arm that may move: the drivers themselves would recover silently."""

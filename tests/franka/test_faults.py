@@ -148,18 +148,6 @@ def test_the_user_stop_is_told_and_recover_waits_for_its_release(
         nudge(arm)
 
 
-def test_recover_bears_with_a_release_that_the_robot_is_slow_to_tell(
-    driver: DriverName, robot: FakeRobot, tmp_path: Path
-):
-    with arm_at(tmp_path, driver, robot.host) as arm:
-        robot.order("user_stop")
-        release = threading.Timer(0.3, robot.order, ["user_release"])
-        release.start()
-        arm.recover()
-        release.join()
-        nudge(arm)
-
-
 def test_a_state_is_measured_after_it_was_asked_for(driver: DriverName, robot: FakeRobot, tmp_path: Path):
     """libfranka keeps a sample that nobody has read; the first to ask would get what was true before."""
     with arm_at(tmp_path, driver, robot.host) as arm:
