@@ -19,11 +19,12 @@ from hal.franka.link import DriverLink
 from hal.franka.path import JointPath, joint_path, straight_path
 from hal.limits import ArmLimits
 from mskgrasp.geometry import Pose
+from mskgrasp.grasp import MAX_OPENING
 
 TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
-_GRIPPER_TIMEOUT_S = 15.0
-_STATE_TIMEOUT_S = 5.0
+_GRIPPER_S = 10.0
+"""Homing, and what the hand takes besides its way, are over in this, s."""
 _RECOVERY_S = 2.0
 """The robot's mode may follow its recovery this much later, s."""
 _STILL_WIDTH = 1e-4
@@ -70,7 +71,7 @@ class FrankaArm(Arm):
         )
         link = DriverLink(config.driver, settings, config.connect_timeout_s)
         try:
-            check_end_effector(_state_of(link).f_t_ee)
+            check_end_effector(self._state_of(link).f_t_ee)
         except BaseException:
             link.close()
             raise
@@ -95,7 +96,10 @@ class FrankaArm(Arm):
         return self._connected_link().ask(op, timeout_s=timeout_s, **values)
 
     def _measure(self) -> DriverState:
-        return _state_of(self._connected_link())
+        return self._state_of(self._connected_link())
+
+    def _state_of(self, link: DriverLink) -> DriverState:
+        return DriverState(**link.ask("state", timeout_s=self._config.patience_s))
 
     def _state(self) -> ArmState:
         state = self._measure()
@@ -141,7 +145,7 @@ class FrankaArm(Arm):
 
     def _follow(self, path: JointPath) -> None:
         # A motion that its driver neither ends nor fails in several times its duration hangs.
-        timeout_s = 4 * path.duration_s + self._config.settle_s + 5.0
+        timeout_s = 4 * path.duration_s + self._config.settle_s + self._config.patience_s
         values = {name: array.tolist() for name, array in asdict(path).items()}
         try:
             self._ask("move", timeout_s=timeout_s, **values)
@@ -163,14 +167,14 @@ class FrankaArm(Arm):
     def _halt(self) -> None:
         # The motion in progress reports what came of it; a link that is gone has stopped the robot.
         with contextlib.suppress(HalError):
-            self._ask("stop", timeout_s=_STATE_TIMEOUT_S)
+            self._ask("stop", timeout_s=self._config.patience_s)
 
     def _recover(self) -> None:
         # Not waited for: a release must not set an arm in motion whose program was recovering meanwhile.
         state = self._measure()
         if state.mode == "user_stopped":
             self._refuse(state)
-        if not self._ask("recover", timeout_s=20.0):
+        if not self._ask("recover", timeout_s=_GRIPPER_S + self._config.patience_s):
             self.close()
             self._link = self._new_link()
         deadline = time.monotonic() + _RECOVERY_S
@@ -207,11 +211,14 @@ class FrankaArm(Arm):
 
     # ------------------------------------------------------------------ gripper
 
+    def _gripper_timeout_s(self) -> float:
+        return _GRIPPER_S + MAX_OPENING / self._config.gripper_speed + self._config.patience_s
+
     def _homed(self) -> DriverState:
         """Before homing the hand does not know its width and refuses to grasp."""
         state = self._ready()
         if state.max_width <= 0:
-            if not self._ask("home_gripper", timeout_s=2 * _GRIPPER_TIMEOUT_S):
+            if not self._ask("home_gripper", timeout_s=self._gripper_timeout_s()):
                 raise MotionAborted("the gripper could not be homed; free the fingers, then call recover()")
             state = self._measure()
         return state
@@ -223,7 +230,7 @@ class FrankaArm(Arm):
         try:
             self._ask(
                 "move_gripper",
-                timeout_s=_GRIPPER_TIMEOUT_S,
+                timeout_s=self._gripper_timeout_s(),
                 width=target,
                 speed=self._config.gripper_speed,
             )
@@ -235,7 +242,10 @@ class FrankaArm(Arm):
         self._homed()
         try:
             gripped = self._ask(
-                "grasp", timeout_s=_GRIPPER_TIMEOUT_S, speed=self._config.gripper_speed, force=force
+                "grasp",
+                timeout_s=self._gripper_timeout_s(),
+                speed=self._config.gripper_speed,
+                force=force,
             )
         except MotionAborted:
             # "Command failed!" and "Command aborted!" are how some firmware reports that it met nothing.
@@ -252,10 +262,6 @@ class FrankaArm(Arm):
             last, width = width, self._measure().width
             quiet = quiet + 1 if abs(width - last) < _STILL_WIDTH else 0
         return width
-
-
-def _state_of(link: DriverLink) -> DriverState:
-    return DriverState(**link.ask("state", timeout_s=_STATE_TIMEOUT_S))
 
 
 def _is_idle(state: DriverState) -> bool:

@@ -25,6 +25,10 @@ _ALARM_S = 5
 """A driver that has not connected this much later than it may ends itself, s: see the worker."""
 
 
+class NoAnswer(CommunicationLost):
+    """A request took too long."""
+
+
 class DriverLink:
     """Starts a driver's process, asks it, and kills it when it does not answer in time.
 
@@ -67,13 +71,13 @@ class DriverLink:
                 settings=asdict(settings),
                 alarm_s=math.ceil(connect_timeout_s) + _ALARM_S,
             )
-        except CommunicationLost as error:
+        except NoAnswer as error:
             self.close()
             raise NotConnected(
-                f"{settings.host} did not accept the connection within {connect_timeout_s:g} s: another "
-                f"program may hold the robot (it serves one at a time), or the address is wrong ({error})"
+                f"{settings.host} did not answer within {connect_timeout_s:g} s: the address ('host') may be "
+                "wrong, the cable out, or another program may hold the robot, which serves one at a time"
             ) from error
-        except MotionAborted as error:
+        except (CommunicationLost, MotionAborted) as error:
             self.close()
             raise NotConnected(f"{settings.host}: connecting failed: {error}") from error
         except BaseException:
@@ -106,7 +110,7 @@ class DriverLink:
             reply = answer.result(max(0.0, deadline_s - time.monotonic()))
         except TimeoutError:
             self._kill()
-            raise CommunicationLost(
+            raise NoAnswer(
                 f"no answer from {self._host} to '{op}' within {timeout_s:.1f} s; its link was closed and "
                 "the robot has stopped: open the cell again"
             ) from None

@@ -116,8 +116,9 @@ def write_cell(
         "joint_acceleration": 6.0,
         "gripper_speed": 0.1,
         # A busy machine simulates several times slower than real time, and takes its time to start Python.
-        "settle_s": 8.0,
-        "connect_timeout_s": 60.0,
+        "settle_s": 10.0,
+        "patience_s": 100.0,
+        "connect_timeout_s": 120.0,
         **arm,
     }
     path = folder / f"{driver}.yaml"

@@ -60,8 +60,8 @@ def once_moving(robot: FakeRobot, action: Callable[[], object]) -> Iterator[None
     finally:
         thread.join()
     assert acted, "the arm never moved"
-    # libfranka gives up a silent link after one or two seconds; what hangs takes 47 s, see FrankaArm._follow.
-    assert time.monotonic() - acted[0] < 30
+    # libfranka gives up a silent link after one or two seconds; what hangs takes over 100 s (patience_s).
+    assert time.monotonic() - acted[0] < 60
 
 
 def assert_at_rest(robot: FakeRobot) -> None:
@@ -193,7 +193,9 @@ def test_a_second_program_is_told_and_the_first_goes_on(driver: DriverName, robo
     with arm_at(tmp_path, driver, robot.host) as arm:
         second = arm_at(tmp_path, driver, robot.host, connect_timeout_s=4.0)
         begin = time.monotonic()
-        with pytest.raises(NotConnected, match="another program may hold the robot"):
+        with pytest.raises(
+            NotConnected, match="did not answer within 4 s: .* another program may hold the robot"
+        ):
             second.connect()
         assert time.monotonic() - begin < 30
         nudge(arm)
