@@ -22,7 +22,7 @@ import numpy as np
 
 from hal.franka.frames import F_T_EE
 from hal.franka.kinematics import forward
-from tests.franka.wire import Channel, GripperState, RobotState
+from tests.franka.wire import Channel, GripperState, RobotState, ask_for_priority
 
 VERSION, GRIPPER_VERSION = 5, 3
 CONNECT, MOVE, STOP_MOVE, RECOVER, LOAD_MODEL = 0, 1, 2, 12, 13
@@ -33,7 +33,7 @@ FRICTION = np.array([0.5, 0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
 """N m of dry friction: leaves the impedance controller up to 4 mrad short of its goal."""
 COMMAND = struct.Struct("<Q 7d7d16d6d2d ?? 7d")
 TICK = 1e-3
-TURN_S = 5e-5
+TURN_S = 3e-4
 ANSWERS = {"ok": 0, "fail": 1, "unsuccessful": 2, "aborted": 3}
 
 
@@ -223,6 +223,7 @@ def main() -> None:
     hand = Hand(channel=Channel(host, 1338, "<HII"))
     orders = selectors.DefaultSelector()
     orders.register(sys.stdin, selectors.EVENT_READ)
+    ask_for_priority()
     print("ready", flush=True)
     due = time.monotonic()
     while True:

@@ -26,8 +26,10 @@ from franky_sim.franka_robot_state import FrankaRobotState
 from franky_sim.franka_server import BaseCommand
 from franky_sim.mujoco_simulator import MujocoSimulator
 
+from tests.franka.wire import ask_for_priority
+
 _LATE_S = 0.005
-_TURN_S = 5e-5
+_TURN_S = 3e-4
 _CARTESIAN_REFLEX = 7
 ANSWERS = {
     "ok": GripperCommandStatus.kSuccess,
@@ -91,6 +93,7 @@ def main() -> None:
             commands = robot._FrankaServer__command_class_map
             assert commands[RobotCommand.kAutomaticErrorRecovery] is AutomaticErrorRecoveryCommand
             commands[RobotCommand.kAutomaticErrorRecovery] = Recovery
+            ask_for_priority()
             print("ready", flush=True)
             serve(server, simulator, robot, answers)
 
