@@ -1,10 +1,11 @@
 """Hardware abstraction: cameras, arms and cells; a YAML file chooses what stands behind them."""
 
-from hal.arm import Arm, ArmLimits, ArmState, GraspOutcome
+from hal.arm import Arm, ArmState, GraspOutcome
 from hal.camera import Camera, RgbdFrame
 from hal.cell import Cell, PartFeeder, PartTracker, Workspace
 from hal.errors import HalError
 from hal.execute import GraspResult, execute_grasp, go_home, put_down
+from hal.limits import ArmLimits
 from hal.open_cell import cell_from_yaml, open_cell
 
 __all__ = [

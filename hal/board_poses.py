@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
 from hal.charuco import Board, project
-from mskgrasp.geometry import Pose
+from mskgrasp.geometry import Pose, straight_line
 
 TABLE_MARGIN = 0.04
 """No corner of the board comes nearer to the table than this, metres."""
@@ -99,15 +99,9 @@ def in_sight(outline: np.ndarray, T_base_board: Pose, sight: Sight) -> bool:
 
 def way_is_clear(start: Pose, goal: Pose, T_tcp_board: Pose, board: Board, table_z: float) -> bool:
     """Whether the board stays off the table while the hand moves straight from start to goal."""
-    ends = Rotation.from_quat(np.stack([start.quat_wxyz, goal.quat_wxyz]), scalar_first=True)
-    for share, turn in zip(shares := np.linspace(0, 1, 9), Slerp([0, 1], ends)(shares), strict=True):
-        hand = Pose(
-            position=start.position + share * (goal.position - start.position),
-            quat_wxyz=turn.as_quat(scalar_first=True),
-        )
-        if _lowest(board.outline(), hand @ T_tcp_board) < table_z + TABLE_MARGIN / 2:
-            return False
-    return True
+    line = straight_line(start, goal, np.linspace(0, 1, 9))
+    hands = (Pose(position=p, quat_wxyz=q) for p, q in zip(line.position, line.quat_wxyz, strict=True))
+    return all(_lowest(board.outline(), hand @ T_tcp_board) >= table_z + TABLE_MARGIN / 2 for hand in hands)
 
 
 def _lowest(outline: np.ndarray, T_base_board: Pose) -> float:

@@ -18,7 +18,7 @@ from hal.charuco import MIN_CORNERS, Board, detect
 from hal.errors import MotionAborted, OutOfWorkspace
 from hal.hand_eye import MIN_VIEWS, BadCalibrationSet, View
 from mskgrasp.errors import UsageError
-from mskgrasp.geometry import Pose
+from mskgrasp.geometry import Pose, pose_distance
 
 _STILL_M = 3e-4
 _STILL_RAD = 1e-3
@@ -164,9 +164,8 @@ def _still_picture(cell: Cell) -> Picture:
         before = cell.arm.state()
         frame = cell.camera.capture()
         after = cell.arm.state()
-        moved = before.T_base_tcp.inverse() @ after.T_base_tcp
-        angle = 2 * float(np.arctan2(np.linalg.norm(moved.quat_wxyz[1:]), abs(moved.quat_wxyz[0])))
-        if np.linalg.norm(moved.position) < _STILL_M and angle < _STILL_RAD:
+        distance, angle = pose_distance(before.T_base_tcp, after.T_base_tcp)
+        if distance < _STILL_M and angle < _STILL_RAD:
             return Picture.of(frame, after)
         cell.arm.wait(0.5)
     raise MotionAborted("the arm does not come to rest; raise --settle-s, and see what pushes it")

@@ -190,6 +190,7 @@ def _with_camera_at(values: dict[str, Any], config: CalibrateConfig, cell_file: 
     if not isinstance(camera, dict) or "calibration" not in camera:
         if config.camera_at is None:
             return values
+        cell_from_values(values, cell_file)  # what is wrong with the file itself is told first
         raise UsageError(
             f"--camera-at is for a camera with a calibration file; that of {cell_file} knows where it is"
         )

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from hal.board_views import Picture
 from hal.charuco import MIN_CORNERS, Board, draw, project
-from hal.hand_eye import HandEye, View, angle_between
+from hal.hand_eye import HandEye, View
 from hal.table import TablePlane
-from mskgrasp.geometry import Pose
+from mskgrasp.geometry import Pose, pose_distance
 
 _SHOWN = 6
 _DEPTH_MATTERS = 0.003
@@ -67,8 +67,7 @@ def describe(found: HandEye, views: Sequence[View], before: Pose, offset: DepthO
     quat = " ".join(f"{value:.5f}" for value in found.T_base_camera.quat_wxyz)
     n_corners = np.mean([len(views[index].corners.ids) for index in found.used])
     rms_px = np.sqrt(np.mean(found.rms_px**2))
-    moved = np.linalg.norm(found.T_base_camera.position - before.position)
-    turned = angle_between(before, found.T_base_camera)
+    moved, turned = pose_distance(before, found.T_base_camera)
     lines = [
         f"camera      x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, quaternion wxyz {quat} (base)",
         f"pictures    {len(found.used)} of {len(views)} used, {n_corners:.1f} corners in each",

@@ -67,12 +67,12 @@ _STEP = 0.03
 
 def check_drivers(values: dict[str, Any]) -> Iterator[Finding]:
     """Whether the packages that the cell file names are installed, and which versions."""
-    names = ["sapien"] if values.get("type") == "sapien" else []
+    drivers: dict[str, dict[str, Any]] = {"sapien": {}} if values.get("type") == "sapien" else {}
     for section in ("arm", "camera"):
         part = values.get(section)
         if values.get("type") == "devices" and isinstance(part, dict):
-            names.append(str(part.get("driver")))
-    for name in dict.fromkeys(names):
+            drivers.setdefault(str(part.get("driver")), part)
+    for name, settings in drivers.items():
         if name not in _PACKAGES:
             continue  # a recording needs no package
         package, install = _PACKAGES[name]
@@ -80,18 +80,18 @@ def check_drivers(values: dict[str, Any]) -> Iterator[Finding]:
         try:
             version = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:
-            first = " (after building libfreenect2, see docs/cells.md)" if name == "kinect2" else ""
+            first = " (after building libfreenect2, see docs/kinect2.md)" if name == "kinect2" else ""
             yield Finding(
                 level="fail",
                 subject=subject,
                 text=f"{package} is not installed: pip install '{install}'{first}",
             )
             continue
-        yield _driver_fits(name, package, version, values)
+        yield _driver_fits(name, package, version, settings)
 
 
-def _driver_fits(name: str, package: str, version: str, values: dict[str, Any]) -> Finding:
-    robot = values["arm"].get("robot", "panda") if name in ("franky", "panda_py") else None
+def _driver_fits(name: str, package: str, version: str, settings: dict[str, Any]) -> Finding:
+    robot = settings.get("robot", "panda")
     if name == "panda_py" and robot == "fr3":
         return Finding(
             level="warn",

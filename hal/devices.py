@@ -8,12 +8,13 @@ from typing import Any, Literal, assert_never, get_args
 import numpy as np
 from pydantic import Field, model_validator
 
-from hal.arm import Arm, ArmLimits
+from hal.arm import Arm
 from hal.calibration import calibration_path
 from hal.camera import Camera
 from hal.cell import Cell, PartFeeder, Workspace
 from hal.errors import OutOfWorkspace
 from hal.execute import APPROACH
+from hal.limits import ArmLimits
 from mskgrasp.config import Config, check_config
 from mskgrasp.errors import BadConfig
 from mskgrasp.grasp import lowest_grasp_z, pose_base_tcp

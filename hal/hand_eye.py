@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from hal.charuco import MIN_SQUARE_PX, Board, Corners, board_pose, project, square_px
 from hal.errors import HalError
-from mskgrasp.geometry import Pose
+from mskgrasp.geometry import Pose, pose_distance
 
 MIN_VIEWS = 8
 """Fewer views with the board in them are no calibration."""
@@ -139,14 +139,9 @@ def solve_hand_eye(board: Board, views: Sequence[View]) -> HandEye:
         translation_m=translation,
         rotation_rad=rotation,
         half_translation_m=float(np.linalg.norm(apart[0] - apart[1])),
-        half_rotation_rad=angle_between(halves[0], halves[1]),
+        half_rotation_rad=pose_distance(halves[0], halves[1])[1],
         scale=scale,
     )
-
-
-def angle_between(a: Pose, b: Pose) -> float:
-    """Angle of the rotation from one pose to another, radians."""
-    return float(np.linalg.norm(_rotvec(a.inverse() @ b)))
 
 
 def spread(poses: Sequence[Pose]) -> np.ndarray:
@@ -263,8 +258,7 @@ def _residuals(
     for i, (view, pose) in enumerate(zip(views, seen, strict=True)):
         assert pose is not None
         from_camera, from_hand = camera @ pose, view.T_base_tcp @ held
-        translation[i] = np.linalg.norm(from_camera.position - from_hand.position)
-        rotation[i] = angle_between(from_camera, from_hand)
+        translation[i], rotation[i] = pose_distance(from_camera, from_hand)
     return translation, rotation
 
 
@@ -272,7 +266,3 @@ def _moved(pose: Pose, step: np.ndarray) -> Pose:
     """A pose moved by (6,) metres and a rotation vector, in its own reference frame."""
     turn = Rotation.from_rotvec(step[3:]) * Rotation.from_quat(pose.quat_wxyz, scalar_first=True)
     return Pose(position=pose.position + step[:3], quat_wxyz=turn.as_quat(scalar_first=True))
-
-
-def _rotvec(pose: Pose) -> np.ndarray:
-    return Rotation.from_quat(pose.quat_wxyz, scalar_first=True).as_rotvec()

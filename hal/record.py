@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
@@ -23,6 +25,9 @@ DESCRIPTION = """Writes the frames of a cell's camera, or a whole run on the cel
 
 The file plays back as a cell (type: replay), a camera or an arm (driver: replay): see docs/replay.md.
 Without --run the arm is asked for its state with every frame and does not move."""
+
+_OWN_S = 2.0
+"""A program that has heard Ctrl-C itself ends in less, s."""
 
 
 class RecordConfig(Config):
@@ -87,7 +92,15 @@ def _run(config: RecordConfig, command: str) -> int:
             try:
                 return process.wait()
             except KeyboardInterrupt:
-                continue  # Ctrl-C reaches the program, too, which stops the arm and ends
+                _hand_on(process)
+
+
+def _hand_on(process: subprocess.Popen[bytes]) -> None:
+    """A terminal sends Ctrl-C to the program, too, which stops the arm and ends; kill and IDEs do not."""
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(_OWN_S)
+        return
+    process.send_signal(signal.SIGINT)
 
 
 if __name__ == "__main__":

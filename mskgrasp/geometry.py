@@ -92,6 +92,13 @@ def twist_and_swing(quat_wxyz: Array) -> tuple[Array, Array]:
     return twist, swing
 
 
+def rotation_angle(quat_wxyz: Array) -> Array:
+    """Angles (...) of the rotations of unit quaternions (..., 4), radians in [0, pi]."""
+    xp = array_namespace(quat_wxyz)
+    w, x, y, z = (quat_wxyz[..., i] for i in range(4))
+    return 2 * xp.atan2(xp.sqrt(x * x + y * y + z * z), xp.abs(w))
+
+
 def quat_from_matrix(rotation: np.ndarray) -> np.ndarray:
     """Quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3)."""
     from scipy.spatial.transform import Rotation
@@ -177,3 +184,27 @@ class Pose:
     def apply(self, points_b: Array) -> Array:
         """Points (..., 3) of frame b, expressed in frame a."""
         return quat_rotate(self.quat_wxyz, points_b) + self.position
+
+
+def pose_distance(a: Pose, b: Pose) -> tuple[float, float]:
+    """How far one single pose is from another: metres, and radians of the turn between them."""
+    between = a.inverse() @ b
+    return float(np.linalg.norm(b.position - a.position)), float(rotation_angle(between.quat_wxyz))
+
+
+def straight_line(start: Pose, goal: Pose, shares: np.ndarray) -> Pose:
+    """Poses (k,) on the straight line between two, turning at constant rate the shorter way.
+
+    Args:
+        start: Where the share is 0.
+        goal: Where it is 1.
+        shares: (k,) in [0, 1].
+    """
+    from scipy.spatial.transform import Rotation, Slerp
+
+    ends = Rotation.from_quat(np.stack([start.quat_wxyz, goal.quat_wxyz]), scalar_first=True)
+    shares = np.asarray(shares, dtype=np.float64)
+    return Pose(
+        position=start.position + shares[:, None] * (goal.position - start.position),
+        quat_wxyz=Slerp([0, 1], ends)(np.clip(shares, 0, 1)).as_quat(scalar_first=True),
+    )

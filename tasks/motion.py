@@ -237,7 +237,9 @@ class PandaMotion:
             still = ((fingers - last).abs() < far).all(dim=-1)
             last = fingers
             middle = fingers.mean(dim=-1)
-            pressing = (middle - ramp[min(i, n_ramp - 1)]).abs() > lag
+            ahead = ramp[min(i, n_ramp - 1)] - middle
+            # Fingers that open press the other way until the target has passed them: they are not done.
+            pressing = torch.where(way == 0, ahead.abs(), ahead * way.sign()) > lag
             arrived = (middle - goal).abs() < 1e-3
             quiet = torch.where(still & (pressing | arrived), quiet + every, 0)
             if bool((quiet >= self.n_steps(STILL_S)).all()):

@@ -8,12 +8,15 @@ from scipy.spatial.transform import Rotation
 
 from mskgrasp.geometry import (
     Pose,
+    pose_distance,
     quat_about_z,
     quat_conjugate,
     quat_from_matrix,
     quat_multiply,
     quat_rotate,
     quat_to_matrix,
+    rotation_angle,
+    straight_line,
     twist_and_swing,
     wrap_angle,
     wrap_half_turn,
@@ -124,3 +127,36 @@ def test_poses_broadcast_over_leading_axes():
     assert np.allclose(
         quat_rotate(quat_conjugate(many.quat_wxyz), many.apply(points) - many.position), points
     )
+
+
+@given(poses(), vectors, vectors)
+def test_a_pose_is_as_far_from_another_as_it_was_moved_and_turned(pose, step, turn):
+    moved = Pose(
+        position=pose.position + step,
+        quat_wxyz=quat_multiply(Rotation.from_rotvec(turn).as_quat(scalar_first=True), pose.quat_wxyz),
+    )
+    metres, radians = pose_distance(pose, moved)
+    assert np.isclose(metres, np.linalg.norm(step), atol=1e-9)
+    angle = np.linalg.norm(turn) % (2 * np.pi)
+    assert np.isclose(radians, min(angle, 2 * np.pi - angle), atol=1e-6)
+
+
+@given(quats())
+def test_the_angle_of_a_rotation_agrees_with_scipy(quat):
+    expected = Rotation.from_quat(quat, scalar_first=True).magnitude()
+    assert np.isclose(rotation_angle(quat), expected, atol=1e-7)
+    assert np.isclose(rotation_angle(-quat), expected, atol=1e-7)
+
+
+@given(poses(), vectors, vectors.filter(lambda turn: np.linalg.norm(turn) < 3.0))
+def test_a_straight_line_moves_and_turns_at_a_constant_rate(start, step, turn):
+    goal = Pose(
+        position=start.position + step,
+        quat_wxyz=quat_multiply(Rotation.from_rotvec(turn).as_quat(scalar_first=True), start.quat_wxyz),
+    )
+    shares = np.array([0.0, 0.3, 1.0])
+    line = straight_line(start, goal, shares)
+    assert np.allclose(line.position, start.position + shares[:, None] * step)
+    for share, quat in zip(shares, line.quat_wxyz, strict=True):
+        expected = Rotation.from_rotvec(share * turn) * Rotation.from_quat(start.quat_wxyz, scalar_first=True)
+        assert np.allclose(quat_to_matrix(quat), expected.as_matrix(), atol=1e-7)

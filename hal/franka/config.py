@@ -54,6 +54,8 @@ class FrankaArmConfig(Config):
     """Pads that report this distance or less hold nothing, m."""
     connect_timeout_s: float = Field(default=10.0, gt=0, le=120)
     """A robot that another program holds never answers: given up after this, s."""
+    patience_s: float = Field(default=5.0, ge=1, le=120)
+    """A driver whose answer is overdue by this hangs, and is ended, s."""
     settle_s: float = Field(default=1.5, gt=0, le=10)
     """The arm may take this long to come to rest at a goal, s."""
     realtime: bool = False

@@ -38,6 +38,9 @@ class FrankyDriver:
     def state(self) -> DriverState:
         """Measures; may be called during a motion."""
         robot, gripper = self._robot.state, self._gripper.state
+        if not self._robot.is_in_control:
+            # The first of the waiting states is from before this call; the one after it is not.
+            robot = self._robot.state
         return DriverState(
             joints=[float(value) for value in robot.q],
             o_t_ee=column_major(robot.O_T_EE.matrix),
@@ -98,7 +101,10 @@ class FrankyDriver:
         stuck = self._robot.has_errors or MODES[int(self._robot.state.robot_mode)] == "reflex"
         if stuck and not self._robot.recover_from_errors():
             raise RuntimeError("automatic error recovery failed")
-        return all(result.wait(_OWED_S) for result in self._abandoned)
+        answered = all(result.wait(_OWED_S) for result in self._abandoned)
+        if answered:
+            self._abandoned.clear()
+        return answered
 
     def _wait(self, start: Callable[[], franky.BoolFuture]) -> bool:
         if self._stopped.is_set():

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import select
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeout
 from dataclasses import asdict
 from typing import Any
 
 from hal.errors import CommunicationLost, HalError, MotionAborted, NotConnected
-from hal.franka.driver import DriverName, DriverSettings, DriverState
+from hal.franka.driver import DriverName, DriverSettings
 from hal.franka.faults import MESSAGES
 
 _EXIT_S = 2.0
+"""How long a driver may take to stop the arm and end, s; then its process is killed."""
+_ALARM_S = 5
+"""A driver that has not connected this much later than it may ends itself, s: see the worker."""
+
+
+class NoAnswer(CommunicationLost):
+    """A request took too long."""
 
 
 class DriverLink:
@@ -37,6 +46,7 @@ class DriverLink:
     def __init__(self, name: DriverName, settings: DriverSettings, connect_timeout_s: float):
         self._host = settings.host
         self._lock = threading.Lock()
+        self._writing = threading.Lock()
         self._waiting: dict[int, Future[dict[str, Any]]] = {}
         self._number = 0
         self._ended = False
@@ -50,17 +60,24 @@ class DriverLink:
             # Ctrl-C is for the program, which then stops the arm; not for the driver under it.
             start_new_session=True,
         )
+        assert self._process.stdin is not None
+        os.set_blocking(self._process.stdin.fileno(), False)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         try:
-            self.ask("connect", timeout_s=connect_timeout_s, settings=asdict(settings))
-        except CommunicationLost as error:
+            self.ask(
+                "connect",
+                timeout_s=connect_timeout_s,
+                settings=asdict(settings),
+                alarm_s=math.ceil(connect_timeout_s) + _ALARM_S,
+            )
+        except NoAnswer as error:
             self.close()
             raise NotConnected(
-                f"{settings.host} did not accept the connection within {connect_timeout_s:g} s: another "
-                f"program may hold the robot (it serves one at a time), or the address is wrong ({error})"
+                f"{settings.host} did not answer within {connect_timeout_s:g} s: the address ('host') may be "
+                "wrong, the cable out, or another program may hold the robot, which serves one at a time"
             ) from error
-        except MotionAborted as error:
+        except (CommunicationLost, MotionAborted) as error:
             self.close()
             raise NotConnected(f"{settings.host}: connecting failed: {error}") from error
         except BaseException:
@@ -71,14 +88,6 @@ class DriverLink:
     def pid(self) -> int:
         """Of the driver's process."""
         return self._process.pid
-
-    def state(self, timeout_s: float = 3.0) -> DriverState:
-        """A fresh measurement.
-
-        Raises:
-            CommunicationLost: The robot or its driver is gone.
-        """
-        return DriverState(**self.ask("state", timeout_s=timeout_s))
 
     def ask(self, op: str, *, timeout_s: float, **values: Any) -> Any:
         """Sends a request and waits for its answer.
@@ -95,12 +104,13 @@ class DriverLink:
             self._number += 1
             number = self._number
             self._waiting[number] = answer
-            self._send({"id": number, "op": op, **values})
+        deadline_s = time.monotonic() + timeout_s
         try:
-            reply = answer.result(timeout_s)
-        except FutureTimeout:
+            self._send({"id": number, "op": op, **values}, deadline_s)
+            reply = answer.result(max(0.0, deadline_s - time.monotonic()))
+        except TimeoutError:
             self._kill()
-            raise CommunicationLost(
+            raise NoAnswer(
                 f"no answer from {self._host} to '{op}' within {timeout_s:.1f} s; its link was closed and "
                 "the robot has stopped: open the cell again"
             ) from None
@@ -115,11 +125,10 @@ class DriverLink:
 
     def close(self) -> None:
         """Stops the arm and ends the process; safe to call twice."""
-        if self._process.stdin is not None and not self._process.stdin.closed:
-            try:
-                self._process.stdin.close()
-            except BrokenPipeError:
-                pass  # it is gone already
+        assert self._process.stdin is not None
+        # A request that cannot be written waits no longer than it may.
+        with self._writing:
+            self._process.stdin.close()
         try:
             self._process.wait(_EXIT_S)
         except subprocess.TimeoutExpired:
@@ -130,20 +139,38 @@ class DriverLink:
             self._process.stdout.close()
         self._log.close()
 
-    def _send(self, request: dict[str, Any]) -> None:
+    def _send(self, request: dict[str, Any], deadline_s: float) -> None:
+        """Writes a request: a driver that hangs reads none, and a path may be longer than the pipe.
+
+        Raises:
+            TimeoutError: It could not be written in time.
+            CommunicationLost: The driver's process has ended.
+        """
         stdin = self._process.stdin
+        assert stdin is not None
+        rest = memoryview(json.dumps(request).encode() + b"\n")
+        if not self._writing.acquire(timeout=max(0.0, deadline_s - time.monotonic())):
+            raise TimeoutError
         try:
-            if stdin is None or stdin.closed:
-                raise BrokenPipeError
-            stdin.write(json.dumps(request).encode() + b"\n")
-            stdin.flush()
+            while rest:
+                if stdin.closed:
+                    raise BrokenPipeError
+                _, ready, _ = select.select([], [stdin], [], max(0.0, deadline_s - time.monotonic()))
+                if not ready:
+                    raise TimeoutError
+                rest = rest[os.write(stdin.fileno(), rest) :]
         except BrokenPipeError:
             raise CommunicationLost(self._epitaph()) from None
+        finally:
+            self._writing.release()
 
     def _read(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            reply = json.loads(line)
+            try:
+                reply = json.loads(line)
+            except ValueError:
+                break  # it was killed while it wrote
             answer = self._waiting.get(reply["id"])
             if answer is not None:
                 answer.set_result(reply)
@@ -156,7 +183,11 @@ class DriverLink:
                 answer.set_result(lost)
 
     def _epitaph(self) -> str:
-        code = self._process.wait(_EXIT_S)
+        try:
+            code = self._process.wait(_EXIT_S)
+        except subprocess.TimeoutExpired:
+            self._kill()
+            code = self._process.wait()
         why = f"ended by signal {-code}" if code < 0 else f"ended with code {code}: {self._last_words()}"
         return f"the driver's process for {self._host} {why}; the robot has stopped: open the cell again"
 

@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
-from concurrent.futures import TimeoutError as FutureTimeout
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -177,7 +176,10 @@ class PandaPyDriver:
         with self._use:
             if MODES[int(self._robot.read_once().robot_mode)] == "reflex":
                 self._robot.automatic_error_recovery()
-        return not wait(self._abandoned, _OWED_S).not_done
+        answered = not wait(self._abandoned, _OWED_S).not_done
+        if answered:
+            self._abandoned.clear()
+        return answered
 
     def _wait(self, command: Callable[[], bool]) -> bool:
         """Runs a command of the gripper, which stops it when asked to."""
@@ -195,7 +197,7 @@ class PandaPyDriver:
         while True:
             try:
                 return result.result(_POLL_S)
-            except FutureTimeout:
+            except TimeoutError:
                 if self._stopped.is_set():
                     self._abandoned.append(result)
                     self._gripper.stop()

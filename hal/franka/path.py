@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from hal.errors import OutOfWorkspace
 from hal.franka.kinematics import forward_pose, solved, track, within
-from mskgrasp.geometry import Pose
+from mskgrasp.geometry import Pose, pose_distance, straight_line
 
 PERIOD_S = 0.05
 """Time between two knots of a path, s: a cubic between them is off by less than 0.1 mm at 0.5 m/s."""
@@ -76,33 +75,22 @@ def straight_path(
         OutOfWorkspace: The line leaves the arm's reach or its joint limits; nothing moved.
     """
     here = forward_pose(start)
-    ends = Rotation.from_quat(np.stack([here.quat_wxyz, goal.quat_wxyz]), scalar_first=True)
-    distance = float(np.linalg.norm(goal.position - here.position))
-    angle = float((ends[0].inv() * ends[1]).magnitude())
+    distance, angle = pose_distance(here, goal)
     seconds = max(_duration(distance, speed, acceleration), _duration(angle, turn_speed, turn_acceleration))
-    path = _along(start, here.position, goal.position, ends, seconds, lower, upper)
+    path = _along(start, here, goal, seconds, lower, upper)
     excess = float((np.abs(path.speeds) / joint_speed).max())
     if excess > 1.0:
-        path = _along(start, here.position, goal.position, ends, 1.02 * excess * seconds, lower, upper)
+        path = _along(start, here, goal, 1.02 * excess * seconds, lower, upper)
     return path
 
 
 def _along(
-    start: np.ndarray,
-    begin: np.ndarray,
-    end: np.ndarray,
-    turn: Rotation,
-    seconds: float,
-    lower: np.ndarray,
-    upper: np.ndarray,
+    start: np.ndarray, here: Pose, goal: Pose, seconds: float, lower: np.ndarray, upper: np.ndarray
 ) -> JointPath:
     share, _ = _profile(seconds)
-    line = np.tile(np.eye(4), (len(share), 1, 1))
-    line[:, :3, :3] = Slerp([0, 1], turn)(np.clip(share, 0, 1)).as_matrix()
-    line[:, :3, 3] = begin + share[:, None] * (end - begin)
-    joints, error = track(line, start)
+    joints, error = track(straight_line(here, goal, share).as_matrix(), start)
     if not solved(error) or not within(joints, lower, upper):
-        target = ", ".join(f"{value:.3f}" for value in end)
+        target = ", ".join(f"{value:.3f}" for value in goal.position)
         raise OutOfWorkspace(
             f"no straight line from here to TCP ({target}) m within the joint limits; "
             "move to other joints first"

@@ -7,9 +7,11 @@ because the program closed it or died, the arm is stopped and the process ends.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import queue
+import signal
 import sys
 import threading
 from collections.abc import Callable
@@ -52,10 +54,15 @@ class Worker:
                 self._answer(request)
             else:
                 self._motions.put(request)
-        if self._driver is not None:
-            self._driver.stop()
+        # In a thread: whoever asks a robot that is gone to stop may wait for ever.
+        threading.Thread(target=self._stop, daemon=True).start()
         self._motions.put(None)
         motions.join(_STOP_S)
+
+    def _stop(self) -> None:
+        if self._driver is not None:
+            with contextlib.suppress(Exception):  # nobody is left to be told
+                self._driver.stop()
 
     def _run_motions(self) -> None:
         while (request := self._motions.get()) is not None:
@@ -75,8 +82,15 @@ class Worker:
         if request["op"] == "connect":
             settings = DriverSettings(**request["settings"])
             self._host = settings.host
-            self._driver = new_driver(self._name)
-            self._driver.connect(settings)
+            # Python's lock is held meanwhile. Where the program is killed now, the kernel alone can end this
+            # process, which would otherwise take the robot as soon as it is free.
+            signal.alarm(request["alarm_s"])
+            try:
+                driver = new_driver(self._name)
+                driver.connect(settings)
+            finally:
+                signal.alarm(0)
+            self._driver = driver
             return None
         driver = self._driver
         assert driver is not None, "the first request is connect"

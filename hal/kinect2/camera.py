@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 from dataclasses import asdict
 
@@ -20,6 +21,8 @@ from mskgrasp.geometry import Pose
 _log = logging.getLogger(__name__)
 _GRACE_S = 1.0
 """The driver ends a request itself; if it has not this much later it hangs, s."""
+_ORPHAN_S = 3.0
+"""Where nobody is left to end a driver that hangs, it ends itself this much later, s."""
 
 
 class Kinect2Camera(Camera):
@@ -59,11 +62,13 @@ class Kinect2Camera(Camera):
             max_skew_s=config.max_skew_s,
             timeout_s=config.connect_timeout_s,
         )
+        # Opening and starting take up to ten seconds of their own.
+        opening_s = config.connect_timeout_s + 10
         link = WorkerLink()
         try:
-            # Opening and starting take up to ten seconds of their own.
             reply, _ = link.ask(
-                {"op": "connect", "settings": asdict(settings)}, timeout_s=config.connect_timeout_s + 10
+                {"op": "connect", "settings": asdict(settings), "alarm_s": _alarm_s(opening_s)},
+                timeout_s=opening_s,
             )
             self._serial = reply["serial"]
             if config.serial is None:
@@ -88,10 +93,11 @@ class Kinect2Camera(Camera):
             )
 
     def close(self) -> None:
-        """Stops the stream and releases the camera; safe to call twice."""
-        if self._link is not None:
-            link, self._link = self._link, None
-            link.close()
+        """Stops the stream and releases the camera, once a capture of another thread is over."""
+        with self._lock:
+            if self._link is not None:
+                link, self._link = self._link, None
+                link.close()
 
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
         """Takes a frame that is exposed after this call.
@@ -111,7 +117,7 @@ class Kinect2Camera(Camera):
             n_pixels = WIDTH * HEIGHT
             try:
                 reply, data = self._link.ask(
-                    {"op": "capture", "timeout_s": timeout_s},
+                    {"op": "capture", "timeout_s": timeout_s, "alarm_s": _alarm_s(timeout_s)},
                     timeout_s=timeout_s + _GRACE_S,
                     n_bytes=8 * n_pixels,
                 )
@@ -148,3 +154,7 @@ class Kinect2Camera(Camera):
         assert self._calibration is not None
         calibrated = self._calibration.intrinsics
         return factory if calibrated is None else np.asarray(calibrated, dtype=np.float64)
+
+
+def _alarm_s(timeout_s: float) -> int:
+    return math.ceil(timeout_s + _GRACE_S + _ORPHAN_S)

@@ -58,7 +58,16 @@ class WorkerLink:
             ProcessEnded: It crashed, or did not answer within ``timeout_s`` and was killed.
             HalError: What the driver answered.
         """
-        deadline_s = time.monotonic() + timeout_s
+        try:
+            return self._ask(request, time.monotonic() + timeout_s, n_bytes)
+        except (ProcessEnded, HalError):
+            raise
+        except BaseException:
+            # Ctrl-C leaves half an answer in the pipe: the next request would get a frame from before it.
+            self._kill()
+            raise
+
+    def _ask(self, request: dict[str, Any], deadline_s: float, n_bytes: int) -> tuple[dict[str, Any], bytes]:
         try:
             assert self._process.stdin is not None
             self._process.stdin.write(json.dumps(request).encode() + b"\n")
@@ -89,8 +98,7 @@ class WorkerLink:
         try:
             process.wait(_EXIT_S)
         except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+            self._kill()
         process.stdout.close()
         self._log.close()
 
@@ -99,8 +107,7 @@ class WorkerLink:
         descriptor = self._process.stdout.fileno()
         ready, _, _ = select.select([descriptor], [], [], max(0.0, deadline_s - time.monotonic()))
         if not ready:
-            self._process.kill()
-            self._process.wait()
+            self._kill()
             raise ProcessEnded("the driver hung and was ended")
         data = os.read(descriptor, 1 << 20)
         if not data:
@@ -108,10 +115,18 @@ class WorkerLink:
         return data
 
     def _epitaph(self) -> str:
-        code = self._process.wait()
+        try:
+            code = self._process.wait(_EXIT_S)
+        except subprocess.TimeoutExpired:  # its pipe is closed, it is not
+            self._kill()
+            code = self._process.wait()
         how = f"exit code {code}" if code >= 0 else signal.Signals(-code).name
         self._log.seek(0)
         lines = [
             line.strip() for line in self._log.read().decode(errors="replace").splitlines() if line.strip()
         ]
         return f"the driver's process ended with {how}" + (f" ({lines[-1]})" if lines else "")
+
+    def _kill(self) -> None:
+        self._process.kill()
+        self._process.wait()

@@ -10,11 +10,15 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 from typing import Any, BinaryIO, TextIO
 
 from hal.errors import CommunicationLost, HalError
 from hal.kinect2.driver import Kinect2Driver, Kinect2Settings
+
+_CLOSE_S = 5
+"""A camera that does not stop is left to the kernel after this, s."""
 
 
 def serve(requests: TextIO, replies: BinaryIO) -> None:
@@ -22,6 +26,8 @@ def serve(requests: TextIO, replies: BinaryIO) -> None:
     driver: Kinect2Driver | None = None
     for line in requests:
         request = json.loads(line)
+        # The kernel ends a driver that hangs, also where its program was killed and cannot.
+        signal.alarm(request["alarm_s"])
         payload: list[memoryview] = []
         try:
             reply: dict[str, Any] = {}
@@ -40,11 +46,13 @@ def serve(requests: TextIO, replies: BinaryIO) -> None:
         except Exception as error:  # whatever the vendor raises must reach the other side
             text = f"pylibfreenect2 failed ({type(error).__name__}: {error}); open the cell again"
             reply = {"error": CommunicationLost.__name__, "message": text}
+        signal.alarm(0)
         replies.write(json.dumps(reply).encode() + b"\n")
         for part in payload:
             replies.write(part)
         replies.flush()
     if driver is not None:
+        signal.alarm(_CLOSE_S)
         driver.close()
 
 

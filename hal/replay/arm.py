@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from hal.arm import Arm, ArmState, GraspOutcome
-from hal.errors import MotionAborted, NeedsRecovery, NotRecorded
+from hal.errors import MotionAborted, NeedsRecovery, NotRecorded, OutOfWorkspace
 from hal.replay.config import ReplayArmConfig
 from hal.replay.events import COMMANDS, arm_state, plain
 from hal.replay.playback import Playback
 from hal.replay.reader import read_recording
+from mskgrasp.errors import MskgraspError
 from mskgrasp.geometry import Pose
 
 
@@ -35,13 +36,14 @@ class ReplayArm(Arm):
         self._playback = playback or Playback(read_recording(config.recording), calls, config.tolerances)
         super().__init__(self._playback.recording.limits)
         self._open = False
+        # The fault is this program's, not the recorded one's: what acknowledges it was not recorded, either.
+        self._astray = False
 
     def connect(self) -> None:
         """Goes to the beginning of the recording."""
         if not self._open:
             self._playback.open()
-            self._stop.clear()
-            self._fault = None
+            self._acknowledge()
             self._open = True
 
     def close(self) -> None:
@@ -87,10 +89,9 @@ class ReplayArm(Arm):
     def recover(self) -> None:
         """Acknowledges a recorded error, or that the program did something else than was recorded."""
         self._require_connection()
-        if self._fault is None:
-            self._replay("recover")
-        self._fault = None
-        self._stop.clear()
+        if not self._astray:
+            self._step("recover", {})
+        self._acknowledge()
 
     def check_pose(self, T_base_tcp: Pose) -> None:
         """Refuses what the recorded arm refused.
@@ -104,18 +105,27 @@ class ReplayArm(Arm):
     def _replay(self, call: str, **arguments: Any) -> Any:
         self._require_connection()
         following = self._playback.peek()
-        if self._fault is not None:
+        error = following.error[0] if following is not None and following.error is not None else None
+        if self._fault is not None and error != NeedsRecovery.__name__:
             raise NeedsRecovery(f"the arm stopped before ({self._fault}); look at it, then call recover()")
         # A recorded stop ended a recorded motion; one that comes now ends this one.
-        if self._stop.is_set() and call != "recover" and (following is None or following.error is None):
+        if self._stop.is_set() and error is None:
+            self._fault, self._astray = "stop() was called", True
             raise MotionAborted("stop() was called; call recover() when it is safe")
+        return self._step(call, {key: plain(value) for key, value in arguments.items()})
+
+    def _step(self, call: str, arguments: dict[str, Any]) -> Any:
         try:
-            return self._playback.command(
-                call, {key: plain(value) for key, value in arguments.items()}
-            ).result
-        except NotRecorded as error:
-            self._fault = str(error)
+            return self._playback.command(call, arguments).result
+        except (OutOfWorkspace, NeedsRecovery):
+            raise  # no fault: nothing had moved
+        except MskgraspError as error:
+            self._fault, self._astray = str(error), isinstance(error, NotRecorded)
             raise
+
+    def _acknowledge(self) -> None:
+        self._fault, self._astray = None, False
+        self._stop.clear()
 
     def _connected(self) -> bool:
         return self._open
@@ -123,11 +133,8 @@ class ReplayArm(Arm):
     def _halt(self) -> None:
         """Nothing moves."""
 
-    def _reachable(self, T_base_tcp: Pose) -> bool:
-        return True  # what the recorded arm could not reach, it refused
-
     def _beneath(self, *_: Any, **__: Any) -> Any:
         raise AssertionError("a recording answers above the backend")
 
-    _state = _forward = _move_to_joints = _move_to_pose = _move_gripper = _grasp = _beneath
-    _wait = _recover = _beneath
+    _state = _forward = _reachable = _move_to_joints = _move_to_pose = _move_gripper = _beneath
+    _grasp = _wait = _recover = _beneath

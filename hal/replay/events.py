@@ -12,7 +12,7 @@ from hal.arm import ArmState, GraspOutcome
 from hal.errors import HalError, MotionAborted
 from mskgrasp import errors as base_errors
 from mskgrasp.errors import MskgraspError
-from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply
+from mskgrasp.geometry import Pose
 
 SCHEMA = 1
 KIND = "mskgrasp cell recording"
@@ -95,11 +95,3 @@ def rebuild(error: tuple[str, str]) -> MskgraspError:
     if name == KeyboardInterrupt.__name__:
         return MotionAborted("at this point of the recording Ctrl-C was pressed; call recover()")
     return _ERRORS.get(name, HalError)(message)
-
-
-def distances(one: list[float], other: list[float]) -> tuple[float, float]:
-    """How far two poses are apart: metres and radians."""
-    a, b = pose(one), pose(other)
-    turn = quat_multiply(quat_conjugate(a.quat_wxyz), b.quat_wxyz)
-    angle = 2 * float(np.arctan2(np.linalg.norm(turn[1:]), abs(turn[0])))
-    return float(np.linalg.norm(a.position - b.position)), angle

@@ -10,8 +10,9 @@ import numpy as np
 
 from hal.errors import CaptureFailed, NotRecorded
 from hal.replay.config import Tolerances
-from hal.replay.events import COMMANDS, Event, distances, rebuild
+from hal.replay.events import COMMANDS, Event, pose, rebuild
 from hal.replay.reader import Recording
+from mskgrasp.geometry import pose_distance
 
 
 class Playback:
@@ -147,7 +148,7 @@ class Playback:
         if key == "T_base_tcp":
             if not np.isfinite([*recorded, *asked]).all():
                 return bool(np.array_equal(recorded, asked, equal_nan=True))
-            distance, angle = distances(recorded, asked)
+            distance, angle = pose_distance(pose(recorded), pose(asked))
             return distance <= limit.position and angle <= limit.rotation
         if isinstance(recorded, str) or isinstance(asked, str):
             return recorded == asked

@@ -10,10 +10,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from hal.arm import ArmLimits
 from hal.camera import RgbdFrame
 from hal.cell import Workspace
 from hal.errors import BadRecording
+from hal.limits import ArmLimits
 from hal.replay.events import KIND, SCHEMA, Event, pose
 
 

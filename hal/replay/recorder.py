@@ -138,19 +138,11 @@ class RecordingArm(Arm):
     def _connected(self) -> bool:
         return self._open
 
-    def _halt(self) -> None:
-        self._arm.stop()
-
-    def _reachable(self, T_base_tcp: Pose) -> bool:
-        return self._arm._reachable(T_base_tcp)
-
-    def _forward(self, joints: np.ndarray) -> Pose:
-        return self._arm._forward(joints)
-
     def _beneath(self, *_: Any, **__: Any) -> Any:
         raise AssertionError("everything is passed on above the backend")
 
-    _state = _move_to_joints = _move_to_pose = _move_gripper = _grasp = _wait = _recover = _beneath
+    _state = _forward = _reachable = _move_to_joints = _move_to_pose = _move_gripper = _beneath
+    _grasp = _wait = _halt = _recover = _beneath
 
 
 class RecordingFeeder:

@@ -36,9 +36,14 @@ class RecordingWriter:
     """
 
     def __init__(self, path: Path, workspace: Workspace, arm: Arm):
+        self._path = path
         if path.exists():
             raise UsageError(f"{path} exists already; move it away or choose another file")
-        self._path = path
+        if self.part.exists():
+            raise UsageError(
+                f"{self.part} is there, of a program that is recording or was killed; move it away (it can "
+                "be played back) or choose another file"
+            )
         self._table = {key: plain(value) for key, value in asdict(workspace).items()}
         self._limits = {key: plain(value) for key, value in vars(arm.limits).items()}
         self._lock = threading.Lock()
@@ -57,7 +62,7 @@ class RecordingWriter:
         if self._file is None:
             try:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
-                self._file = h5py.File(self.part, "w")
+                self._file = h5py.File(self.part, "x")
             except OSError as error:
                 self._users -= 1
                 raise UsageError(f"cannot write {self.part}: {error}; choose another file") from error

@@ -9,10 +9,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hal.arm import Arm, ArmLimits, ArmState, GraspOutcome
+from hal.arm import Arm, ArmState, GraspOutcome
 from hal.errors import MotionAborted, OutOfWorkspace
+from hal.limits import ArmLimits
 from hal.sim.world import SapienWorld
-from mskgrasp.geometry import Pose
+from mskgrasp.geometry import Pose, pose_distance, straight_line
 from mskgrasp.grasp import MAX_OPENING, MIN_GAP
 from tasks.kinematics import HOME, forward, track
 from tasks.motion import PEAK_ACCELERATION, ease, ease_duration
@@ -77,15 +78,14 @@ class SapienArm(Arm):
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
         start = self._target()
         here = Pose.from_matrix(forward(start)[0].numpy())
-        distance = float(np.linalg.norm(T_base_tcp.position - here.position))
-        angle = 2 * math.acos(min(1.0, abs(float(np.dot(here.quat_wxyz, T_base_tcp.quat_wxyz)))))
+        distance, angle = pose_distance(here, T_base_tcp)
         seconds = max(
             ease_duration(distance, speed, PEAK_ACCELERATION),
             ease_duration(angle, TURN_SPEED, JOINT_ACCELERATION),
         )
         n_waypoints = max(2, math.ceil(distance / _WAYPOINT_M), math.ceil(angle / 0.05))
-        line = _straight(here, T_base_tcp, np.linspace(0, 1, n_waypoints + 1)[1:])
-        joints, error = track(torch.as_tensor(line), start)
+        line = straight_line(here, T_base_tcp, np.linspace(0, 1, n_waypoints + 1)[1:])
+        joints, error = track(torch.as_tensor(line.as_matrix()), start)
         if float(error.max()) > UNREACHED or not self._within_limits(joints.numpy()):
             target = ", ".join(f"{value:.3f}" for value in T_base_tcp.position)
             raise OutOfWorkspace(f"no straight line from here to TCP ({target}) m within the joint limits")
@@ -158,17 +158,6 @@ class SapienArm(Arm):
         env = self._world.env
         joints = env.agent.robot.get_qpos()[:, :7].double()
         env.motion.set_arm(joints, torch.zeros_like(joints))
-
-
-def _straight(start: Pose, goal: Pose, share: np.ndarray) -> np.ndarray:
-    """(k, 4, 4) poses on the straight line between two, turning at constant rate."""
-    from scipy.spatial.transform import Rotation, Slerp
-
-    ends = Rotation.from_quat(np.stack([start.quat_wxyz, goal.quat_wxyz]), scalar_first=True)
-    line = np.tile(np.eye(4), (len(share), 1, 1))
-    line[:, :3, :3] = Slerp([0, 1], ends)(share).as_matrix()
-    line[:, :3, 3] = start.position + share[:, None] * (goal.position - start.position)
-    return line
 
 
 def _interpolate(waypoints: Tensor, share: Tensor) -> Tensor:

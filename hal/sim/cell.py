@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from pydantic import Field, model_validator
 
-from hal.arm import ArmLimits
 from hal.cell import Cell, Workspace
+from hal.limits import ArmLimits
 from hal.sim.arm import SapienArm
 from hal.sim.camera import SapienCamera
 from hal.sim.noise import SensorNoise

@@ -62,27 +62,37 @@ class SapienWorld:
 
     def open(self) -> None:
         """Builds the world for its first user."""
-        self._users += 1
         if self._gym is None:
-            logging.getLogger("mani_skill").setLevel(logging.ERROR)
-            part, seed = self._first
-            folder = str(find_part(part).folder)
-            self._gym = gymnasium.make(
-                "GraspDisplacement-v1",
-                parts=[folder],
-                obs_mode="none",
-                physics=self.physics.model_dump(),
-                camera=self.overhead.model_dump(),
-                region=self.region,
-                sim_backend="physx_cpu",
-                render_backend=render_backend(),
-            )
+            self._build()
+        self._users += 1
+
+    def _build(self) -> None:
+        logging.getLogger("mani_skill").setLevel(logging.ERROR)
+        part, seed = self._first
+        self._gym = gymnasium.make(
+            "GraspDisplacement-v1",
+            parts=[str(find_part(part).folder)],
+            obs_mode="none",
+            physics=self.physics.model_dump(),
+            camera=self.overhead.model_dump(),
+            region=self.region,
+            sim_backend="physx_cpu",
+            render_backend=render_backend(),
+        )
+        try:
             self.present(part, seed)
+        except BaseException:
+            self._free()
+            raise
 
     def close(self) -> None:
         """Frees the world after its last user."""
         self._users = max(0, self._users - 1)
-        if self._users == 0 and self._gym is not None:
+        if self._users == 0:
+            self._free()
+
+    def _free(self) -> None:
+        if self._gym is not None:
             self._gym.close()
             self._gym = None
 

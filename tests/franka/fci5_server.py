@@ -5,7 +5,8 @@ have inertia and dry friction, and a hand that can hold a part. Written from the
 the tests: it knows external torque control alone, which is what panda_py uses. MODEL is the shared object
 that the client loads for its dynamics. Faults are commanded on standard input, one a line:
 
-    reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | unhomed | q
+    reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | unhomed | flange |
+    q (answers with the joints) | clock (answers with the robot's time, s)
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ FRICTION = np.array([0.5, 0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
 """N m of dry friction: leaves the impedance controller up to 4 mrad short of its goal."""
 COMMAND = struct.Struct("<Q 7d7d16d6d2d ?? 7d")
 TICK = 1e-3
+TURN_S = 3e-4
 ANSWERS = {"ok": 0, "fail": 1, "unsuccessful": 2, "aborted": 3}
 
 
@@ -53,6 +55,7 @@ class Robot:
     answered: bool = False
     tick: int = 0
     pose: np.ndarray = field(default_factory=lambda: forward(READY)[0])
+    f_t_ee: np.ndarray = field(default_factory=lambda: F_T_EE)
 
     def step(self) -> None:
         self.tick += 1
@@ -75,7 +78,7 @@ class Robot:
             RobotState(
                 tick=self.tick,
                 pose=self.pose,
-                f_t_ee=F_T_EE,
+                f_t_ee=self.f_t_ee,
                 q=self.q,
                 dq=self.dq,
                 torque=self.torque,
@@ -139,6 +142,8 @@ class Robot:
                 self.finish(2, USER_STOPPED)
             case "user_release":
                 self.mode = IDLE
+            case "flange":
+                self.f_t_ee = np.eye(4)  # no end effector is chosen in Desk
 
 
 @dataclass
@@ -234,11 +239,11 @@ def main() -> None:
             words = line.split()
             robot.fault(words)
             hand.fault(words)
-            print(" ".join(map(str, robot.q)) if words == ["q"] else "done", flush=True)
+            answers = {"q": " ".join(map(str, robot.q)), "clock": f"{robot.tick * TICK}"}
+            print(answers.get(words[0], "done"), flush=True)
         due = max(due + TICK, time.monotonic() - 0.005)
-        ahead = due - time.monotonic()
-        if ahead > 1e-4:
-            time.sleep(ahead)
+        # Late or not, its client must get a turn: a server that never sleeps starves it on a busy machine.
+        time.sleep(max(due - time.monotonic(), TURN_S))
 
 
 if __name__ == "__main__":

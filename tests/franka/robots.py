@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -21,7 +22,9 @@ import yaml
 
 from hal.franka.driver import DriverName
 
-_HOSTS = (f"127.{os.getpid() >> 8 & 255}.{os.getpid() & 255}.{k}" for k in itertools.count(1))
+HOSTS = (f"127.{os.getpid() >> 8 & 255}.{os.getpid() & 255}.{k}" for k in itertools.count(1))
+TIMEOUT_S = 120.0
+"""For what takes a second on an idle machine."""
 _SYMBOLS = [
     *(f"{kind}{k}" for kind in ("Ji_J_J", "O_J_J", "O_T_J") for k in range(1, 10)),
     "M_NE",
@@ -54,6 +57,20 @@ class FakeRobot:
         """(7,) where the arm truly is, radians."""
         return np.array([float(value) for value in self.order("q").split()])
 
+    def wait(self, seconds: float) -> None:
+        """Returns when the robot has lived through so many seconds: a busy machine takes longer for them."""
+        end, deadline = float(self.order("clock")) + seconds, time.monotonic() + TIMEOUT_S
+        while float(self.order("clock")) < end:
+            assert time.monotonic() < deadline, "the simulated robot stands still"
+            time.sleep(0.02)
+
+    def wait_until_moved(self, begin: np.ndarray, radians: float = 0.02) -> None:
+        """Returns when a joint is this far from where it began."""
+        deadline = time.monotonic() + TIMEOUT_S
+        while np.abs(self.joints() - begin).max() < radians:
+            assert time.monotonic() < deadline, "the arm never moved"
+            time.sleep(0.02)
+
     def freeze(self) -> None:
         """Answers nothing any more, as with the cable pulled."""
         self.process.send_signal(signal.SIGSTOP)
@@ -62,7 +79,7 @@ class FakeRobot:
 @contextmanager
 def franky_sim(host: str | None = None) -> Iterator[FakeRobot]:
     """An FR3 that franky can drive: franky-sim, in MuJoCo."""
-    with _serve("tests.franka.franky_sim_server", host or next(_HOSTS), []) as robot:
+    with _serve("tests.franka.franky_sim_server", host or next(HOSTS), []) as robot:
         yield robot
 
 
@@ -72,7 +89,7 @@ def fci5(host: str | None = None, version: int = 5) -> Iterator[FakeRobot]:
     with tempfile.TemporaryDirectory() as folder:
         model = build_model(Path(folder))
         arguments = [str(model), str(version)]
-        with _serve("tests.franka.fci5_server", host or next(_HOSTS), arguments) as robot:
+        with _serve("tests.franka.fci5_server", host or next(HOSTS), arguments) as robot:
             yield robot
 
 
@@ -98,9 +115,10 @@ def write_cell(
         "acceleration": 3.0,
         "joint_acceleration": 6.0,
         "gripper_speed": 0.1,
-        # A busy machine simulates several times slower than real time.
-        "settle_s": 8.0,
-        "connect_timeout_s": 30.0,
+        # A busy machine simulates several times slower than real time, and takes its time to start Python.
+        "settle_s": 10.0,
+        "patience_s": 100.0,
+        "connect_timeout_s": 120.0,
         **arm,
     }
     path = folder / f"{driver}.yaml"

@@ -5,14 +5,17 @@ The drivers are the real wheels over the real wire protocol; the faults are made
 
 from __future__ import annotations
 
+import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -28,9 +31,9 @@ from hal.errors import (
     NotConnected,
 )
 from hal.franka import FrankaArm
-from hal.franka.driver import DriverName
+from hal.franka.driver import DriverName, DriverSettings
 from mskgrasp.geometry import Pose
-from tests.franka.robots import FakeRobot, fci5, robot_for, write_cell
+from tests.franka.robots import HOSTS, TIMEOUT_S, FakeRobot, fci5, robot_for, write_cell
 
 
 def arm_at(folder: Path, driver: DriverName, host: str, **settings: object) -> FrankaArm:
@@ -41,29 +44,30 @@ def arm_at(folder: Path, driver: DriverName, host: str, **settings: object) -> F
 
 @contextmanager
 def once_moving(robot: FakeRobot, action: Callable[[], object]) -> Iterator[None]:
-    """Does something when the arm is on its way."""
+    """Does something when the arm is on its way; what comes of it must come within seconds."""
     begin = robot.joints()
 
-    def wait() -> None:
-        deadline = time.monotonic() + 30
-        while np.abs(robot.joints() - begin).max() < 0.02 and time.monotonic() < deadline:
-            time.sleep(0.05)
+    def act() -> None:
+        robot.wait_until_moved(begin)
         acted.append(time.monotonic())
         action()
 
     acted: list[float] = []
-    thread = threading.Thread(target=wait)
+    thread = threading.Thread(target=act)
     thread.start()
-    yield
-    thread.join()
-    # Told within seconds of the fault; libfranka itself gives up a silent link after one or two.
-    assert time.monotonic() - acted[0] < 10
+    try:
+        yield
+    finally:
+        thread.join()
+    assert acted, "the arm never moved"
+    # libfranka gives up a silent link after one or two seconds; what hangs takes over 100 s (patience_s).
+    assert time.monotonic() - acted[0] < 60
 
 
 def assert_at_rest(robot: FakeRobot) -> None:
-    time.sleep(0.5)
+    robot.wait(0.5)  # an arm brakes for a moment
     first = robot.joints()
-    time.sleep(0.5)
+    robot.wait(0.5)
     assert robot.joints() == pytest.approx(first, abs=1e-2)  # MuJoCo creeps; the motion makes ten times that
 
 
@@ -137,9 +141,20 @@ def test_the_user_stop_is_told_and_recover_waits_for_its_release(
             slow(arm)
         with pytest.raises(NeedsRecovery, match="user stop"):
             arm.recover()
+        with pytest.raises(NeedsRecovery, match=r"recover\(\)"):
+            nudge(arm)
         robot.order("user_release")
         arm.recover()
         nudge(arm)
+
+
+def test_a_state_is_measured_after_it_was_asked_for(driver: DriverName, robot: FakeRobot, tmp_path: Path):
+    """libfranka keeps a sample that nobody has read; the first to ask would get what was true before."""
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        for _ in range(20):
+            for order, mode in (("user_stop", "user_stopped"), ("user_release", "idle")):
+                robot.order(order)
+                assert arm._measure().mode == mode
 
 
 def test_a_cable_pulled_in_mid_motion_is_told_within_seconds(
@@ -155,7 +170,6 @@ def test_a_cable_pulled_in_mid_motion_is_told_within_seconds(
             with pytest.raises(CommunicationLost):
                 command()
     robot.process.send_signal(signal.SIGCONT)
-    time.sleep(0.5)
     assert_at_rest(robot)
     with arm_at(tmp_path, driver, robot.host) as arm:
         arm.recover()
@@ -179,9 +193,11 @@ def test_a_second_program_is_told_and_the_first_goes_on(driver: DriverName, robo
     with arm_at(tmp_path, driver, robot.host) as arm:
         second = arm_at(tmp_path, driver, robot.host, connect_timeout_s=4.0)
         begin = time.monotonic()
-        with pytest.raises(NotConnected, match="another program may hold the robot"):
+        with pytest.raises(
+            NotConnected, match="did not answer within 4 s: .* another program may hold the robot"
+        ):
             second.connect()
-        assert time.monotonic() - begin < 8
+        assert time.monotonic() - begin < 30
         nudge(arm)
         arm.close()
         with arm_at(tmp_path, driver, robot.host) as third:
@@ -197,7 +213,6 @@ def test_a_driver_process_that_dies_is_told_and_the_arm_stops(
         with once_moving(robot, lambda: os.kill(link.pid, signal.SIGKILL)):
             with pytest.raises(CommunicationLost, match="ended by signal 9"):
                 slow(arm)
-        time.sleep(0.3)
         assert_at_rest(robot)
     with arm_at(tmp_path, driver, robot.host) as arm:
         nudge(arm)
@@ -223,18 +238,17 @@ def test_a_program_that_is_ended_in_mid_motion_leaves_an_arm_at_rest(
         [sys.executable, "-c", code, path], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert program.stdout is not None
+    begin = robot.joints()
     assert program.stdout.readline().strip() == "moving"
-    begin, deadline = robot.joints(), time.monotonic() + 60
-    while np.abs(robot.joints() - begin).max() < 0.01:
-        assert time.monotonic() < deadline and program.poll() is None, "it never moved"
-        time.sleep(0.05)
+    robot.wait_until_moved(begin, 0.01)
     program.send_signal(ending)
-    _, error = program.communicate(timeout=20)
+    _, error = program.communicate(timeout=TIMEOUT_S)
     assert program.returncode != 0
     if ending is signal.SIGINT:
         assert "KeyboardInterrupt" in error
-    time.sleep(1.5)
+    robot.wait(1.5)
     assert_at_rest(robot)
+    assert np.abs(robot.joints() - begin).max() < 0.4  # it was going for 0.5 rad or more
     with arm_at(tmp_path, driver, robot.host) as arm:
         arm.move_gripper(0.05)
 
@@ -291,6 +305,47 @@ def test_a_missing_package_is_told_with_its_extra(driver: DriverName, tmp_path: 
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(DriverMissing, match=r"pip install 'mskgrasp\[franka\]'"):
         arm_at(tmp_path, driver, "127.0.0.250").connect()
+
+
+def test_another_end_effector_in_desk_is_told(tmp_path: Path):
+    """Our server alone: franky-sim's hand cannot be taken off."""
+    with fci5() as robot:
+        robot.order("flange")
+        with pytest.raises(NotConnected, match=r"end effector is at \(0.0000, .*choose it in Desk"):
+            arm_at(tmp_path, "panda_py", robot.host).connect()
+
+
+def test_a_driver_that_hangs_is_ended_and_told_even_where_it_reads_no_request(tmp_path: Path):
+    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
+        link = arm._link
+        assert link is not None
+        os.kill(link.pid, signal.SIGSTOP)
+        begin = time.monotonic()
+        with pytest.raises(CommunicationLost, match="no answer from .* to 'move' within 1.0 s"):
+            link.ask("move", timeout_s=1.0, seconds=[0.0] * 100_000)  # more than a pipe holds
+        assert time.monotonic() - begin < 30
+        with pytest.raises(CommunicationLost, match="ended by signal 9"):
+            arm.state()
+
+
+def test_a_driver_whose_program_was_killed_while_it_connected_ends_by_itself(driver: DriverName):
+    """It must not take the robot later, when another program has left it."""
+    host = next(HOSTS)
+    settings = DriverSettings(
+        host=host, realtime=False, contact_torque=[20.0] * 7, contact_force=20.0,
+        stiffness=[], damping=[], settle_s=1.0,
+    )  # fmt: skip
+    request = {"id": 1, "op": "connect", "settings": asdict(settings), "alarm_s": 3}
+    with socket.create_server((host, 1337)):  # takes the call and says nothing
+        worker = subprocess.Popen(
+            [sys.executable, "-m", "hal.franka.worker", driver],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+        )
+        assert worker.stdin is not None
+        worker.stdin.write(json.dumps(request).encode() + b"\n")
+        worker.stdin.close()
+        assert worker.wait(TIMEOUT_S) in (0, -signal.SIGALRM)
 
 
 def test_pads_that_meet_something_on_their_way_are_told(tmp_path: Path):

@@ -168,7 +168,7 @@ def test_neither_vendor_nor_simulator_is_imported_before_an_arm_connects():
         "for name in ('franky', 'panda_py', 'sapien', 'mani_skill', 'torch'): sys.modules[name] = None\n"
         "import hal, hal.devices, hal.franka, hal.franka.worker, hal.franka.franky_driver\n"
         "import hal.franka.panda_py_driver\n"
-        "from hal.arm import ArmLimits\n"
+        "from hal.limits import ArmLimits\n"
         "hal.franka.FrankaArm(hal.franka.FrankyArmConfig(driver='franky', host='x'), None)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

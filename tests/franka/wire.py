@@ -66,9 +66,12 @@ class GripperState:
 
 
 def ask_for_priority() -> None:
-    """A robot's control has a processor for itself; here it goes first, where the system lets it."""
+    """A robot's control has a processor for itself; here it goes first, where the system lets it.
+
+    libfranka takes a second without a state for a lost link.
+    """
     with contextlib.suppress(PermissionError):
-        os.setpriority(os.PRIO_PROCESS, 0, -10)
+        os.setpriority(os.PRIO_PROCESS, 0, -5)
 
 
 class Channel:

@@ -182,6 +182,12 @@ def test_a_wheel_for_another_robot_is_found():
         assert finding.level in ("warn", "fail") and str(arm["driver"]) in finding.subject
 
 
+def test_an_arms_driver_in_the_place_of_a_camera_is_a_finding(tmp_path: Path):
+    path = tmp_path / "cell.yaml"
+    path.write_text("type: devices\ncamera: {driver: franky}\nworkspace: {table_z: 0.0}\n")
+    assert [f.level for f in examine(path, move=False) if f.subject == "cell file"] == ["fail"]
+
+
 def test_a_cell_without_its_devices_says_what_is_missing_and_goes_on(tmp_path: Path):
     """No robot at that address, no Kinect, no calibration: each a line, none an exception."""
     cell = dict(

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from hal.board_poses import Sight, candidate_poses
 from hal.charuco import Board, Corners, project
-from hal.hand_eye import BadCalibrationSet, HandEye, View, angle_between, solve_hand_eye, spread
-from mskgrasp.geometry import Pose
+from hal.hand_eye import BadCalibrationSet, HandEye, View, solve_hand_eye, spread
+from mskgrasp.geometry import Pose, pose_distance
 
 BOARD = Board()
 INTRINSICS = np.array([[365.456, 0, 256.1], [0, 365.456, 205.4], [0, 0, 1.0]])
@@ -58,8 +58,8 @@ def views_of(
 
 def errors(found: HandEye, camera: Pose = OVERHEAD) -> tuple[float, float]:
     """mm and degrees."""
-    apart = found.T_base_camera.position - camera.position
-    return float(np.linalg.norm(apart)) * 1e3, np.degrees(angle_between(found.T_base_camera, camera))
+    apart, turn = pose_distance(found.T_base_camera, camera)
+    return apart * 1e3, float(np.degrees(turn))
 
 
 def test_without_noise_the_camera_is_found_exactly():

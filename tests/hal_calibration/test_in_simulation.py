@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -16,8 +13,10 @@ from hal.board_views import Picture, picture_paths, read_picture
 from hal.calibrate import CalibrateConfig, capture, solve
 from hal.calibration import read_calibration
 from hal.charuco import Board
-from hal.hand_eye import HandEye, angle_between, solve_hand_eye
+from hal.hand_eye import HandEye, solve_hand_eye
 from mskgrasp.errors import UsageError
+from mskgrasp.geometry import pose_distance
+from tests.programs import running
 
 SAPIEN = Path(__file__).parents[2] / "configs" / "cells" / "sapien.yaml"
 BOARD = Board()
@@ -37,9 +36,8 @@ def pictures(folder: Path) -> list[Picture]:
 
 def error(found: HandEye, pictures: list[Picture]) -> tuple[float, float]:
     """mm and degrees from the simulator's truth."""
-    truth = pictures[0].T_base_camera
-    apart = float(np.linalg.norm(found.T_base_camera.position - truth.position))
-    return apart * 1e3, float(np.degrees(angle_between(found.T_base_camera, truth)))
+    apart, turn = pose_distance(found.T_base_camera, pictures[0].T_base_camera)
+    return apart * 1e3, float(np.degrees(turn))
 
 
 def test_the_camera_is_found_within_a_millimetre_and_a_tenth_of_a_degree(pictures: list[Picture]):
@@ -87,13 +85,12 @@ def test_a_damaged_picture_is_named(folder: Path, tmp_path: Path):
 
 
 def test_ctrl_c_keeps_the_pictures(tmp_path: Path):
-    command = [sys.executable, "-m", "hal.calibrate", "--cell", str(SAPIEN), "--out", str(tmp_path / "out")]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 300
-    while len(picture_paths(tmp_path / "out")) < 2:
-        assert process.poll() is None and time.monotonic() < deadline
-        time.sleep(0.2)
-    os.kill(process.pid, signal.SIGINT)
-    _, printed = process.communicate(timeout=120)
+    with running("hal.calibrate", "--cell", str(SAPIEN), "--out", str(tmp_path / "out")) as process:
+        deadline = time.monotonic() + 400
+        while len(picture_paths(tmp_path / "out")) < 2:
+            assert process.poll() is None and time.monotonic() < deadline
+            time.sleep(0.2)
+        process.send_signal(signal.SIGINT)
+        _, printed = process.communicate(timeout=120)
     assert process.returncode == 130 and "Ctrl-C" in printed and "Traceback" not in printed
     assert len(picture_paths(tmp_path / "out")) >= 2

@@ -38,13 +38,17 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys, program, *arguments: str) -> tu
             ["--cell", str(CELLS / "sapien.yaml"), "--camera-at", "0", "0", "1"],
             "knows where it is",
         ),
+        (calibrate, ["--cell", "empty.yaml", "--camera-at", "0", "0", "1"], "'type' is None; legal: sapien"),
+        (calibrate, ["--cell", "."], "Is a directory"),
         (doctor, ["--cell", "none.yaml"], "No such file"),
+        (doctor, ["--cell", "."], "Is a directory"),
     ],
 )
 def test_wrong_input_is_one_line_and_exit_code_2(
     monkeypatch: pytest.MonkeyPatch, capsys, tmp_path: Path, program, arguments: list[str], message: str
 ):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty.yaml").touch()
     code, printed = run(monkeypatch, capsys, program, *arguments)
     assert code == 2 and message in printed
     assert printed.startswith("error: ") and printed.count("\n") == 1

@@ -1,7 +1,13 @@
-"""What every arm promises: the simulated one, and both drivers of a Franka arm over the wire protocol."""
+"""What every arm promises: the simulated one, both drivers of a Franka arm over the wire, and a replay.
+
+The arm of a recording knows what happened and nothing else. Each test is therefore first run on the simulated
+arm while it is recorded, which holds that one to the contract, too, and then on what was recorded.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import inspect
 import threading
 import time
 from collections.abc import Iterator
@@ -11,13 +17,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hal import Cell, cell_from_yaml, execute_grasp
+from hal import Arm, Cell, cell_from_yaml, execute_grasp
 from hal.arm import JOINT_TOLERANCE, POSITION_TOLERANCE, ROTATION_TOLERANCE
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace
-from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply
+from hal.replay import ReplayArm, ReplayArmConfig, recorded_cell
+from hal.replay.recorder import RecordingArm
+from mskgrasp.geometry import Pose, pose_distance, quat_multiply
 from mskgrasp.grasp import pose_base_tcp
 from tests.franka.robots import robot_for, write_cell
 from tests.hal_contract.conftest import CELLS
+from tests.replay.toy import toy_cell
 
 STILL_RAD, STILL_M = 2e-3, 1e-3
 """An arm in MuJoCo creeps by this much when it stands."""
@@ -30,6 +39,13 @@ def backend(name: str, folder: Path) -> AbstractContextManager[Path]:
     def serve() -> Iterator[Path]:
         if name == "sapien":
             yield CELLS / "sapien.yaml"
+        elif name == "replay":
+            with recorded_cell(toy_cell(), folder / "toy.h5").connected() as cell:
+                cell.arm.move_gripper(0.05)
+                cell.arm.state()
+            path = folder / "replay.yaml"
+            path.write_text(f"type: replay\nrecording: {folder / 'toy.h5'}\n")
+            yield path
         elif name == "franky" or name == "panda_py":
             with robot_for(name) as robot:
                 yield write_cell(folder, name, robot.host)
@@ -39,37 +55,80 @@ def backend(name: str, folder: Path) -> AbstractContextManager[Path]:
     return serve()
 
 
-@pytest.fixture(params=["sapien", "franky", "panda_py"], scope="module")
+@pytest.fixture(params=["sapien", "franky", "panda_py", "replay"], scope="module")
 def name(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
 @pytest.fixture(scope="module")
 def world(name: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
-    """A cell whose arm is connected; the camera is not needed."""
-    with backend(name, tmp_path_factory.mktemp(name)) as path:
+    """A cell whose arm is connected; where it will be recorded, the camera keeps the simulation going."""
+    with backend("sapien" if name == "replay" else name, tmp_path_factory.mktemp(name)) as path:
         cell = cell_from_yaml(path)
-        with cell.arm:
+        with cell.camera if name == "replay" else cell.arm:
             yield cell
 
 
 @pytest.fixture
-def cell(world: Cell) -> Iterator[Cell]:
+def cell(world: Cell, name: str, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Cell]:
     """Connected, at home, without a fault."""
-    world.arm.recover()
-    world.arm.move_gripper(0.08)
-    world.arm.move_to_joints(world.workspace.home)
-    yield world
-    world.arm.recover()
+    if name != "replay":
+        with at_home(world):
+            yield world
+        return
+    recording = tmp_path / "test.h5"
+    recorded = recorded_cell(world, recording)
+    with recorded.arm, at_home(recorded):
+        rehearse(request, recorded)
+    with ReplayArm(ReplayArmConfig(driver="replay", recording=recording)) as arm:
+        replayed = dataclasses.replace(world, arm=arm)
+        with at_home(replayed):
+            yield replayed
+
+
+@contextmanager
+def at_home(cell: Cell) -> Iterator[None]:
+    cell.arm.recover()
+    cell.arm.move_gripper(0.08)
+    cell.arm.move_to_joints(cell.workspace.home)
+    yield
+    cell.arm.recover()
+
+
+def rehearse(request: pytest.FixtureRequest, recorded: Cell) -> None:
+    """Runs the test that asks for a replay on the recorded cell."""
+    given = {**request.node.callspec.params, "cell": recorded, "name": "sapien"}
+    wanted = inspect.signature(request.function).parameters
+    request.function(**{key: given[key] if key in given else request.getfixturevalue(key) for key in wanted})
+
+
+@contextmanager
+def stopped_after(seconds: float, cell: Cell, name: str) -> Iterator[None]:
+    """Calls stop() from another thread; what was recorded was stopped then, and needs no second one."""
+    timer = threading.Timer(600 if name == "replay" else seconds, cell.arm.stop)
+    timer.start()
+    try:
+        yield
+    finally:
+        if name == "replay":
+            timer.cancel()
+        timer.join()
+
+
+def joints_at_rest(arm: Arm) -> np.ndarray:
+    deadline = time.monotonic() + 60
+    last, quiet = arm.state().joints, 0
+    while quiet < 3:
+        assert time.monotonic() < deadline, "the arm goes on"
+        time.sleep(0.1)
+        now = arm.state().joints
+        quiet = quiet + 1 if np.abs(now - last).max() < 1e-3 else 0
+        last = now
+    return last
 
 
 def over_the_table(z: float = 0.3, theta: float = 0.0) -> Pose:
     return pose_base_tcp(np.array([0.42, 0.05, z, theta]))
-
-
-def angle_between(a: Pose, b: Pose) -> float:
-    turn = quat_multiply(quat_conjugate(a.quat_wxyz), b.quat_wxyz)
-    return 2 * float(np.arctan2(np.linalg.norm(turn[1:]), abs(turn[0])))
 
 
 def test_state_has_units_and_shapes(cell: Cell):
@@ -99,8 +158,8 @@ def test_a_straight_motion_arrives(cell: Cell, theta: float):
     target = over_the_table(theta=theta)
     cell.arm.move_to_pose(target, speed=0.5)
     reached = cell.arm.state().T_base_tcp
-    assert np.linalg.norm(reached.position - target.position) < POSITION_TOLERANCE
-    assert angle_between(reached, target) < ROTATION_TOLERANCE
+    distance, angle = pose_distance(reached, target)
+    assert distance < POSITION_TOLERANCE and angle < ROTATION_TOLERANCE
 
 
 @pytest.mark.parametrize("name", ["franky", "panda_py"], indirect=True, scope="module")
@@ -133,6 +192,12 @@ def test_the_gripper_reaches_a_width(cell: Cell):
 def test_grasping_nothing_is_an_outcome(cell: Cell):
     outcome = cell.arm.grasp(20.0)
     assert not outcome.holding and outcome.width < 1e-3
+
+
+def test_a_hand_that_has_closed_is_open_when_it_says_so(cell: Cell):
+    cell.arm.grasp(20.0)
+    cell.arm.move_gripper(0.08)
+    assert cell.arm.state().gripper_width == pytest.approx(0.08, abs=2e-3)
 
 
 def test_a_command_outside_the_limits_is_refused_and_nothing_moves(cell: Cell):
@@ -198,14 +263,11 @@ def test_a_grasp_out_of_reach_is_refused_before_anything_moves(cell: Cell):
 
 def test_stop_from_another_thread_ends_a_motion_and_nothing_moves_before_recover(cell: Cell, name: str):
     far = cell.workspace.home + np.array([0.5, 0, 0, 0, 0, 0, 0])
-    timer = threading.Timer(0.05 if name == "sapien" else 0.6, cell.arm.stop)
-    timer.start()
-    with pytest.raises((MotionAborted, NeedsRecovery), match="stop"):
-        for k in range(200):  # a simulated motion may be quicker than the timer
-            cell.arm.move_to_joints(far if k % 2 == 0 else cell.workspace.home)
-    timer.join()
-    time.sleep(0.2)  # what was stopped has come to rest
-    stopped = cell.arm.state().joints
+    with stopped_after(0.05 if name == "sapien" else 0.6, cell, name):
+        with pytest.raises((MotionAborted, NeedsRecovery), match="stop"):
+            for k in range(200):  # a simulated motion may be quicker than the timer
+                cell.arm.move_to_joints(far if k % 2 == 0 else cell.workspace.home)
+    stopped = joints_at_rest(cell.arm)
     with pytest.raises(NeedsRecovery, match=r"recover\(\)"):
         cell.arm.move_to_joints(cell.workspace.home)
     with pytest.raises(NeedsRecovery, match=r"recover\(\)"):
@@ -227,23 +289,23 @@ def test_stop_from_another_thread_ends_a_motion_and_nothing_moves_before_recover
     ids=["gripper", "grasp", "wait", "line"],
 )
 def test_stop_ends_every_kind_of_motion(cell: Cell, name: str, command):
-    timer = threading.Timer(0.005 if name == "sapien" else 0.2, cell.arm.stop)
-    timer.start()
-    with pytest.raises((MotionAborted, NeedsRecovery), match="stop"):
-        for k in range(200):  # a simulated motion may be quicker than the timer
-            command(cell.arm, k)
-    timer.join()
+    with stopped_after(0.005 if name == "sapien" else 0.2, cell, name):
+        with pytest.raises((MotionAborted, NeedsRecovery), match="stop"):
+            for k in range(200):  # a simulated motion may be quicker than the timer
+                command(cell.arm, k)
     with pytest.raises(NeedsRecovery):
         command(cell.arm, 0)
 
 
-def test_an_interrupted_program_leaves_an_arm_that_must_be_recovered(cell: Cell, monkeypatch):
+def test_an_interrupted_program_leaves_an_arm_that_must_be_recovered(cell: Cell, name: str, monkeypatch):
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
+    moved = cell.arm._arm if isinstance(cell.arm, RecordingArm) else cell.arm
     with monkeypatch.context() as patch:
-        patch.setattr(cell.arm, "_move_to_joints", interrupt)
-        with pytest.raises(KeyboardInterrupt):
+        patch.setattr(moved, "_move_to_joints", interrupt)
+        # A recorded Ctrl-C must not end the program that plays it back.
+        with pytest.raises(MotionAborted if name == "replay" else KeyboardInterrupt):
             cell.arm.move_to_joints(cell.workspace.home)
     with pytest.raises(NeedsRecovery):
         cell.arm.move_gripper(0.05)

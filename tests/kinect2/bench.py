@@ -58,8 +58,13 @@ class Bench:
         write_calibration(self.calibration, calibration)
 
     def camera(self, **settings: Any) -> Kinect2Camera:
-        """A camera, not connected; quiet about warming up."""
+        """A camera, not connected; quiet about warming up, and patient with a busy machine."""
         values: dict[str, Any] = dict(
-            driver="kinect2", serial=SERIAL, calibration=self.calibration, warm_up_s=0, connect_timeout_s=15
+            driver="kinect2",
+            serial=SERIAL,
+            calibration=self.calibration,
+            warm_up_s=0,
+            connect_timeout_s=60,
+            latency_s=0.4,
         )
         return Kinect2Camera(Kinect2Config(**(values | settings)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import signal
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,12 +22,10 @@ from mskgrasp.config import check_config
 from mskgrasp.errors import BadConfig, MskgraspError
 from tests.kinect2.bench import FAKE, SERIAL, Bench
 
-BLOCK = (
-    0.04,
-    0.10,
-    -0.03,
-    0.02,
-)  # of fake/pylibfreenect2/scene.py: right of the middle, seen from the camera
+BLOCK = (0.04, 0.10, -0.03, 0.02)
+"""Of fake/pylibfreenect2/scene.py: left, right, top, bottom, m; right of the middle, seen from the camera."""
+BUSY_S = 20.0
+"""A busy machine may take this much longer."""
 
 
 def test_the_image_is_not_mirrored_and_a_pixel_is_where_its_ray_says(bench: Bench):
@@ -99,7 +99,7 @@ def test_a_frame_is_exposed_after_it_was_asked_for(bench: Bench):
         ("stalled", CaptureFailed, "its stream stands still"),
         ("slow", CaptureFailed, "its stream stands still"),
         ("frozen", CaptureFailed, "stale"),
-        ("late", CaptureFailed, r"more than 0.1 s late \(latency_s\)"),
+        ("late", CaptureFailed, r"more than 0.4 s late \(latency_s\)"),
         ("skewed", CaptureFailed, "without colour of the same moment"),
         ("dark", CaptureFailed, r"measured 0.0% of its depth image.*min_valid"),
         ("hung", CommunicationLost, "the driver hung and was ended"),
@@ -114,12 +114,12 @@ def test_a_fault_ends_in_its_error_in_time_and_the_camera_opens_again(
         bench.set(fault=fault)
         begun = time.monotonic()
         with pytest.raises(error, match=message) as caught:
-            camera.capture(0.6)
-        assert time.monotonic() - begun < 0.6 + 1.0 + 1.5  # timeout, grace, a busy machine
+            camera.capture(1.6)  # a late frame is more than a second under way
+        assert time.monotonic() - begun < 1.6 + 1.0 + BUSY_S  # timeout, grace
         assert "\n" not in str(caught.value)
         if error is CommunicationLost:
             with pytest.raises(CommunicationLost, match="open the cell again"):
-                camera.capture(0.6)
+                camera.capture(1.6)
         bench.set()
         if error is CaptureFailed:
             camera.capture()
@@ -186,7 +186,7 @@ def test_a_driver_that_does_not_stop_is_ended(bench: Bench):
     begun = time.monotonic()
     camera.close()
     camera.close()
-    assert time.monotonic() - begun < 6
+    assert time.monotonic() - begun < 3 + BUSY_S
 
 
 def test_a_killed_driver_is_reported_and_the_program_lives(bench: Bench):
@@ -207,13 +207,51 @@ def test_a_program_that_dies_leaves_no_driver_behind(bench: Bench):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == -signal.SIGKILL, done.stderr
-    driver = int(done.stdout)
-    deadline = time.monotonic() + 10
+    wait_for_end(int(done.stdout))
+
+
+def test_a_program_that_dies_while_the_driver_hangs_leaves_none_behind(bench: Bench):
+    with bench.camera() as camera:
+        link = camera._link
+        assert link is not None
+        bench.set(fault="hung")
+        request = dict(op="capture", timeout_s=0.5, alarm_s=1)
+        assert link._process.stdin is not None
+        link._process.stdin.write(json.dumps(request).encode() + b"\n")
+        link._process.stdin.flush()  # and nobody waits for an answer
+        assert link._process.wait(1 + BUSY_S) == -signal.SIGALRM
+
+
+def test_after_ctrl_c_no_frame_from_before_it_is_delivered(bench: Bench, monkeypatch: pytest.MonkeyPatch):
+    camera = bench.camera()
+    with camera:
+        link = camera._link
+        assert link is not None
+
+        def interrupt(_: float) -> bytes:
+            raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch:
+            patch.setattr(link, "_read", interrupt)
+            with pytest.raises(KeyboardInterrupt):
+                camera.capture()
+        time.sleep(0.1)
+        with pytest.raises(CommunicationLost, match="open the cell again"):
+            camera.capture()
+    with camera:
+        asked = time.monotonic()
+        assert camera.capture().timestamp_s >= asked
+
+
+def wait_for_end(pid: int) -> None:
+    deadline = time.monotonic() + BUSY_S
     while time.monotonic() < deadline:
         try:
-            os.kill(driver, 0)
-        except ProcessLookupError:
+            status = Path(f"/proc/{pid}/stat").read_text()
+        except OSError:
             return
+        if status.rpartition(")")[2].split()[0] == "Z":
+            return  # ended; a container's first process may never ask how
         time.sleep(0.05)
     pytest.fail("the driver's process is still there")
 

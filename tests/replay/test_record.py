@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import h5py
 import pytest
 
 from hal.replay import read_recording, recorded_cell
+from tests.programs import running
 from tests.replay.toy import toy_cell
+
+TIMEOUT_S = 120.0
 
 
 @pytest.fixture
@@ -46,6 +53,49 @@ def test_a_program_runs_on_the_recorded_cell_and_its_faults_are_kept(cell_file: 
     recording = read_recording(out)
     assert recording.n_frames == 3
     assert recording.events[-1].error is not None and recording.events[-1].error[0] == "NotRecorded"
+
+
+def test_ctrl_c_keeps_the_frames(cell_file: Path, tmp_path: Path):
+    out = tmp_path / "frames.h5"
+    arguments = ["--cell", str(cell_file), "--out", str(out), "--interval", "3600"]
+    with running("hal.record", *arguments) as program:
+        wait_for_frame(tmp_path / "frames.h5.part")
+        program.send_signal(signal.SIGINT)
+        _, printed = program.communicate(timeout=TIMEOUT_S)
+    assert program.returncode == 130 and "Ctrl-C" in printed and "Traceback" not in printed
+    assert read_recording(out).n_frames == 1
+
+
+def test_a_program_that_did_not_hear_ctrl_c_is_told(cell_file: Path, tmp_path: Path):
+    """A terminal sends Ctrl-C to both, `kill` to one alone."""
+    out, inner = tmp_path / "run.h5", tmp_path / "inner.h5"
+    arguments = ["--cell", str(cell_file), "--out", str(out)]
+    with running("hal.record", *arguments, "--run", f"hal.record --out {inner} --interval 3600") as program:
+        wait_for_frame(tmp_path / "inner.h5.part")
+        program.send_signal(signal.SIGINT)
+        _, printed = program.communicate(timeout=TIMEOUT_S)
+    assert program.returncode == 130 and "Traceback" not in printed
+    assert read_recording(out).n_frames == read_recording(inner).n_frames == 1
+
+
+def test_what_a_killed_program_left_is_not_written_over(cell_file: Path, tmp_path: Path):
+    left = tmp_path / "frames.h5.part"
+    left.write_bytes(b"precious")
+    done = record("--cell", str(cell_file), "--out", str(tmp_path / "frames.h5"))
+    assert done.returncode == 2 and "frames.h5.part is there" in done.stderr
+    assert left.read_bytes() == b"precious"
+
+
+def wait_for_frame(recording: Path) -> None:
+    """Returns when a frame is in it: then the program waits for the time of the next."""
+    deadline = time.monotonic() + TIMEOUT_S
+    while time.monotonic() < deadline:
+        # It is locked and still being written; after each call it is whole.
+        with contextlib.suppress(OSError, KeyError), h5py.File(recording, "r", locking=False) as file:
+            if len(file["frames/depth"]) > 0:
+                return
+        time.sleep(0.1)
+    pytest.fail(f"no frame in {recording}")
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ What the real package does with a segmentation fault happens here, too: the proc
 happens is told by a JSON file named in FAKE_KINECT2, read anew at every call: ``serials`` (those connected),
 ``held`` (those another program uses), ``start_fails``, and ``fault``: "" or one of
 
-    stalled   no frame comes any more          late    every frame is on its way for 0.6 s more
+    stalled   no frame comes any more          late    every frame is on its way for 1 s more
     frozen    the same frame comes repeatedly   skewed  colour is half a second older than depth
     dark      no pixel is valid                 slow    one frame in 20 s
     hung      waiting never ends                crash   the driver dies while waiting
@@ -147,7 +147,7 @@ class SyncMultiFrameListener:
         if device is None or device._started_s is None or fault == "stalled" or device._gone():
             return -1, time.monotonic() + 0.02
         period_s = 20.0 if fault == "slow" else 1 / 30
-        delay_s = _LATENCY_S + (0.6 if fault == "late" else 0.0)
+        delay_s = _LATENCY_S + (1.0 if fault == "late" else 0.0)
         arrived = int((time.monotonic() - device._started_s - delay_s) // period_s)
         return arrived, device._started_s + delay_s + (arrived + 1) * period_s
 

@@ -1,0 +1,161 @@
+"""What an arm may be told to do, checked before anything moves. Pure functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hal.errors import OutOfWorkspace
+from mskgrasp.geometry import Pose, straight_line
+from mskgrasp.grasp import PAD_REACH, TABLE_CLEARANCE, lowest_grasp_z
+
+_CHECKS = 33
+"""Points of a motion that are looked at; on a motion of 2 m they are 6 cm apart."""
+_SLACK = 1e-3
+"""Along the way, metres: an arm rests as exactly as its drives hold it."""
+_UNIT = 1e-3
+# Corners of the pads and of the palm in the tcp frame, metres (collision boxes of the Panda's hand).
+_HAND_CORNERS = np.array(
+    [
+        [x * half_x, y * half_y, z]
+        for half_x, half_y, z in ((0.011, 0.056, PAD_REACH), (0.032, 0.102, -0.0375))
+        for x in (-1, 1)
+        for y in (-1, 1)
+    ]
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmLimits:
+    """What every command is checked against before anything moves.
+
+    Attributes:
+        joint_lower: (7,) radians.
+        joint_upper: (7,) radians.
+        box_lower: (3,) the TCP stays inside this box, base frame, metres.
+        box_upper: (3,) the other corner.
+        table_z: Height of the table, base frame, metres; the pads stay clear of it.
+        max_force: Greatest gripper force, N.
+    """
+
+    joint_lower: np.ndarray
+    joint_upper: np.ndarray
+    box_lower: np.ndarray
+    box_upper: np.ndarray
+    table_z: float
+    max_force: float
+
+
+def lowest_point(T_base_tcp: Pose) -> float:
+    """Height of the lowest corner of the open hand, base frame, metres."""
+    return float(T_base_tcp.apply(_HAND_CORNERS)[:, 2].min())
+
+
+def check_target_joints(limits: ArmLimits, joints: np.ndarray) -> None:
+    """Refuses joints (7,) outside their limits.
+
+    Raises:
+        OutOfWorkspace: Says which, and what is legal.
+    """
+    lower, upper = limits.joint_lower, limits.joint_upper
+    if joints.shape != (7,) or not np.isfinite(joints).all():
+        raise OutOfWorkspace(f"joints must be 7 finite numbers, got {joints.tolist()}")
+    outside = np.flatnonzero((joints < lower) | (joints > upper))
+    if len(outside):
+        i = outside[0]
+        raise OutOfWorkspace(
+            f"joint {i + 1} to {joints[i]:.3f} rad is outside {lower[i]:.3f} .. {upper[i]:.3f} rad"
+        )
+
+
+def check_target_pose(limits: ArmLimits, T_base_tcp: Pose) -> None:
+    """Refuses a pose outside the box or too near the table.
+
+    Raises:
+        OutOfWorkspace: Says what is wrong with it, and what is legal.
+    """
+    position, quat_wxyz = np.asarray(T_base_tcp.position), np.asarray(T_base_tcp.quat_wxyz)
+    numbers = [*position.ravel(), *quat_wxyz.ravel()]
+    if position.shape != (3,) or quat_wxyz.shape != (4,) or not np.isfinite(numbers).all():
+        raise OutOfWorkspace(f"a target must be one pose of finite numbers, got {position.tolist()}")
+    if abs(float(np.linalg.norm(quat_wxyz)) - 1) > _UNIT:
+        raise OutOfWorkspace(f"a target's quaternion must have length 1, got {quat_wxyz.tolist()} (w x y z)")
+    if _outside(limits, position) > 0:
+        raise OutOfWorkspace(f"TCP target {shown(position)} m is outside the workspace {_box(limits)}")
+    clearance = lowest_point(T_base_tcp) - limits.table_z
+    if clearance < TABLE_CLEARANCE - 1e-6:
+        raise OutOfWorkspace(
+            f"TCP target z {position[2]:.4f} m would bring the hand {clearance * 1e3:.1f} mm over the "
+            f"table; it must stay {TABLE_CLEARANCE * 1e3:g} mm above (pointing down: z >= "
+            f"{lowest_grasp_z(limits.table_z):.4f} m)"
+        )
+
+
+def check_line(limits: ArmLimits, start: Pose, goal: Pose) -> None:
+    """Refuses a straight motion on whose way a tilting hand would meet the table.
+
+    Raises:
+        OutOfWorkspace: Says where.
+    """
+    line = straight_line(start, goal, np.linspace(0, 1, _CHECKS))
+    _check_way(
+        limits,
+        [Pose(position=p, quat_wxyz=q) for p, q in zip(line.position, line.quat_wxyz, strict=True)],
+        "the straight line to this pose",
+    )
+
+
+def check_joint_path(
+    limits: ArmLimits, forward: Callable[[np.ndarray], Pose], start: np.ndarray, goal: np.ndarray
+) -> None:
+    """Refuses a joint motion whose end, or way, brings the hand to the table or out of the box.
+
+    Args:
+        limits: Of the arm.
+        forward: ``T_base_tcp`` at joints (7,).
+        start: (7,) radians, where the arm is.
+        goal: (7,) radians, within their limits.
+
+    Raises:
+        OutOfWorkspace: Says where.
+    """
+    end = forward(goal).position
+    if _outside(limits, end) > 0:
+        raise OutOfWorkspace(
+            f"these joints put the TCP at {shown(end)} m, outside the workspace {_box(limits)}"
+        )
+    shares = np.linspace(0, 1, _CHECKS)
+    _check_way(
+        limits, [forward(start + share * (goal - start)) for share in shares], "the way to these joints"
+    )
+
+
+def _check_way(limits: ArmLimits, poses: list[Pose], what: str) -> None:
+    """An arm that was guided out of its limits may come back, and go no farther out on its way."""
+    heights = np.array([lowest_point(pose) for pose in poses])
+    if heights.min() < min(heights[0], limits.table_z + TABLE_CLEARANCE) - _SLACK:
+        raise OutOfWorkspace(
+            f"{what} brings the hand down to {heights.min():.3f} m; the table is at {limits.table_z:g} m"
+        )
+    excess = np.array([_outside(limits, pose.position) for pose in poses])
+    if excess.max() > excess[0] + _SLACK:
+        worst = poses[int(excess.argmax())].position
+        raise OutOfWorkspace(
+            f"{what} leads past {shown(worst)} m, outside the workspace {_box(limits)}; go there in steps"
+        )
+
+
+def _outside(limits: ArmLimits, position: np.ndarray) -> float:
+    """How far a position is out of the box, metres; 0 inside."""
+    return max(0.0, float(np.maximum(limits.box_lower - position, position - limits.box_upper).max()))
+
+
+def shown(position: np.ndarray) -> str:
+    """A position for people, metres."""
+    return "(" + ", ".join(f"{value:.3f}" for value in position) + ")"
+
+
+def _box(limits: ArmLimits) -> str:
+    return f"{np.round(limits.box_lower, 3).tolist()} .. {np.round(limits.box_upper, 3).tolist()} m"
