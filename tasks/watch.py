@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
+
 import torch
 from mani_skill.utils.structs.actor import Actor
 from torch import Tensor
@@ -43,6 +44,6 @@ class SpeedWatch:
         """(n,) m/s, of the type and on the device of another tensor."""
         return torch.as_tensor(self._fastest, dtype=like.dtype, device=like.device).expand(like.shape)
 
-    def _position(self) -> np.ndarray | Tensor:
+    def _position(self) -> Any:
         # One sub-scene: asking the engine costs a hundredth of a tensor operation.
         return self._part.pose.p.clone() if self._entity is None else self._entity.pose.p

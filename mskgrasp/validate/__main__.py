@@ -82,14 +82,14 @@ def validate(config: ValidateConfig) -> int:
 
 def _by_hand(config: ValidateConfig) -> list[Check]:
     with tqdm(desc="closed form", unit="check", leave=False, disable=None) as bar:
-        return run_checks(config.physics, lambda _: bar.update(1) and None)
+        return run_checks(config.physics, lambda _: _advance(bar))
 
 
 def _fidelity(config: ValidateConfig, parts: list[Part]) -> list:
     bench = Bench(config.physics, parts[0])
     try:
         with tqdm(total=len(parts), desc="parts", unit="part", leave=False, disable=None) as bar:
-            return check_parts(bench, parts, lambda: bar.update(1) and None)
+            return check_parts(bench, parts, lambda: _advance(bar))
     finally:
         bench.close()
 
@@ -99,18 +99,17 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
     folders = [part.folder for part in parts]
     settings = config.settings()
     n = len(parts) * config.grasps_per_part
-    patient = dict(mininterval=0.5 if sys.stderr.isatty() else 15.0, file=sys.stderr)
-    with tqdm(total=n, desc="drawing grasps", unit="grasp", leave=False, **patient) as bar:
+    with tqdm(total=n, desc="drawing grasps", unit="grasp", leave=False, mininterval=_patience()) as bar:
         drawn = draw_grasps(
             folders,
             config.grasps_per_part,
             config.seed,
             config.out,
             workers,
-            lambda k: bar.update(k) and None,
+            lambda k: _advance(bar, k),
         )
-    with tqdm(total=n * len(settings), desc="grasps", unit="grasp", **patient) as bar:
-        outcomes = run_settings(settings, drawn, config.out, workers, lambda k: bar.update(k) and None)
+    with tqdm(total=n * len(settings), desc="grasps", unit="grasp", mininterval=_patience()) as bar:
+        outcomes = run_settings(settings, drawn, config.out, workers, lambda k: _advance(bar, k))
     found = {name: compare(one, outcomes[REFERENCE]) for name, one in outcomes.items()}
     candidates = [
         setting.name
@@ -126,6 +125,14 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
     results["cheapest_that_adds_nothing"] = chosen
     results["impossible"] = vars(seen)
     return found
+
+
+def _patience() -> float:
+    return 0.5 if sys.stderr.isatty() else 15.0
+
+
+def _advance(bar: tqdm, by: int = 1) -> None:
+    bar.update(by)
 
 
 if __name__ == "__main__":

@@ -80,7 +80,7 @@ class Bench:
         """The part's rigid body."""
         entity: sapien.Entity = self.env.part._objs[0]
         found = entity.find_component_by_type(PhysxRigidDynamicComponent)
-        assert found is not None
+        assert isinstance(found, PhysxRigidDynamicComponent)
         return found
 
     def pose(self) -> Pose:
@@ -90,7 +90,7 @@ class Bench:
 
     def pose_in_hand(self) -> Pose:
         """``T_tcp_obj`` with the measured TCP."""
-        pose = base_pose(self.env.agent.tcp).inverse() @ base_pose(self.env.part)
+        pose = self.env.tcp_pose().inverse() @ base_pose(self.env.part)
         return Pose(position=pose.position[0].double().numpy(), quat_wxyz=pose.quat_wxyz[0].double().numpy())
 
     def step(self, seconds: float) -> float:
@@ -99,8 +99,8 @@ class Bench:
         self.env.motion.step(n)
         return n / self.physics.rate_hz
 
-    def push(self, force: np.ndarray, seconds: float) -> float:
-        """The same with a constant force (3,), N, on the part's centre of mass."""
+    def push(self, force: list[float], seconds: float) -> float:
+        """The same with a constant force (x, y, z), N, on the part's centre of mass."""
         n = self.env.motion.n_steps(seconds)
         for _ in range(n):
             body = self.body

@@ -61,7 +61,7 @@ def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:
     shift = np.linalg.norm(difference[:, :3], axis=1)
     turn = np.abs(wrap_angle(difference[:, 3]))
     ours, theirs = (one.displacement[one.success] for one in (outcomes, reference))
-    p = min(float(stats.ks_2samp(ours[:, axis], theirs[:, axis]).pvalue) for axis in range(4))
+    p = min(stats.ks_2samp(ours[:, axis], theirs[:, axis]).pvalue for axis in range(4))  # pyright: ignore[reportAttributeAccessIssue]
     return Comparison(
         success_rate=float(outcomes.success.mean()),
         agreement=float((outcomes.success == reference.success).mean()),
@@ -69,7 +69,7 @@ def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:
         shift_p90=_percentile(shift, 90),
         turn_median=_percentile(turn, 50),
         turn_p90=_percentile(turn, 90),
-        p_value=min(1.0, 4 * p),
+        p_value=min(1.0, 4 * float(p)),
         cpu_ms=1e3 * float(outcomes.cpu_seconds.mean()),
         n=len(both),
         n_both=int(both.sum()),

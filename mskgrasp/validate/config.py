@@ -57,7 +57,7 @@ class ValidateConfig(Config):
         return setting_name(self.physics.rate_hz, self.physics.position_iterations)
 
     def settings(self) -> list[Setting]:
-        """The grid with the setting under test, what it is held against, the floor, and the former in full."""
+        """The grid with the setting under test; the reference, the floor, and the former in full."""
         pairs = {(rate, count) for rate in self.rates_hz for count in self.iterations}
         pairs.add((self.physics.rate_hz, self.physics.position_iterations))
         grid = [

@@ -218,7 +218,7 @@ def _try_grasps(setting: Setting, drawn: Drawn, file: Path) -> int:
 def _write(file: Path, **arrays: np.ndarray) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     temporary = file.with_suffix(f".{os.getpid()}.tmp.npz")
-    np.savez(temporary, **arrays)
+    np.savez(temporary, allow_pickle=False, **arrays)
     temporary.rename(file)
 
 

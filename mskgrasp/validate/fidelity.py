@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 import trimesh
+from sapien.physx import PhysxCollisionShapeConvexMesh
 
 from mskgrasp.parts import Part
 from mskgrasp.parts.decompose import MOST_P95_MM, MOST_VOLUME_RATIO
@@ -47,7 +49,7 @@ class Fidelity:
             and self.inertia_error <= MOST_INERTIA_ERROR
         )
 
-    def as_dict(self) -> dict[str, object]:
+    def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self) | {"passed": self.passed}
 
@@ -67,11 +69,12 @@ def _compare(part: Part, bench: Bench) -> Fidelity:
     mesh.density = part.density
     body = bench.body
     expected = np.sort(np.linalg.eigvalsh(mesh.moment_inertia))
-    cooked = [1e3 * shape.vertices * shape.scale for shape in body.collision_shapes]
+    shapes = [shape for shape in body.collision_shapes if isinstance(shape, PhysxCollisionShapeConvexMesh)]
+    cooked = [1e3 * shape.vertices * shape.scale for shape in shapes]
     fit = hull_fit(trimesh.Trimesh(1e3 * mesh.vertices, mesh.faces, process=False), cooked)
     return Fidelity(
         part=part.name,
-        hulls=len(body.collision_shapes),
+        hulls=len(shapes),
         surface_p95=1e-3 * fit.p95,
         volume_ratio=fit.volume_ratio,
         mass_error=float(abs(body.mass / mesh.mass - 1)),
