@@ -18,7 +18,7 @@ import torch
 import mskgrasp
 from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, u16_to_depth
 from mskgrasp.errors import NoPartFound
-from mskgrasp.grasp import sample_grasps
+from mskgrasp.grasp import MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.images import view_part
 from tasks import REGION, GraspDisplacementEnv, Overhead, Physics
 from tasks.attempt import TABLE_Z
@@ -101,6 +101,10 @@ class Simulator:
             row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
             if not all(np.isfinite(row[name]).all() for name in FIELDS if name.startswith("pose")):
                 discarded["not_finite"] += 1
+                report(-1)
+                continue
+            if row["success"] and np.linalg.norm(row["displacement"][:3]) > MAX_DISPLACEMENT:
+                discarded["moved_too_far"] += 1
                 report(-1)
                 continue
             rows.append(dict(row, depth=depth, grasp=grasp[0]))
