@@ -102,7 +102,9 @@ def _collect(config: CollectConfig, parts: list[Part]) -> None:
 def _hands(config: CollectConfig, missing: list[ShardTask]) -> str:
     """Who will make the missing shards."""
     if config.cluster is not None:
-        return f"{count_cores()} cores of the cluster at {config.cluster}"
+        cores = count_cores()
+        waits = "" if cores else " (waiting for nodes to join it)"
+        return f"{cores} cores of the cluster at {config.cluster}{waits}"
     return f"{_n_workers(config, missing)} workers"
 
 

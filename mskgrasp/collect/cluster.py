@@ -98,6 +98,8 @@ def connected(address: str) -> Iterator[None]:
     # Read when Ray is imported; a user who wants otherwise sets them.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+    # Ray prints what befalls its processes over the progress bar; what matters is told as `Lost`.
+    os.environ.setdefault("RAY_DEDUP_LOGS_SKIP_REGEX", ".")
     if address != "auto":
         _knock(address)
     import ray

@@ -120,9 +120,8 @@ def _examine(path: Path) -> tuple[_Shard | None, list[str]]:
         attempts, info = read_unchecked(path)
     except BadDataset as error:
         return None, [str(error).removeprefix(str(path)).lstrip(": ")]
-    reasons = list(problems(attempts))
-    if not reasons:
-        reasons = list(range_problems(attempts, info))
+    with np.errstate(all="ignore"):  # a damaged number may be of any size
+        reasons = list(problems(attempts)) or list(range_problems(attempts, info))
     n = len(attempts)
     digest = hashlib.sha256(np.ascontiguousarray(attempts.grasp).tobytes()).hexdigest() if n else ""
     return _Shard(path=path, info=info, n=n, grasps=digest), reasons
@@ -238,13 +237,13 @@ def _missing(
     folder: Path, paths: list[Path], shards: list[_Shard], settings: dict[str, Any]
 ) -> Iterator[Fault]:
     """Shards that should be there, and those with too few attempts."""
-    per_part, size = settings.get("attempts_per_part"), settings.get("shard_size")
-    planned = isinstance(per_part, int) and isinstance(size, int) and per_part > 0 and size > 0
+    plan = _plan(settings)
     names = {path.name for path in paths}
     highest: dict[str, int] = {}
     for shard in shards:
         highest[shard.info.part] = max(highest.get(shard.info.part, 0), shard.info.index)
-        if planned:
+        if plan:
+            per_part, size = plan
             expected = min(size, per_part - shard.info.index * size)
             made = shard.n + sum(n for n in shard.info.discarded.values() if isinstance(n, int))
             if expected <= 0:
@@ -258,8 +257,16 @@ def _missing(
     # A part may also be given by its folder, whose own name need not be the part's.
     asked = [str(word) for word in words if "/" not in str(word)] if isinstance(words, (list, tuple)) else []
     for part in sorted({*highest, *asked}):
-        n = -(-per_part // size) if planned else highest.get(part, 0) + 1
+        n = -(-plan[0] // plan[1]) if plan else highest.get(part, 0) + 1
         for index in range(n):
             path = shard_path(folder, part, index)
             if path.name not in names:
                 yield Fault(path=path, reason="is missing; run the collection again to make it")
+
+
+def _plan(settings: dict[str, Any]) -> tuple[int, int] | None:
+    """Attempts on a part, and in a shard; None where the settings do not tell."""
+    per_part, size = settings.get("attempts_per_part"), settings.get("shard_size")
+    if isinstance(per_part, int) and isinstance(size, int) and per_part > 0 and size > 0:
+        return per_part, size
+    return None

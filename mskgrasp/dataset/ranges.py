@@ -69,24 +69,19 @@ def _info_problems(info: ShardInfo, n: int) -> Iterator[str]:
 
 def _label_problems(attempts: Attempts) -> Iterator[str]:
     held = attempts.success
-    with np.errstate(invalid="ignore"):
-        moved = np.linalg.norm(attempts.displacement[:, :3], axis=1)
-        turned, tilt, width = attempts.displacement[:, 3], attempts.tilt, attempts.width_after
-        yield from _worst(
-            held & (moved > MAX_DISPLACEMENT), moved * 1e3,
-            f"is called a success but moved {{:.1f}} mm in the hand, at most {MAX_DISPLACEMENT * 1e3:g}",
-        )  # fmt: skip
-        yield from _worst(
-            held & (np.abs(turned) > np.pi + 1e-5), turned, "has dtheta {:.3f} rad, legal -pi..pi"
-        )
-        yield from _worst(
-            held & ((tilt < 0) | (tilt > np.pi + 1e-5)), tilt, "has tilt {:.3f} rad, legal 0..pi"
-        )
-        yield from _worst(
-            held & ((width < MIN_GAP - 1e-5) | (width > MAX_OPENING + 1e-3)), width * 1e3,
-            "is called a success with pads {:.2f} mm apart, "
-            f"legal {MIN_GAP * 1e3:g}..{MAX_OPENING * 1e3:g}",
-        )  # fmt: skip
+    moved = np.linalg.norm(attempts.displacement[:, :3], axis=1)
+    turned, tilt, width = attempts.displacement[:, 3], attempts.tilt, attempts.width_after
+    yield from _worst(
+        held & (moved > MAX_DISPLACEMENT), moved * 1e3,
+        f"is called a success but moved {{:.1f}} mm in the hand, at most {MAX_DISPLACEMENT * 1e3:g}",
+    )  # fmt: skip
+    yield from _worst(held & (np.abs(turned) > np.pi + 1e-5), turned, "has dtheta {:.3f} rad, legal -pi..pi")
+    yield from _worst(held & ((tilt < 0) | (tilt > np.pi + 1e-5)), tilt, "has tilt {:.3f} rad, legal 0..pi")
+    yield from _worst(
+        held & ((width < MIN_GAP - 1e-5) | (width > MAX_OPENING + 1e-3)), width * 1e3,
+        "is called a success with pads {:.2f} mm apart, "
+        f"legal {MIN_GAP * 1e3:g}..{MAX_OPENING * 1e3:g}",
+    )  # fmt: skip
 
 
 def _grasp_problems(attempts: Attempts, info: ShardInfo) -> Iterator[str]:

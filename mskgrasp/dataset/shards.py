@@ -200,5 +200,7 @@ def _read_info(file: h5py.File) -> ShardInfo:
 
 
 def _check(attempts: Attempts, source: str) -> None:
-    for problem in problems(attempts):
+    with np.errstate(all="ignore"):  # a damaged number may be of any size
+        found = list(problems(attempts))
+    for problem in found:
         raise BadDataset(f"{source}: {problem}; delete it and collect again")

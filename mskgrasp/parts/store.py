@@ -20,7 +20,7 @@ from mskgrasp.errors import BadPart
 from mskgrasp.geometry import Pose
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
 
-FILES = ("mesh.ply", "hulls.glb", "part.json")
+FILES: tuple[str, ...] = ("mesh.ply", "hulls.glb", "part.json")
 LEGAL_FOLDER = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 _ABANDONED_S = 3600.0

@@ -21,7 +21,8 @@ from tests.collecting import REPOSITORY, assert_equal, collect, command
 MOMENTS = (
     *[("start", 3.0)] * 4,
     *[("worker", 4.0)] * 2,
-    *[("writing", 0.0)] * 2,
+    ("writing", 0.0),
+    ("writing", 0.02),
     *[("written", 1.0)] * 2,
 )
 
@@ -36,27 +37,33 @@ class Life:
     before_settings: int = 0
     finished: list[int] = field(default_factory=list)
 
+    @property
+    def log(self) -> Path:
+        return self.out.parent / "log.txt"
+
     def live(self) -> None:
         rng = np.random.default_rng(self.seed)
         self.out.parent.mkdir()
         for k in rng.permutation(len(MOMENTS)):
             event, span = MOMENTS[k]
-            process = subprocess.Popen(
-                command(self.out, "--workers", "1"), cwd=REPOSITORY, start_new_session=True,
-                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-            )  # fmt: skip
+            with open(self.log, "ab") as log:
+                process = subprocess.Popen(
+                    command(self.out, "--workers", "1"), cwd=REPOSITORY, start_new_session=True,
+                    stdout=log, stderr=log,
+                )  # fmt: skip
             self.wait_for(event, process)
             time.sleep(float(rng.uniform(0, span)))
             # One in four loses the collector alone: its workers are still ending when the next one starts.
             kill = os.kill if rng.random() < 0.25 else os.killpg
-            kill(process.pid, signal.SIGKILL)
+            if process.poll() is None:
+                kill(process.pid, signal.SIGKILL)
             self.half_written += bool(list(self.out.glob("shards/*.tmp")))
             self.before_settings += not (self.out / "config.yaml").exists()
             process.wait(timeout=30)
-            assert process.returncode == -signal.SIGKILL or not self.missing(), process.communicate()[1]
+            assert process.returncode == -signal.SIGKILL or not self.missing(), self.log.read_text()
             self.look()
 
-    def wait_for(self, event: str, process: subprocess.Popen[str]) -> None:
+    def wait_for(self, event: str, process: subprocess.Popen[bytes]) -> None:
         shards = self.out / "shards"
         before = self.names(".h5")
         leftovers = self.names(".tmp")
@@ -70,7 +77,7 @@ class Life:
                 return
             if event == "written" and self.names(".h5") - before:
                 return
-            time.sleep(0.1 if event == "worker" else 0.0005)
+            time.sleep(0.1 if event == "worker" else 0.001)
 
     def names(self, suffix: str) -> set[str]:
         try:
