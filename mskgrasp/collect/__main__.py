@@ -177,7 +177,7 @@ def begin(config: CollectConfig) -> None:
         write_config(config, config.out / "config.yaml")
     # Only now: a folder that holds something is known as a dataset by its settings.
     make_folder(config.out / "shards")
-    for leftover in (*config.out.glob("*.tmp"), *(config.out / "shards").glob("*.tmp")):
+    for leftover in (*filter(_is_leftover, config.out.iterdir()), *(config.out / "shards").glob("*.tmp")):
         leftover.unlink(missing_ok=True)  # a worker of that run may just be ending
 
 

@@ -31,12 +31,15 @@ class _Part:
     family: str
 
 
-def check_export_path(path: Path, suffix: str) -> list[Path]:
-    """The files that an export will write.
+def check_export_path(folder: Path, path: Path, suffix: str) -> list[Path]:
+    """The files that an export of the dataset in ``folder`` will write.
 
     Raises:
-        UsageError: The name has another ending, a file is there already, or its folder cannot be made.
+        UsageError: The name has another ending, a file is there already, it lies among the shards, or its
+            folder cannot be made.
     """
+    if path.resolve().is_relative_to((folder / "shards").resolve()):
+        raise UsageError(f"--out {path} lies among the dataset's shards; choose another folder")
     if path.suffix != suffix:
         raise UsageError(f"--out {path}: this format needs a name that ends in {suffix}")
     files = [path] if suffix == ".npz" else [path, path.with_suffix(".json")]
@@ -67,7 +70,7 @@ def export_npz(folder: Path, out: Path, watch: Watch = iter) -> int:
         BadDataset: A shard is damaged, or the shards do not belong together.
         UsageError: The file exists, or cannot be made.
     """
-    check_export_path(out, ".npz")
+    check_export_path(folder, out, ".npz")
     paths = list_shards(folder)
     pieces: dict[str, list[np.ndarray]] = {name: [] for name in SMALL}
     infos: list[ShardInfo] = []
@@ -150,10 +153,16 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
     # The simulator's own conventions are its room's; this verb alone looks there.
     from tasks.trajectories import Episode, write_trajectories
 
-    files = check_export_path(out, ".h5")
+    files = check_export_path(folder, out, ".h5")
     paths = list_shards(folder)
     _, info = read_columns(paths[0], ("success",))
     size = read_columns(paths[0], ("depth",))[0]["depth"].shape[1:]
+
+    lift_height = info.physics.get("lift_height")
+    if not isinstance(lift_height, int | float):
+        raise BadDataset(
+            f"{paths[0]}: physics has no lift_height, without which the part's pose is not known"
+        )
 
     def episodes() -> Iterator[Episode]:
         for path in watch(paths):
@@ -161,7 +170,7 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
             _same_settings(path, own, [info])
             if attempts.depth.shape[1:] != size:
                 raise BadDataset(f"{path}: depth images of another size than {size}; collect it again")
-            after = _pose_after(attempts, float(own.physics["lift_height"]))
+            after = _pose_after(attempts, lift_height)
             for row in range(len(attempts)):
                 won = bool(attempts.success[row])
                 yield Episode(

@@ -58,8 +58,7 @@ def _info_problems(info: ShardInfo, n: int) -> Iterator[str]:
         yield f"index {info.index} and seed {info.seed} must not be negative"
     if not info.part_hash:
         yield "part_hash is empty"
-    counts = info.discarded.items() if isinstance(info.discarded, dict) else [("discarded", info.discarded)]
-    for reason, count in counts:
+    for reason, count in info.discarded.items():
         if not isinstance(count, int) or count < 0:
             yield f"discarded[{reason!r}] is {count!r}, must be a count"
             return

@@ -19,6 +19,8 @@ from mskgrasp.grasp import FAILURES
 
 SCHEMA_VERSION = 1
 _FORMAT = "mskgrasp-shard"
+_MOST_BYTES = 2**32
+"""More than 10,000 images of the largest camera."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
@@ -150,15 +152,32 @@ def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], Sh
     try:
         with h5py.File(path, "r") as file:
             _check_header(file, path)
-            return {name: np.asarray(file[name]) for name in names}, _read_info(file)
+            return {name: _array(file, name) for name in names}, _read_info(file)
     except BadDataset:
         raise
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+    except (
+        OSError,
+        RuntimeError,
+        LookupError,
+        ArithmeticError,
+        ValueError,
+        TypeError,
+        AttributeError,
+    ) as error:
         # h5py reports damage with whichever of these its call stack ends in.
         problem = " ".join(str(error).split()).strip("'\"")
         raise BadDataset(
             f"{path} is damaged or no HDF5 file ({problem}); delete it and collect again"
         ) from error
+
+
+def _array(file: h5py.File, name: str) -> np.ndarray:
+    stored = file[name]
+    assert isinstance(stored, h5py.Dataset)  # _check_header has seen to it
+    # Damage can make an array look as large as anything: that must not be tried.
+    if stored.size * stored.dtype.itemsize > _MOST_BYTES:
+        raise ValueError(f"{name} claims the shape {stored.shape}")
+    return np.asarray(stored)
 
 
 def _check_header(file: h5py.File, path: Path) -> None:
@@ -193,10 +212,17 @@ def _read_info(file: h5py.File) -> ShardInfo:
         T_base_camera=Pose.from_vector(pose),
         table_z=float(attrs["table_z"]),
         region=(x_min, x_max, y_min, y_max),
-        physics=json.loads(attrs["physics"]),
-        versions=json.loads(attrs["versions"]),
-        discarded=json.loads(attrs["discarded"]),
+        physics=_mapping(attrs, "physics"),
+        versions=_mapping(attrs, "versions"),
+        discarded=_mapping(attrs, "discarded"),
     )
+
+
+def _mapping(attrs: dict[str, Any], name: str) -> dict[str, Any]:
+    values = json.loads(attrs[name])
+    if not isinstance(values, dict):
+        raise ValueError(f"attribute {name} is no JSON object")
+    return values
 
 
 def _check(attempts: Attempts, source: str) -> None:

@@ -168,6 +168,8 @@ def test_wrong_names_and_places_are_usage_errors(collected, tmp_path):
         export_npz(collected, tmp_path / "data.h5")
     with pytest.raises(UsageError, match=r"ends in \.h5"):
         export_maniskill(collected, tmp_path / "data.npz")
+    with pytest.raises(UsageError, match="among the dataset's shards"):
+        export_npz(collected, collected / "shards" / "data.npz")
     (tmp_path / "file").write_text("")
     with pytest.raises(UsageError, match="cannot make folder"):
         export_npz(collected, tmp_path / "file" / "data.npz")
