@@ -188,7 +188,9 @@ def use_one_core() -> None:
 
 def _leave_with_parent() -> None:
     """Ends this process when its parent is gone, however that ended."""
-    parent = os.getppid()
+    # Asked now, the system may already name another: the parent can have died while this process started.
+    born_of = multiprocessing.parent_process()
+    parent = os.getppid() if born_of is None else born_of.pid
 
     def watch() -> None:
         while os.getppid() == parent:
