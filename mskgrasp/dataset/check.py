@@ -180,8 +180,12 @@ def _shared_faults(shards: list[_Shard], settings: dict[str, Any]) -> Iterator[F
     families: dict[str, Counter[str]] = defaultdict(Counter)
     for shard in shards:
         families[shard.info.part][shard.info.family] += 1
+    right = {}
+    for part, found in families.items():
+        ready = _in_parts_folder(part, "family")
+        right[part] = ready if ready in found else found.most_common(1)[0][0]
     for shard in shards:
-        usual = families[shard.info.part].most_common(1)[0][0]
+        usual = right[shard.info.part]
         if shard.info.family != usual:
             reason = f"family {shard.info.family!r} differs from the part's {usual!r}"
             yield Fault(path=shard.path, reason=reason)
@@ -204,7 +208,7 @@ def _hash_faults(shards: list[_Shard], notes: list[str]) -> Iterator[Fault]:
     right: dict[str, str] = {}
     changed: list[str] = []
     for part, found in sorted(counts.items()):
-        ready = _hash_in_parts_folder(part)
+        ready = _in_parts_folder(part, "content_hash")
         foreign = {h for other, its in counts.items() if other != part for h in its}
         # A hash that another part has as well is the likelier one to be wrong.
         right[part] = min(found, key=lambda h: (h != ready, h in foreign, -found[h], h))
@@ -226,9 +230,10 @@ def _hash_faults(shards: list[_Shard], notes: list[str]) -> Iterator[Fault]:
             yield Fault(path=shard.path, reason=reason)
 
 
-def _hash_in_parts_folder(part: str) -> str | None:
+def _in_parts_folder(part: str, key: str) -> str | None:
+    """What this machine's part of that name says; None where it has none."""
     try:
-        return str(store.read_record(store.parts_folder() / part).get("content_hash"))
+        return str(store.read_record(store.parts_folder() / part).get(key))
     except BadPart:
         return None
 
