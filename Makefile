@@ -17,9 +17,9 @@ $(READY): pyproject.toml .ci/constraints.txt .ci/setup
 	PYTHON=$(PYTHON) .ci/setup
 	@touch $@
 
-# Tests need the extras, which collecting and planning do without: [cad] (700 MB) and the drivers.
+# Tests need the extras, which collecting and planning do without: [cad] (700 MB), Ray and the drivers.
 $(TESTABLE): pyproject.toml .ci/constraints.txt .ci/setup
-	PYTHON=$(PYTHON) EXTRAS=dev,cad,franka .ci/setup
+	PYTHON=$(PYTHON) EXTRAS=dev,cad,cluster,franka .ci/setup
 	@touch $@ $(READY)
 
 collect: $(READY) ## Collect the demo dataset into data/demo (the main job; resumes)

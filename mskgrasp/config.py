@@ -9,6 +9,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from mskgrasp.errors import BadConfig
+from mskgrasp.files import write_whole
 
 
 class Config(BaseModel):
@@ -69,7 +70,7 @@ def check_config(model: type[ConfigT], values: Any, source: str) -> ConfigT:
 
 def write_config(config: BaseModel, path: Path) -> None:
     """Writes the resolved configuration as YAML, so that a run can be repeated from its output."""
-    path.write_text(yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False), encoding="utf-8")
+    write_whole(path, yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False).encode())
 
 
 def _explain(model: type[BaseModel], error: ValidationError) -> str:

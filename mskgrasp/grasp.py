@@ -39,6 +39,8 @@ MIN_RISE = 0.8
 """Least share of the lift that a held part has risen."""
 HOLD_S = 0.2
 """How long a lifted part is held before it is judged, seconds."""
+MAX_DISPLACEMENT = 0.05
+"""No grasp that holds a part lets it move farther than this in the hand: such a row is no label, metres."""
 EJECTED_DISTANCE = 0.05
 """A part that ends this far from where it lay, and not in the hand, was ejected, metres."""
 FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled")

@@ -17,8 +17,6 @@ MIN_PAD_FORCE = 0.05
 """Less force is no touch, N."""
 MAX_SPEED = 3.0
 """No grasp makes a part faster than this, m/s: a faster one was flung out of an overlap by the solver."""
-MAX_DISPLACEMENT = 0.05
-"""A part that is held has not moved farther than this in the hand, m."""
 MAX_DRIFT = 1e-3
 """A part that moves more than this on the table before it is grasped was not at rest, m."""
 MAX_TURN = 0.02

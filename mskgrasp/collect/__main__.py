@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import time
@@ -11,6 +12,13 @@ from rich.console import Console
 from tqdm import tqdm
 
 from mskgrasp.cli import make_folder, parse, run
+from mskgrasp.collect.cluster import (
+    check_cluster,
+    connected,
+    count_cores,
+    make_shards_on_cluster,
+    wait_until_seen,
+)
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary
 from mskgrasp.collect.shard import ShardTask
@@ -45,6 +53,8 @@ def main() -> int:
 
 def collect(config: CollectConfig) -> None:
     """Makes the shards that are missing and sums up the dataset."""
+    if config.cluster is not None:
+        check_cluster(config.cluster)
     # Sets of parts are written out: a catalogue that grows must not change a dataset that was begun.
     names = chosen_names(config.parts or ("starter",))
     if config.sample:
@@ -53,7 +63,8 @@ def collect(config: CollectConfig) -> None:
     parts = chosen_parts(config)
     config = config.model_copy(update={"parts": tuple(word for word, _ in parts)})
     check_out(config)
-    _collect(config, [part for _, part in parts])
+    with contextlib.nullcontext() if config.cluster is None else connected(config.cluster):
+        _collect(config, [part for _, part in parts])
 
 
 def sampled(names: list[str], count: int) -> list[str]:
@@ -75,18 +86,30 @@ def _collect(config: CollectConfig, parts: list[Part]) -> None:
     hashes = {part.name: part.content_hash for part in parts}
     missing = [task for task in everything if not is_done(config.out, task, hashes[task.part])]
     done = sum(task.n for task in everything) - sum(task.n for task in missing)
-    n_workers = min(config.workers or os.cpu_count() or 1, max(1, len(missing)))
     print(
         f"{len(parts)} parts, {sum(task.n for task in everything)} attempts into {config.out}"
         + (f", {done} of them already there" if done else "")
-        + (f"; {n_workers} workers" if missing else "")
+        + (f"; {_hands(config, missing)}" if missing else "")
     )
     if missing:
-        _simulate(config, missing, sum(task.n for task in everything), done, n_workers)
+        _simulate(config, missing, parts, done)
     summaries = summarise(config.out, config.part_filter)
     print_table(summaries, Console(width=None if sys.stdout.isatty() else 150))
     write_summary(summaries, config.out)
     print(f"wrote {config.out / 'summary.json'} and {draw_summary(config.out, config.seed)}")
+
+
+def _hands(config: CollectConfig, missing: list[ShardTask]) -> str:
+    """Who will make the missing shards."""
+    if config.cluster is not None:
+        cores = count_cores()
+        waits = "" if cores else " (waiting for nodes to join it)"
+        return f"{cores} cores of the cluster at {config.cluster}{waits}"
+    return f"{_n_workers(config, missing)} workers"
+
+
+def _n_workers(config: CollectConfig, missing: list[ShardTask]) -> int:
+    return min(config.workers or os.cpu_count() or 1, len(missing))
 
 
 def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:
@@ -126,7 +149,8 @@ def check_out(config: CollectConfig) -> None:
     if config.out.exists() and not config.out.is_dir():
         raise UsageError(f"--out {config.out} is a file; choose a folder")
     if not settings.exists():
-        if config.out.is_dir() and any(config.out.iterdir()):
+        # A run that is killed before it has settings leaves at most a half-written file of them.
+        if config.out.is_dir() and not all(_is_leftover(path) for path in config.out.iterdir()):
             raise UsageError(f"--out {config.out} holds other files; choose a new folder")
         return
     try:
@@ -142,13 +166,19 @@ def check_out(config: CollectConfig) -> None:
         )
 
 
+def _is_leftover(path: Path) -> bool:
+    return path.name.startswith("config.yaml.") and path.suffix == ".tmp"
+
+
 def begin(config: CollectConfig) -> None:
     """Opens the dataset's folder, and clears away what a killed run left half-written."""
-    make_folder(config.out / "shards")
+    make_folder(config.out)
     if not (config.out / "config.yaml").exists():
         write_config(config, config.out / "config.yaml")
-    for leftover in (config.out / "shards").glob("*.tmp"):
-        leftover.unlink()
+    # Only now: a folder that holds something is known as a dataset by its settings.
+    make_folder(config.out / "shards")
+    for leftover in (*filter(_is_leftover, config.out.iterdir()), *(config.out / "shards").glob("*.tmp")):
+        leftover.unlink(missing_ok=True)  # a worker of that run may just be ending
 
 
 def plan_shards(config: CollectConfig, parts: list[Part]) -> list[ShardTask]:
@@ -189,13 +219,17 @@ def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
     return True
 
 
-def _simulate(config: CollectConfig, tasks: list[ShardTask], total: int, done: int, n_workers: int) -> None:
+def _simulate(config: CollectConfig, tasks: list[ShardTask], parts: list[Part], done: int) -> None:
     started, attempts, successes = time.monotonic(), 0, 0
+    workers: set[str] = set()
     bar = tqdm(
-        total=total, initial=done, unit="grasp", dynamic_ncols=True, smoothing=0.05,
-        mininterval=0.5 if sys.stderr.isatty() else 15.0, file=sys.stderr,
+        total=done + sum(task.n for task in tasks), initial=done, unit="grasp", dynamic_ncols=True,
+        smoothing=0.05, mininterval=0.5 if sys.stderr.isatty() else 15.0, file=sys.stderr,
     )  # fmt: skip
-    events = make_shards(config, tasks, n_workers)
+    if config.cluster is None:
+        events = make_shards(config, tasks, _n_workers(config, tasks))
+    else:
+        events = make_shards_on_cluster(config, tasks, {part.name: part for part in parts})
     try:
         for event in events:
             match event:
@@ -204,17 +238,21 @@ def _simulate(config: CollectConfig, tasks: list[ShardTask], total: int, done: i
                     successes += outcome == 1
                     bar.set_postfix_str(f"success {successes / max(attempts, 1):.1%}", refresh=False)
                     bar.update(1)
-                case Lost(undone=undone, undone_successes=undone_successes, exit_code=code):
+                case Lost(undone=undone, undone_successes=undone_successes, reason=reason):
                     bar.update(-undone)
                     attempts, successes = attempts - undone, successes - undone_successes
-                    bar.write(f"a worker died (exit code {code}); its shard is made again", file=sys.stderr)
-                case Finished():
-                    pass
+                    bar.write(f"a worker died ({reason}); its shard is made again", file=sys.stderr)
+                case Finished(worker=worker):
+                    workers.add(worker)
     finally:
         events.close()
         bar.close()
     seconds = time.monotonic() - started
-    print(f"{attempts} grasps in {seconds:.0f} s: {attempts / seconds:.1f} grasps/s with {n_workers} workers")
+    if config.cluster is not None:
+        wait_until_seen(config.out, tasks)
+    print(
+        f"{attempts} grasps in {seconds:.0f} s: {attempts / seconds:.1f} grasps/s with {len(workers)} workers"
+    )
 
 
 if __name__ == "__main__":

@@ -56,6 +56,8 @@ class CollectConfig(Config):
     """Everything random follows from it; the number of workers changes nothing."""
     workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
     """Processes; 0: one for each core."""
+    cluster: str | None = None
+    """Run on a Ray cluster: auto, or host:port of its head. workers then bounds the cores that are used."""
     part_filter: PartFilter = PartFilter()
     """Bounds on the size of parts and on how easily they are grasped."""
     physics: Physics = Physics()
@@ -74,4 +76,4 @@ class CollectConfig(Config):
 
     def identity(self) -> dict:
         """What decides the data: two runs with the same identity make the same arrays."""
-        return self.model_dump(mode="json", exclude={"out", "workers"})
+        return self.model_dump(mode="json", exclude={"out", "workers", "cluster"})

@@ -18,11 +18,11 @@ import torch
 import mskgrasp
 from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, u16_to_depth
 from mskgrasp.errors import NoPartFound
-from mskgrasp.grasp import sample_grasps
+from mskgrasp.grasp import MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.images import view_part
 from tasks import REGION, GraspDisplacementEnv, Overhead, Physics
 from tasks.attempt import TABLE_Z
-from tasks.outcome import MAX_DISPLACEMENT, MAX_PENETRATION, MAX_SPEED
+from tasks.outcome import MAX_PENETRATION, MAX_SPEED
 from tasks.renderer import render_backend
 
 FIELDS = (
@@ -157,7 +157,7 @@ def impossible(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> 
     if float(outcome["fastest"][0]) > MAX_SPEED:
         return "too_fast"
     if row["success"] and np.linalg.norm(row["displacement"][:3]) > MAX_DISPLACEMENT:
-        return "displaced_too_far"
+        return "moved_too_far"
     return ""
 
 

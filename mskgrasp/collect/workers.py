@@ -36,9 +36,10 @@ class Progress:
 
 @dataclass(frozen=True, kw_only=True)
 class Finished:
-    """A shard lies on disk."""
+    """A shard lies on disk; `worker` names the process that made it."""
 
     task: ShardTask
+    worker: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +49,7 @@ class Lost:
     task: ShardTask
     undone: int
     undone_successes: int
-    exit_code: int | None
+    reason: str
 
 
 @dataclass
@@ -93,8 +94,7 @@ def make_shards(
                     if tries[key] >= MAX_TRIES:
                         raise WorkerFailed(
                             f"shard {event.task.index} of part '{event.task.part}' killed its worker "
-                            f"{MAX_TRIES} times (exit code {event.exit_code}); leave the part out with "
-                            "--parts"
+                            f"{MAX_TRIES} times ({event.reason}); leave the part out with --parts"
                         )
                     waiting.appendleft(event.task)
                 if event is not None:
@@ -134,7 +134,7 @@ def _listen(worker: _Worker) -> Progress | Finished | Lost | None:
             task=worker.task or _NO_TASK,
             undone=worker.done,
             undone_successes=worker.successes,
-            exit_code=worker.process.exitcode,
+            reason=f"exit code {worker.process.exitcode}",
         )
     if kind == "error":
         raise WorkerFailed(value)
@@ -145,7 +145,7 @@ def _listen(worker: _Worker) -> Progress | Finished | Lost | None:
     task = worker.task
     assert task is not None
     worker.task, worker.done, worker.successes = None, 0, 0
-    return Finished(task=task)
+    return Finished(task=task, worker=str(worker.process.pid))
 
 
 _NO_TASK = ShardTask(part="", folder="", index=-1, first=0, n=0, seed=0)
@@ -155,16 +155,11 @@ def _work(connection: Connection, config: CollectConfig) -> None:
     """A worker's life: receive a task, simulate it, write the shard, say so."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     _leave_with_parent()
-    # One core a worker: neither torch nor the software renderer may spread over the others.
-    os.environ.setdefault("LP_NUM_THREADS", "1")
     try:
-        import torch
-
+        use_one_core()
         from mskgrasp.collect.shard import Simulator
         from mskgrasp.dataset import shard_path, write_shard
 
-        torch.set_num_threads(1)
-        logging.getLogger("mani_skill").setLevel(logging.ERROR)
         simulator = Simulator(config.physics, config.camera)
         while True:
             task: ShardTask = connection.recv()
@@ -182,9 +177,20 @@ def _work(connection: Connection, config: CollectConfig) -> None:
         connection.send(("error", f"a worker failed: {type(error).__name__}: {error}"))
 
 
+def use_one_core() -> None:
+    """Keeps this process to one core: neither torch nor the software renderer may spread over the others."""
+    os.environ.setdefault("LP_NUM_THREADS", "1")
+    import torch
+
+    torch.set_num_threads(1)
+    logging.getLogger("mani_skill").setLevel(logging.ERROR)
+
+
 def _leave_with_parent() -> None:
     """Ends this process when its parent is gone, however that ended."""
-    parent = os.getppid()
+    # Asked now, the system may already name another: the parent can have died while this process started.
+    born_of = multiprocessing.parent_process()
+    parent = os.getppid() if born_of is None else born_of.pid
 
     def watch() -> None:
         while os.getppid() == parent:

@@ -6,10 +6,11 @@ import errno
 import hashlib
 import json
 import os
+import re
 import shutil
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -21,7 +22,8 @@ from mskgrasp.errors import BadPart
 from mskgrasp.geometry import Pose
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
 
-FILES = ("mesh.ply", "hulls.glb", "part.json")
+FILES: tuple[str, ...] = ("mesh.ply", "hulls.glb", "part.json")
+LEGAL_FOLDER = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 _ABANDONED_S = 3600.0
 """Temporary folders older than this were left by a killed build."""
@@ -70,23 +72,59 @@ def write_part(name: str, mesh: bytes, hulls: bytes, record: dict[str, Any]) -> 
     Everything is written to a temporary folder that is renamed at the end. Where another process was faster
     and its part has the same recipe, that one stays.
     """
-    root = parts_folder()
-    root.mkdir(parents=True, exist_ok=True)
-    _sweep(root)
     record = record | {"content_hash": content_hash(mesh, hulls, record)}
     text = json.dumps(record, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
+    contents = dict(zip(FILES, (mesh, hulls, text.encode()), strict=True))
+    return load_part(_put(parts_folder(), name, contents, record["recipe_hash"]))
+
+
+def pack_part(part: Part) -> dict[str, bytes]:
+    """A part's files by name, to be sent to another machine."""
+    return {name: _read(part.folder, name) for name in FILES}
+
+
+def receive_part(name: str, digest: str, contents: Mapping[str, bytes]) -> Part:
+    """Keeps the files of a part that came from another machine.
+
+    They go to a folder of their own, ``received`` beside the parts folder, named for the hash: what this
+    machine calls by the same name stays as it is.
+
+    Raises:
+        BadPart: The files are not those of the part with this content hash.
+    """
+    folder = f"{name}-{digest[:16]}"
+    root = parts_folder().with_name("received")
+    if not LEGAL_FOLDER.fullmatch(folder) or set(contents) != set(FILES):
+        raise BadPart(f"{name!r} with {', '.join(contents)} was received, which is no part: check the sender")
+    try:
+        part = load_part(root / folder)
+        if part.content_hash == digest:
+            return part
+    except BadPart:
+        pass  # not there yet, or damaged
+    record = _record(root / folder, contents["part.json"])
+    if content_hash(contents["mesh.ply"], contents["hulls.glb"], record) != digest:
+        raise BadPart(
+            f"part '{name}' arrived damaged: its files do not match the hash {digest[:16]}; try again"
+        )
+    return load_part(_put(root, folder, contents, str(record.get("recipe_hash"))))
+
+
+def _put(root: Path, name: str, contents: Mapping[str, bytes], recipe: str) -> Path:
+    root.mkdir(parents=True, exist_ok=True)
+    _sweep(root)
     temporary = root / f".tmp-{name}-{uuid.uuid4().hex[:12]}"
     temporary.mkdir()
     try:
-        for file_name, content in zip(FILES, (mesh, hulls, text.encode()), strict=True):
+        for file_name, content in contents.items():
             with open(temporary / file_name, "wb") as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-        _take_place(temporary, root / name, record["recipe_hash"])
+        _take_place(temporary, root / name, recipe)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-    return load_part(root / name)
+    return root / name
 
 
 def load_part(folder: Path | str) -> Part:

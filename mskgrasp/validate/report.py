@@ -16,12 +16,13 @@ from rich.console import Console
 from rich.table import Table
 
 from mskgrasp.collect.shard import versions
+from mskgrasp.grasp import MAX_DISPLACEMENT
 from mskgrasp.validate.by_hand import Check
 from mskgrasp.validate.compare import MOST_DISAGREEMENT, MOST_TIMES_FLOOR, Comparison, complaints
 from mskgrasp.validate.config import FLOOR, NOTHING_SKIPPED, REFERENCE, ValidateConfig
 from mskgrasp.validate.convergence import Outcomes
 from mskgrasp.validate.fidelity import Fidelity
-from tasks.outcome import MAX_DISPLACEMENT, MAX_PENETRATION, MAX_SPEED
+from tasks.outcome import MAX_PENETRATION, MAX_SPEED
 
 _GOOD, _BAD, _INK = "#2b8a3e", "#c92a2a", "#22252b"
 
@@ -51,7 +52,7 @@ def impossible(outcomes: Outcomes) -> Impossible:
     reasons = {
         "penetrated": outcomes.penetration > MAX_PENETRATION,
         "too_fast": outcomes.fastest > MAX_SPEED,
-        "displaced_too_far": outcomes.success & (way > MAX_DISPLACEMENT),
+        "moved_too_far": outcomes.success & (way > MAX_DISPLACEMENT),
         "not_finite": outcomes.success & ~np.isfinite(outcomes.displacement).all(axis=1),
     }
     kept = ~np.any(list(reasons.values()), axis=0)

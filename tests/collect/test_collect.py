@@ -15,55 +15,22 @@ import pytest
 import yaml
 
 from mskgrasp.dataset import list_shards, read_shard
-
-REPOSITORY = Path(__file__).parents[2]
-PARTS = ["parallel_key_a16x10x56", "hex_nut_m30"]
+from tests.collecting import PARTS, REPOSITORY, assert_equal, collect, command
 
 
-def command(out: Path, *options: str) -> list[str]:
-    config = out.parent / "small.yaml"
-    config.write_text(yaml.safe_dump(dict(parts=PARTS, attempts_per_part=6, shard_size=3, seed=5)))
-    program = [sys.executable, "-m", "mskgrasp.collect"]
-    return [*program, "--config", str(config), "--out", str(out), *options]
-
-
-def collect(out: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(out, *options), capture_output=True, text=True, cwd=REPOSITORY, timeout=280)
-
-
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small dataset made by one worker without any trouble."""
-    out = tmp_path_factory.mktemp("undisturbed") / "data"
-    done = collect(out, "--workers", "1")
-    assert done.returncode == 0, done.stderr
-    return out
-
-
-def assert_equal(first: Path, second: Path) -> None:
-    """Both datasets hold the same shards, byte by byte."""
-    names = [path.name for path in list_shards(first)]
-    assert names == [path.name for path in list_shards(second)]
-    for name in names:
-        one, two = (read_shard(folder / "shards" / name)[0] for folder in (first, second))
-        for column, values in vars(one).items():
-            assert np.array_equal(values, vars(two)[column], equal_nan=values.dtype.kind == "f"), column
-        assert (first / "shards" / name).read_bytes() == (second / "shards" / name).read_bytes()
-
-
-def test_a_run_leaves_shards_settings_summary_and_picture(undisturbed):
-    assert len(list_shards(undisturbed)) == 4
-    assert yaml.safe_load((undisturbed / "config.yaml").read_text())["seed"] == 5
-    rows = json.loads((undisturbed / "summary.json").read_text())["parts"]
+def test_a_run_leaves_shards_settings_summary_and_picture(collected):
+    assert len(list_shards(collected)) == 4
+    assert yaml.safe_load((collected / "config.yaml").read_text())["seed"] == 5
+    rows = json.loads((collected / "summary.json").read_text())["parts"]
     assert [row["part"] for row in rows] == sorted(PARTS)
     assert sum(row["attempts"] for row in rows) == 12
     for row in rows:
         assert row["attempts"] == row["successes"] + sum(row["failures"].values())
-    assert (undisturbed / "summary.png").read_bytes().startswith(b"\x89PNG")
+    assert (collected / "summary.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_labels_obey_the_definitions(undisturbed):
-    for path in list_shards(undisturbed):
+def test_labels_obey_the_definitions(collected):
+    for path in list_shards(collected):
         attempts, info = read_shard(path)
         assert attempts.depth.shape[1:] == (160, 160)
         assert (np.isnan(attempts.displacement).any(axis=1) == ~attempts.success).all()
@@ -75,15 +42,15 @@ def test_labels_obey_the_definitions(undisturbed):
         assert info.physics["rate_hz"] == 500
 
 
-def test_a_finished_run_has_nothing_left_to_do(undisturbed):
-    stamps = [path.stat().st_mtime_ns for path in list_shards(undisturbed)]
-    done = collect(undisturbed, "--workers", "2")
+def test_a_finished_run_has_nothing_left_to_do(collected):
+    stamps = [path.stat().st_mtime_ns for path in list_shards(collected)]
+    done = collect(collected, "--workers", "2")
     assert done.returncode == 0 and "12 of them already there" in done.stdout
-    assert [path.stat().st_mtime_ns for path in list_shards(undisturbed)] == stamps
+    assert [path.stat().st_mtime_ns for path in list_shards(collected)] == stamps
 
 
-def test_other_settings_are_refused_for_a_begun_dataset(undisturbed):
-    done = collect(undisturbed, "--seed", "6")
+def test_other_settings_are_refused_for_a_begun_dataset(collected):
+    done = collect(collected, "--seed", "6")
     assert done.returncode == 2
     assert "seed differ" in done.stderr and len(done.stderr.strip().splitlines()) == 1
 
@@ -114,7 +81,7 @@ def started(out: Path, *options: str) -> subprocess.Popen[str]:
     return process
 
 
-def test_two_workers_one_of_them_killed_make_the_same_bytes_as_one(undisturbed, tmp_path):
+def test_two_workers_one_of_them_killed_make_the_same_bytes_as_one(collected, tmp_path):
     out = tmp_path / "data"
     process = started(out, "--workers", "2")
     workers = [
@@ -125,10 +92,10 @@ def test_two_workers_one_of_them_killed_make_the_same_bytes_as_one(undisturbed, 
     _, errors = process.communicate(timeout=250)
     assert process.returncode == 0, errors
     assert "a worker died" in errors
-    assert_equal(undisturbed, out)
+    assert_equal(collected, out)
 
 
-def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(undisturbed, tmp_path):
+def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(collected, tmp_path):
     out = tmp_path / "data"
     process = started(out, "--workers", "1")
     process.send_signal(signal.SIGINT)
@@ -156,7 +123,7 @@ def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(undisturb
     assert done.returncode == 0, done.stderr
     assert "making again" in done.stderr and finished[0].name in done.stderr
     assert not list((out / "shards").glob("*.tmp"))
-    assert_equal(undisturbed, out)
+    assert_equal(collected, out)
 
 
 @pytest.mark.parametrize(

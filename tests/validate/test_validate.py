@@ -90,7 +90,7 @@ def test_what_cannot_be_is_counted_by_reason():
     sick = outcomes()
     sick.penetration[3], sick.fastest[5], sick.displacement[8, 0] = 0.002, 4.0, 0.06
     found = impossible(sick)
-    assert found.dropped == {"penetrated": 1, "too_fast": 1, "displaced_too_far": 1, "not_finite": 0}
+    assert found.dropped == {"penetrated": 1, "too_fast": 1, "moved_too_far": 1, "not_finite": 0}
     assert found.penetration == 0 and found.fastest == pytest.approx(0.3) and found.displaced < 0.05
 
 

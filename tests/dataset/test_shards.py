@@ -189,6 +189,20 @@ def broken(attempts: Attempts, name: str, row: int, value) -> Attempts:
     return dataclasses.replace(attempts, **{name: array})
 
 
+def test_an_array_that_claims_to_be_enormous_is_told_and_not_read(shard):
+    def change(file):
+        del file["tilt"]
+        file.create_dataset("tilt", shape=(10**12,), dtype="float32", chunks=(1024,))
+
+    edit(shard, change)
+    assert "tilt claims the shape (1000000000000,)" in complaint(lambda: read_shard(shard))
+
+
+def test_an_attribute_that_is_no_object_is_told(shard):
+    edit(shard, lambda file: file.attrs.__setitem__("discarded", "[1]"))
+    assert "discarded is no JSON object" in complaint(lambda: read_shard(shard))
+
+
 def test_values_that_contradict_each_other_are_refused_when_writing(tmp_path, attempts):
     held, failed = int(np.flatnonzero(attempts.success)[0]), int(np.flatnonzero(~attempts.success)[0])
     cases = {

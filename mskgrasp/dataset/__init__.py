@@ -1,0 +1,27 @@
+"""Datasets of grasp attempts: one HDF5 file a shard, and the program ``python -m mskgrasp.dataset``."""
+
+from mskgrasp.dataset.attempts import DEPTH_UNIT, Attempts, ShardInfo, depth_to_u16, u16_to_depth
+from mskgrasp.dataset.shards import (
+    SCHEMA_VERSION,
+    list_shards,
+    read_columns,
+    read_shard,
+    read_success,
+    shard_path,
+    write_shard,
+)
+
+__all__ = [
+    "DEPTH_UNIT",
+    "SCHEMA_VERSION",
+    "Attempts",
+    "ShardInfo",
+    "depth_to_u16",
+    "list_shards",
+    "read_columns",
+    "read_shard",
+    "read_success",
+    "shard_path",
+    "u16_to_depth",
+    "write_shard",
+]

@@ -1,0 +1,201 @@
+"""A dataset's card: what it holds, how it was made, how large it is; for a terminal and for a page."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
+from mskgrasp.grasp import FAILURES
+from mskgrasp.metrics import wilson_interval
+
+Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
+"""Title, headers, rows."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """Attempts on the parts of one family: how many parts, attempts, successes."""
+
+    parts: int
+    attempts: int
+    successes: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Card:
+    """A dataset in numbers.
+
+    Attributes:
+        name: Of its folder.
+        shards: Files.
+        parts: Different parts.
+        families: By name, sorted.
+        failures: Attempts that failed, by reason.
+        discarded: Attempts that were thrown away, by reason; not among the attempts.
+        displacement: Median and 90th percentile of the translation over successes, metres; None without.
+        turn: The same of |dtheta|, radians.
+        image: Height and width of a depth image, pixels.
+        seed: Everything random follows from it.
+        physics: Settings of the simulation.
+        versions: Sets of software versions, and how many shards were made with each.
+        size: Bytes on disk.
+    """
+
+    name: str
+    shards: int
+    parts: int
+    families: dict[str, Family]
+    failures: dict[str, int]
+    discarded: dict[str, int]
+    displacement: tuple[float, float] | None
+    turn: tuple[float, float] | None
+    image: tuple[int, int]
+    seed: int
+    physics: dict[str, Any]
+    versions: list[tuple[dict[str, str], int]]
+    size: int
+
+    @property
+    def attempts(self) -> int:
+        """All attempts."""
+        return sum(family.attempts for family in self.families.values())
+
+    @property
+    def successes(self) -> int:
+        """Those that lifted the part."""
+        return sum(family.successes for family in self.families.values())
+
+
+def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = iter) -> Card:
+    """Sums up a dataset without reading its images.
+
+    Args:
+        folder: Of the dataset.
+        watch: Given the files that will be read, yields each: the place for a progress bar.
+
+    Raises:
+        BadDataset: There is no shard, or one is damaged.
+    """
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    parts: dict[str, set[str]] = defaultdict(set)
+    failures: Counter[int] = Counter()
+    discarded: Counter[str] = Counter()
+    versions: Counter[tuple[tuple[str, str], ...]] = Counter()
+    moved: list[np.ndarray] = []
+    paths = list_shards(folder)
+    size, info, image = 0, None, (0, 0)
+    for path in watch(paths):
+        columns, info = read_columns(path, ("success", "failure", "displacement"))
+        counts[info.family].update(attempts=len(columns["success"]), successes=int(columns["success"].sum()))
+        parts[info.family].add(info.part)
+        failures.update(columns["failure"][~columns["success"]].tolist())
+        discarded.update(info.discarded)
+        versions[tuple(sorted(info.versions.items()))] += 1
+        moved.append(columns["displacement"][columns["success"]])
+        size += path.stat().st_size
+    assert info is not None  # list_shards returns one at least
+    image = image_size(paths[0])
+    held = np.concatenate(moved)
+    return Card(
+        name=folder.resolve().name,
+        shards=len(paths),
+        parts=len(set().union(*parts.values())),
+        families={family: Family(parts=len(parts[family]), **counts[family]) for family in sorted(counts)},
+        failures={FAILURES[code]: n for code, n in failures.most_common()},
+        discarded=dict(discarded.most_common()),
+        displacement=_middle_and_tail(np.linalg.norm(held[:, :3], axis=1)),
+        turn=_middle_and_tail(np.abs(held[:, 3])),
+        image=image,
+        seed=info.seed,
+        physics=dict(info.physics),
+        versions=[(dict(names), n) for names, n in versions.most_common()],
+        size=size,
+    )
+
+
+def image_size(path: Path) -> tuple[int, int]:
+    """Height and width of a shard's depth images, pixels.
+
+    Raises:
+        BadDataset: The shard is damaged.
+    """
+    depth = read_columns(path, ("depth",))[0]["depth"]
+    return depth.shape[1], depth.shape[2]
+
+
+def _middle_and_tail(values: np.ndarray) -> tuple[float, float] | None:
+    if not len(values):
+        return None
+    middle, tail = np.quantile(values, (0.5, 0.9))
+    return float(middle), float(tail)
+
+
+def tables(card: Card) -> list[Table]:
+    """The card as tables of text."""
+    n, won = card.attempts, card.successes
+    facts = [
+        ("attempts", f"{n}"),
+        ("parts", f"{card.parts} of {len(card.families)} families"),
+        ("success", _share(won, n)),
+    ]
+    if card.displacement and card.turn:
+        moved, turned = np.array(card.displacement) * 1e3, np.degrees(card.turn)
+        facts += [
+            ("displacement", f"median {moved[0]:.2f} mm, 90 % under {moved[1]:.1f} mm"),
+            ("turn", f"median {turned[0]:.2f} degrees, 90 % under {turned[1]:.1f} degrees"),
+        ]
+    facts += [
+        ("depth images", f"{card.image[1]} x {card.image[0]} pixels, uint16, 0.1 mm"),
+        ("seed", f"{card.seed}"),
+        ("schema", f"version {SCHEMA_VERSION}"),
+        ("on disk", f"{card.shards} shards, {_bytes(card.size)}, {_bytes(card.size / max(n, 1))} an attempt"),
+    ]
+    families = [
+        (name, f"{f.parts}", f"{f.attempts}", _share(f.successes, f.attempts))
+        for name, f in card.families.items()
+    ]
+    failures = [(name, f"{count}", f"{count / max(n, 1):.1%}") for name, count in card.failures.items()]
+    thrown = [(name, f"{count}") for name, count in card.discarded.items()] or [("none", "0")]
+    versions = [
+        (", ".join(f"{name} {version}" for name, version in names.items()), f"{count}")
+        for names, count in card.versions
+    ]
+    return [
+        (f"Dataset {card.name}", ("", ""), facts),
+        ("Success by family", ("family", "parts", "attempts", "success (95 % interval)"), families),
+        ("Failures", ("reason", "attempts", "of all"), failures or [("none", "0", "0.0%")]),
+        ("Discarded", ("reason", "attempts"), thrown),
+        ("Physics", ("setting", "value"), [(key, f"{value}") for key, value in card.physics.items()]),
+        ("Made with", ("versions", "shards"), versions),
+    ]
+
+
+def markdown(card: Card) -> str:
+    """The card as a page."""
+    blocks = []
+    for level, (title, headers, rows) in enumerate(tables(card)):
+        # A name is text here, whatever it contains.
+        cells = [[cell.replace("|", "\\|") for cell in row] for row in (headers, *rows)]
+        lines = ["| " + " | ".join(row) + " |" for row in cells]
+        lines.insert(1, "|" + "---|" * len(headers))
+        blocks.append(f"{'##' if level else '#'} {title}\n\n" + "\n".join(lines) + "\n")
+    return "\n".join(blocks)
+
+
+def _share(won: int, n: int) -> str:
+    low, high = wilson_interval(won, n)
+    return f"{won / max(n, 1):.1%} ({low:.1%} - {high:.1%})"
+
+
+def _bytes(n: float) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if n < 1000:
+            return f"{n:.0f} {unit}" if unit == "B" else f"{n:.1f} {unit}"
+        n /= 1000
+    return f"{n:.2f} TB"

@@ -1,0 +1,277 @@
+"""Whether a dataset is whole and sound: what is wrong, file by file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mskgrasp.config import read_yaml
+from mskgrasp.dataset.attempts import ShardInfo, problems
+from mskgrasp.dataset.ranges import range_problems
+from mskgrasp.dataset.shards import read_unchecked, shard_path
+from mskgrasp.errors import BadConfig, BadDataset, BadPart, UsageError
+from mskgrasp.parts import store
+
+SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics")
+"""What all shards of a dataset have in common."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """Something that makes a dataset unfit for use.
+
+    Attributes:
+        path: The file, in the dataset's folder.
+        reason: What is wrong with it, without its name.
+    """
+
+    path: Path
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """What a check has found.
+
+    Attributes:
+        n_shards: Files that could be read as shards.
+        n_attempts: Attempts in them.
+        faults: By file, in the order of their names; a file may have several.
+        notes: What is worth knowing and no fault.
+    """
+
+    n_shards: int
+    n_attempts: int
+    faults: tuple[Fault, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Shard:
+    path: Path
+    info: ShardInfo
+    n: int
+    grasps: str  # digest
+
+
+def check_dataset(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = iter) -> Report:
+    """Reads all of a dataset and looks for whatever is wrong with it; changes nothing.
+
+    Args:
+        folder: Of the dataset.
+        watch: Given the files that will be read, yields each: the place for a progress bar.
+
+    Raises:
+        UsageError: The folder is no dataset: it does not exist or has no folder ``shards``.
+    """
+    require_dataset(folder)
+    faults: list[Fault] = []
+    notes: list[str] = []
+    paths = []
+    for path in sorted((folder / "shards").iterdir()):
+        if path.suffix == ".tmp":
+            notes.append(f"shards/{path.name} was left by a killed run; the next run clears it away")
+        elif path.suffix != ".h5" or not path.is_file():
+            faults.append(Fault(path=path, reason="is no shard of this dataset (foreign file); remove it"))
+        else:
+            paths.append(path)
+    shards = []
+    for path in watch(paths):
+        shard, reasons = _examine(path)
+        faults += [Fault(path=path, reason=reason) for reason in reasons]
+        shards += [shard] if shard else []
+    settings = _settings(folder, faults)
+    faults += _name_faults(folder, shards)
+    faults += _shared_faults(shards, settings)
+    faults += _hash_faults(shards, notes)
+    faults += _missing(folder, paths, shards, settings)
+    versions = Counter(json.dumps(shard.info.versions, sort_keys=True) for shard in shards)
+    if len(versions) > 1:
+        notes.append(f"the shards were made with {len(versions)} sets of software versions; see `info`")
+    if not shards and not faults:
+        faults.append(Fault(path=folder / "shards", reason="holds no shard; collect some"))
+    faults.sort(key=lambda fault: fault.path.name)
+    n = sum(shard.n for shard in shards)
+    return Report(n_shards=len(shards), n_attempts=n, faults=tuple(faults), notes=tuple(notes))
+
+
+def require_dataset(folder: Path) -> None:
+    """Refuses a folder that cannot be a dataset.
+
+    Raises:
+        UsageError: It does not exist, is a file, or has no folder ``shards``.
+    """
+    if not folder.is_dir():
+        what = "is a file" if folder.exists() else "does not exist"
+        raise UsageError(f"{folder} {what}; give the folder of a dataset, the --out of mskgrasp.collect")
+    if not (folder / "shards").is_dir():
+        raise UsageError(f"{folder} is no dataset: it has no folder shards; give the --out of a collection")
+
+
+def _examine(path: Path) -> tuple[_Shard | None, list[str]]:
+    try:
+        attempts, info = read_unchecked(path)
+    except BadDataset as error:
+        return None, [str(error).removeprefix(str(path)).lstrip(": ")]
+    with np.errstate(all="ignore"):  # a damaged number may be of any size
+        reasons = list(problems(attempts)) or list(range_problems(attempts, info))
+    n = len(attempts)
+    digest = hashlib.sha256(np.ascontiguousarray(attempts.grasp).tobytes()).hexdigest() if n else ""
+    return _Shard(path=path, info=info, n=n, grasps=digest), reasons
+
+
+def _settings(folder: Path, faults: list[Fault]) -> dict[str, Any]:
+    """The dataset's config.yaml, as plain values: its schema is the collector's, which is not imported."""
+    path = folder / "config.yaml"
+    try:
+        return read_yaml(path)
+    except BadConfig as error:
+        faults.append(Fault(path=path, reason=str(error)))
+        return {}
+
+
+def _name_faults(folder: Path, shards: list[_Shard]) -> Iterator[Fault]:
+    seen: dict[str, _Shard] = {}
+    present = {shard.path.name for shard in shards}
+    for shard in shards:
+        info = shard.info
+        try:
+            name = shard_path(folder, info.part, info.index).name
+        except BadDataset as error:
+            yield Fault(path=shard.path, reason=str(error))
+            continue
+        if shard.path.name != name:
+            what = f"holds shard {info.index} of part '{info.part}'"
+            twice = f"which {name} holds, too (duplicate)" if name in present else f"but is not called {name}"
+            yield Fault(path=shard.path, reason=f"{what}, {twice}")
+        elif shard.grasps and shard.grasps in seen:
+            other = seen[shard.grasps].path.name
+            yield Fault(path=shard.path, reason=f"holds the same attempts as {other} (duplicate)")
+        if shard.grasps and shard.path.name == name:
+            seen.setdefault(shard.grasps, shard)
+
+
+def _shared_faults(shards: list[_Shard], settings: dict[str, Any]) -> Iterator[Fault]:
+    for name in SHARED:
+        values = [_plain(getattr(shard.info, name)) for shard in shards]
+        if not values:
+            return
+        usual = Counter(values).most_common(1)[0][0]
+        if name == "seed" and isinstance(settings.get(name), int):
+            usual = _plain(settings[name])
+        for shard, value in zip(shards, values, strict=True):
+            if value != usual:
+                reason = f"{name} {_short(value)} differs from the dataset's {_short(usual)}"
+                yield Fault(path=shard.path, reason=reason)
+    physics = settings.get("physics")
+    if isinstance(physics, dict):
+        # Settings that came later than the dataset are in one of the two alone.
+        for name, value in shards[0].info.physics.items():
+            if name in physics and physics[name] != value:
+                reason = f"physics.{name} is {physics[name]!r}, the shards were made with {value!r}"
+                yield Fault(path=shards[0].path.parent.parent / "config.yaml", reason=reason)
+    families: dict[str, Counter[str]] = defaultdict(Counter)
+    for shard in shards:
+        families[shard.info.part][shard.info.family] += 1
+    right = {}
+    for part, found in families.items():
+        ready = _in_parts_folder(part, "family")
+        right[part] = ready if ready in found else found.most_common(1)[0][0]
+    for shard in shards:
+        usual = right[shard.info.part]
+        if shard.info.family != usual:
+            reason = f"family {shard.info.family!r} differs from the part's {usual!r}"
+            yield Fault(path=shard.path, reason=reason)
+
+
+def _plain(value: Any) -> str:
+    if hasattr(value, "as_vector"):
+        value = value.as_vector()
+    return json.dumps(value.tolist() if isinstance(value, np.ndarray) else value, sort_keys=True)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _hash_faults(shards: list[_Shard], notes: list[str]) -> Iterator[Fault]:
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    for shard in shards:
+        counts[shard.info.part][shard.info.part_hash] += 1
+    right: dict[str, str] = {}
+    changed: list[str] = []
+    for part, found in sorted(counts.items()):
+        ready = _in_parts_folder(part, "content_hash")
+        foreign = {h for other, its in counts.items() if other != part for h in its}
+        # A hash that another part has as well is the likelier one to be wrong.
+        right[part] = min(found, key=lambda h: (h != ready, h in foreign, -found[h], h))
+        if ready is not None and ready not in found:
+            changed.append(part)
+    if changed:
+        names = ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else "")
+        notes.append(
+            f"{len(changed)} parts in {store.parts_folder()} are not those that were grasped ({names}); "
+            "this dataset cannot be added to"
+        )
+    for shard in shards:
+        part, given = shard.info.part, shard.info.part_hash
+        others = [other for other, hash_ in right.items() if hash_ == given and other != part]
+        if others:
+            yield Fault(path=shard.path, reason=f"part_hash {given[:12]} is that of part '{others[0]}'")
+        elif given != right[part]:
+            reason = f"part_hash {given[:12]} differs from the part's {right[part][:12]}"
+            yield Fault(path=shard.path, reason=reason)
+
+
+def _in_parts_folder(part: str, key: str) -> str | None:
+    """What this machine's part of that name says; None where it has none."""
+    try:
+        return str(store.read_record(store.parts_folder() / part).get(key))
+    except BadPart:
+        return None
+
+
+def _missing(
+    folder: Path, paths: list[Path], shards: list[_Shard], settings: dict[str, Any]
+) -> Iterator[Fault]:
+    """Shards that should be there, and those with too few attempts."""
+    plan = _plan(settings)
+    names = {path.name for path in paths}
+    highest: dict[str, int] = {}
+    for shard in shards:
+        highest[shard.info.part] = max(highest.get(shard.info.part, 0), shard.info.index)
+        if plan:
+            per_part, size = plan
+            expected = min(size, per_part - shard.info.index * size)
+            made = shard.n + sum(n for n in shard.info.discarded.values() if isinstance(n, int))
+            if expected <= 0:
+                yield Fault(
+                    path=shard.path, reason=f"config.yaml asks for {per_part} attempts, not for these"
+                )
+            elif made != expected:
+                reason = f"holds {shard.n} attempts, {made} with those discarded, must be {expected}"
+                yield Fault(path=shard.path, reason=reason)
+    words = settings.get("parts")
+    # A part may also be given by its folder, whose own name need not be the part's.
+    asked = [str(word) for word in words if "/" not in str(word)] if isinstance(words, (list, tuple)) else []
+    for part in sorted({*highest, *asked}):
+        n = -(-plan[0] // plan[1]) if plan else highest.get(part, 0) + 1
+        for index in range(n):
+            path = shard_path(folder, part, index)
+            if path.name not in names:
+                yield Fault(path=path, reason="is missing; run the collection again to make it")
+
+
+def _plan(settings: dict[str, Any]) -> tuple[int, int] | None:
+    """Attempts on a part, and in a shard; None where the settings do not tell."""
+    per_part, size = settings.get("attempts_per_part"), settings.get("shard_size")
+    if isinstance(per_part, int) and isinstance(size, int) and per_part > 0 and size > 0:
+        return per_part, size
+    return None

@@ -1,0 +1,232 @@
+"""Grasp attempts on disk: one HDF5 file a shard, written whole or not at all, checked when read."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from mskgrasp.dataset.attempts import COLUMNS, Attempts, ShardInfo, problems, shape_problems
+from mskgrasp.errors import BadDataset
+from mskgrasp.files import write_whole
+from mskgrasp.geometry import Pose
+from mskgrasp.grasp import FAILURES
+
+SCHEMA_VERSION = 1
+_FORMAT = "mskgrasp-shard"
+_MOST_BYTES = 2**32
+"""More than 10,000 images of the largest camera."""
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+
+
+def shard_path(folder: Path, part: str, index: int) -> Path:
+    """Where a shard of a dataset lies.
+
+    Raises:
+        BadDataset: The part's name cannot begin a file name.
+    """
+    if not _NAME.fullmatch(part):
+        raise BadDataset(f"part name {part!r} cannot be a file name; use letters, digits, '.', '-' and '_'")
+    return Path(folder) / "shards" / f"{part}-{index:04d}.h5"
+
+
+def list_shards(folder: Path) -> list[Path]:
+    """The finished shards of a dataset in the order of their names.
+
+    Raises:
+        BadDataset: No such folder, or no finished shard in it.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise BadDataset(
+            f"no dataset folder {folder}; collect one: python -m mskgrasp.collect --out {folder}"
+        )
+    paths = sorted(path for path in (folder / "shards").glob("*.h5") if path.is_file())
+    if not paths:
+        raise BadDataset(
+            f"no shards/*.h5 in {folder}; collect some: python -m mskgrasp.collect --out {folder}"
+        )
+    return paths
+
+
+def write_shard(path: Path, attempts: Attempts, info: ShardInfo) -> None:
+    """Writes a shard so that either all of it or nothing is ever seen under its name.
+
+    The same attempts and info give the same bytes.
+
+    Raises:
+        BadDataset: The attempts contradict the schema.
+        OSError: The disk is full or not writable; nothing is left behind.
+    """
+    path = Path(path)
+    _check(attempts, str(path))
+    if not _NAME.fullmatch(info.part):
+        raise BadDataset(f"{path}: part name {info.part!r}; use letters, digits, '.', '-' and '_'")
+    image = _file_image(attempts, info)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, image)
+
+
+def _file_image(attempts: Attempts, info: ShardInfo) -> bytes:
+    # Built in memory: HDF5 that runs into a full disk leaves a handle that can no longer be closed.
+    with h5py.File("shard", "w", driver="core", backing_store=False) as file:
+        for name, column in COLUMNS.items():
+            array = getattr(attempts, name)
+            options: dict[str, Any] = {}
+            if name == "depth" and array.size:
+                options = {"chunks": (1, *array.shape[1:]), "compression": "gzip"}
+                options |= {"compression_opts": 1, "shuffle": True}
+            stored = file.create_dataset(name, data=array, track_times=False, **options)
+            stored.attrs["unit"] = column.unit
+            stored.attrs["frame"] = column.frame
+        file["failure"].attrs["failure_names"] = list(FAILURES)
+        file.attrs["format"] = _FORMAT
+        file.attrs["schema_version"] = SCHEMA_VERSION
+        for name in ("part", "part_hash", "family", "index", "seed", "table_z"):
+            file.attrs[name] = getattr(info, name)
+        file.attrs["intrinsics"] = np.asarray(info.intrinsics, dtype=np.float64)
+        pose = np.asarray(info.T_base_camera.as_vector(), dtype=np.float64)
+        file.attrs["T_base_camera"] = pose
+        file.attrs["T_base_camera_layout"] = "x y z qw qx qy qz, metres"
+        file.attrs["region"] = np.asarray(info.region, dtype=np.float64)
+        file.attrs["region_layout"] = "x_min x_max y_min y_max, base, metres"
+        for name in ("physics", "versions", "discarded"):
+            file.attrs[name] = json.dumps(getattr(info, name), sort_keys=True)
+        file.flush()
+        return file.id.get_file_image()
+
+
+def read_shard(path: Path) -> tuple[Attempts, ShardInfo]:
+    """Reads and checks a shard.
+
+    Raises:
+        BadDataset: The file is missing, truncated, foreign, of another schema, or contradicts it.
+    """
+    attempts, info = read_unchecked(path)
+    _check(attempts, str(path))
+    return attempts, info
+
+
+def read_unchecked(path: Path) -> tuple[Attempts, ShardInfo]:
+    """Reads a shard as it is, for those who look for what is wrong with it.
+
+    Raises:
+        BadDataset: The file is missing, truncated, foreign or of another schema.
+    """
+    arrays, info = _read(path, tuple(COLUMNS))
+    return Attempts(**arrays), info
+
+
+def read_columns(path: Path, names: Sequence[str]) -> tuple[dict[str, np.ndarray], ShardInfo]:
+    """Reads some of a shard's arrays, for example without the images; their values are not checked.
+
+    Raises:
+        BadDataset: The file is missing, truncated, foreign, of another schema, or an array has the wrong
+            type or shape.
+    """
+    arrays, info = _read(path, tuple(names))
+    for problem in shape_problems(arrays):
+        raise BadDataset(f"{path}: {problem}; delete it and collect again")
+    return arrays, info
+
+
+def read_success(path: Path) -> tuple[np.ndarray, ShardInfo]:
+    """Reads which attempts of a shard lifted the part, (n,) bool, without the images.
+
+    Raises:
+        BadDataset: The file is missing, truncated, foreign or of another schema.
+    """
+    arrays, info = read_columns(path, ("success",))
+    return arrays["success"], info
+
+
+def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], ShardInfo]:
+    path = Path(path)
+    if not path.is_file():
+        raise BadDataset(f"no shard {path}; collect it: python -m mskgrasp.collect")
+    try:
+        with h5py.File(path, "r") as file:
+            _check_header(file, path)
+            return {name: _array(file, name) for name in names}, _read_info(file)
+    except BadDataset:
+        raise
+    except (
+        OSError,
+        RuntimeError,
+        LookupError,
+        ArithmeticError,
+        ValueError,
+        TypeError,
+        AttributeError,
+    ) as error:
+        # h5py reports damage with whichever of these its call stack ends in.
+        problem = " ".join(str(error).split()).strip("'\"")
+        raise BadDataset(
+            f"{path} is damaged or no HDF5 file ({problem}); delete it and collect again"
+        ) from error
+
+
+def _array(file: h5py.File, name: str) -> np.ndarray:
+    stored = file[name]
+    assert isinstance(stored, h5py.Dataset)  # _check_header has seen to it
+    # Damage can make an array look as large as anything: that must not be tried.
+    if stored.size * stored.dtype.itemsize > _MOST_BYTES:
+        raise ValueError(f"{name} claims the shape {stored.shape}")
+    return np.asarray(stored)
+
+
+def _check_header(file: h5py.File, path: Path) -> None:
+    kind = file.attrs.get("format")
+    if kind != _FORMAT:
+        raise BadDataset(f"{path} is HDF5 but no grasp shard (format {kind!r}); remove it")
+    version = file.attrs.get("schema_version")
+    if version != SCHEMA_VERSION:
+        raise BadDataset(f"{path} has schema version {version}, legal: {SCHEMA_VERSION}; collect it again")
+    missing = [name for name in COLUMNS if not isinstance(file.get(name), h5py.Dataset)]
+    if missing:
+        raise BadDataset(f"{path} lacks the array {', '.join(missing)}; delete it and collect again")
+    names = tuple(np.asarray(file["failure"].attrs["failure_names"]).tolist())
+    if names != FAILURES:
+        raise BadDataset(f"{path} names failures {names}, legal: {FAILURES}; collect it again")
+
+
+def _read_info(file: h5py.File) -> ShardInfo:
+    attrs: dict[str, Any] = dict(file.attrs)
+    x_min, x_max, y_min, y_max = (float(value) for value in attrs["region"])
+    intrinsics = np.asarray(attrs["intrinsics"], dtype=np.float64).reshape(3, 3)
+    pose = np.asarray(attrs["T_base_camera"], dtype=np.float64).reshape(7)
+    if not (np.isfinite(intrinsics).all() and np.isfinite(pose).all()):
+        raise ValueError("camera calibration is not finite")
+    return ShardInfo(
+        part=str(attrs["part"]),
+        part_hash=str(attrs["part_hash"]),
+        family=str(attrs["family"]),
+        index=int(attrs["index"]),
+        seed=int(attrs["seed"]),
+        intrinsics=intrinsics,
+        T_base_camera=Pose.from_vector(pose),
+        table_z=float(attrs["table_z"]),
+        region=(x_min, x_max, y_min, y_max),
+        physics=_mapping(attrs, "physics"),
+        versions=_mapping(attrs, "versions"),
+        discarded=_mapping(attrs, "discarded"),
+    )
+
+
+def _mapping(attrs: dict[str, Any], name: str) -> dict[str, Any]:
+    values = json.loads(attrs[name])
+    if not isinstance(values, dict):
+        raise ValueError(f"attribute {name} is no JSON object")
+    return values
+
+
+def _check(attempts: Attempts, source: str) -> None:
+    with np.errstate(all="ignore"):  # a damaged number may be of any size
+        found = list(problems(attempts))
+    for problem in found:
+        raise BadDataset(f"{source}: {problem}; delete it and collect again")

@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+
+from mskgrasp.dataset import list_shards, read_shard
+from mskgrasp.dataset.card import read_card
+from mskgrasp.dataset.verbs import main
+from tests import synthetic
+
+
+def test_the_card_counts_what_the_shards_hold(collected):
+    card = read_card(collected)
+    shards = [read_shard(path) for path in list_shards(collected)]
+    success = np.concatenate([attempts.success for attempts, _ in shards])
+    assert (card.attempts, card.successes) == (len(success), int(success.sum()))
+    assert card.shards == 4 and card.parts == 2 and card.seed == 5
+    assert sum(card.failures.values()) == card.attempts - card.successes
+    assert card.discarded == {}
+    assert card.size == sum(path.stat().st_size for path in list_shards(collected))
+    assert card.versions[0][0]["sapien"] and card.versions[0][1] == 4
+    rows = json.loads((collected / "summary.json").read_text())["parts"]
+    for family, counts in card.families.items():
+        own = [row for row in rows if row["family"] == family]
+        assert counts.attempts == sum(row["attempts"] for row in own)
+        assert counts.successes == sum(row["successes"] for row in own)
+
+
+def test_displacements_are_those_of_successes(tmp_path):
+    folder = synthetic.write_dataset(tmp_path / "boxes", n_parts=3, n_attempts=30, seed=2)
+    moved = np.concatenate(
+        [a.displacement[a.success] for a, _ in (read_shard(path) for path in list_shards(folder))]
+    )
+    card = read_card(folder)
+    assert card.displacement is not None and card.turn is not None
+    assert np.isclose(card.displacement[0], np.median(np.linalg.norm(moved[:, :3], axis=1)))
+    assert np.isclose(card.turn[1], np.quantile(np.abs(moved[:, 3]), 0.9))
+    assert card.discarded == {"unsettled": 3}
+
+
+def test_the_printed_card_has_every_block(collected, capsys):
+    assert main(["info", str(collected)]) == 0
+    printed = capsys.readouterr().out
+    for word in ("12", "4 shards", "hex_nut", "Failures", "Discarded", "rate_hz", "sapien 3."):
+        assert word in printed
+
+
+def test_markdown_is_made_of_well_formed_tables(collected, capsys):
+    assert main(["info", str(collected), "--markdown"]) == 0
+    page = capsys.readouterr().out
+    assert page.startswith("# Dataset data\n")
+    blocks = re.findall(r"(?:^\|.*\n)+", page, flags=re.MULTILINE)
+    assert len(blocks) == 6
+    for block in blocks:
+        lines = block.splitlines()
+        assert set(lines[1]) <= {"|", "-"}
+        assert len({line.count("|") for line in lines}) == 1
+    assert "| attempts | 12 |" in page

@@ -1,0 +1,298 @@
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+
+from mskgrasp.dataset import read_shard
+from mskgrasp.dataset.check import check_dataset
+from mskgrasp.dataset.verbs import main
+from mskgrasp.errors import UsageError
+from mskgrasp.geometry import Pose
+from mskgrasp.grasp import FAILURES, pose_base_tcp
+from tests.collecting import REPOSITORY
+
+KEY, NUT = "parallel_key_a16x10x56", "hex_nut_m30"
+
+
+@pytest.fixture
+def data(collected: Path, tmp_path: Path) -> Path:
+    """A copy of a simulated dataset, to be damaged."""
+    return Path(shutil.copytree(collected, tmp_path / "data"))
+
+
+def shard(data: Path, name: str = f"{KEY}-0000.h5") -> Path:
+    return data / "shards" / name
+
+
+def faults(data: Path) -> dict[str, str]:
+    """What the check finds: file name to its reasons."""
+    found: dict[str, str] = {}
+    for fault in check_dataset(data).faults:
+        assert "\n" not in fault.reason
+        found[fault.path.name] = found.get(fault.path.name, "") + fault.reason + "; "
+    return found
+
+
+def only(data: Path, name: str = f"{KEY}-0000.h5") -> str:
+    """The reasons of the one file that is bad."""
+    found = faults(data)
+    assert list(found) == [name], found
+    return found[name]
+
+
+def put(path: Path, column: str, index, value) -> None:
+    with h5py.File(path, "r+") as file:
+        file[column][index] = value
+
+
+def replace(path: Path, column: str, array: np.ndarray) -> None:
+    with h5py.File(path, "r+") as file:
+        kept = dict(file[column].attrs)
+        del file[column]
+        file[column] = array
+        file[column].attrs.update(kept)
+
+
+def attribute(path: Path, name: str, value) -> None:
+    with h5py.File(path, "r+") as file:
+        file.attrs[name] = value
+
+
+def held(data: Path) -> tuple[Path, int]:
+    """A shard with a success, and its row."""
+    for path in sorted((data / "shards").glob("*.h5")):
+        rows = np.flatnonzero(read_shard(path)[0].success)
+        if len(rows):
+            return path, int(rows[-1])
+    raise AssertionError("the small dataset has no success")
+
+
+def test_what_the_collector_makes_is_sound(collected, capsys):
+    assert main(["check", str(collected)]) == 0
+    assert "sound, 4 shards, 12 attempts" in capsys.readouterr().out
+
+
+def test_the_program_names_each_bad_shard_and_fails(data):
+    shard(data).write_bytes(shard(data).read_bytes()[:5000])
+    put(shard(data, f"{NUT}-0001.h5"), "grasp", (1, 2), np.nan)
+    done = subprocess.run(
+        [sys.executable, "-m", "mskgrasp.dataset", "check", str(data)],
+        capture_output=True, text=True, cwd=REPOSITORY, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 1 and "Traceback" not in done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith(f"shards/{NUT}-0001.h5: grasp of attempt 1 is not finite")
+    assert lines[1].startswith(f"shards/{KEY}-0000.h5: is damaged")
+    assert "2 bad files" in lines[2] and len(lines) == 3
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 0.97])
+def test_a_truncated_shard_is_named(data, share):
+    content = shard(data).read_bytes()
+    shard(data).write_bytes(content[: int(share * len(content))])
+    assert "damaged" in only(data)
+
+
+def test_a_damaged_image_is_named(data):
+    with h5py.File(shard(data)) as file:
+        place = file["depth"].id.get_chunk_info(1)
+    content = bytearray(shard(data).read_bytes())
+    for offset in range(place.byte_offset + 30, place.byte_offset + 60):
+        content[offset] ^= 0xFF
+    shard(data).write_bytes(bytes(content))
+    assert "damaged" in only(data)
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        "grasp",
+        "displacement",
+        "tilt",
+        "width_after",
+        "pose_base_obj",
+        "pose_tcp_obj_before",
+        "pose_tcp_obj_after",
+    ],
+)
+def test_a_flipped_bit_in_a_number_is_told_by_the_others(data, column):
+    path, row = held(data)
+    with h5py.File(path) as file:
+        stored = file[column]
+        offset = stored.id.get_offset() + row * stored.id.get_storage_size() // len(stored)
+    content = bytearray(path.read_bytes())
+    content[offset + 3] ^= 0x40  # the highest bit of the exponent of the row's first float32
+    path.write_bytes(bytes(content))
+    assert f"attempt {row}" in only(data, path.name) or column in only(data, path.name)
+
+
+def test_a_column_of_another_type_or_length_is_named(data):
+    replace(shard(data), "tilt", np.zeros(3, np.float64))
+    assert "tilt is float64, must be float32" in only(data)
+    replace(shard(data), "tilt", np.zeros(2, np.float32))
+    assert "tilt has shape (2,)" in only(data)
+
+
+def test_labels_that_contradict_each_other_are_named(data):
+    path, row = held(data)
+    put(path, "failure", row, FAILURES.index("missed"))
+    assert "success True with failure 1 (missed)" in only(data, path.name)
+    put(path, "success", row, False)
+    assert "is given though it failed" in only(data, path.name)
+
+
+def test_a_success_that_moved_over_five_centimetres_is_named(data):
+    path, row = held(data)
+    attempts, _ = read_shard(path)
+    # Consistent in itself: the pose afterwards tells the same; x of the grasp frame is x of the TCP's.
+    put(path, "displacement", (row, 0), attempts.displacement[row, 0] + 0.06)
+    put(path, "pose_tcp_obj_after", (row, 0), attempts.pose_tcp_obj_after[row, 0] + 0.06)
+    reason = only(data, path.name)
+    assert f"attempt {row} is called a success but moved" in reason and "at most 50" in reason
+    assert "does not follow" not in reason
+
+
+def test_a_displacement_that_does_not_follow_from_the_poses_is_named(data):
+    path, row = held(data)
+    put(path, "displacement", (row, 1), read_shard(path)[0].displacement[row, 1] + 0.002)
+    assert "does not follow from its poses before and after (2.00 mm off)" in only(data, path.name)
+
+
+def shift_grasp(path: Path, change: np.ndarray) -> None:
+    """Moves the first grasp, and the poses that follow from it, so that nothing else is wrong."""
+    attempts, _ = read_shard(path)
+    grasp = (attempts.grasp[0].astype(float) + change).astype(np.float32)
+    before = pose_base_tcp(grasp.astype(float)).inverse() @ Pose.from_vector(
+        attempts.pose_base_obj[0].astype(float)
+    )
+    put(path, "grasp", 0, grasp)
+    put(path, "pose_tcp_obj_before", 0, before.as_vector())
+    put(path, "success", 0, False)
+    put(path, "failure", 0, FAILURES.index("missed"))
+    for column in ("displacement", "tilt"):
+        put(path, column, 0, np.nan)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ((0.4, 0, 0, 0), "outside the region"),
+        ((0, 0, -0.06, 0), "the lowest is"),
+        ((0, 0, 0.5, 0), "the highest is"),
+        ((0, 0, 0, 4.0), "has theta"),
+    ],
+)
+def test_a_grasp_where_none_is_sampled_is_named(data, change, words):
+    shift_grasp(shard(data), np.array(change, dtype=float))
+    assert words in only(data)
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(0.1, "none is under 0.2"), (2.0, "below the table"), (0.0, "without one valid pixel")],
+)
+def test_depth_in_another_unit_is_named(data, factor, words):
+    with h5py.File(shard(data)) as file:
+        depth = file["depth"][:]
+    put(shard(data), "depth", 2, (depth[2] * factor).astype(np.uint16))
+    assert "attempt 2 has" in only(data) and words in only(data)
+
+
+def test_a_swapped_hash_is_named(data):
+    with h5py.File(shard(data, f"{NUT}-0000.h5")) as file:
+        other = file.attrs["part_hash"]
+    attribute(shard(data), "part_hash", other)
+    assert f"is that of part '{NUT}'" in only(data)
+
+
+def test_a_hash_that_differs_from_the_parts_other_shards_is_named(data):
+    attribute(shard(data), "part_hash", "0123456789abcdef")
+    assert "part_hash 0123456789ab differs from the part's" in only(data)
+
+
+def test_a_renamed_shard_is_named_and_missed(data):
+    shard(data).rename(shard(data, f"{KEY}-0007.h5"))
+    found = faults(data)
+    assert set(found) == {f"{KEY}-0000.h5", f"{KEY}-0007.h5"}
+    assert "missing" in found[f"{KEY}-0000.h5"]
+    assert f"holds shard 0 of part '{KEY}', but is not called {KEY}-0000.h5" in found[f"{KEY}-0007.h5"]
+
+
+def test_a_shard_that_is_there_twice_is_named(data):
+    shutil.copy(shard(data), shard(data, f"{NUT}-0009.h5"))
+    assert "which parallel_key_a16x10x56-0000.h5 holds, too (duplicate)" in only(data, f"{NUT}-0009.h5")
+    shard(data, f"{NUT}-0009.h5").unlink()
+    shutil.copy(shard(data), shard(data, f"{KEY}-0001.h5"))
+    attribute(shard(data, f"{KEY}-0001.h5"), "index", 1)
+    assert f"holds the same attempts as {KEY}-0000.h5 (duplicate)" in only(data, f"{KEY}-0001.h5")
+
+
+def test_missing_shards_and_parts_are_named(data):
+    shard(data, f"{NUT}-0001.h5").unlink()
+    assert "is missing" in only(data, f"{NUT}-0001.h5")
+    shard(data, f"{NUT}-0000.h5").unlink()
+    assert list(faults(data)) == [f"{NUT}-0000.h5", f"{NUT}-0001.h5"]
+
+
+def test_a_shard_with_too_few_attempts_is_named(data):
+    with h5py.File(shard(data), "r+") as file:
+        for column in list(file):
+            values, kept = file[column][:2], dict(file[column].attrs)
+            del file[column]
+            file[column] = values
+            file[column].attrs.update(kept)
+    assert "holds 2 attempts, 2 with those discarded, must be 3" in only(data)
+    attribute(shard(data), "discarded", '{"part_not_seen": 1}')
+    assert faults(data) == {}
+    attribute(shard(data), "discarded", '{"part_not_seen": -1}')
+    assert "must be a count" in only(data)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("seed", 6),
+        ("table_z", 0.004),
+        ("region", [0.38, 0.62, -0.12, 0.121]),
+        ("intrinsics", [[366.0, 0, 79.5], [0, 366.0, 79.5], [0, 0, 1]]),
+        ("physics", '{"rate_hz": 250}'),
+        ("family", "spoon"),
+    ],
+)
+def test_a_shard_of_other_settings_is_named(data, name, value):
+    attribute(shard(data), name, value)
+    assert f"{name} " in only(data) and "differs from the" in only(data)
+
+
+def test_settings_that_changed_after_the_shards_were_made_are_named(data):
+    settings = yaml.safe_load((data / "config.yaml").read_text())
+    settings["physics"]["finger_force"] = 30.0
+    (data / "config.yaml").write_text(yaml.safe_dump(settings))
+    assert "physics.finger_force is 30.0, the shards were made with 20.0" in only(data, "config.yaml")
+    (data / "config.yaml").unlink()
+    assert "cannot read configuration" in only(data, "config.yaml")
+
+
+def test_foreign_files_are_named_and_leftovers_only_noted(data):
+    (data / "shards" / "notes.txt").write_text("hello")
+    assert "foreign" in only(data, "notes.txt")
+    (data / "shards" / "notes.txt").unlink()
+    (data / "shards" / "other.h5").write_text("no HDF5")
+    assert "no HDF5" in only(data, "other.h5")
+    (data / "shards" / "other.h5").unlink()
+    (data / "shards" / f"{NUT}-0000.h5.0123.tmp").write_bytes(b"half")
+    report = check_dataset(data)
+    assert not report.faults and "killed run" in report.notes[0]
+
+
+def test_a_folder_that_is_no_dataset_is_a_usage_error(tmp_path):
+    for folder, words in ((tmp_path / "nowhere", "does not exist"), (tmp_path, "no folder shards")):
+        with pytest.raises(UsageError, match=words):
+            check_dataset(folder)
