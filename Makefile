@@ -5,7 +5,7 @@ READY := $(VENV)/.ready
 TESTABLE := $(VENV)/.testable
 RUN := $(VENV)/bin/python -m
 
-.PHONY: help setup collect train plan evaluate test bench-parts check format clean
+.PHONY: help setup collect train plan evaluate test bench-parts bench-collect check format clean
 .DEFAULT_GOAL := help
 
 help: ## Explain the targets
@@ -39,6 +39,9 @@ test: $(TESTABLE) ## Run the tests
 
 bench-parts: $(TESTABLE) ## Seconds to make a part, by family and stage
 	$(RUN) tests.benchmarks.build_parts
+
+bench-collect: $(TESTABLE) ## Grasps/s of the collector beside plain ManiSkill and raw SAPIEN
+	$(RUN) tests.benchmarks.collect_speed
 
 check: $(TESTABLE) ## Check style, types and the floors of the house
 	$(RUN) ruff format --check .
