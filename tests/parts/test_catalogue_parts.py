@@ -22,11 +22,11 @@ ONCE_A_FAMILY = {recipe_of(name).family: name for name in reversed(builtin_names
 
 
 def some_of_every_module() -> list[str]:
-    """Parts of three families of every module that draws parts: building all families takes minutes."""
+    """Parts of two families of every module that draws parts: building all families takes minutes."""
     modules: dict[str, list[str]] = {}
     for name in sorted(ONCE_A_FAMILY.values()):
         modules.setdefault(recipe_of(name).make.__module__, []).append(name)
-    return [names[i] for names in modules.values() for i in sorted({0, len(names) // 2, len(names) - 1})]
+    return [names[i] for names in modules.values() for i in sorted({0, len(names) - 1})]
 
 
 IN_PHYSX = """
@@ -74,7 +74,8 @@ def test_there_are_hundreds_of_recipes_and_no_family_dominates():
 
 def test_meshes_are_closed_single_bodies_about_their_centroid(family_parts):
     for part in family_parts.values():
-        mesh = trimesh.load_mesh(part.mesh_path)
+        # As it is stored: trimesh would merge corners that lie nearer than it can tell apart in metres.
+        mesh = trimesh.load_mesh(part.mesh_path, process=False)
         assert mesh.is_watertight and mesh.is_winding_consistent and mesh.body_count == 1, part.name
         assert np.allclose(mesh.center_mass, 0, atol=2e-6), part.name
         assert part.mass == pytest.approx(part.density * mesh.volume, rel=1e-3), part.name
