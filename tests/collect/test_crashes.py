@@ -16,10 +16,10 @@ from mskgrasp.dataset import read_shard
 from mskgrasp.dataset.check import check_dataset
 from tests.collecting import REPOSITORY, assert_equal, collect, command
 
-# What is waited for before the clock starts, and for how many seconds it may run: start-up, a worker's
-# start-up, the write and the rename of a shard, the time between shards.
 KILLS = int(os.environ.get("MSKGRASP_KILLS", "4"))
 """Of each of two runs; 10 for all moments, which take four minutes."""
+# What is waited for before the clock starts, and for how many seconds it may run: start-up, a worker's
+# start-up, the write and the rename of a shard, the time between shards.
 MOMENTS = (
     *[("start", 3.0)] * 4,
     *[("worker", 4.0)] * 2,
