@@ -21,6 +21,7 @@ import torch
 
 import tasks
 from mskgrasp.collect.shard import draw_attempt
+from mskgrasp.cores import one_thread_a_process
 from mskgrasp.errors import MskgraspError
 from mskgrasp.parts import load_part
 from tasks import GraspDisplacementEnv, Physics
@@ -102,7 +103,8 @@ def draw_grasps(
         name = f"{part.name}-{part.content_hash[:12]}-{seed}-{n}.npz"
         drawn.append(Drawn(folder=folder, file=out / "grasps" / name))
     jobs = [(str(one.folder), n, seed, str(one.file)) for one in drawn if not one.file.exists()]
-    _in_parallel(_draw, jobs, workers, report)
+    with one_thread_a_process():
+        _in_parallel(_draw, jobs, workers, report)
     return drawn
 
 
@@ -136,7 +138,8 @@ def run_settings(
                 jobs.append((setting, one, file))
     # The finest first: what takes longest must not be begun last.
     jobs.sort(key=lambda job: -job[0].physics.rate_hz * job[0].physics.position_iterations)
-    _in_parallel(_try_grasps, jobs, workers, report)
+    with one_thread_a_process():
+        _in_parallel(_try_grasps, jobs, workers, report)
     return {setting.name: _read(out, setting, drawn) for setting in settings}
 
 
@@ -146,8 +149,6 @@ def _in_parallel(
     if not jobs:
         return
     context = multiprocessing.get_context("spawn")  # a forked simulator shares the parent's driver state
-    threads = os.environ.get("OMP_NUM_THREADS")
-    os.environ["OMP_NUM_THREADS"] = "1"
     pool = ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context)
     try:
         for future in as_completed([pool.submit(function, *job) for job in jobs]):
@@ -158,10 +159,6 @@ def _in_parallel(
         ) from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-        if threads is None:
-            del os.environ["OMP_NUM_THREADS"]
-        else:
-            os.environ["OMP_NUM_THREADS"] = threads
 
 
 def _make_env(folder: str, physics: Physics, renderer: str) -> tuple[gymnasium.Env, GraspDisplacementEnv]:

@@ -127,9 +127,15 @@ def test_physx_takes_every_hull_as_it_is_and_mass_and_inertia_too(family_parts, 
         part = family_parts[name]
         assert mass == pytest.approx(part.mass, rel=1e-5), name
         assert inertia == pytest.approx(part.principal_inertia, rel=1e-3), name
-        stored = sorted(ConvexHull(points).volume for points in hulls_of(part))
-        cooked = sorted(ConvexHull(np.array(points) * 1e3).volume for points in shapes)
-        assert len(cooked) == len(stored) and np.allclose(cooked, stored, rtol=2e-3), name
+        stored = hulls_of(part)
+        cooked = [ConvexHull(np.array(points) * 1e3) for points in shapes]
+        assert len(cooked) == len(stored), name
+        for corners in stored:
+            # PhysX drops corners that hardly stand out; the order of the hulls is its own.
+            off = min(float((corners @ c.equations[:, :3].T + c.equations[:, 3]).max()) for c in cooked)
+            assert off < 0.03, name
+        volume = sum(ConvexHull(corners).volume for corners in stored)
+        assert sum(hull.volume for hull in cooked) == pytest.approx(volume, rel=2e-3), name
 
 
 def test_the_published_table_is_that_of_these_parts(family_parts):
