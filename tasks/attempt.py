@@ -72,11 +72,12 @@ class Attempt:
         self._speed = SpeedWatch(part, gpu=motion.gpu)
         motion.watch = self._speed.look
 
-    def run(self, grasp: Tensor) -> dict[str, Tensor]:
+    def run(self, commanded: Tensor, executed: Tensor | None = None) -> dict[str, Tensor]:
         """Executes one grasp in every sub-scene; all of them wait for the slowest.
 
         Args:
-            grasp: (n, 4) x, y, z, theta, base frame.
+            commanded: (n, 4) x, y, z, theta, base frame.
+            executed: (n, 4) where the hand truly goes; as commanded by default.
 
         Returns:
             success (n) bool; failure (n) uint8; displacement (n, 4) and tilt (n), NaN where not
@@ -88,6 +89,7 @@ class Attempt:
             ValueError: A grasp is too low or out of the arm's reach.
         """
         physics, motion = self._physics, self._motion
+        grasp = commanded if executed is None else executed
         start, free, reach = self._approach(grasp)
         lifted = grasp.clone()
         lifted[:, 2] += physics.lift_height
@@ -127,7 +129,7 @@ class Attempt:
             carried = self._lift(grasp, lifted, alive & held, collided, penetration)
         if not carried and bool(alive.any()):
             self._wait_for_rest()
-        return self._outcome(grasp, rest, settled, collided, held, penetration, began)
+        return self._outcome(commanded, rest, settled, collided, held, penetration, began)
 
     def _approach(self, grasp: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Where the descent begins (n, 4), whether it meets nothing (n,), and what stands between the pads.
@@ -191,7 +193,7 @@ class Attempt:
 
     def _outcome(
         self,
-        grasp: Tensor,
+        commanded: Tensor,
         rest: Pose,
         settled: Tensor,
         collided: Tensor,
@@ -217,7 +219,7 @@ class Attempt:
                 wandered=moved[:, :2].norm(dim=-1),
             )
         )
-        before, after = pose_base_tcp(grasp).inverse() @ rest, tcp.inverse() @ now
+        before, after = pose_base_tcp(commanded).inverse() @ rest, tcp.inverse() @ now
         displacement, tilt = object_displacement(before, after)
         unknown = torch.full_like(displacement, math.nan)
         return dict(

@@ -8,7 +8,7 @@ import numpy as np
 import sapien
 import torch
 from mani_skill.envs.sapien_env import BaseEnv
-from mani_skill.sensors.camera import CameraConfig
+from mani_skill.sensors.camera import Camera, CameraConfig
 from mani_skill.utils import sapien_utils
 from mani_skill.utils.registration import register_env
 from mani_skill.utils.structs.actor import Actor
@@ -18,13 +18,15 @@ from sapien.physx import PhysxMaterial
 from torch import Tensor
 
 from mskgrasp.config import check_config
+from mskgrasp.errors import BadConfig
 from mskgrasp.geometry import Pose
-from mskgrasp.grasp import MIN_RISE
+from mskgrasp.grasp import MIN_RISE, lowest_grasp_z
 from mskgrasp.parts import Part, find_part, starter_names
 from tasks.attempt import TABLE_Z, Attempt
-from tasks.camera import Overhead, camera_config
+from tasks.camera import Overhead, camera_config, without_reflection_table
 from tasks.contacts import HandContacts
-from tasks.frames import BASE_IN_WORLD, base_pose, to_world
+from tasks.execution import ExecutionError, ExecutionNoise
+from tasks.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_world
 from tasks.motion import PandaMotion
 from tasks.panda import GraspPanda, panda_for
 from tasks.part_actor import build_part, hull_corners
@@ -48,6 +50,7 @@ class GraspDisplacementEnv(BaseEnv):
     - the part: one for each sub-scene, given by ``parts`` or drawn from the built-in ones
     - its resting pose, by the poses' probabilities
     - its place, uniform in a 24 x 24 cm region, and its turn about the vertical
+    - where ``noise`` asks for it: errors of arm, gripper force, friction and camera (`tasks.execution`)
 
     **Success Conditions:**
     - after the lift and 0.2 s of holding, both pads touch the part and their gap is over 0.5 mm
@@ -77,6 +80,7 @@ class GraspDisplacementEnv(BaseEnv):
         parts: list[str] | None = None,
         physics: dict | None = None,
         camera: dict | None = None,
+        noise: dict | None = None,
         region: Region = REGION,
         robot_uids: str = "panda_grasp",
         num_envs: int = 1,
@@ -89,24 +93,39 @@ class GraspDisplacementEnv(BaseEnv):
             parts: Names or folders of parts, dealt out over the sub-scenes; drawn when None.
             physics: Overrides of `tasks.physics.Physics`.
             camera: Overrides of `tasks.camera.Overhead`.
+            noise: Overrides of `tasks.execution.ExecutionNoise`, all of which is off.
             region: Where parts lie, base frame.
             robot_uids: Only ``panda_grasp``.
             num_envs: Sub-scenes; more than one needs PhysX on a GPU.
             **kwargs: Passed to ManiSkill.
 
         Raises:
-            BadConfig: An override is not valid.
+            BadConfig: An override is not valid, or asks for what cannot be varied.
             BadPart: A part is unknown or damaged.
         """
         if robot_uids != "panda_grasp":
             raise ValueError(f"robot_uids must be 'panda_grasp', got {robot_uids!r}")
         self.physics = check_config(Physics, physics or {}, "physics")
         self.overhead = check_config(Overhead, camera or {}, "camera")
+        self.noise = check_config(ExecutionNoise, noise or {}, "noise")
+        self._check_noise(num_envs)
         self.region = tuple(region)
         self._part_names = list(parts) if parts else None
         self.parts: list[Part] = []
         self._outcome: dict[str, Tensor] | None = None
         super().__init__(*args, robot_uids=panda_for(self.physics, self.region), num_envs=num_envs, **kwargs)
+
+    def _check_noise(self, num_envs: int) -> None:
+        noise, part = self.noise, self.physics.friction_pad_part
+        low = noise.friction_pad_part[0] if noise.friction_pad_part else part
+        if low < part / 2:  # PhysX averages: pads without any friction leave half of the part's
+            raise BadConfig(
+                f"noise: friction_pad_part from {low:g} on needs physics.friction_pad_part <= {2 * low:g}"
+            )
+        if num_envs > 1 and noise != ExecutionNoise(
+            arm_position_std=noise.arm_position_std, arm_angle_std=noise.arm_angle_std
+        ):
+            raise BadConfig("noise: with more than one environment only the arm's errors can be drawn")
 
     @property
     def _default_sim_config(self) -> SimConfig:
@@ -164,6 +183,9 @@ class GraspDisplacementEnv(BaseEnv):
 
     def _after_reconfigure(self, options: dict) -> None:
         self._laid_z = torch.zeros(self.num_envs, device=self.device)
+        self._errors: list[ExecutionError | None] = [None] * self.num_envs
+        if self.scene.can_render():
+            without_reflection_table(self._overhead_sensor)
         self.motion = PandaMotion(self.scene, self.agent, self.physics)
         self.contacts = HandContacts(self.scene, self.agent, self.part)
         self.attempt = Attempt(self.agent, self.part, self._hulls, self.motion, self.contacts, self.physics)
@@ -191,6 +213,22 @@ class GraspDisplacementEnv(BaseEnv):
             # This mode's controller sets no targets: the drives would pull towards the last attempt.
             rest = torch.as_tensor(self.agent.rest_qpos[:7], dtype=torch.float64, device=self.device)
             self.motion.place(rest.expand(self.num_envs, 7))
+        if self.noise != ExecutionNoise():
+            for i in env_idx.tolist():
+                self._errors[i] = self.noise.draw(self._batched_episode_rng[i])
+            self._apply(self._errors[0])
+
+    def _apply(self, error: ExecutionError | None) -> None:
+        """Makes gripper, pads and camera those of an attempt; where they vary there is one sub-scene."""
+        if error is None:
+            return
+        if error.finger_force is not None:
+            self.agent.set_finger_force(error.finger_force)
+        if error.friction_pad_part is not None:
+            self.agent.set_pad_friction(2 * error.friction_pad_part - self.physics.friction_pad_part)
+        if self.noise.moves_camera and self.scene.can_render():
+            true = error.true_camera(self.overhead.T_base_camera(self.region_centre))
+            self._overhead_sensor.camera._render_cameras[0].set_local_pose(sapien_camera_pose(true))
 
     # ------------------------------------------------------------------ looking
 
@@ -203,12 +241,18 @@ class GraspDisplacementEnv(BaseEnv):
         self.agent.show(with_robot)
         try:
             self.scene.update_render(update_sensors=True, update_human_render_cameras=False)
-            sensor = self._sensors["overhead"]
+            sensor = self._overhead_sensor
             sensor.capture()
             seen = sensor.get_obs(rgb=True, depth=True, position=False, segmentation=False)
         finally:
             self.agent.show(True)
         return seen["rgb"], seen["depth"][..., 0]
+
+    @property
+    def _overhead_sensor(self) -> Camera:
+        sensor = self._sensors["overhead"]
+        assert isinstance(sensor, Camera)
+        return sensor
 
     def part_pose(self) -> Pose:
         """``T_base_obj`` of the parts: positions (n, 3), quaternions (n, 4)."""
@@ -220,12 +264,28 @@ class GraspDisplacementEnv(BaseEnv):
 
     # ------------------------------------------------------------------ stepping
 
+    def try_grasp(self, grasp: Tensor) -> dict[str, Tensor]:
+        """One whole attempt in every sub-scene; see `tasks.attempt.Attempt.run`.
+
+        Args:
+            grasp: (n, 4) commanded x, y, z, theta, base frame; where the hand truly goes, ``noise`` says.
+        """
+        return self.attempt.run(grasp, self._executed(grasp))
+
+    def _executed(self, grasp: Tensor) -> Tensor:
+        if self.noise.arm_position_std == 0 and self.noise.arm_angle_std == 0:
+            return grasp
+        rows = [np.zeros(4) if error is None else error.grasp for error in self._errors]
+        executed = grasp + torch.as_tensor(np.stack(rows), dtype=grasp.dtype, device=grasp.device)
+        executed[:, 2].clamp_(min=lowest_grasp_z(TABLE_Z))
+        return executed
+
     def _step_action(self, action: Any) -> Any:
         if self.agent.control_mode != "grasp" or action is None:
             self._outcome = None
             return super()._step_action(action)
         grasp = torch.as_tensor(action, dtype=torch.float32, device=self.device).reshape(-1, 4)
-        self._outcome = self.attempt.run(grasp)
+        self._outcome = self.try_grasp(grasp)
         return grasp
 
     # ------------------------------------------------------------------ ManiSkill's questions

@@ -127,6 +127,14 @@ class GraspPanda(Panda):
                 self.physics.finger_stiffness, self.physics.finger_damping, force, mode="force"
             )
 
+    def set_pad_friction(self, coefficient: float) -> None:
+        """Gives the material of the pads a coefficient; the effective one is its mean with the part's."""
+        for name in FINGER_LINKS:
+            for link in self.robot.links_map[name]._objs:
+                for shape in link.collision_shapes:
+                    shape.physical_material.set_static_friction(coefficient)
+                    shape.physical_material.set_dynamic_friction(coefficient)
+
     @property
     def rest_qpos(self) -> np.ndarray:
         """(9,) arm at home, fingers open."""

@@ -283,5 +283,5 @@ def _ready(job: Job) -> Simulator:
                 "path on every node"
             )
         use_one_core()
-        _simulator = Simulator(job.config.physics, job.config.camera)
+        _simulator = Simulator(job.config.physics, job.config.camera, job.config.noise)
     return _simulator

@@ -9,7 +9,7 @@ import tyro
 from pydantic import Field, model_validator
 
 from mskgrasp.config import Config
-from tasks import REGION, Overhead, Physics
+from tasks import REGION, ExecutionNoise, Overhead, Physics
 
 LEAST_RATE_HZ = 250
 
@@ -64,6 +64,8 @@ class CollectConfig(Config):
     """The simulated cell."""
     camera: Overhead = Overhead()
     """The overhead depth camera."""
+    noise: ExecutionNoise = ExecutionNoise()
+    """Errors of arm, gripper, friction and camera; all off."""
 
     @model_validator(mode="after")
     def _check(self) -> CollectConfig:

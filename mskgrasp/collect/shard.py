@@ -20,7 +20,7 @@ from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, u16_to_depth
 from mskgrasp.errors import NoPartFound
 from mskgrasp.grasp import MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.images import view_part
-from tasks import REGION, GraspDisplacementEnv, Overhead, Physics
+from tasks import REGION, ExecutionNoise, GraspDisplacementEnv, Overhead, Physics
 from tasks.attempt import TABLE_Z
 from tasks.outcome import MAX_PENETRATION, MAX_SPEED
 from tasks.renderer import render_backend
@@ -46,9 +46,10 @@ class ShardTask:
 class Simulator:
     """The environment of one worker, built once and refilled with part after part."""
 
-    def __init__(self, physics: Physics, camera: Overhead):
+    def __init__(self, physics: Physics, camera: Overhead, noise: ExecutionNoise):
         self._physics = physics
         self._camera = camera
+        self._noise = noise
         self._env: gymnasium.Env | None = None
 
     def _load(self, folder: str) -> GraspDisplacementEnv:
@@ -60,6 +61,7 @@ class Simulator:
                 obs_mode="none",
                 physics=self._physics.model_dump(),
                 camera=self._camera.model_dump(),
+                noise=self._noise.model_dump(),
                 render_backend=render_backend(),
             )
             # ManiSkill collects garbage at every new scene; what is loaded by now is none.
@@ -90,7 +92,7 @@ class Simulator:
                 discarded["part_not_seen"] += 1
                 report(-1)
                 continue
-            outcome = env.attempt.run(torch.as_tensor(grasp, device=env.device))
+            outcome = env.try_grasp(torch.as_tensor(grasp, device=env.device))
             row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
             reason = impossible(outcome, row)
             if reason:
@@ -111,6 +113,7 @@ class Simulator:
             table_z=TABLE_Z,
             region=REGION,
             physics=self._physics.model_dump(),
+            noise=self._noise.model_dump(mode="json"),
             versions=versions(),
             discarded=dict(discarded),
         )

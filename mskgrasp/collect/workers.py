@@ -160,7 +160,7 @@ def _work(connection: Connection, config: CollectConfig) -> None:
         from mskgrasp.collect.shard import Simulator
         from mskgrasp.dataset import shard_path, write_shard
 
-        simulator = Simulator(config.physics, config.camera)
+        simulator = Simulator(config.physics, config.camera, config.noise)
         while True:
             task: ShardTask = connection.recv()
             attempts, info = simulator.run(task, lambda outcome: connection.send(("progress", outcome)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -107,6 +107,7 @@ class ShardInfo:
         physics: Settings of the simulation.
         versions: Software versions.
         discarded: Why and how often an attempt was thrown away.
+        noise: Errors of the cell that the attempts met; empty: none.
     """
 
     part: str
@@ -121,6 +122,7 @@ class ShardInfo:
     physics: dict[str, Any]
     versions: dict[str, str]
     discarded: dict[str, int]
+    noise: dict[str, Any] = field(default_factory=dict)
 
 
 def depth_to_u16(depth: np.ndarray) -> np.ndarray:

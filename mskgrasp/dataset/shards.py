@@ -95,7 +95,7 @@ def _file_image(attempts: Attempts, info: ShardInfo) -> bytes:
         file.attrs["T_base_camera_layout"] = "x y z qw qx qy qz, metres"
         file.attrs["region"] = np.asarray(info.region, dtype=np.float64)
         file.attrs["region_layout"] = "x_min x_max y_min y_max, base, metres"
-        for name in ("physics", "versions", "discarded"):
+        for name in ("physics", "noise", "versions", "discarded"):
             file.attrs[name] = json.dumps(getattr(info, name), sort_keys=True)
         file.flush()
         return file.id.get_file_image()
@@ -215,6 +215,7 @@ def _read_info(file: h5py.File) -> ShardInfo:
         physics=_mapping(attrs, "physics"),
         versions=_mapping(attrs, "versions"),
         discarded=_mapping(attrs, "discarded"),
+        noise=_mapping(attrs, "noise") if "noise" in attrs else {},
     )
 
 

@@ -33,7 +33,7 @@ from mskgrasp.collect.shard import Simulator, draw_attempt
 from mskgrasp.collect.workers import Progress, make_shards
 from mskgrasp.images import view_part
 from mskgrasp.parts import Part, find_part, starter_names
-from tasks import REGION, GraspDisplacementEnv, Overhead, Physics
+from tasks import REGION, ExecutionNoise, GraspDisplacementEnv, Overhead, Physics
 from tasks.attempt import TABLE_Z
 from tasks.renderer import render_backend
 from tests.benchmarks.raw_sapien import RawSapien
@@ -148,7 +148,7 @@ class Ours:
     """The collector's own loop, with a clock around PhysX and the renderer."""
 
     def __init__(self) -> None:
-        self.simulator = Simulator(Physics(), Overhead())
+        self.simulator = Simulator(Physics(), Overhead(), ExecutionNoise())
         self.engine = 0.0
         self._clock(ManiSkillScene, "step")
         self._clock(GraspDisplacementEnv, "capture_depth")

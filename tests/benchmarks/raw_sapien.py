@@ -38,7 +38,7 @@ class RawSapien:
             solver_velocity_iterations=1,
             sleep_threshold=0.0,
         )
-        physx.set_scene_config(enable_tgs=True, enable_pcm=True)
+        physx.set_scene_config(enable_tgs=True, enable_pcm=p.persistent_manifold)
         system = physx.PhysxCpuSystem()
         self.scene = sapien.Scene([system, sapien.render.RenderSystem()])
         self.scene.set_timestep(1 / p.rate_hz)
