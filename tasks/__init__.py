@@ -1,8 +1,5 @@
 """The ManiSkill task ``GraspDisplacement-v1``; importing this package registers it."""
 
-from tasks.camera import Overhead
-from tasks.execution import ExecutionNoise
-from tasks.grasp_displacement import REGION, GraspDisplacementEnv
-from tasks.physics import Physics
+from tasks.grasp_displacement import GraspDisplacementEnv
 
-__all__ = ["REGION", "ExecutionNoise", "GraspDisplacementEnv", "Overhead", "Physics"]
+__all__ = ["GraspDisplacementEnv"]

@@ -18,6 +18,7 @@ from mskgrasp.grasp import (
     pose_base_grasp,
     pose_base_tcp,
 )
+from mskgrasp.settings import TABLE_Z, Physics
 from tasks.clearance import Clearance, hand_clearance
 from tasks.contacts import HandContacts
 from tasks.frames import base_pose
@@ -25,11 +26,8 @@ from tasks.kinematics import top_down
 from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration
 from tasks.outcome import MAX_DRIFT, MAX_TURN, MIN_PAD_FORCE, Observed, judge
 from tasks.panda import GraspPanda
-from tasks.physics import Physics
 from tasks.watch import SpeedWatch
 
-TABLE_Z = 0.0
-"""Height of the table, base frame, m."""
 SPEED_WINDOW_S = 0.02
 """The last part of the hold, over which the part's speed in the hand is measured, s."""
 AFTERMATH_S = 0.3

@@ -22,19 +22,16 @@ from mskgrasp.errors import BadConfig
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import MIN_RISE, lowest_grasp_z
 from mskgrasp.parts import Part, find_part, starter_names
-from tasks.attempt import TABLE_Z, Attempt
-from tasks.camera import Overhead, camera_config, without_reflection_table
+from mskgrasp.settings import REGION, TABLE_Z, ExecutionError, ExecutionNoise, Overhead, Physics, Region
+from tasks.attempt import Attempt
+from tasks.camera import camera_config, without_reflection_table
 from tasks.contacts import HandContacts
-from tasks.execution import ExecutionError, ExecutionNoise
 from tasks.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_world
 from tasks.motion import PandaMotion
 from tasks.panda import GraspPanda, panda_for
 from tasks.part_actor import build_part, hull_corners
-from tasks.physics import Physics
-from tasks.placement import Region, random_resting_pose
-
-REGION: Region = (0.38, 0.62, -0.12, 0.12)
-"""The 24 x 24 cm on the table where parts lie, base frame, metres."""
+from tasks.physics import sim_config
+from tasks.placement import random_resting_pose
 
 
 @register_env("GraspDisplacement-v1", max_episode_steps=250)
@@ -50,7 +47,7 @@ class GraspDisplacementEnv(BaseEnv):
     - the part: one for each sub-scene, given by ``parts`` or drawn from the built-in ones
     - its resting pose, by the poses' probabilities
     - its place, uniform in a 24 x 24 cm region, and its turn about the vertical
-    - where ``noise`` asks for it: errors of arm, gripper force, friction and camera (`tasks.execution`)
+    - where ``noise`` asks for it: errors of arm, gripper force, friction and camera (`mskgrasp.settings`)
 
     **Success Conditions:**
     - after the lift and 0.2 s of holding, both pads touch the part and their gap is over 0.5 mm
@@ -91,9 +88,9 @@ class GraspDisplacementEnv(BaseEnv):
         Args:
             *args: Passed to ManiSkill.
             parts: Names or folders of parts, dealt out over the sub-scenes; drawn when None.
-            physics: Overrides of `tasks.physics.Physics`.
-            camera: Overrides of `tasks.camera.Overhead`.
-            noise: Overrides of `tasks.execution.ExecutionNoise`, all of which is off.
+            physics: Overrides of `mskgrasp.settings.Physics`.
+            camera: Overrides of `mskgrasp.settings.Overhead`.
+            noise: Overrides of `mskgrasp.settings.ExecutionNoise`, all of which is off.
             region: Where parts lie, base frame.
             robot_uids: Only ``panda_grasp``.
             num_envs: Sub-scenes; more than one needs PhysX on a GPU.
@@ -129,7 +126,7 @@ class GraspDisplacementEnv(BaseEnv):
 
     @property
     def _default_sim_config(self) -> SimConfig:
-        return self.physics.sim_config()
+        return sim_config(self.physics)
 
     @property
     def _default_sensor_configs(self) -> list[CameraConfig]:

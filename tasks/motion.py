@@ -14,8 +14,8 @@ from mani_skill.envs.scene import ManiSkillScene
 from torch import Tensor
 
 from mskgrasp.grasp import MAX_OPENING
+from mskgrasp.settings import Physics
 from tasks.panda import GraspPanda
-from tasks.physics import Physics
 
 STILL_FINGER = 2e-3
 """A finger slower than this, m/s, has met what it holds. Speeds are differences of positions: PhysX's

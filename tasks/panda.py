@@ -14,8 +14,8 @@ from mani_skill.agents.registration import register_agent
 from mani_skill.agents.robots.panda.panda import Panda
 
 from mskgrasp.grasp import MAX_OPENING, lowest_grasp_z
+from mskgrasp.settings import REGION, Physics
 from tasks.kinematics import HOME
-from tasks.physics import Physics
 
 ARM_TORQUE_LIMIT = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
 """N m; Franka Emika Panda datasheet."""
@@ -65,7 +65,7 @@ class GraspPanda(Panda):
 
     uid = "panda_grasp"
     physics = Physics()
-    region = (0.38, 0.62, -0.12, 0.12)
+    region = REGION
 
     @property
     def urdf_config(self) -> dict:

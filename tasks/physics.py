@@ -1,88 +1,27 @@
-"""The physics settings that make the labels true, in one place.
-
-Every default has its reason beside it; docs/physics.md tells the measurements.
-"""
+"""The engine's configuration for the settings of the simulated cell."""
 
 from __future__ import annotations
 
 from mani_skill.utils.structs.types import GPUMemoryConfig, SceneConfig, SimConfig
-from pydantic import Field, model_validator
 
-from mskgrasp.config import Config
-from mskgrasp.grasp import HOLD_S
+from mskgrasp.settings import Physics
 
 
-class Physics(Config):
-    """Settings of the simulated cell; SI units."""
-
-    rate_hz: int = Field(default=500, ge=100)
-    """Simulation steps a second. Under 250 Hz light parts creep out of the fingers: data is not collected."""
-    position_iterations: int = Field(default=15, ge=4)
-    """Solver iterations a step."""
-    contact_offset: float = Field(default=0.003, gt=0, le=0.02)
-    """Distance at which contacts are generated, m; ManiSkill's 20 mm costs two to four times the time."""
-    persistent_manifold: bool = False
-    """PhysX' cache of contact points (PCM); on a GPU it is always on. Points that are no longer there hold 2
-    of 100 blocks that spin between closing pads up to 1.4 degrees askew."""
-    friction_pad_part: float = Field(default=0.5, ge=0, le=2)
-    """Effective Coulomb coefficient between pads and part (rubber on dry steel: 0.4 to 0.7)."""
-    friction_table_part: float = Field(default=0.4, ge=0, le=2)
-    """Effective Coulomb coefficient between table and part."""
-    pad_patch_radius: float = Field(default=0.005, ge=0)
-    """Radius of the pad's contact patch, m, which resists turning about a single contact point."""
-    finger_speed: float = Field(default=0.1, gt=0)
-    """Closing speed of each finger, m/s (Franka Hand: 0.1 m/s at most)."""
-    finger_force: float = Field(default=20.0, gt=0, le=70)
-    """Force of each pad on the part, N."""
-    finger_stiffness: float = Field(default=2000.0, gt=0)
-    """Drive stiffness of a finger, N/m; with the force limit it only shapes the last millimetres."""
-    finger_damping: float = Field(default=50.0, ge=0)
-    """Drive damping of a finger, N s/m."""
-    finger_armature: float = Field(default=0.3, ge=0)
-    """Inertia of motor and spindle that a finger joint carries, kg."""
-    descend_speed: float = Field(default=0.25, gt=0)
-    """Peak speed of the straight descent, m/s."""
-    lift_speed: float = Field(default=0.25, gt=0)
-    """Peak speed of the straight lift, m/s."""
-    lift_height: float = Field(default=0.1, gt=0, le=0.3)
-    """How far a part is lifted, m."""
-    hold_s: float = Field(default=HOLD_S, ge=HOLD_S)
-    """How long the lifted part is held before it is judged, s."""
-    settle_s: float = Field(default=0.06, ge=0)
-    """How long a part may settle on the table before it is grasped, s."""
-    approach_clearance: float = Field(default=0.01, gt=0, le=0.1)
-    """Height of the pads over the part's top at which the straight descent begins, m."""
-    skip_air: bool = True
-    """Whether the hand is put where it gets through nothing but air, instead of being moved there."""
-    reflex_force: float = Field(default=20.0, gt=0)
-    """Contact force on the hand that ends a descent, N, as the robot's reflex would."""
-
-    @model_validator(mode="after")
-    def _check(self) -> Physics:
-        if self.friction_table < 0:
-            raise ValueError("friction_table_part must be at least half of friction_pad_part")
-        return self
-
-    @property
-    def friction_table(self) -> float:
-        """The table's own coefficient: PhysX averages both materials, and the part's is that of the pads."""
-        return 2 * self.friction_table_part - self.friction_pad_part
-
-    def sim_config(self) -> SimConfig:
-        """ManiSkill's configuration for these settings."""
-        return SimConfig(
-            spacing=2.0,  # far sub-scenes lose float32 precision; parts and arms need under 2 m
-            sim_freq=self.rate_hz,
-            control_freq=self.rate_hz // 25,
-            gpu_memory_config=GPUMemoryConfig(
-                max_rigid_contact_count=2**21, max_rigid_patch_count=2**20, collision_stack_size=2**28
-            ),
-            scene_config=SceneConfig(
-                contact_offset=self.contact_offset,
-                rest_offset=0.0,
-                sleep_threshold=0.0,  # a sleeping part ignores a slow push
-                solver_position_iterations=self.position_iterations,
-                enable_pcm=self.persistent_manifold,
-                cpu_workers=0,
-            ),
-        )
+def sim_config(physics: Physics) -> SimConfig:
+    """ManiSkill's configuration for these settings."""
+    return SimConfig(
+        spacing=2.0,  # far sub-scenes lose float32 precision; parts and arms need under 2 m
+        sim_freq=physics.rate_hz,
+        control_freq=physics.rate_hz // 25,
+        gpu_memory_config=GPUMemoryConfig(
+            max_rigid_contact_count=2**21, max_rigid_patch_count=2**20, collision_stack_size=2**28
+        ),
+        scene_config=SceneConfig(
+            contact_offset=physics.contact_offset,
+            rest_offset=0.0,
+            sleep_threshold=0.0,  # a sleeping part ignores a slow push
+            solver_position_iterations=physics.position_iterations,
+            enable_pcm=physics.persistent_manifold,
+            cpu_workers=0,
+        ),
+    )

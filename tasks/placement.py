@@ -6,9 +6,7 @@ import numpy as np
 
 from mskgrasp.geometry import Pose, quat_about_z, quat_multiply, quat_rotate
 from mskgrasp.parts import Part
-
-Region = tuple[float, float, float, float]
-"""x_min, x_max, y_min, y_max on the table, base frame, metres."""
+from mskgrasp.settings import Region
 
 
 def random_resting_pose(

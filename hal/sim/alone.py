@@ -11,8 +11,7 @@ from hal.sim.camera import SapienCamera
 from hal.sim.noise import SensorNoise
 from hal.sim.world import SapienWorld
 from mskgrasp.config import Config
-from tasks import Overhead, Physics
-from tasks.placement import Region
+from mskgrasp.settings import Overhead, Physics, Region
 
 
 class SapienCameraConfig(Config):

@@ -15,8 +15,7 @@ from hal.sim.camera import SapienCamera
 from hal.sim.noise import SensorNoise
 from hal.sim.world import SapienWorld
 from mskgrasp.config import Config
-from tasks import REGION, Overhead, Physics
-from tasks.attempt import TABLE_Z
+from mskgrasp.settings import REGION, TABLE_Z, Overhead, Physics
 from tasks.kinematics import JOINT_LOWER, JOINT_UPPER, top_down
 
 READY = (0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398)

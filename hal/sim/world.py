@@ -12,8 +12,8 @@ from hal.errors import NotConnected
 from hal.sim.board import show_board
 from mskgrasp.geometry import Pose
 from mskgrasp.parts import find_part
-from tasks import GraspDisplacementEnv, Overhead, Physics
-from tasks.placement import Region
+from mskgrasp.settings import Overhead, Physics, Region
+from tasks import GraspDisplacementEnv
 from tasks.renderer import render_backend
 
 

@@ -20,8 +20,7 @@ from mskgrasp.collect.cluster import (
     wait_until_seen,
 )
 from mskgrasp.collect.config import CollectConfig
-from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary
-from mskgrasp.collect.shard import ShardTask
+from mskgrasp.collect.work import ShardTask
 from mskgrasp.collect.workers import Finished, Lost, Progress, make_shards
 from mskgrasp.config import read_config, write_config
 from mskgrasp.dataset import read_shard, shard_path
@@ -93,6 +92,8 @@ def _collect(config: CollectConfig, parts: list[Part]) -> None:
     )
     if missing:
         _simulate(config, missing, parts, done)
+    from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary  # takes seconds
+
     summaries = summarise(config.out, config.part_filter)
     print_table(summaries, Console(width=None if sys.stdout.isatty() else 150))
     write_summary(summaries, config.out)

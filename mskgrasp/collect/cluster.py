@@ -15,16 +15,19 @@ from collections import Counter, deque
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mskgrasp.cli import explain_os_error
 from mskgrasp.collect.config import CollectConfig
-from mskgrasp.collect.shard import ShardTask, Simulator, versions
+from mskgrasp.collect.work import ShardTask, versions
 from mskgrasp.collect.workers import MAX_TRIES, Finished, Lost, Progress, WorkerFailed, use_one_core
 from mskgrasp.dataset import shard_path, write_shard
 from mskgrasp.errors import MskgraspError, UsageError
 from mskgrasp.parts import Part
 from mskgrasp.parts.store import pack_part, receive_part
+
+if TYPE_CHECKING:
+    from mskgrasp.collect.shard import Simulator
 
 NODE_TRIES = 10
 """How often a shard may lose its node, which is hardly its own fault, before the run gives up."""
@@ -283,5 +286,7 @@ def _ready(job: Job) -> Simulator:
                 "path on every node"
             )
         use_one_core()
+        from mskgrasp.collect.shard import Simulator
+
         _simulator = Simulator(job.config.physics, job.config.camera, job.config.noise)
     return _simulator

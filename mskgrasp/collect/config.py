@@ -9,7 +9,7 @@ import tyro
 from pydantic import Field, model_validator
 
 from mskgrasp.config import Config
-from tasks import REGION, ExecutionNoise, Overhead, Physics
+from mskgrasp.settings import REGION, ExecutionNoise, Overhead, Physics
 
 LEAST_RATE_HZ = 250
 

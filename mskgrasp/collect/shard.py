@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import gc
-import importlib.metadata
-import platform
 import zlib
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
 import numpy as np
 import torch
 
-import mskgrasp
+from mskgrasp.collect.work import ShardTask, versions
 from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, u16_to_depth
 from mskgrasp.errors import NoPartFound
 from mskgrasp.grasp import MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.images import view_part
-from tasks import REGION, ExecutionNoise, GraspDisplacementEnv, Overhead, Physics
-from tasks.attempt import TABLE_Z
+from mskgrasp.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
+from tasks import GraspDisplacementEnv
 from tasks.outcome import MAX_PENETRATION, MAX_SPEED
 from tasks.renderer import render_backend
 
@@ -29,18 +26,6 @@ FIELDS = (
     "success", "failure", "displacement", "tilt", "width_after",
     "pose_base_obj", "pose_tcp_obj_before", "pose_tcp_obj_after",
 )  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class ShardTask:
-    """Which attempts to make: `n` of them on a part, from number `first` on."""
-
-    part: str
-    folder: str
-    index: int
-    first: int
-    n: int
-    seed: int
 
 
 class Simulator:
@@ -182,10 +167,3 @@ def _stack(rows: list[dict[str, np.ndarray]], shape: tuple[int, int]) -> Attempt
     return Attempts(
         **{name: np.stack([row[name] for row in rows]).astype(kind.dtype) for name, kind in empty.items()}
     )
-
-
-def versions() -> dict[str, str]:
-    """Versions of what makes the data."""
-    packages = ("sapien", "mani_skill", "torch", "numpy")
-    found = {name: importlib.metadata.version(name) for name in packages}
-    return dict(found, mskgrasp=mskgrasp.__version__, python=platform.python_version())

@@ -17,7 +17,7 @@ from typing import Any
 
 from mskgrasp.cli import explain_os_error
 from mskgrasp.collect.config import CollectConfig
-from mskgrasp.collect.shard import ShardTask
+from mskgrasp.collect.work import ShardTask
 from mskgrasp.errors import MskgraspError
 
 MAX_TRIES = 3

@@ -16,7 +16,8 @@ from mskgrasp.grasp import MAX_OPENING
 from mskgrasp.parts import Part, store
 from mskgrasp.parts.build import write_solid
 from mskgrasp.parts.solid import Solid
-from tasks import GraspDisplacementEnv, Physics
+from mskgrasp.settings import Physics
+from tasks import GraspDisplacementEnv
 from tasks.frames import base_pose
 from tasks.kinematics import top_down
 

@@ -16,8 +16,8 @@ from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply
 from mskgrasp.grasp import MAX_OPENING
 from mskgrasp.parts import Part
 from mskgrasp.parts import shape as h
+from mskgrasp.settings import Physics
 from mskgrasp.validate.bench import Bench, make_body
-from tasks import Physics
 from tasks.kinematics import top_down
 from tasks.outcome import MAX_PENETRATION
 

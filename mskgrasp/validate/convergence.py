@@ -24,7 +24,8 @@ from mskgrasp.collect.shard import draw_attempt
 from mskgrasp.cores import one_thread_a_process
 from mskgrasp.errors import MskgraspError
 from mskgrasp.parts import load_part
-from tasks import GraspDisplacementEnv, Physics
+from mskgrasp.settings import Physics
+from tasks import GraspDisplacementEnv
 from tasks.renderer import render_backend
 
 KEPT = ("success", "failure", "displacement", "tilt", "penetration", "fastest", "seconds")

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from mskgrasp.collect.shard import versions
+from mskgrasp.collect.work import versions
 from mskgrasp.grasp import MAX_DISPLACEMENT
 from mskgrasp.validate.by_hand import Check
 from mskgrasp.validate.compare import MOST_DISAGREEMENT, MOST_TIMES_FLOOR, Comparison, complaints

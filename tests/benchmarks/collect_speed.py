@@ -33,8 +33,8 @@ from mskgrasp.collect.shard import Simulator, draw_attempt
 from mskgrasp.collect.workers import Progress, make_shards
 from mskgrasp.images import view_part
 from mskgrasp.parts import Part, find_part, starter_names
-from tasks import REGION, ExecutionNoise, GraspDisplacementEnv, Overhead, Physics
-from tasks.attempt import TABLE_Z
+from mskgrasp.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
+from tasks import GraspDisplacementEnv
 from tasks.renderer import render_backend
 from tests.benchmarks.raw_sapien import RawSapien
 

@@ -11,7 +11,7 @@ from mani_skill import PACKAGE_ASSET_DIR
 from sapien import physx
 
 from mskgrasp.parts import Part
-from tasks import Overhead, Physics
+from mskgrasp.settings import Overhead, Physics
 from tasks.camera import FAR, NEAR
 from tasks.frames import sapien_camera_pose, to_world
 from tasks.kinematics import top_down

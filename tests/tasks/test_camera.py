@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from mskgrasp.images import view_part
-from tasks.attempt import TABLE_Z
+from mskgrasp.settings import TABLE_Z
 from tasks.renderer import render_backend
 
 

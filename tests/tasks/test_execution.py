@@ -15,8 +15,7 @@ from mskgrasp.errors import BadConfig
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import FAILURES, lowest_grasp_z
 from mskgrasp.images import view_part
-from tasks import REGION, ExecutionNoise
-from tasks.attempt import TABLE_Z
+from mskgrasp.settings import REGION, TABLE_Z, ExecutionNoise
 from tasks.renderer import render_backend
 
 Z = 0.02

@@ -13,12 +13,12 @@ import pytest
 
 from mskgrasp.errors import BadConfig
 from mskgrasp.parts import find_part
+from mskgrasp.settings import Physics
 from mskgrasp.validate.by_hand import run_checks
 from mskgrasp.validate.compare import cheapest, compare, complaints
 from mskgrasp.validate.config import FLOOR, REFERENCE, ValidateConfig
 from mskgrasp.validate.convergence import Outcomes, Setting, draw_grasps, run_settings
 from mskgrasp.validate.report import impossible
-from tasks import Physics
 
 REPOSITORY = Path(__file__).parents[2]
 
