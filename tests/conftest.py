@@ -14,6 +14,27 @@ import torch
 from tests.collecting import collect
 
 
+LONGEST = (
+    "parts/test_catalogue_parts.py",
+    "hal_contract/test_arm_contract.py",
+    "collect/test_collect.py",
+    "franka/test_faults.py",
+    "hal_contract/test_same_code.py",
+    "validate/test_validate.py",
+    "collect/test_crashes.py",
+    "collect/test_cluster.py",
+    "test_evaluate.py",
+    "sim_in_the_loop/test_precise_grasps.py",
+)
+"""Files that take a minute or more: begun first, so that no process is left alone with one at the end."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    tests = Path(__file__).parent
+    rank = {tests / name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path, len(rank)))
+
+
 @pytest.fixture(scope="session", autouse=True)
 def two_threads() -> None:
     torch.set_num_threads(2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from dataclasses import asdict
 from typing import Any, NoReturn
@@ -28,6 +29,8 @@ _GRIPPER_S = 10.0
 _RECOVERY_S = 2.0
 """The robot's mode may follow its recovery this much later, s."""
 _STILL_WIDTH = 1e-4
+_STILL_JOINT, _STANDING_S = 1e-4, 0.75
+"""An arm that comes by less than so many radians nearer to its goal in so many seconds has arrived there."""
 _POLL_S = 0.05
 
 
@@ -153,9 +156,14 @@ class FrankaArm(Arm):
             self._raise_aborted(error)
         goal = path.joints[-1]
         deadline = time.monotonic() + self._config.settle_s
-        # Nearer than the base class asks for, so that its check does not depend on the moment.
-        while np.abs(np.array(self._measure().joints) - goal).max() > JOINT_TOLERANCE / 4:
-            if time.monotonic() > deadline or self._stop.is_set():
+        # Nearer than the base class asks for, so that its check does not depend on the moment; an arm that
+        # comes no nearer stands as near as it gets.
+        nearest, since = math.inf, time.monotonic()
+        while (error := np.abs(np.array(self._measure().joints) - goal).max()) > JOINT_TOLERANCE / 4:
+            now = time.monotonic()
+            if error < nearest - _STILL_JOINT:
+                nearest, since = error, now
+            if now > deadline or now - since > _STANDING_S or self._stop.is_set():
                 return
             time.sleep(_POLL_S)
 

@@ -14,6 +14,9 @@ from mskgrasp.geometry import Pose, pose_distance, straight_line
 PERIOD_S = 0.05
 """Time between two knots of a path, s: a cubic between them is off by less than 0.1 mm at 0.5 m/s."""
 
+CREEP_RAD = 2e-5
+"""A joint that moves by less over a whole path stands, rad: 0.02 mm at the hand."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class JointPath:
@@ -33,6 +36,19 @@ class JointPath:
     def duration_s(self) -> float:
         """Seconds from the first knot to the last."""
         return float(self.seconds[-1])
+
+    def without_creep(self) -> JointPath:
+        """The same path with joints that move by next to nothing standing where they are.
+
+        A profile over a millionth of a radian is beyond the accuracy of trajectory solvers: Ruckig, which
+        franky uses, then now and then finds none and aborts the motion.
+        """
+        still = np.ptp(self.joints, axis=0) < CREEP_RAD
+        return JointPath(
+            seconds=self.seconds,
+            joints=np.where(still, self.joints[0], self.joints),
+            speeds=np.where(still, 0.0, self.speeds),
+        )
 
 
 def joint_path(

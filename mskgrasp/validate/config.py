@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -10,10 +11,24 @@ from pydantic import Field, model_validator
 
 from mskgrasp.config import Config
 from mskgrasp.settings import Physics
-from mskgrasp.validate.convergence import Setting
 
 SHIFT = 1e-5
 """By how much the starts of the floor are moved, m: less than any camera or arm could tell."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """One way to simulate.
+
+    Attributes:
+        name: For tables and files.
+        physics: What differs.
+        shift: By how much the parts' starts are moved on the table, m: 0, or the 10 um of the floor.
+    """
+
+    name: str
+    physics: Physics
+    shift: float = 0.0
 
 
 class ValidateConfig(Config):

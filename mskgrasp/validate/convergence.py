@@ -25,6 +25,7 @@ from mskgrasp.cores import one_thread_a_process
 from mskgrasp.errors import MskgraspError
 from mskgrasp.parts import load_part
 from mskgrasp.settings import Physics
+from mskgrasp.validate.config import Setting
 from tasks import GraspDisplacementEnv
 from tasks.renderer import render_backend
 
@@ -33,21 +34,6 @@ KEPT = ("success", "failure", "displacement", "tilt", "penetration", "fastest", 
 
 class ValidationFailed(MskgraspError):
     """The validation could not be carried out."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Setting:
-    """One way to simulate.
-
-    Attributes:
-        name: For tables and files.
-        physics: What differs.
-        shift: By how much the parts' starts are moved on the table, m: 0, or the 10 um of the floor.
-    """
-
-    name: str
-    physics: Physics
-    shift: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

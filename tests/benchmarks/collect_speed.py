@@ -28,6 +28,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from mskgrasp.collect.__main__ import plan_shards
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.shard import Simulator, draw_attempt
 from mskgrasp.collect.workers import Progress, make_shards
@@ -49,12 +50,19 @@ def main() -> None:
     parser.add_argument(
         "--shards", type=int, default=2, help="shards of 25 attempts a part for the scaling (default 2)"
     )
+    parser.add_argument(
+        "--endurance", type=int, default=0,
+        help="only let one worker make so many attempts, 10000 say, and compare each tenth of them",
+    )  # fmt: skip
     options = parser.parse_args()
     logging.getLogger("mani_skill").setLevel(logging.ERROR)
     torch.set_num_threads(1)
     names = starter_names()
     chosen = [names[int(i)] for i in np.linspace(0, len(names) - 1, min(options.parts, len(names)))]
     parts = [find_part(name) for name in chosen]
+    if options.endurance:
+        endure(parts, options.endurance)
+        return
     found = side_by_side(parts, options.attempts)
     rates = {workers: throughput(parts, options.shards, workers) for workers in (1, 2)}
     report(found, rates)
@@ -198,8 +206,6 @@ class Ours:
 
 def throughput(parts: list[Part], shards: int, workers: int) -> dict[str, float]:
     """Grasps a second of the collector in its steady state, and the memory of its largest worker, GiB."""
-    from mskgrasp.collect.__main__ import plan_shards
-
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         (out / "shards").mkdir()
@@ -225,8 +231,40 @@ def throughput(parts: list[Part], shards: int, workers: int) -> dict[str, float]
         return {"grasps_per_s": (last - first) / (ended - began), "gib": most}
 
 
-def largest_child() -> float:
-    """Greatest resident memory of this process's children, GiB."""
+def endure(parts: list[Part], n: int) -> None:
+    """Prints grasps a second and memory of one worker over each tenth of n attempts."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        (out / "shards").mkdir()
+        config = CollectConfig(
+            out=out,
+            parts=tuple(part.name for part in parts),
+            attempts_per_part=-(-n // len(parts)),
+            shard_size=25,
+        )
+        tasks = plan_shards(config, parts)
+        total = sum(task.n for task in tasks)
+        done, tenths = 0, []
+        began = None
+        with tqdm(total=total, unit="grasp", file=sys.stderr, disable=None) as bar:
+            for event in make_shards(config, tasks, 1):
+                if not isinstance(event, Progress):
+                    continue
+                began = began or time.perf_counter()  # the worker has started
+                done += 1
+                bar.update()
+                if done * 10 // total > len(tenths):
+                    now = time.perf_counter()
+                    tenths.append((total / 10 / (now - began), largest_child("VmRSS")))
+                    began = now
+    for number, (rate, gib) in enumerate(tenths, 1):
+        print(f"attempts up to {number * total // 10:6d}: {rate:.2f} grasps/s, {gib:.3f} GiB")
+    print(json.dumps({"last_over_first": round(tenths[-1][0] / tenths[0][0], 3),
+                      "gib_grown": round(tenths[-1][1] - tenths[0][1], 3)}))  # fmt: skip
+
+
+def largest_child(field: str = "VmHWM") -> float:
+    """Resident memory of the largest of this process's children, GiB: its greatest, or VmRSS, now."""
     most = 0.0
     for folder in Path("/proc").glob("[0-9]*"):
         try:
@@ -234,8 +272,8 @@ def largest_child() -> float:
         except OSError:
             continue
         fields = dict(line.split(":", 1) for line in status.splitlines() if ":" in line)
-        if int(fields["PPid"]) == os.getpid() and "VmHWM" in fields:
-            most = max(most, int(fields["VmHWM"].split()[0]) / 2**20)
+        if int(fields["PPid"]) == os.getpid() and field in fields:
+            most = max(most, int(fields[field].split()[0]) / 2**20)
     return most
 
 

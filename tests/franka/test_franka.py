@@ -98,6 +98,16 @@ def test_a_joint_path_keeps_speed_and_acceleration():
     )
 
 
+def test_joints_that_all_but_stand_are_left_standing():
+    goal = HOME + np.array([0.05, 1e-7, -3e-6, 0.0, 1e-5, 1e-4, 0.0])
+    path = joint_path(HOME, goal, speed=np.ones(7), acceleration=np.ones(7))
+    quiet = path.without_creep()
+    moves = np.array([True, False, False, False, False, True, False])
+    assert np.array_equal(quiet.joints[:, moves], path.joints[:, moves])
+    assert np.array_equal(quiet.speeds[:, moves], path.speeds[:, moves])
+    assert (quiet.joints[:, ~moves] == HOME[~moves]).all() and not quiet.speeds[:, ~moves].any()
+
+
 @settings(deadline=None, max_examples=50)
 @given(shares)
 def test_libfrankas_columns_become_our_pose(share: list[float]):
