@@ -13,7 +13,6 @@ import torch
 
 from tests.collecting import collect
 
-
 LONGEST = (
     "parts/test_catalogue_parts.py",
     "hal_contract/test_arm_contract.py",

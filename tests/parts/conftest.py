@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -17,11 +17,32 @@ def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("shared-cache")
 
 
+class BuiltIn(Mapping[str, Part]):
+    """The starter parts by name, each made when it is first asked for."""
+
+    def __init__(self, cache: Path):
+        self._cache = cache
+        self._made: dict[str, Part] = {}
+
+    def __getitem__(self, name: str) -> Part:
+        if name not in starter_names():
+            raise KeyError(name)
+        if name not in self._made:
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setenv("XDG_CACHE_HOME", str(self._cache))
+                self._made[name] = build_part(name)
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(starter_names())
+
+    def __len__(self) -> int:
+        return len(starter_names())
+
+
 @pytest.fixture(scope="session")
-def builtin_parts(shared_cache: Path) -> dict[str, Part]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(shared_cache))
-        return {name: build_part(name) for name in starter_names()}
+def builtin_parts(shared_cache: Path) -> BuiltIn:
+    return BuiltIn(shared_cache)
 
 
 @pytest.fixture(autouse=True)
