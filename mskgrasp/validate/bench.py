@@ -68,13 +68,18 @@ class Bench:
         self._env.close()
 
     def lay(
-        self, part: Part, position: tuple[float, float, float], quat_wxyz: np.ndarray | None = None
+        self,
+        part: Part,
+        position: tuple[float, float, float],
+        quat_wxyz: np.ndarray | None = None,
+        *,
+        fresh: bool = True,
     ) -> None:
-        """A fresh scene with the part at rest at a pose in the base frame, metres; the arm at home."""
+        """The part at rest at a pose in the base frame, metres, the arm at home; in a fresh scene, or not."""
         quat = np.array([1.0, 0, 0, 0]) if quat_wxyz is None else quat_wxyz
         pose = np.array([[*position, *quat]])
-        options = dict(parts=[str(part.folder)], reconfigure=True, pose_base_obj=pose)
-        self.env.reset(seed=0, options=options)
+        scene = dict(parts=[str(part.folder)], reconfigure=True) if fresh else {}
+        self.env.reset(seed=0, options=dict(scene, pose_base_obj=pose))
 
     @property
     def body(self) -> PhysxRigidDynamicComponent:
@@ -125,10 +130,10 @@ class Bench:
         self.body.disable_gravity = False
 
     def grasp(
-        self, part: Part, position: tuple[float, float, float], turn: float = 0.0
+        self, part: Part, position: tuple[float, float, float], turn: float = 0.0, *, fresh: bool = True
     ) -> dict[str, np.ndarray]:
         """Lays the part at a pose (turned about z) and grasps the middle of the region at 20 mm."""
-        self.lay(part, position, np.array([np.cos(turn / 2), 0, 0, np.sin(turn / 2)]))
+        self.lay(part, position, np.array([np.cos(turn / 2), 0, 0, np.sin(turn / 2)]), fresh=fresh)
         x, y = self.env.region_centre
         outcome = self.env.attempt.run(torch.tensor([[x, y, 0.02, 0.0]]))
         return {name: value[0].double().numpy() for name, value in outcome.items()}

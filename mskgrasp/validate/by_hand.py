@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -62,14 +62,22 @@ class Check:
         return asdict(self) | {"passed": self.passed}
 
 
-def run_checks(physics: Physics, report: Callable[[Check], None]) -> list[Check]:
-    """All checks under some settings; ``report`` is told of each when it is done."""
+def run_checks(
+    physics: Physics, report: Callable[[Check], None], experiments: Sequence[Experiment] | None = None
+) -> list[Check]:
+    """Checks under some settings; ``report`` is told of each when it is done.
+
+    Args:
+        physics: The settings.
+        report: Told of every check.
+        experiments: Which; all of `EXPERIMENTS` by default.
+    """
     with tempfile.TemporaryDirectory(prefix="mskgrasp-validate-") as scratch:
         bodies = _bodies(Path(scratch), physics)
         bench = Bench(physics, bodies["block"])
         done = []
         try:
-            for experiment in EXPERIMENTS:
+            for experiment in experiments or EXPERIMENTS:
                 for check in experiment(bench, bodies):
                     report(check)
                     done.append(check)
@@ -99,6 +107,7 @@ def _bodies(folder: Path, physics: Physics) -> dict[str, Part]:
     }
 
 
+Experiment = Callable[[Bench, dict[str, Part]], Iterator[Check]]
 BLOCK = (0.04, 0.02, 0.03)
 LEVER = (0.15, 0.01, 0.01)
 LEVER_ARM = 0.06
@@ -274,7 +283,8 @@ def centring(bench: Bench, bodies: dict[str, Part]) -> Iterator[Check]:
     for _ in range(BLOCKS):
         turn = float(rng.uniform(-0.5, 0.5))
         dx, dy = rng.uniform(-0.007, 0.007, 2)
-        outcome = bench.grasp(bodies["block"], (x + dx, y + dy, z), turn)
+        # One after the other in the same scene, as the collector does it.
+        outcome = bench.grasp(bodies["block"], (x + dx, y + dy, z), turn, fresh=False)
         askew.append(abs(math.degrees(float(outcome["displacement"][3]) + turn)))
     yield Check(
         name=f"the most askew of {BLOCKS} blocks laid at random", formula="flat against the pads", unit="deg",
