@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
+import shapely
+import trimesh
+
 from mskgrasp.parts import solid as s
 from mskgrasp.parts.cad.brep import lengths, mesh_of, needs_cad, table
 from mskgrasp.parts.cad.hulls import turned_hulls
 from mskgrasp.parts.families.recipe import ALUMINIUM, STEEL, Recipe
-from mskgrasp.parts.pieces import merge_hulls
+from mskgrasp.parts.pieces import merge_hulls, turned_pieces
+from mskgrasp.parts.shape import HULL_DETAIL_MM
 
 CAST_IRON = 7200.0
 POLYAMIDE = 1140.0
@@ -27,18 +32,22 @@ def recipes() -> Iterator[Recipe]:
             source="own dimensions, drawn with build123d 0.13",
             density=density,
             dimensions=lengths(row),
-            make=_maker(draw, turned=row["family"] == "nozzle"),
+            make=_maker(draw, HULLS.get(row["family"])),
         )
 
 
-def _maker(draw: Callable[[Any, Size], Any], *, turned: bool) -> Callable[[dict[str, float]], s.Solid]:
+def _maker(
+    draw: Callable[[Any, Size], Any], pieces: Callable[[trimesh.Trimesh, Size], list[np.ndarray]] | None
+) -> Callable[[dict[str, float]], s.Solid]:
     @needs_cad
     def make(size: dict[str, float]) -> s.Solid:
         import build123d
 
         a, b, c, d, e, f = (size[f"{letter}_mm"] for letter in "abcdef")
         mesh = mesh_of(draw(build123d, (a, b, c, d, e, f)))
-        return s.Solid(mesh=mesh, hulls=tuple(merge_hulls(turned_hulls(mesh), 0.03)) if turned else ())
+        # Without pieces of its own the mesh is decomposed.
+        hulls = pieces(mesh, (a, b, c, d, e, f)) if pieces else []
+        return s.Solid(mesh=mesh, hulls=tuple(hulls))
 
     return make
 
@@ -106,6 +115,22 @@ def boss_foot(b: Any, size: Size) -> Any:
     return body - b.Cylinder(bore / 2, 4 * height)
 
 
+def _foot_pieces(_: trimesh.Trimesh, size: Size) -> list[np.ndarray]:
+    """The foot around its bore, and wedges of the boss; the decomposition takes minutes for the cone."""
+    length, width, thick, top, height, bore = size
+    corner = min(length, width) / 6
+    plan = shapely.box(-length / 2, -width / 2, length / 2, width / 2)
+    outline = shapely.get_coordinates(plan.buffer(-corner).buffer(corner, quad_segs=3))[:-1]
+    base, hollow = min(top * 1.35, width - 4) / 2, bore / 2
+
+    def radius(z: float) -> float:
+        return base + (top / 2 - base) * z / height
+
+    boss = [(hollow, thick), (radius(thick), thick), (radius(height - 1), height - 1),
+            (top / 2 - 1, height), (hollow, height)]  # fmt: skip
+    return s.around_hole(outline, s.bore_polygon(hollow), 0, thick) + turned_pieces(boss, HULL_DETAIL_MM)
+
+
 def housing(b: Any, size: Size) -> Any:
     """An open box with rounded corners and ribs across."""
     length, width, height, wall, corner, ribs = size
@@ -151,3 +176,9 @@ FAMILIES: dict[str, tuple[float, Callable[[Any, Size], Any]]] = {
     "yoke": (STEEL, yoke),
 }
 """Density in kg/m^3 and the drawing of each family."""
+
+HULLS: dict[str, Callable[[trimesh.Trimesh, Size], list[np.ndarray]]] = {
+    "boss_foot": _foot_pieces,
+    "nozzle": lambda mesh, _: merge_hulls(turned_hulls(mesh), 0.03),
+}
+"""Pieces of the families that know their own."""
