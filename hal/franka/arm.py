@@ -29,7 +29,7 @@ _GRIPPER_S = 10.0
 _RECOVERY_S = 2.0
 """The robot's mode may follow its recovery this much later, s."""
 _STILL_WIDTH = 1e-4
-_STILL_JOINT, _STANDING_S = 1e-4, 0.75
+_STILL_JOINT, _STANDING_S = 1e-4, 0.4
 """An arm that comes by less than so many radians nearer to its goal in so many seconds has arrived there."""
 _POLL_S = 0.05
 

@@ -13,8 +13,11 @@ from mskgrasp.parts import Part, build_part, starter_names
 
 @pytest.fixture(scope="session")
 def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Holds the built-in parts; tests must not write to it."""
-    return tmp_path_factory.mktemp("shared-cache")
+    """Holds the built-in parts, for all processes of the tests; tests must not write to it."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "shared-cache"
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 class BuiltIn(Mapping[str, Part]):
