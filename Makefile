@@ -35,7 +35,7 @@ evaluate: $(READY) ## Plan and execute grasps in the simulated cell with models/
 	$(RUN) mskgrasp.evaluate --cell configs/cells/sapien.yaml --models models/demo --trials 2 --out out/eval
 
 test: $(TESTABLE) ## Run the tests
-	$(RUN) pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder --durations 15
+	$(RUN) pytest -n 3 --dist loadfile --no-loadscope-reorder --durations 15
 
 bench-parts: $(TESTABLE) ## Seconds to make a part, by family and stage
 	$(RUN) tests.benchmarks.build_parts

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 from pathlib import Path
 
@@ -41,8 +42,14 @@ def two_threads() -> None:
 
 @pytest.fixture(scope="session")
 def collected(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small dataset made by one worker without any trouble; not to be changed."""
-    out = tmp_path_factory.mktemp("collected") / "data"
-    done = collect(out, "--workers", "1")
-    assert done.returncode == 0, done.stderr
-    return out
+    """A small dataset made by one worker without any trouble, for all processes; not to be changed."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "collected"
+    folder.mkdir(exist_ok=True)
+    with open(folder / "lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # whoever comes first makes it
+        if not (folder / "made").exists():
+            done = collect(folder / "data", "--workers", "1")
+            assert done.returncode == 0, done.stderr
+            (folder / "made").touch()
+    return folder / "data"

@@ -80,7 +80,7 @@ def slow(arm: Arm) -> None:
 def nudge(arm: Arm) -> None:
     """A short motion that shows that the arm moves again."""
     here = arm.state().joints
-    arm.move_to_joints(here + np.array([-0.05 if here[0] > 0 else 0.05, *np.zeros(6)]))
+    arm.move_to_joints(here + np.array([-0.05 if here[0] > 0 else 0.05, *np.zeros(6)]), speed=1.0)
 
 
 @pytest.fixture(scope="module", params=["franky", "panda_py"])

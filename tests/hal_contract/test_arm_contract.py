@@ -90,7 +90,7 @@ def cell(world: Cell, name: str, request: pytest.FixtureRequest, tmp_path: Path)
 def at_home(cell: Cell) -> Iterator[None]:
     cell.arm.recover()
     cell.arm.move_gripper(0.08)
-    cell.arm.move_to_joints(cell.workspace.home)
+    cell.arm.move_to_joints(cell.workspace.home, speed=1.0)
     yield
     cell.arm.recover()
 
@@ -269,12 +269,12 @@ def test_stop_from_another_thread_ends_a_motion_and_nothing_moves_before_recover
                 cell.arm.move_to_joints(far if k % 2 == 0 else cell.workspace.home)
     stopped = joints_at_rest(cell.arm)
     with pytest.raises(NeedsRecovery, match=r"recover\(\)"):
-        cell.arm.move_to_joints(cell.workspace.home)
+        cell.arm.move_to_joints(cell.workspace.home, speed=1.0)
     with pytest.raises(NeedsRecovery, match=r"recover\(\)"):
         cell.arm.grasp(20.0)
     assert cell.arm.state().joints == pytest.approx(stopped, abs=1e-2)
     cell.arm.recover()
-    cell.arm.move_to_joints(cell.workspace.home)
+    cell.arm.move_to_joints(cell.workspace.home, speed=1.0)
     assert cell.arm.state().joints == pytest.approx(cell.workspace.home, abs=JOINT_TOLERANCE)
 
 
@@ -306,7 +306,7 @@ def test_an_interrupted_program_leaves_an_arm_that_must_be_recovered(cell: Cell,
         patch.setattr(moved, "_move_to_joints", interrupt)
         # A recorded Ctrl-C must not end the program that plays it back.
         with pytest.raises(MotionAborted if name == "replay" else KeyboardInterrupt):
-            cell.arm.move_to_joints(cell.workspace.home)
+            cell.arm.move_to_joints(cell.workspace.home, speed=1.0)
     with pytest.raises(NeedsRecovery):
         cell.arm.move_gripper(0.05)
 
