@@ -40,8 +40,8 @@ class JointPath:
     def without_creep(self) -> JointPath:
         """The same path with joints that move by next to nothing standing where they are.
 
-        A profile over a millionth of a radian is beyond the accuracy of trajectory solvers: Ruckig, which
-        franky uses, then now and then finds none and aborts the motion.
+        A profile over a millionth of a radian is at the end of a trajectory solver's accuracy: Ruckig, which
+        franky uses, was seen to find none on such a path (-111), which aborts the motion.
         """
         still = np.ptp(self.joints, axis=0) < CREEP_RAD
         return JointPath(

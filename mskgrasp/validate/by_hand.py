@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -62,22 +62,14 @@ class Check:
         return asdict(self) | {"passed": self.passed}
 
 
-def run_checks(
-    physics: Physics, report: Callable[[Check], None], experiments: Sequence[Experiment] | None = None
-) -> list[Check]:
-    """Checks under some settings; ``report`` is told of each when it is done.
-
-    Args:
-        physics: The settings.
-        report: Told of every check.
-        experiments: Which; all of `EXPERIMENTS` by default.
-    """
+def run_checks(physics: Physics, report: Callable[[Check], None]) -> list[Check]:
+    """All checks under some settings; ``report`` is told of each when it is done."""
     with tempfile.TemporaryDirectory(prefix="mskgrasp-validate-") as scratch:
         bodies = _bodies(Path(scratch), physics)
         bench = Bench(physics, bodies["block"])
         done = []
         try:
-            for experiment in experiments or EXPERIMENTS:
+            for experiment in EXPERIMENTS:
                 for check in experiment(bench, bodies):
                     report(check)
                     done.append(check)
@@ -107,7 +99,6 @@ def _bodies(folder: Path, physics: Physics) -> dict[str, Part]:
     }
 
 
-Experiment = Callable[[Bench, dict[str, Part]], Iterator[Check]]
 BLOCK = (0.04, 0.02, 0.03)
 LEVER = (0.15, 0.01, 0.01)
 LEVER_ARM = 0.06

@@ -22,8 +22,8 @@ from mskgrasp.parts.measure import oblongness
 ONCE_A_FAMILY = {recipe_of(name).family: name for name in reversed(builtin_names())}
 
 
-FAMILIES = int(os.environ.get("MSKGRASP_FAMILIES", "1"))
-"""Of every module that draws parts, how many families are built; 99 for all, which take half an hour."""
+FAMILIES = int(os.environ.get("MSKGRASP_FAMILIES", "2"))
+"""Of every module that draws parts, how many families are built; 99 for all."""
 
 
 def some_of_every_module() -> list[str]:

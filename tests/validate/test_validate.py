@@ -14,7 +14,7 @@ import pytest
 from mskgrasp.errors import BadConfig
 from mskgrasp.parts import find_part
 from mskgrasp.settings import Physics
-from mskgrasp.validate.by_hand import Check, free_fall, lever, rolling, run_checks, sliding
+from mskgrasp.validate.by_hand import Check, run_checks
 from mskgrasp.validate.compare import cheapest, compare, complaints
 from mskgrasp.validate.config import FLOOR, REFERENCE, Setting, ValidateConfig
 from mskgrasp.validate.convergence import Outcomes, draw_grasps, run_settings
@@ -39,7 +39,7 @@ def outcomes(n: int = 200, **changes: np.ndarray) -> Outcomes:
 def test_a_coarse_simulation_fails():
     told: list[Check] = []
     coarse = Physics(rate_hz=100, position_iterations=4)
-    checks = run_checks(coarse, told.append, (free_fall, sliding, rolling, lever))
+    checks = run_checks(coarse, told.append)
     failed = [check.name for check in checks if not check.passed]
     assert "fall in 0.2 s" in failed and len(failed) >= 3
     assert told == checks
