@@ -15,7 +15,7 @@ from manifold3d import Manifold
 from scipy.spatial import ConvexHull
 
 from mskgrasp.errors import BadPart
-from mskgrasp.parts.measure import MOST_OBLONG, HullFit, hull_fit, oblongness
+from mskgrasp.parts.measure import MOST_OBLONG, HullFit, MeshSurface, oblongness
 from mskgrasp.parts.pieces import merge_hulls
 from mskgrasp.parts.solid import cut, few_corners
 
@@ -60,13 +60,14 @@ def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
     """
     # CoACD looks for concavity between the facets of a fine ball, for minutes.
     convex = mesh_mm.convex_hull.volume <= _CONVEX_RATIO * mesh_mm.volume
+    surface = MeshSurface(mesh_mm)
     tried: list[tuple[float, int, HullFit]] = []
     for concavity_mm in LADDER_MM:
         cut_up = [np.asarray(mesh_mm.vertices)] if convex else _cut_up(mesh_mm, concavity_mm)
         for pieces in _with_few_corners(cut_up, _LOST_SHARE * concavity_mm):
-            fit = hull_fit(mesh_mm, pieces)
+            fit = surface.fit(pieces)
             if _within(fit, MOST_P95_MM, MOST_VOLUME_RATIO):
-                joined = _join(mesh_mm, pieces, MOST_P95_MM, MOST_VOLUME_RATIO, finish=_stout)
+                joined = _join(surface, pieces, MOST_P95_MM, MOST_VOLUME_RATIO, finish=_stout)
                 if len(joined) <= MOST_HULLS:
                     return tuple(joined)
             tried.append((fit.p95, len(pieces), fit))
@@ -82,11 +83,12 @@ def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
 
 def fewest_hulls(mesh_mm: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
     """Exact pieces joined where that changes little: within ``CLOSE_P95_MM`` and ``CLOSE_VOLUME_RATIO``."""
+    surface = MeshSurface(mesh_mm)
     most_largest = np.inf  # more than PhysX should take have to be joined, whatever stands out
     if len(hulls) <= MOST_HULLS:
         # Holes that are filled on purpose stand out already.
-        most_largest = max(CLOSE_LARGEST_MM, hull_fit(mesh_mm, hulls).outward_largest + 0.01)
-    return tuple(_join(mesh_mm, hulls, CLOSE_P95_MM, CLOSE_VOLUME_RATIO, most_largest))
+        most_largest = max(CLOSE_LARGEST_MM, surface.fit(hulls).outward_largest + 0.01)
+    return tuple(_join(surface, hulls, CLOSE_P95_MM, CLOSE_VOLUME_RATIO, most_largest))
 
 
 def is_manifold(mesh_mm: trimesh.Trimesh) -> bool:
@@ -144,7 +146,7 @@ def _lost_mm(points: np.ndarray, kept: np.ndarray) -> float:
 
 
 def _join(
-    mesh_mm: trimesh.Trimesh,
+    surface: MeshSurface,
     hulls: Sequence[np.ndarray],
     most_p95: float,
     most_ratio: float,
@@ -167,9 +169,11 @@ def _join(
             low, middle = middle + 1, (middle + 1 + high) // 2
             continue
         joined = finish(joined)
-        stout = max(oblongness(points) for points in joined) <= most_oblong
-        fit = hull_fit(mesh_mm, joined)
-        if stout and _within(fit, most_p95, most_ratio) and fit.outward_largest <= most_largest:
+        close = max(oblongness(points) for points in joined) <= most_oblong
+        if close:
+            fit = surface.fit(joined)
+            close = _within(fit, most_p95, most_ratio) and fit.outward_largest <= most_largest
+        if close:
             best, low = joined, middle + 1
         else:
             high = middle

@@ -106,31 +106,66 @@ def longest_axis(mesh: trimesh.Trimesh) -> float:
 
 def hull_fit(mesh_mm: trimesh.Trimesh, hulls_mm: Sequence[np.ndarray]) -> HullFit:
     """Compares the surface of the union of the hulls with that of the mesh."""
-    union = Manifold.batch_boolean(
-        [Manifold.hull_points(np.asarray(points, dtype=np.float64)) for points in hulls_mm], OpType.Add
-    )
-    # Copies: manifold3d takes neither a read-only array nor a view with strides.
-    mesh = Manifold(Mesh64(np.array(mesh_mm.vertices, np.float64), np.array(mesh_mm.faces, np.uint64)))
-    step = float(np.max(mesh_mm.extents)) / 40
-    surfaces = [
-        _outer_triangles(_triangles(union.refine_to_length(step)), hulls_mm),
-        _triangles(mesh.refine_to_length(step)),
-    ]
-    distances, areas = [], []
-    for source, target in (surfaces, surfaces[::-1]):
-        samples, weight = _samples(source)
-        distances.append(_distance_to(target, samples))
-        areas.append(weight)
-    outward, inward = distances
-    return HullFit(
-        largest=float(max(outward.max(), inward.max())),
-        p95=_p95(np.concatenate(distances), np.concatenate(areas)),
-        volume_ratio=float(union.volume() / mesh_mm.volume),
-        outward_largest=float(outward.max()),
-        outward_p95=_p95(outward, areas[0]),
-        inward_largest=float(inward.max()),
-        inward_p95=_p95(inward, areas[1]),
-    )
+    return MeshSurface(mesh_mm).fit(hulls_mm)
+
+
+class MeshSurface:
+    """A mesh prepared for comparing one set of hulls after the other with it."""
+
+    def __init__(self, mesh_mm: trimesh.Trimesh) -> None:
+        """Cuts the surface finely and sorts it for searching."""
+        # Copies: manifold3d takes neither a read-only array nor a view with strides.
+        body = Manifold(Mesh64(np.array(mesh_mm.vertices, np.float64), np.array(mesh_mm.faces, np.uint64)))
+        self._step = float(np.max(mesh_mm.extents)) / 40
+        self._volume = float(mesh_mm.volume)
+        self._surface = _Surface(_triangles(body.refine_to_length(self._step)))
+        self._samples, self._areas = _samples(self._surface.triangles)
+
+    def fit(self, hulls_mm: Sequence[np.ndarray]) -> HullFit:
+        """Compares the surface of the union of the hulls with that of the mesh."""
+        union = Manifold.batch_boolean(
+            [Manifold.hull_points(np.asarray(points, dtype=np.float64)) for points in hulls_mm], OpType.Add
+        )
+        outer = _Surface(_outer_triangles(_triangles(union.refine_to_length(self._step)), hulls_mm))
+        samples, areas = _samples(outer.triangles)
+        outward = self._surface.distance_to(samples)
+        inward = outer.distance_to(self._samples)
+        return HullFit(
+            largest=float(max(outward.max(), inward.max())),
+            p95=_p95(np.concatenate([outward, inward]), np.concatenate([areas, self._areas])),
+            volume_ratio=float(union.volume() / self._volume),
+            outward_largest=float(outward.max()),
+            outward_p95=_p95(outward, areas),
+            inward_largest=float(inward.max()),
+            inward_p95=_p95(inward, self._areas),
+        )
+
+
+class _Surface:
+    """A finely cut surface, sorted by the centres of its triangles (n, 3, 3)."""
+
+    def __init__(self, triangles: np.ndarray) -> None:
+        self.triangles = triangles
+        self._tree = KDTree(triangles.mean(axis=1))
+
+    def distance_to(self, points: np.ndarray) -> np.ndarray:
+        """Distance of points (n, 3)."""
+        distance = self._by_nearest(points, 8)
+        # Among slivers eight centres may all be of farther triangles: large distances are looked at again.
+        doubtful = np.flatnonzero(distance > max(float(np.quantile(distance, 0.9)), 0.01))
+        if len(doubtful):
+            distance[doubtful] = self._by_nearest(points[doubtful], 64)
+        return distance
+
+    def _by_nearest(self, points: np.ndarray, count: int) -> np.ndarray:
+        """Distance to the triangles whose centres are nearest."""
+        count = min(count, len(self.triangles))
+        nearest = np.reshape(self._tree.query(points, k=count)[1], (len(points), count))
+        best = np.full(len(points), np.inf)
+        for column in nearest.T:
+            closest = trimesh.triangles.closest_point(self.triangles[column], points)
+            best = np.minimum(best, np.linalg.norm(closest - points, axis=1))
+        return best
 
 
 def _p95(distance: np.ndarray, area: np.ndarray) -> float:
@@ -166,7 +201,10 @@ def _outer_triangles(triangles: np.ndarray, hulls: Sequence[np.ndarray]) -> np.n
     covered = np.zeros(len(triangles), dtype=bool)
     for points in hulls:
         planes = ConvexHull(points).equations
-        covered |= (in_front @ planes[:, :3].T + planes[:, 3]).max(axis=1) < 0
+        # Most triangles are not even in the hull's box, and those that are need not be tried twice.
+        low, high = points.min(axis=0) - 1e-6, points.max(axis=0) + 1e-6
+        near = np.flatnonzero(~covered & ((in_front >= low) & (in_front <= high)).all(axis=1))
+        covered[near] = (in_front[near] @ planes[:, :3].T + planes[:, 3]).max(axis=1) < 0
     return triangles[~covered]
 
 
@@ -179,25 +217,3 @@ def _samples(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     chosen = triangles[::stride]
     points = np.concatenate([chosen.mean(axis=1), chosen[:, 0]])
     return points, np.concatenate([area[::stride], np.zeros(len(chosen))])
-
-
-def _distance_to(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Distance of points (n, 3) to a finely cut surface."""
-    tree = KDTree(triangles.mean(axis=1))
-    distance = _distance_by_nearest(tree, triangles, points, 8)
-    # Among slivers eight centres may all be of farther triangles: the large distances are looked at again.
-    doubtful = np.flatnonzero(distance > max(float(np.quantile(distance, 0.9)), 0.01))
-    if len(doubtful):
-        distance[doubtful] = _distance_by_nearest(tree, triangles, points[doubtful], 64)
-    return distance
-
-
-def _distance_by_nearest(tree: KDTree, triangles: np.ndarray, points: np.ndarray, count: int) -> np.ndarray:
-    """Distance to the triangles whose centres are nearest."""
-    count = min(count, len(triangles))
-    nearest = np.reshape(tree.query(points, k=count)[1], (len(points), count))
-    best = np.full(len(points), np.inf)
-    for column in nearest.T:
-        closest = trimesh.triangles.closest_point(triangles[column], points)
-        best = np.minimum(best, np.linalg.norm(closest - points, axis=1))
-    return best

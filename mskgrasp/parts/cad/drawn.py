@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from mskgrasp.parts import solid as s
 from mskgrasp.parts.cad.brep import lengths, mesh_of, needs_cad, table
 from mskgrasp.parts.cad.hulls import turned_hulls
 from mskgrasp.parts.families.recipe import ALUMINIUM, STEEL, Recipe
-from mskgrasp.parts.pieces import merge_hulls, turned_pieces
+from mskgrasp.parts.measure import MOST_OBLONG, oblongness
+from mskgrasp.parts.pieces import merge_hulls, split_by, turned_pieces
 from mskgrasp.parts.shape import HULL_DETAIL_MM
 
 CAST_IRON = 7200.0
@@ -88,6 +90,21 @@ def port_block(b: Any, size: Size) -> Any:
     for x in (-length / 4, length / 4):
         body -= b.Pos(x, 0, height / 2) * b.Cylinder(cross / 2, height)
     return body
+
+
+def _block_pieces(_: trimesh.Trimesh, size: Size) -> list[np.ndarray]:
+    """Sectors around the long bore, chamfered, with the room of the cross bores cut out of them."""
+    length, width, height, bore, cross, edge = size
+    outline = s.rectangle(-height / 2, height / 2, -width / 2, width / 2)
+    sectors = s.around_hole(outline, s.bore_polygon(bore / 2), -length / 2, length / 2)
+    pieces = [points[:, [2, 1, 0]] for points in sectors]
+    half = np.array([length, width, height]) / 2
+    edges = [np.array(sign) / np.sqrt(2) for sign in product((-1, 0, 1), repeat=3) if sign.count(0) == 1]
+    pieces = s.cut(pieces, edges, [np.abs(normal) @ half - edge / np.sqrt(2) for normal in edges])
+    for x in (-length / 4, length / 4):
+        cutter = s.prism(s.bore_polygon(cross / 2, centre=(x, 0)), 0, height)
+        pieces = [rest for points in pieces for rest in split_by(points, cutter)]
+    return merge_hulls([points for points in pieces if oblongness(points) <= 0.9 * MOST_OBLONG], 0.01)
 
 
 def cast_angle(b: Any, size: Size) -> Any:
@@ -179,6 +196,7 @@ FAMILIES: dict[str, tuple[float, Callable[[Any, Size], Any]]] = {
 
 HULLS: dict[str, Callable[[trimesh.Trimesh, Size], list[np.ndarray]]] = {
     "boss_foot": _foot_pieces,
+    "port_block": _block_pieces,
     "nozzle": lambda mesh, _: merge_hulls(turned_hulls(mesh), 0.03),
 }
 """Pieces of the families that know their own."""
