@@ -48,6 +48,9 @@ class ValidateConfig(Config):
     """Simulation rates; the highest belongs to the finest setting."""
     iterations: tuple[int, ...] = (8, 15, 25, 50)
     """Solver iterations; the highest belong to the finest setting."""
+    variants: Annotated[dict[str, dict[str, float | bool]], tyro.conf.Suppress] = {}
+    """Other values of some physics settings, by a name for the tables: each is tried at the rate and with the
+    iterations under test, and held against the same finest setting. It shows what these values decide."""
     convergence: bool = True
     """Whether grasps are compared under all rates and iterations; without, the checks take a minute."""
     physics: Physics = Physics()
@@ -59,6 +62,11 @@ class ValidateConfig(Config):
             raise ValueError("rates_hz and iterations need at least one value each")
         for rate in self.rates_hz:
             self.at(rate, self.iterations[0])
+        for name, values in self.variants.items():
+            unknown = values.keys() - Physics.model_fields.keys()
+            if unknown:
+                raise ValueError(f"variants: {name!r} sets {', '.join(sorted(unknown))}, no setting of physics")
+            self.varied(name)
         return self
 
     def at(self, rate_hz: int, iterations: int) -> Physics:
@@ -66,13 +74,17 @@ class ValidateConfig(Config):
         values = self.physics.model_dump() | {"rate_hz": rate_hz, "position_iterations": iterations}
         return Physics.model_validate(values)
 
+    def varied(self, name: str) -> Physics:
+        """The settings under test with a variant's values."""
+        return Physics.model_validate(self.physics.model_dump() | self.variants[name])
+
     @property
     def production(self) -> str:
         """Name of the setting under test."""
         return setting_name(self.physics.rate_hz, self.physics.position_iterations)
 
     def settings(self) -> list[Setting]:
-        """The grid with the setting under test; the reference, the floor, and the former in full."""
+        """The grid with the setting under test; reference and floor; the former in full; the variants."""
         pairs = {(rate, count) for rate in self.rates_hz for count in self.iterations}
         pairs.add((self.physics.rate_hz, self.physics.position_iterations))
         grid = [
@@ -86,6 +98,7 @@ class ValidateConfig(Config):
             Setting(name=REFERENCE, physics=finest),
             Setting(name=FLOOR, physics=finest, shift=SHIFT),
             Setting(name=NOTHING_SKIPPED, physics=self.physics.model_copy(update=whole)),
+            *(Setting(name=name, physics=self.varied(name)) for name in self.variants),
         ]
 
 

@@ -90,11 +90,11 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
     with tqdm(total=n * len(settings), desc="grasps", unit="grasp", mininterval=_patience()) as bar:
         outcomes = run_settings(settings, drawn, config.out, workers, lambda k: _advance(bar, k))
     found = {name: compare(one, outcomes[REFERENCE]) for name, one in outcomes.items()}
+    apart = (FLOOR, REFERENCE, NOTHING_SKIPPED, *config.variants)
     candidates = [
         setting.name
         for setting in settings
-        if setting.physics.rate_hz >= LEAST_RATE_HZ
-        and setting.name not in (FLOOR, REFERENCE, NOTHING_SKIPPED)
+        if setting.physics.rate_hz >= LEAST_RATE_HZ and setting.name not in apart
     ]
     chosen = cheapest(found, found[FLOOR], found[REFERENCE].success_rate, candidates)
     print_convergence(config, found, chosen)

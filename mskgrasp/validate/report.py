@@ -195,7 +195,7 @@ def _draw_cost(
         axes.axhspan(0, MOST_TIMES_FLOOR * floor, color="#e3efe5", lw=0)
     axes.axhline(floor, color=_INK, lw=0.8, ls=":")
     for setting, comparison in found.items():
-        if setting in (FLOOR, REFERENCE, NOTHING_SKIPPED):
+        if setting in (FLOOR, REFERENCE, NOTHING_SKIPPED, *config.variants):
             continue
         value = scale * getattr(comparison, name)
         fine = not complaints(comparison, found[FLOOR], found[REFERENCE].success_rate)
