@@ -13,6 +13,7 @@ from mskgrasp.geometry import Pose
 from mskgrasp.grasp import (
     MAX_OPENING,
     MIN_GAP,
+    MIN_RISE,
     lowest_grasp_z,
     object_displacement,
     pose_base_grasp,
@@ -36,8 +37,8 @@ REST_WINDOW_S = 0.06
 """A part that did not move for so long has come to rest, s."""
 RUN_UP = 0.008
 """Way of each finger to the first contact, m: enough to reach the speed of the ramp."""
-LEFT_BEHIND = 0.04
-"""The hand this much higher than the part it should carry has lost it, m."""
+LEFT_BEHIND = 0.02
+"""The hand this much farther from the part than a success may be has lost it, m."""
 
 
 class Attempt:
@@ -120,7 +121,12 @@ class Attempt:
         held, penetration = torch.zeros_like(settled), torch.zeros(motion.n, device=motion.device)
         alive = settled & ~collided & ~empty
         if bool(alive.any()):
-            motion.move_fingers(-MAX_OPENING / 2, frozen=collided | empty)
+            apart = collided | empty
+
+            def all_met() -> bool:
+                return bool((apart | (self._gap() <= MIN_GAP)).all())
+
+            motion.move_fingers(-MAX_OPENING / 2, frozen=apart, check=all_met)
             held, penetration = self.grip()
         carried = bool((alive & held).any())
         if carried:
@@ -175,10 +181,12 @@ class Attempt:
         hand_z = base_pose(self._agent.tcp).position[:, 2]
         part_z = base_pose(self._part).position[:, 2]
 
+        most_behind = (1 - MIN_RISE) * physics.lift_height + LEFT_BEHIND
+
         def all_lost(_: int) -> bool:
             hand_rise = base_pose(self._agent.tcp).position[:, 2] - hand_z
             part_rise = base_pose(self._part).position[:, 2] - part_z
-            lost = ~alive | (self._gap() <= MIN_GAP) | (hand_rise - part_rise > LEFT_BEHIND)
+            lost = ~alive | (self._gap() <= MIN_GAP) | (hand_rise - part_rise > most_behind)
             torch.maximum(penetration, self.grip()[1], out=penetration)
             return bool(lost.all())
 

@@ -30,7 +30,7 @@ from tasks.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_world
 from tasks.motion import PandaMotion
 from tasks.panda import GraspPanda, panda_for
 from tasks.part_actor import build_part, hull_corners
-from tasks.physics import sim_config
+from tasks.physics import MOST_HULLS, sim_config
 from tasks.placement import random_resting_pose
 
 
@@ -108,6 +108,7 @@ class GraspDisplacementEnv(BaseEnv):
         self._check_noise(num_envs)
         self.region = tuple(region)
         self._part_names = list(parts) if parts else None
+        self._n_scenes = num_envs
         self.parts: list[Part] = []
         self._outcome: dict[str, Tensor] | None = None
         super().__init__(*args, robot_uids=panda_for(self.physics, self.region), num_envs=num_envs, **kwargs)
@@ -126,7 +127,10 @@ class GraspDisplacementEnv(BaseEnv):
 
     @property
     def _default_sim_config(self) -> SimConfig:
-        return sim_config(self.physics)
+        # Which part comes where may be drawn later: room for the most complex one everywhere.
+        names = self._part_names or []
+        most = max((find_part(name).n_hulls for name in names), default=MOST_HULLS)
+        return sim_config(self.physics, most * self._n_scenes)
 
     @property
     def _default_sensor_configs(self) -> list[CameraConfig]:

@@ -76,6 +76,7 @@ class PandaMotion:
         self._steps = 0
         self._watch_every = self.n_steps(CHECK_S)
         self._driven: list[tuple[float, float] | None] = [None] * 7
+        self._commanded: Tensor | None = None
 
     def n_steps(self, seconds: float) -> int:
         """Simulation steps in a time, at least one."""
@@ -98,6 +99,7 @@ class PandaMotion:
 
     def set_arm(self, q: Tensor, qd: Tensor) -> None:
         """Drive targets of the arm: (n, 7) radians and radians a second."""
+        self._commanded = q
         if self.gpu:
             robot = self._agent.robot
             robot.set_joint_drive_targets(q.to(torch.float32), self._agent.arm_joints)
@@ -170,7 +172,8 @@ class PandaMotion:
             pairs = torch.stack([path[:, 0], speed[:, 0]], dim=-1).tolist()
             rows = [[(position, velocity) for position, velocity in row] for row in pairs]
         still = torch.zeros_like(path[0])
-        last = path[0]
+        # An arm that is frozen from the first step on stays where it was sent before.
+        last = path[0] if self._commanded is None else self._commanded
         for i in range(len(path)):
             if rows is not None:
                 self._drive_arm(rows[i])

@@ -6,16 +6,42 @@ from mani_skill.utils.structs.types import GPUMemoryConfig, SceneConfig, SimConf
 
 from mskgrasp.settings import Physics
 
+MOST_HULLS = 48
+"""Of a part; as `mskgrasp.parts.decompose.MOST_HULLS`, whose module loads the decomposition."""
 
-def sim_config(physics: Physics) -> SimConfig:
-    """ManiSkill's configuration for these settings."""
+CONTACTS_A_HULL = 64
+"""Contact points that PhysX on a GPU may need room for, a hull: at most table, both pads and palm touch it at
+once, a pair has up to 8 points, and pairs that are merely near count, too."""
+PATCHES_A_HULL = 16
+
+
+def gpu_memory(n_hulls: int) -> GPUMemoryConfig:
+    """Buffers for PhysX on a GPU, which drops contacts without a word where they are too small.
+
+    Args:
+        n_hulls: Hulls of all parts of all sub-scenes together.
+    """
+    usual = GPUMemoryConfig()
+    contacts = max(usual.max_rigid_contact_count, _power_of_two(CONTACTS_A_HULL * n_hulls))
+    patches = max(usual.max_rigid_patch_count, _power_of_two(PATCHES_A_HULL * n_hulls))
+    # The stack holds what is found of a pair before it is written down: 128 bytes a point.
+    stack = max(usual.collision_stack_size, 128 * contacts)
+    return GPUMemoryConfig(
+        max_rigid_contact_count=contacts, max_rigid_patch_count=patches, collision_stack_size=stack
+    )
+
+
+def _power_of_two(count: int) -> int:
+    return 1 << max(0, count - 1).bit_length()
+
+
+def sim_config(physics: Physics, n_hulls: int) -> SimConfig:
+    """ManiSkill's configuration for these settings, and for so many hulls in all sub-scenes together."""
     return SimConfig(
         spacing=2.0,  # far sub-scenes lose float32 precision; parts and arms need under 2 m
         sim_freq=physics.rate_hz,
         control_freq=physics.rate_hz // 25,
-        gpu_memory_config=GPUMemoryConfig(
-            max_rigid_contact_count=2**21, max_rigid_patch_count=2**20, collision_stack_size=2**28
-        ),
+        gpu_memory_config=gpu_memory(n_hulls),
         scene_config=SceneConfig(
             contact_offset=physics.contact_offset,
             rest_offset=0.0,

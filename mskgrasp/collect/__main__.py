@@ -20,11 +20,12 @@ from mskgrasp.collect.cluster import (
     wait_until_seen,
 )
 from mskgrasp.collect.config import CollectConfig
-from mskgrasp.collect.work import ShardTask
+from mskgrasp.collect.work import ShardTask, other_versions
 from mskgrasp.collect.workers import Finished, Lost, Progress, make_shards
 from mskgrasp.config import read_config, write_config
 from mskgrasp.dataset import read_shard, shard_path
 from mskgrasp.errors import BadConfig, BadDataset, BadPart, UsageError
+from mskgrasp.files import LOCK, only_here
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.catalogue import ratings, read_index, spread
 
@@ -62,8 +63,12 @@ def collect(config: CollectConfig) -> None:
     parts = chosen_parts(config)
     config = config.model_copy(update={"parts": tuple(word for word, _ in parts)})
     check_out(config)
-    with contextlib.nullcontext() if config.cluster is None else connected(config.cluster):
-        _collect(config, [part for _, part in parts])
+    make_folder(config.out)
+    with only_here(config.out) as alone:
+        if not alone:
+            raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
+        with contextlib.nullcontext() if config.cluster is None else connected(config.cluster):
+            _collect(config, [part for _, part in parts])
 
 
 def sampled(names: list[str], count: int) -> list[str]:
@@ -168,17 +173,16 @@ def check_out(config: CollectConfig) -> None:
 
 
 def _is_leftover(path: Path) -> bool:
-    return path.name.startswith("config.yaml.") and path.suffix == ".tmp"
+    return path.name == LOCK or (path.name.startswith("config.yaml.") and path.suffix == ".tmp")
 
 
 def begin(config: CollectConfig) -> None:
     """Opens the dataset's folder, and clears away what a killed run left half-written."""
-    make_folder(config.out)
     if not (config.out / "config.yaml").exists():
         write_config(config, config.out / "config.yaml")
     # Only now: a folder that holds something is known as a dataset by its settings.
     make_folder(config.out / "shards")
-    for leftover in (*filter(_is_leftover, config.out.iterdir()), *(config.out / "shards").glob("*.tmp")):
+    for leftover in (*config.out.glob("config.yaml.*.tmp"), *(config.out / "shards").glob("*.tmp")):
         leftover.unlink(missing_ok=True)  # a worker of that run may just be ending
 
 
@@ -203,7 +207,7 @@ def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
     """Whether a shard lies on disk and is whole; a damaged one is told of, to be made again.
 
     Raises:
-        BadDataset: The part has changed since the shard was made.
+        BadDataset: The part, or what simulates it, has changed since the shard was made.
     """
     path = shard_path(out, task.part, task.index)
     if not path.exists():
@@ -217,6 +221,9 @@ def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
         raise BadDataset(
             f"{path}: part '{task.part}' has changed since; delete its shards or choose another --out"
         )
+    other = other_versions(info.versions)
+    if other:
+        raise BadDataset(f"{path} was made by other software: {other}; choose another --out")
     return True
 
 

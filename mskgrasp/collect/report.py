@@ -12,12 +12,15 @@ from rich.console import Console
 from rich.table import Table
 
 from mskgrasp.collect.config import PartFilter
-from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard
+from mskgrasp.dataset import ShardInfo, list_shards, read_shard
+from mskgrasp.dataset.shards import read_columns
 from mskgrasp.grasp import FAILURES
 from mskgrasp.metrics import wilson_interval
 from mskgrasp.pictures import draw_contact_sheet
 
 N_PICTURES = 24
+
+Columns = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,18 +56,20 @@ class PartSummary:
 
 def summarise(folder: Path, part_filter: PartFilter) -> list[PartSummary]:
     """Reads a dataset and sums up each part."""
-    parts: dict[str, list[tuple[Attempts, ShardInfo]]] = {}
+    parts: dict[str, list[tuple[Columns, ShardInfo]]] = {}
     for path in list_shards(folder):
-        attempts, info = read_shard(path)
-        parts.setdefault(info.part, []).append((attempts, info))
+        # Without the images: those of a large dataset do not fit into memory.
+        columns, info = read_columns(path, ("success", "failure", "displacement", "tilt"))
+        parts.setdefault(info.part, []).append((columns, info))
     return [_sum_up(name, shards, part_filter) for name, shards in sorted(parts.items())]
 
 
-def _sum_up(name: str, shards: list[tuple[Attempts, ShardInfo]], part_filter: PartFilter) -> PartSummary:
-    success = np.concatenate([attempts.success for attempts, _ in shards])
-    failure = np.concatenate([attempts.failure for attempts, _ in shards])
-    displacement = np.concatenate([attempts.displacement for attempts, _ in shards])[success]
-    tilt = np.concatenate([attempts.tilt for attempts, _ in shards])[success]
+def _sum_up(name: str, shards: list[tuple[Columns, ShardInfo]], part_filter: PartFilter) -> PartSummary:
+    success, failure, displacement, tilt = (
+        np.concatenate([columns[name] for columns, _ in shards])
+        for name in ("success", "failure", "displacement", "tilt")
+    )
+    displacement, tilt = displacement[success], tilt[success]
     discarded: Counter[str] = Counter()
     for _, info in shards:
         discarded.update(info.discarded)

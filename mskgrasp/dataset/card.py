@@ -43,6 +43,7 @@ class Card:
         image: Height and width of a depth image, pixels.
         seed: Everything random follows from it.
         physics: Settings of the simulation.
+        noise: Errors of the cell that the attempts met; empty: none were asked about.
         versions: Sets of software versions, and how many shards were made with each.
         size: Bytes on disk.
     """
@@ -58,6 +59,7 @@ class Card:
     image: tuple[int, int]
     seed: int
     physics: dict[str, Any]
+    noise: dict[str, Any]
     versions: list[tuple[dict[str, str], int]]
     size: int
 
@@ -114,6 +116,7 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
         image=image,
         seed=info.seed,
         physics=dict(info.physics),
+        noise=dict(info.noise),
         versions=[(dict(names), n) for names, n in versions.most_common()],
         size=size,
     )
@@ -172,6 +175,11 @@ def tables(card: Card) -> list[Table]:
         ("Failures", ("reason", "attempts", "of all"), failures or [("none", "0", "0.0%")]),
         ("Discarded", ("reason", "attempts"), thrown),
         ("Physics", ("setting", "value"), [(key, f"{value}") for key, value in card.physics.items()]),
+        (
+            "Errors of the cell",
+            ("setting", "value"),
+            [(key, f"{value}") for key, value in card.noise.items() if value] or [("none", "")],
+        ),
         ("Made with", ("versions", "shards"), versions),
     ]
 

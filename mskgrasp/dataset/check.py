@@ -19,7 +19,7 @@ from mskgrasp.dataset.shards import read_unchecked, shard_path
 from mskgrasp.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.parts import store
 
-SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics")
+SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise")
 """What all shards of a dataset have in common."""
 
 
@@ -264,7 +264,10 @@ def _missing(
     for part in sorted({*highest, *asked}):
         n = -(-plan[0] // plan[1]) if plan else highest.get(part, 0) + 1
         for index in range(n):
-            path = shard_path(folder, part, index)
+            try:
+                path = shard_path(folder, part, index)
+            except BadDataset:
+                break  # the name of a part that cannot be: told where its shard is read
             if path.name not in names:
                 yield Fault(path=path, reason="is missing; run the collection again to make it")
 

@@ -22,7 +22,7 @@ from mskgrasp.grasp import FAILURES, pose_base_tcp
 Watch = Callable[[Sequence[Path]], Iterable[Path]]
 """Given the files that will be read, yields each: the place for a progress bar."""
 SMALL = tuple(name for name in COLUMNS if name != "depth")
-_SHARED = ("region", "table_z", "intrinsics", "T_base_camera", "physics")
+_SHARED = ("region", "table_z", "intrinsics", "T_base_camera", "physics", "noise")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +123,7 @@ def _about(infos: list[ShardInfo], counts: list[int]) -> dict[str, np.ndarray]:
         table_z=np.array(info.table_z),
         region=np.array(info.region),
         physics_json=np.array(json.dumps(info.physics, sort_keys=True)),
+        noise_json=np.array(json.dumps(info.noise, sort_keys=True)),
         units_json=np.array(json.dumps({name: f"{c.unit}; frame: {c.frame}" for name, c in COLUMNS.items()})),
     )
 
@@ -170,7 +171,8 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
             _same_settings(path, own, [info])
             if attempts.depth.shape[1:] != size:
                 raise BadDataset(f"{path}: depth images of another size than {size}; collect it again")
-            after = _pose_after(attempts, lift_height)
+            # Where the arm errs, the hand was not where it was sent, and where it was is not stored.
+            after = _pose_after(attempts, np.nan if _arm_errs(own) else lift_height)
             for row in range(len(attempts)):
                 won = bool(attempts.success[row])
                 yield Episode(
@@ -189,7 +191,11 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
             temporary / out.name,
             episodes(),
             env_kwargs=dict(
-                obs_mode="depth", control_mode="grasp", physics=dict(info.physics), camera=camera
+                obs_mode="depth",
+                control_mode="grasp",
+                physics=dict(info.physics),
+                noise=dict(info.noise),
+                camera=camera,
             ),
             intrinsics=info.intrinsics,
             T_base_camera=info.T_base_camera,
@@ -197,8 +203,14 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
         )
 
 
+def _arm_errs(info: ShardInfo) -> bool:
+    return any(info.noise.get(name) for name in ("arm_position_std", "arm_angle_std"))
+
+
 def _pose_after(attempts: Attempts, lift_height: float) -> np.ndarray:
     """(n, 7) the part after the lift, base frame; NaN where it failed: the hand's place is not stored."""
+    if not np.isfinite(lift_height):
+        return np.full((len(attempts), 7), np.nan)
     lifted = attempts.grasp.astype(np.float64)
     lifted[:, 2] += lift_height
     after = pose_base_tcp(lifted) @ Pose.from_vector(attempts.pose_tcp_obj_after.astype(np.float64))

@@ -174,6 +174,10 @@ def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], Sh
 def _array(file: h5py.File, name: str) -> np.ndarray:
     stored = file[name]
     assert isinstance(stored, h5py.Dataset)  # _check_header has seen to it
+    # What a shard says must be in the shard: a foreign file must not make us read others.
+    link = file.get(name, getlink=True)
+    if not isinstance(link, h5py.HardLink) or stored.external or stored.is_virtual:
+        raise ValueError(f"{name} lies in another file")
     # Damage can make an array look as large as anything: that must not be tried.
     if stored.size * stored.dtype.itemsize > _MOST_BYTES:
         raise ValueError(f"{name} claims the shape {stored.shape}")

@@ -10,6 +10,7 @@ from typing import Annotated, Literal, assert_never
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 from tqdm import tqdm
 
@@ -127,7 +128,7 @@ def run_info(verb: Info) -> int:
         for header in headers:
             table.add_column(header)
         for row in rows:
-            table.add_row(*row)
+            table.add_row(*map(escape, row))
         console.print(f"[bold]{title}[/bold]", highlight=False)
         console.print(table)
         console.print()

@@ -19,6 +19,8 @@ MOST_RATE_DIFFERENCE = 0.02
 """By how much the success rate may differ from that of the finest setting."""
 LEAST_P = 0.05
 """Under this the distributions of displacements count as different (after Bonferroni over the axes)."""
+LEAST_BOTH = 30
+"""Grasps that must succeed under both: of fewer nothing can be said."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +34,11 @@ class Comparison:
         shift_p90: Its 90th percentile, m.
         turn_median: Median difference of the displacements' turns, rad.
         turn_p90: Its 90th percentile, rad.
-        p_value: Least p of two-sample Kolmogorov-Smirnov tests of dx, dy, dz, dtheta, times four.
+        p_value: Least p of two-sample Kolmogorov-Smirnov tests of dx, dy, dz, dtheta, times four: whether the
+            distributions over all successes can be told apart.
+        bias: Largest mean difference of dx, dy, dz over grasps that succeeded under both, m, without the
+            tenth that differs most either way: what is wrong on the whole, not grasp by grasp.
+        bias_p: Least p of paired Wilcoxon signed-rank tests of the four differences, times four.
         cpu_ms: Processor time of a grasp, ms.
         n: Grasps.
         n_both: Grasps that succeeded under both.
@@ -45,13 +51,15 @@ class Comparison:
     turn_median: float
     turn_p90: float
     p_value: float
+    bias: float
+    bias_p: float
     cpu_ms: float
     n: int
     n_both: int
 
-    def as_dict(self) -> dict[str, float]:
-        """For JSON."""
-        return asdict(self)
+    def as_dict(self) -> dict[str, float | None]:
+        """For JSON, which knows no NaN: what is unknown is None."""
+        return {key: value if np.isfinite(value) else None for key, value in asdict(self).items()}
 
 
 def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:
@@ -61,7 +69,9 @@ def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:
     shift = np.linalg.norm(difference[:, :3], axis=1)
     turn = np.abs(wrap_angle(difference[:, 3]))
     ours, theirs = (one.displacement[one.success] for one in (outcomes, reference))
-    p = min(stats.ks_2samp(ours[:, axis], theirs[:, axis]).pvalue for axis in range(4))  # pyright: ignore[reportAttributeAccessIssue]
+    p = float("nan")
+    if min(len(ours), len(theirs)) > 1:
+        p = min(stats.ks_2samp(ours[:, axis], theirs[:, axis]).pvalue for axis in range(4))  # pyright: ignore[reportAttributeAccessIssue]
     return Comparison(
         success_rate=float(outcomes.success.mean()),
         agreement=float((outcomes.success == reference.success).mean()),
@@ -69,7 +79,9 @@ def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:
         shift_p90=_percentile(shift, 90),
         turn_median=_percentile(turn, 50),
         turn_p90=_percentile(turn, 90),
-        p_value=min(1.0, 4 * float(p)),
+        p_value=float(np.minimum(1.0, 4 * p)),
+        bias=_bias(difference),
+        bias_p=_bias_p(np.column_stack([difference[:, :3], wrap_angle(difference[:, 3])])),
         cpu_ms=1e3 * float(outcomes.cpu_seconds.mean()),
         n=len(both),
         n_both=int(both.sum()),
@@ -79,6 +91,8 @@ def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:
 def complaints(found: Comparison, floor: Comparison, reference_rate: float) -> list[str]:
     """Why a setting adds something to the floor; empty where it adds nothing."""
     said = []
+    if found.n_both < LEAST_BOTH:
+        said.append(f"only {found.n_both} grasps succeeded under both, {LEAST_BOTH} are needed to compare")
     if found.agreement < floor.agreement - MOST_DISAGREEMENT:
         said.append(f"S agrees in {found.agreement:.1%}, at the floor in {floor.agreement:.1%}")
     for name, unit, scale in (
@@ -101,6 +115,18 @@ def cheapest(
     """The candidate of least processor time that adds nothing to the floor."""
     fit = [name for name in candidates if not complaints(found[name], floor, reference_rate)]
     return min(fit, key=lambda name: found[name].cpu_ms, default=None)
+
+
+def _bias(difference: np.ndarray) -> float:
+    if not len(difference):
+        return float("nan")
+    return float(np.abs(stats.trim_mean(difference[:, :3], 0.1, axis=0)).max())
+
+
+def _bias_p(difference: np.ndarray) -> float:
+    moved = [axis for axis in difference.T if np.any(axis != 0)]
+    found = [float(stats.wilcoxon(axis).pvalue) for axis in moved]  # pyright: ignore[reportAttributeAccessIssue]
+    return min(1.0, 4 * min(found, default=1.0))
 
 
 def _percentile(values: np.ndarray, share: float) -> float:

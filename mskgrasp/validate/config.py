@@ -65,7 +65,9 @@ class ValidateConfig(Config):
         for name, values in self.variants.items():
             unknown = values.keys() - Physics.model_fields.keys()
             if unknown:
-                raise ValueError(f"variants: {name!r} sets {', '.join(sorted(unknown))}, no setting of physics")
+                raise ValueError(
+                    f"variants: {name!r} sets {', '.join(sorted(unknown))}, no setting of physics"
+                )
             self.varied(name)
         return self
 

@@ -121,7 +121,8 @@ def print_convergence(config: ValidateConfig, found: dict[str, Comparison], chos
     )
     table.add_column("setting", no_wrap=True)
     for header in (
-        "success", "S agrees", "shift median, mm", "90 %", "turn median, deg", "90 %", "p", "CPU ms a grasp",
+        "success", "S agrees", "shift median, mm", "90 %", "turn median, deg", "90 %", "p", "bias, mm",
+        "its p", "CPU ms a grasp",
     ):  # fmt: skip
         table.add_column(header, justify="right")
     table.add_column("adds to the floor", no_wrap=True)
@@ -133,7 +134,8 @@ def print_convergence(config: ValidateConfig, found: dict[str, Comparison], chos
             label, f"{c.success_rate:.1%}", f"{c.agreement:.1%}",
             f"{1e3 * c.shift_median:.3f}", f"{1e3 * c.shift_p90:.2f}",
             f"{math.degrees(c.turn_median):.3f}", f"{math.degrees(c.turn_p90):.2f}",
-            f"{c.p_value:.2f}", f"{c.cpu_ms:.0f}", "; ".join(said) or "nothing",
+            f"{c.p_value:.2f}", f"{1e3 * c.bias:.3f}", f"{c.bias_p:.3f}", f"{c.cpu_ms:.0f}",
+            "; ".join(said) or "nothing",
         )  # fmt: skip
     Console(width=None if console().is_terminal else 230).print(table)
     print(f"cheapest setting that adds nothing to the floor: {chosen or 'none of these'}")

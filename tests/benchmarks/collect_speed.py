@@ -1,8 +1,9 @@
 """How fast grasps are simulated. Run: python -m tests.benchmarks.collect_speed --help.
 
-In one run, on one core, with the same parts, physics, starts and grasps, attempt by attempt in turn:
+In one run, on one core, with the same parts, physics, starts and grasps, part by part in turn:
 (a) a plain ManiSkill loop, ``pd_ee_pose`` at 20 Hz and ``obs_mode="depth"``; (b) a raw SAPIEN script
-that runs every attempt to its end; (c) the collector. Then the collector with one worker and with two.
+that runs every attempt to its end; (c) the collector, shards written to disk. Processor time of all of it,
+the loading of the part's scene included. Then the collector as users start it, with one worker and with two.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ os.environ.setdefault("LP_NUM_THREADS", "0")  # the software renderer stays in t
 import gymnasium
 import numpy as np
 import torch
+import trimesh
 from mani_skill.envs.scene import ManiSkillScene
 from rich.console import Console
 from rich.table import Table
@@ -31,22 +33,26 @@ from tqdm import tqdm
 from mskgrasp.collect.__main__ import plan_shards
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.shard import Simulator, draw_attempt
+from mskgrasp.collect.work import ShardTask
 from mskgrasp.collect.workers import Progress, make_shards
-from mskgrasp.images import view_part
+from mskgrasp.dataset import write_shard
+from mskgrasp.geometry import Pose
+from mskgrasp.grasp import PAD_REACH
 from mskgrasp.parts import Part, find_part, starter_names
-from mskgrasp.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
+from mskgrasp.settings import REGION, ExecutionNoise, Overhead, Physics
 from tasks import GraspDisplacementEnv
 from tasks.renderer import render_backend
 from tests.benchmarks.raw_sapien import RawSapien
 
-Draw = tuple[np.ndarray, np.ndarray]
+Draw = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""The part's pose (7,), the grasp (4,), and where the hand comes from (4,)."""
 
 
 def main() -> None:
     """Prints a table and, last, one JSON object."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--parts", type=int, default=9, help="parts of the starter set (default 9)")
-    parser.add_argument("--attempts", type=int, default=8, help="attempts a part (default 8)")
+    parser.add_argument("--parts", type=int, default=6, help="parts of the starter set (default 6)")
+    parser.add_argument("--attempts", type=int, default=25, help="attempts a part (default 25)")
     parser.add_argument(
         "--shards", type=int, default=2, help="shards of 25 attempts a part for the scaling (default 2)"
     )
@@ -70,30 +76,45 @@ def main() -> None:
 
 def side_by_side(parts: list[Part], n: int) -> dict[str, dict[str, float]]:
     """Processor time of n attempts a part in the three programs, and their success."""
-    programs = {"maniskill": PlainManiSkill(parts[0]), "raw": Raw(), "ours": Ours()}
+    ours = Ours()
+    programs = {"maniskill": PlainManiSkill(parts[0]), "raw": Raw()}
     seconds: dict[str, float] = defaultdict(float)
     lifted: dict[str, int] = defaultdict(int)
     with tqdm(total=len(parts) * n * 3, unit="grasp", file=sys.stderr, disable=None) as bar:
+        ours.shard(parts[0], 1)  # shaders are compiled, caches filled
+        ours.engine = 0.0
         for number, part in enumerate(parts):
-            programs["ours"].load(part)
-            drawn = programs["ours"].draw(n)
+            drawn = ours.draw(part, n)
             for name, program in programs.items():
-                program.load(part)
                 if number == 0:
-                    program.attempt(*drawn[0])  # shaders are compiled, caches filled
                     program.load(part)
-                    program.forget()
+                    program.attempt(*drawn[0])
                 began = time.process_time()
-                for pose, grasp in drawn:
-                    lifted[name] += program.attempt(pose, grasp)
+                program.load(part)
+                for draw in drawn:
+                    lifted[name] += program.attempt(*draw)
                     bar.update()
                 seconds[name] += time.process_time() - began
+            engine, began = ours.engine, time.process_time()
+            lifted["ours"] += ours.shard(part, n)
+            seconds["ours"] += time.process_time() - began
+            ours.in_shards += ours.engine - engine
+            bar.update(n)
     total = len(parts) * n
     found = {
-        name: {"grasps_per_s": total / seconds[name], "success": lifted[name] / total} for name in programs
+        name: {"grasps_per_s": total / spent, "success": lifted[name] / total}
+        for name, spent in seconds.items()
     }
-    found["ours"]["engine_share"] = programs["ours"].engine / seconds["ours"]
+    found["ours"]["engine_share"] = ours.in_shards / seconds["ours"]
     return found
+
+
+def over_the_part(part: Part, pose: np.ndarray, grasp: np.ndarray) -> np.ndarray:
+    """Where a hand begins that comes down on a grasp: pads 1 cm over the part's top, at least 6 cm up."""
+    corners = Pose.from_vector(pose).apply(np.asarray(trimesh.load_mesh(part.mesh_path).vertices))
+    above = grasp.copy()
+    above[2] = max(grasp[2] + 0.06, corners[:, 2].max() + PAD_REACH + 0.01)
+    return above
 
 
 class PlainManiSkill:
@@ -109,14 +130,10 @@ class PlainManiSkill:
         """A fresh scene with this part."""
         self.env.reset(seed=0, options=dict(parts=[str(part.folder)], reconfigure=True))
 
-    def forget(self) -> None:
-        """Nothing is counted here."""
-
-    def attempt(self, pose: np.ndarray, grasp: np.ndarray) -> bool:
+    def attempt(self, pose: np.ndarray, grasp: np.ndarray, above: np.ndarray) -> bool:
         """Approach, descend, close, lift, hold: 2.45 s at 20 Hz."""
         self.env.reset(seed=0, options=dict(pose_base_obj=pose[None]))
-        above, top = grasp.copy(), grasp.copy()
-        above[2] += 0.06
+        top = grasp.copy()
         top[2] += 0.1
         waypoints = [
             (above, above, 12, 1),
@@ -144,12 +161,9 @@ class Raw:
         """A fresh scene with this part."""
         self.sim.load(part)
 
-    def forget(self) -> None:
-        """Nothing is counted here."""
-
-    def attempt(self, pose: np.ndarray, grasp: np.ndarray) -> bool:
+    def attempt(self, pose: np.ndarray, grasp: np.ndarray, above: np.ndarray) -> bool:
         """One attempt."""
-        return self.sim.attempt(pose, grasp)
+        return self.sim.attempt(pose, grasp, above)
 
 
 class Ours:
@@ -158,6 +172,9 @@ class Ours:
     def __init__(self) -> None:
         self.simulator = Simulator(Physics(), Overhead(), ExecutionNoise())
         self.engine = 0.0
+        """Seconds inside PhysX and the renderer so far."""
+        self.in_shards = 0.0
+        """Those of them that were spent on shards."""
         self._clock(ManiSkillScene, "step")
         self._clock(GraspDisplacementEnv, "capture_depth")
 
@@ -172,40 +189,32 @@ class Ours:
 
         setattr(owner, name, timed)
 
-    def load(self, part: Part) -> None:
-        """A fresh scene with this part."""
-        self.env = self.simulator._load(str(part.folder))
-
-    def forget(self) -> None:
-        """Sets the clock back."""
-        self.engine = 0.0
-
-    def draw(self, n: int) -> list[Draw]:
-        """Starts (7,) and grasps (4,) as the collector draws them."""
+    def draw(self, part: Part, n: int) -> list[Draw]:
+        """The first attempts at a part, as the collector draws them."""
+        env = self.simulator._load(str(part.folder))
         drawn: list[Draw] = []
         attempt = 0
         while len(drawn) < n:
-            _, grasp = draw_attempt(self.env, self.env.parts[0].name, 0, attempt)
+            _, grasp = draw_attempt(env, part.name, 0, attempt)
             attempt += 1
             if grasp is not None:
-                drawn.append((self.env.part_pose().as_vector()[0].double().numpy(), grasp[0].astype(float)))
+                pose, grasp = env.part_pose().as_vector()[0].double().numpy(), grasp[0].astype(float)
+                drawn.append((pose, grasp, over_the_part(part, pose, grasp)))
         return drawn
 
-    def attempt(self, pose: np.ndarray, grasp: np.ndarray) -> bool:
-        """Image, box of the part, attempt, as in a shard; the grasp is the given one."""
-        env = self.env
-        env.reset(seed=0, options=dict(pose_base_obj=pose[None]))
-        depth = env.capture_depth()[0].cpu().numpy()
-        view_part(
-            depth, env.overhead.intrinsics(), env.overhead.T_base_camera(env.region_centre),
-            table_z=TABLE_Z, region=REGION,
-        )  # fmt: skip
-        outcome = env.attempt.run(torch.as_tensor(grasp[None], dtype=torch.float32))
-        return bool(outcome["success"][0])
+    def shard(self, part: Part, n: int) -> int:
+        """A shard of n attempts, written; how many of them lifted the part."""
+        task = ShardTask(part=part.name, folder=str(part.folder), index=0, first=0, n=n, seed=0)
+        with tempfile.TemporaryDirectory() as folder:
+            attempts, info = self.simulator.run(task, lambda _: None)
+            write_shard(Path(folder) / "shard.h5", attempts, info)
+        return int(attempts.success.sum())
 
 
 def throughput(parts: list[Part], shards: int, workers: int) -> dict[str, float]:
     """Grasps a second of the collector in its steady state, and the memory of its largest worker, GiB."""
+    for name in ("OMP_NUM_THREADS", "LP_NUM_THREADS"):  # workers are to start as users start them
+        os.environ.pop(name, None)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         (out / "shards").mkdir()

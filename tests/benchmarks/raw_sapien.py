@@ -85,8 +85,8 @@ class RawSapien:
         )
         self.eye.entity.set_pose(sapien_camera_pose(self.camera.T_base_camera(self.centre_xy)))
 
-    def attempt(self, pose: np.ndarray, grasp: np.ndarray) -> bool:
-        """Lays the part, takes the depth image, grasps and lifts; whether the part was lifted."""
+    def attempt(self, pose: np.ndarray, grasp: np.ndarray, above: np.ndarray) -> bool:
+        """Lays the part, takes the image, descends from above, grasps and lifts; whether it was lifted."""
         p = self.physics
         self.part.set_pose(sapien.Pose(p=to_world(pose[:3]), q=pose[3:]))
         body = self.part.find_component_by_type(physx.PhysxRigidDynamicComponent)
@@ -97,8 +97,7 @@ class RawSapien:
         self.eye.take_picture()
         self.eye.get_picture("GbufferDepth")
         self._show(1.0)
-        above, top = grasp.copy(), grasp.copy()
-        above[2] += 0.06
+        top = grasp.copy()
         top[2] += p.lift_height
         self._place(above)
         self._wait(SETTLE_S)

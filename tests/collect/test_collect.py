@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import yaml
 
+from mskgrasp.collect.__main__ import is_done
+from mskgrasp.collect.work import ShardTask
 from mskgrasp.dataset import list_shards, read_shard
+from mskgrasp.errors import BadDataset
+from mskgrasp.files import only_here
 from tests.collecting import PARTS, REPOSITORY, assert_equal, collect, command
 
 
@@ -150,3 +156,27 @@ def test_a_wrong_configuration_is_one_line_that_names_it(tmp_path, text, code, m
     assert message in done.stderr.strip().splitlines()[-1]
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "data").exists()
+
+
+def test_shards_of_other_software_are_not_added_to(collected, tmp_path):
+    path = list_shards(collected)[0]
+    info = read_shard(path)[1]
+    task = ShardTask(part=info.part, folder="", index=info.index, first=0, n=3, seed=info.seed)
+    assert is_done(collected, task, info.part_hash)
+    out = tmp_path / "data"
+    shutil.copytree(collected, out)
+    with h5py.File(out / "shards" / path.name, "r+") as file:
+        file.attrs["versions"] = json.dumps(info.versions | {"simulation": "0123456789abcdef"})
+    with pytest.raises(BadDataset, match="other software: simulation 0123456789abcdef"):
+        is_done(out, task, info.part_hash)
+
+
+def test_two_collections_do_not_write_into_one_folder(collected, tmp_path):
+    out = tmp_path / "data"
+    shutil.copytree(collected, out)
+    with only_here(out) as alone, only_here(out) as both:
+        assert alone and not both
+        done = collect(out)
+    assert done.returncode == 2 and "another collection is writing" in done.stderr
+    with only_here(out) as alone:
+        assert alone

@@ -263,6 +263,7 @@ def test_a_shard_with_too_few_attempts_is_named(data):
         ("region", [0.38, 0.62, -0.12, 0.121]),
         ("intrinsics", [[366.0, 0, 79.5], [0, 366.0, 79.5], [0, 0, 1]]),
         ("physics", '{"rate_hz": 250}'),
+        ("noise", '{"finger_force": [5.0, 70.0]}'),
         ("family", "spoon"),
     ],
 )
@@ -296,3 +297,10 @@ def test_a_folder_that_is_no_dataset_is_a_usage_error(tmp_path):
     for folder, words in ((tmp_path / "nowhere", "does not exist"), (tmp_path, "no folder shards")):
         with pytest.raises(UsageError, match=words):
             check_dataset(folder)
+
+
+def test_a_part_whose_name_leads_out_of_the_folder_hides_no_other_fault(data):
+    attribute(shard(data), "part", "../../x")
+    shard(data, f"{KEY}-0001.h5").unlink()
+    found = faults(data)
+    assert len(found) >= 2 and any("is missing" in reason for reason in found.values())

@@ -232,3 +232,18 @@ def test_a_crash_while_writing_leaves_nothing_and_an_older_shard_whole(shard, at
             write_shard(path, attempts, synthetic.info("other"))
     assert [path.name for path in shard.parent.iterdir()] == [shard.name]
     assert shard.read_bytes() == before
+
+
+def test_what_lies_in_another_file_is_not_read(shard, tmp_path):
+    secret = tmp_path / "secret"
+    secret.write_bytes(bytes(4 * 12))
+    with h5py.File(shard, "r+") as file:
+        del file["tilt"]
+        file.create_dataset("tilt", shape=(12,), dtype="f4", external=[(str(secret), 0, 48)])
+    assert "tilt lies in another file" in complaint(lambda: read_shard(shard))
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["tilt"] = np.zeros(12, np.float32)
+    with h5py.File(shard, "r+") as file:
+        del file["tilt"]
+        file["tilt"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "/tilt")
+    assert "tilt lies in another file" in complaint(lambda: read_shard(shard))

@@ -151,3 +151,31 @@ def test_empty_lists_are_refused():
 def validate(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "mskgrasp.validate", *arguments]
     return subprocess.run(command, capture_output=True, text=True, cwd=REPOSITORY, timeout=300)
+
+
+def test_without_successes_in_common_nothing_can_be_said():
+    nothing = outcomes(success=np.zeros(200, bool), displacement=np.full((200, 4), np.nan))
+    found = compare(nothing, nothing)
+    assert any("only 0 grasps" in said for said in complaints(found, found, 0.0))
+    assert found.as_dict()["shift_median"] is None
+    assert cheapest({"it": found}, found, 0.0, ["it"]) is None
+
+
+def test_a_bias_that_the_spread_hides_is_seen_in_pairs():
+    before = outcomes(n=1200)
+    noise = np.random.default_rng(0).normal(0, 1e-4, before.displacement.shape)
+    biased = compare(
+        dataclasses.replace(before, displacement=before.displacement + noise + [5e-4, 0, 0, 0]), before
+    )
+    assert biased.p_value > 0.05 and biased.bias_p < 1e-6
+    assert biased.bias == pytest.approx(5e-4, rel=0.1)
+    fair = compare(dataclasses.replace(before, displacement=before.displacement + noise), before)
+    assert fair.bias < 2e-5 and fair.bias_p > 0.01
+
+
+def test_variants_are_tried_beside_the_grid():
+    config = ValidateConfig(variants={"soft pads": {"pad_patch_radius": 0.008}})
+    tried = {setting.name: setting for setting in config.settings()}["soft pads"].physics
+    assert tried.pad_patch_radius == 0.008 and tried.rate_hz == config.physics.rate_hz
+    with pytest.raises(ValueError, match="no setting of physics"):
+        ValidateConfig(variants={"typo": {"pad_radius": 0.008}})
