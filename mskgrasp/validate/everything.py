@@ -14,7 +14,7 @@ from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.validate.bench import Bench
 from mskgrasp.validate.by_hand import Check, run_checks
 from mskgrasp.validate.compare import Comparison, cheapest, compare, complaints
-from mskgrasp.validate.config import FLOOR, NOTHING_SKIPPED, REFERENCE, ValidateConfig
+from mskgrasp.validate.config import CELL_FLOOR, FLOOR, NOTHING_SKIPPED, REFERENCE, ValidateConfig
 from mskgrasp.validate.convergence import draw_grasps, run_settings
 from mskgrasp.validate.fidelity import check_parts
 from mskgrasp.validate.report import (
@@ -49,7 +49,7 @@ def validate(config: ValidateConfig) -> int:
         reference = found[REFERENCE].success_rate
         failed += [
             f"{config.production}: {said}"
-            for said in complaints(found[config.production], found[FLOOR], reference)
+            for said in complaints(found[config.production], found[CELL_FLOOR], reference)
         ]
     results["failed"] = failed
     write_json(config.out / "validate.json", config, results)
@@ -90,13 +90,16 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
     with tqdm(total=n * len(settings), desc="grasps", unit="grasp", mininterval=_patience()) as bar:
         outcomes = run_settings(settings, drawn, config.out, workers, lambda k: _advance(bar, k))
     found = {name: compare(one, outcomes[REFERENCE]) for name, one in outcomes.items()}
-    apart = (FLOOR, REFERENCE, NOTHING_SKIPPED, *config.variants)
+    apart = (FLOOR, CELL_FLOOR, REFERENCE, NOTHING_SKIPPED, *config.variants)
     candidates = [
         setting.name
         for setting in settings
         if setting.physics.rate_hz >= LEAST_RATE_HZ and setting.name not in apart
     ]
-    chosen = cheapest(found, found[FLOOR], found[REFERENCE].success_rate, candidates)
+    chosen = {
+        floor: cheapest(found, found[floor], found[REFERENCE].success_rate, candidates)
+        for floor in (FLOOR, CELL_FLOOR)
+    }
     print_convergence(config, found, chosen)
     seen = impossible(outcomes[config.production])
     print_impossible(seen)

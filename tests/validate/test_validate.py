@@ -16,7 +16,7 @@ from mskgrasp.parts import find_part
 from mskgrasp.settings import Physics
 from mskgrasp.validate.by_hand import Check, run_checks
 from mskgrasp.validate.compare import cheapest, compare, complaints
-from mskgrasp.validate.config import FLOOR, REFERENCE, Setting, ValidateConfig
+from mskgrasp.validate.config import CELL_FLOOR, FLOOR, REFERENCE, Setting, ValidateConfig
 from mskgrasp.validate.convergence import Outcomes, draw_grasps, run_settings
 from mskgrasp.validate.report import impossible
 
@@ -113,6 +113,7 @@ def test_the_grid_holds_the_setting_under_test_and_the_floor():
     config = ValidateConfig(rates_hz=(250, 1000), iterations=(8, 50), physics=Physics(rate_hz=500))
     settings = {setting.name: setting for setting in config.settings()}
     assert {"250 Hz, 8 it", "1000 Hz, 50 it", "500 Hz, 15 it"} < set(settings)
+    assert settings[CELL_FLOOR].shift == 1e-4 and settings[CELL_FLOOR].physics == settings[FLOOR].physics
     assert settings[FLOOR].shift == 1e-5 and settings[FLOOR].physics == settings[REFERENCE].physics
     assert settings[REFERENCE].physics.rate_hz == 1000 and not settings[REFERENCE].physics.skip_air
 
@@ -179,3 +180,13 @@ def test_variants_are_tried_beside_the_grid():
     assert tried.pad_patch_radius == 0.008 and tried.rate_hz == config.physics.rate_hz
     with pytest.raises(ValueError, match="no setting of physics"):
         ValidateConfig(variants={"typo": {"pad_radius": 0.008}})
+
+
+def test_distributions_that_differ_by_less_than_can_be_noticed_are_the_same():
+    """Most parts do not rise in the hand: dz is nearly one number, and any shift of it is significant."""
+    still = outcomes(n=1200)
+    still.displacement[:, 2] = np.where(still.success, np.random.default_rng(1).normal(0, 1e-6, 1200), np.nan)
+    for shift, same in ((2e-5, True), (2e-4, False)):
+        moved = still.displacement + np.array([0, 0, shift, 0])
+        found = compare(dataclasses.replace(still, displacement=moved), still)
+        assert (found.p_value > 0.05) == same
