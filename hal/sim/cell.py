@@ -46,6 +46,8 @@ class SapienCellConfig(Config):
     """The overhead depth camera."""
     noise: SensorNoise = SensorNoise()
     """How the camera errs: off, iid (3 mm) or kinect2; see docs/sensor_noise.md."""
+    colour_scale: int = Field(default=1, ge=1, le=6)
+    """Over 1, frames also hold a colour image so much finer than depth; a Kinect v2's is 3 times so."""
 
     @model_validator(mode="after")
     def _check(self) -> SapienCellConfig:
@@ -69,6 +71,7 @@ def sapien_cell(config: SapienCellConfig) -> Cell:
         home=home,
         part=config.part,
         seed=config.seed,
+        colour_scale=config.colour_scale,
     )
     limits = ArmLimits(
         joint_lower=np.array(JOINT_LOWER),
