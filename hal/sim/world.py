@@ -11,9 +11,10 @@ import torch
 from hal.errors import NotConnected
 from hal.sim.board import show_board
 from hal.sim.colour import FineColour
+from hal.sim.tape import stick_tape
 from mskgrasp.geometry import Pose
 from mskgrasp.parts import find_part
-from mskgrasp.settings import Overhead, Physics, Region
+from mskgrasp.settings import Overhead, Physics, Region, Tape
 from tasks import GraspDisplacementEnv
 from tasks.renderer import render_backend
 
@@ -28,6 +29,7 @@ class SapienWorld:
         home: (7,) joints of the arm when a part is laid down.
         part: What lies on the table at first.
         seed: Its place and turn follow from it.
+        tape: Squares of tape that are stuck on top of a part once it lies; none where None.
         colour_scale: Over 1, frames hold a fine colour image with so many pixels along a pixel of depth.
     """
 
@@ -40,6 +42,7 @@ class SapienWorld:
         home: np.ndarray,
         part: str,
         seed: int,
+        tape: Tape | None = None,
         colour_scale: int = 1,
     ):
         self.physics = physics
@@ -47,6 +50,7 @@ class SapienWorld:
         self.region = region
         self._home = torch.as_tensor(home, dtype=torch.float64)[None]
         self._first = (part, seed)
+        self._tape = tape
         self._colour_scale = colour_scale
         self._fine_colour: FineColour | None = None
         self._users = 0
@@ -106,7 +110,7 @@ class SapienWorld:
         """Lays a part on the table, arm at home, everything at rest.
 
         Raises:
-            BadPart: There is no such part.
+            BadPart: There is no such part, or no room for the tape on it.
         """
         folder = str(find_part(part).folder)
         self._fine_colour = None
@@ -114,6 +118,9 @@ class SapienWorld:
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
         self.env.motion.place(self._home)
         self.env.motion.step(self.env.motion.n_steps(self.physics.settle_s))
+        if self._tape is not None:
+            entity = self.env.part._objs[0]
+            stick_tape(entity, self.env.parts[0], self.part_pose().quat_wxyz, self._tape)
 
     def fine_colour(self) -> np.ndarray | None:
         """The fine colour image of what the camera has just seen; None where none is asked for."""
