@@ -124,8 +124,10 @@ def _search(
     least, most = SPECK * (tape.small / pitch) ** 2, 2 * tape.large / pitch
     run: list[tuple[Spot, Spot]] = []
     longest = run
-    nearest, complaint = -1, ""
-    for level in range(255 - _STEP, 0, -_STEP):
+    nearest, complaint = 0, _complaint([], [], view, tape)
+    # Levels at which nothing is white say nothing; where half of all is, the table is, and tape no longer.
+    darkest = int(np.median(grey[grey > 0])) if grey.any() else 255
+    for level in range(int(grey.max()) - 1, darkest - 1, -_STEP):
         spots = find_spots(grey, level, least=least, most=most)
         kinds = [_kind(spot, view, tape, pitch) for spot in spots]
         if sorted(map(str, kinds)) == ["0", "1"]:
@@ -178,8 +180,8 @@ def _complaint(spots: list[Spot], kinds: list[int | None], view: RegisteredFrame
     sizes = f"{1e3 * tape.large:g} and {1e3 * tape.small:g} mm"
     if not spots:
         return (
-            f"none found: nothing in the region is white; stick both squares ({sizes}) on top of the part, "
-            "and light it"
+            f"none found: nothing in the region is whiter than most of it; stick both squares ({sizes}) on top "
+            "of the part, and light it without glare"
         )
     other = _describe(others[0], view) if others else ""
     if len(spots) > 2 and len(found) == 2:
