@@ -180,8 +180,8 @@ def _complaint(spots: list[Spot], kinds: list[int | None], view: RegisteredFrame
     sizes = f"{1e3 * tape.large:g} and {1e3 * tape.small:g} mm"
     if not spots:
         return (
-            f"none found: nothing in the region is whiter than most of it; stick both squares ({sizes}) on top "
-            "of the part, and light it without glare"
+            f"none found: nothing in the region is whiter than most of it; stick both squares ({sizes}) on "
+            "top of the part, and light it without glare"
         )
     other = _describe(others[0], view) if others else ""
     if len(spots) > 2 and len(found) == 2:

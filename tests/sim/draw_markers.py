@@ -19,14 +19,17 @@ from tests.sim.marked_parts import (
     errors,
     find,
     lay,
+    littered,
     marked_cell,
     noisy,
     present,
     random_motion,
+    small_motion,
 )
 
 OUT = Path(__file__).parents[2] / "docs" / "markers.png"
 N_MOTIONS = 20
+N_LITTERED = 500
 SHOWN = "pillow_block_80x32"
 SIDE = 75
 BLUE, ORANGE = "#1f6feb", "#e8590c"
@@ -47,6 +50,8 @@ def main() -> None:
             found, refused = measure(cell, [random_motion(cell, resting, rng) for _ in range(N_MOTIONS)], rng)
             for kind, values in found.items():
                 every[kind] += values
+            if part == SHOWN:
+                litter(cell, small_motion(cell, resting), rng)
             print(f"| `{part}` | {row(found['clean'])} | {row(found['noisy'])} | {refused} |")
         print(f"| all | {row(every['clean'])} | {row(every['noisy'])} | |")
     for kind, colour in (("noisy", ORANGE), ("clean", BLUE)):
@@ -78,6 +83,18 @@ def measure(
                 refused += 1
                 print(f"{kind}: {error}")
     return found, refused
+
+
+def litter(cell: Cell, motion: Motion, rng: np.random.Generator) -> None:
+    """Prints what becomes of pictures on which something lies on or beside a square."""
+    found = []
+    for frame in littered(cell, motion.frames[1], N_LITTERED, rng):
+        try:
+            found.append(errors(cell, motion, (motion.frames[0], frame)))
+        except MarkersNotFound:
+            continue
+    most = np.max(found, axis=0)
+    print(f"of {N_LITTERED} littered pictures {len(found)} were not refused, errors up to {most} mm, degrees")
 
 
 def row(values: Sequence[tuple[float, float]]) -> str:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import torch
 from mani_skill.utils.structs.pose import Pose as ManiSkillPose
@@ -95,6 +97,16 @@ def random_motion(cell: Cell, resting: Pose, rng: np.random.Generator) -> Motion
     return Motion(poses=(poses[0], poses[1]), frames=(frames[0], frames[1]), grasp=grasp)
 
 
+def small_motion(cell: Cell, resting: Pose) -> Motion:
+    """Half a centimetre and six degrees in the middle of the region."""
+    poses, frames = [], []
+    for place in ((0.5, 0.0, 0.3), (0.505, 0.004, 0.4)):
+        poses.append(lay(cell, resting, *place))
+        frames.append(cell.camera.capture())
+    grasp = np.array([0.5, 0.0, 0.0115, 0.2])
+    return Motion(poses=(poses[0], poses[1]), frames=(frames[0], frames[1]), grasp=grasp)
+
+
 def noisy(frame: RgbdFrame, rng: np.random.Generator) -> RgbdFrame:
     """The frame as a Kinect v2 and a colour camera would take it."""
     assert frame.fine_colour is not None
@@ -104,6 +116,33 @@ def noisy(frame: RgbdFrame, rng: np.random.Generator) -> RgbdFrame:
         depth=add_noise(frame.depth, frame.intrinsics, SensorNoise(model="kinect2"), rng),
         fine_colour=np.clip(np.rint(colour), 0, 255).astype(np.uint8),
     )
+
+
+def blot(
+    frame: RgbdFrame, pixel: np.ndarray, size: tuple[float, float], grey: int, *, round_: bool
+) -> RgbdFrame:
+    """Something over a place of the depth image, its size (of a disc: its radius) in pixels of colour."""
+    assert frame.fine_colour is not None
+    shape, place = np.zeros(frame.fine_colour.shape[:2], np.float32), (pixel + 0.5) * 3 - 0.5
+    if round_:
+        cv2.circle(shape, np.rint(place).astype(int).tolist(), round(size[0]), 1.0, -1, cv2.LINE_AA)
+    else:
+        corners = cv2.boxPoints((place.tolist(), size, 25.0))
+        cv2.fillConvexPoly(shape, np.rint(corners * 16).astype(np.int32), 1.0, cv2.LINE_AA, 4)
+    share = cv2.GaussianBlur(shape, (0, 0), 0.7)[..., None]
+    colour = np.rint(frame.fine_colour * (1 - share) + grey * share).astype(np.uint8)
+    return dataclasses.replace(frame, fine_colour=colour)
+
+
+def littered(cell: Cell, frame: RgbdFrame, n: int, rng: np.random.Generator) -> Iterator[RgbdFrame]:
+    """The frame with one thing of any size, shape and brightness on or beside one of its squares, n times."""
+    squares = find(cell, frame).pixels
+    for _ in range(n):
+        place = squares[rng.integers(2)] + rng.uniform(-14 / 3, 14 / 3, 2)
+        round_ = bool(rng.integers(2))
+        size = rng.uniform(3, 20, 2) / (2 if round_ else 1)
+        grey = int(rng.choice([20, 139, 195, 228, 255]))
+        yield blot(frame, place, (size[0], size[1]), grey, round_=round_)
 
 
 def find(cell: Cell, frame: RgbdFrame) -> Markers:
