@@ -23,6 +23,8 @@ class RgbdFrame:
         T_base_camera: Pose of the camera's optical frame (x right, y down, z forward) in the base.
         timestamp_s: Time of the exposure, seconds on the monotonic clock of this machine.
         serial: Which camera took it.
+        fine_colour: (k h, k w, 3) uint8, RGB, or None: the same exposure with k x k pixels of colour for
+            every pixel of depth, where a camera has them and its settings ask for them.
     """
 
     colour: np.ndarray
@@ -31,6 +33,7 @@ class RgbdFrame:
     T_base_camera: Pose
     timestamp_s: float
     serial: str
+    fine_colour: np.ndarray | None = None
 
 
 class Camera(Device):

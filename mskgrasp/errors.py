@@ -21,6 +21,10 @@ class BadPart(MskgraspError):
     """A mesh or a part folder cannot be used as a part."""
 
 
+class TapeDoesNotFit(BadPart):
+    """No two tape squares find room on top of the part."""
+
+
 class UnknownPart(BadPart, UsageError):
     """No part has that name."""
 
@@ -35,6 +39,10 @@ class BadModel(MskgraspError):
 
 class NoPartFound(MskgraspError):
     """The depth image shows no part that could be grasped."""
+
+
+class MarkersNotFound(MskgraspError):
+    """The tape squares on the part are not seen so that the part's motion could be told from them."""
 
 
 class NoGraspFound(MskgraspError):

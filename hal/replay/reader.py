@@ -53,6 +53,7 @@ class Recording:
                     T_base_camera=pose(group["T_base_camera"][index]),
                     timestamp_s=timestamp_s,
                     serial=str(group.attrs["serial"]),
+                    fine_colour=group["fine_colour"][index] if "fine_colour" in group else None,
                 )
         except (OSError, KeyError, IndexError, ValueError) as error:
             raise BadRecording(
@@ -113,6 +114,10 @@ def _check_frames(group: Any) -> int:
     for key, shape in shapes.items():
         if group[key].shape != shape:
             raise ValueError(f"frames/{key} is {group[key].shape}, expected {shape}")
+    if "fine_colour" in group:
+        scale = group["fine_colour"].shape[1] // h
+        if scale < 1 or group["fine_colour"].shape != (n, scale * h, scale * w, 3):
+            raise ValueError(f"frames/fine_colour is {group['fine_colour'].shape}, no multiple of depth")
     if group["depth"].dtype != np.float32 or group["colour"].dtype != np.uint8:
         raise ValueError(f"depth is {group['depth'].dtype}, colour {group['colour'].dtype}")
     return n

@@ -145,6 +145,7 @@ class RecordingWriter:
                 intrinsics=frame.intrinsics,
                 T_base_camera=np.asarray(frame.T_base_camera.as_vector(), dtype=np.float64),
                 exposed_s=np.float64(frame.timestamp_s - self._start_s),
+                **({} if frame.fine_colour is None else dict(fine_colour=frame.fine_colour)),
             )
             group = self._file.require_group("frames")
             if not group.keys():

@@ -62,4 +62,5 @@ class SapienCamera(Camera):
             T_base_camera=self._world.overhead.T_base_camera(((x_min + x_max) / 2, (y_min + y_max) / 2)),
             timestamp_s=taken,
             serial="sapien",
+            fine_colour=self._world.fine_colour(),
         )

@@ -15,7 +15,7 @@ from hal.sim.camera import SapienCamera
 from hal.sim.noise import SensorNoise
 from hal.sim.world import SapienWorld
 from mskgrasp.config import Config
-from mskgrasp.settings import REGION, TABLE_Z, Overhead, Physics
+from mskgrasp.settings import REGION, TABLE_Z, Overhead, Physics, Tape
 from tasks.kinematics import JOINT_LOWER, JOINT_UPPER, top_down
 
 READY = (0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398)
@@ -46,6 +46,10 @@ class SapienCellConfig(Config):
     """The overhead depth camera."""
     noise: SensorNoise = SensorNoise()
     """How the camera errs: off, iid (3 mm) or kinect2; see docs/sensor_noise.md."""
+    tape: Tape | None = None
+    """Two squares of white tape on top of every part, to measure by; null: none. See docs/markers.md."""
+    colour_scale: int = Field(default=1, ge=1, le=6)
+    """Over 1, frames also hold a colour image so much finer than depth; a Kinect v2's is 3 times so."""
 
     @model_validator(mode="after")
     def _check(self) -> SapienCellConfig:
@@ -69,6 +73,8 @@ def sapien_cell(config: SapienCellConfig) -> Cell:
         home=home,
         part=config.part,
         seed=config.seed,
+        tape=config.tape,
+        colour_scale=config.colour_scale,
     )
     limits = ArmLimits(
         joint_lower=np.array(JOINT_LOWER),

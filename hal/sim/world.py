@@ -10,9 +10,11 @@ import torch
 
 from hal.errors import NotConnected
 from hal.sim.board import show_board
+from hal.sim.colour import FineColour
+from hal.sim.tape import stick_tape
 from mskgrasp.geometry import Pose
 from mskgrasp.parts import find_part
-from mskgrasp.settings import Overhead, Physics, Region
+from mskgrasp.settings import Overhead, Physics, Region, Tape
 from tasks import GraspDisplacementEnv
 from tasks.renderer import render_backend
 
@@ -27,6 +29,8 @@ class SapienWorld:
         home: (7,) joints of the arm when a part is laid down.
         part: What lies on the table at first.
         seed: Its place and turn follow from it.
+        tape: Squares of tape that are stuck on top of a part once it lies; none where None.
+        colour_scale: Over 1, frames hold a fine colour image with so many pixels along a pixel of depth.
     """
 
     def __init__(
@@ -38,12 +42,17 @@ class SapienWorld:
         home: np.ndarray,
         part: str,
         seed: int,
+        tape: Tape | None = None,
+        colour_scale: int = 1,
     ):
         self.physics = physics
         self.overhead = overhead
         self.region = region
         self._home = torch.as_tensor(home, dtype=torch.float64)[None]
         self._first = (part, seed)
+        self._tape = tape
+        self._colour_scale = colour_scale
+        self._fine_colour: FineColour | None = None
         self._users = 0
         self._gym: gymnasium.Env | None = None
 
@@ -92,6 +101,7 @@ class SapienWorld:
             self._free()
 
     def _free(self) -> None:
+        self._fine_colour = None
         if self._gym is not None:
             self._gym.close()
             self._gym = None
@@ -100,13 +110,25 @@ class SapienWorld:
         """Lays a part on the table, arm at home, everything at rest.
 
         Raises:
-            BadPart: There is no such part.
+            BadPart: There is no such part, or no room for the tape on it.
         """
         folder = str(find_part(part).folder)
+        self._fine_colour = None
         # A fresh scene each time, so that a trial does not depend on those before it.
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
         self.env.motion.place(self._home)
         self.env.motion.step(self.env.motion.n_steps(self.physics.settle_s))
+        if self._tape is not None:
+            entity = self.env.part._objs[0]
+            stick_tape(entity, self.env.parts[0], self.part_pose().quat_wxyz, self._tape)
+
+    def fine_colour(self) -> np.ndarray | None:
+        """The fine colour image of what the camera has just seen; None where none is asked for."""
+        if self._colour_scale == 1:
+            return None
+        if self._fine_colour is None:
+            self._fine_colour = FineColour(self.env, self.overhead, self._colour_scale)
+        return self._fine_colour.capture()
 
     def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
         """Fixes a flat board to the hand, to be looked at: it weighs nothing and touches nothing.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -27,7 +28,7 @@ from hal.replay import (
 )
 from mskgrasp.errors import BadConfig, UsageError
 from mskgrasp.geometry import Pose
-from tests.replay.toy import DOWN, ToyArm, toy_cell
+from tests.replay.toy import DOWN, ToyArm, ToyCamera, toy_cell
 
 GRASP = np.array([0.45, 0.05, 0.06, 0.2])
 
@@ -178,6 +179,17 @@ def test_the_file_is_plain_hdf5_as_documented(recording: Path):
     assert events[0]["call"] == "present" and events[0]["arguments"] == {"part": "nut", "seed": 3}
     aborted = next(event for event in events if event["error"])
     assert aborted["error"][0] == "MotionAborted" and aborted["after"]["T_base_tcp"][2] > 0.1
+
+
+def test_a_fine_colour_image_is_recorded_where_the_camera_has_one(recording: Path, tmp_path: Path):
+    path = tmp_path / "fine.h5"
+    fine_cell = dataclasses.replace(toy_cell(), camera=ToyCamera(fine=True))
+    with recorded_cell(fine_cell, path).connected() as cell:
+        for _ in range(2):
+            cell.camera.capture()
+    fine = read_recording(path).frame(1, 0.0).fine_colour
+    assert fine is not None and fine.shape == (8, 12, 3) and (fine == 20).all()
+    assert read_recording(recording).frame(1, 0.0).fine_colour is None
 
 
 def test_a_killed_program_leaves_what_happened_until_then(tmp_path: Path):

@@ -82,8 +82,9 @@ class ToyArm(Arm):
 class ToyCamera(Camera):
     """Counts: every pixel of frame k is k metres away. Its fourth frame does not come."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, fine: bool = False) -> None:
         self._taken = 0
+        self._fine = fine
 
     def connect(self) -> None: ...
     def close(self) -> None: ...
@@ -101,6 +102,7 @@ class ToyCamera(Camera):
             T_base_camera=Pose(position=np.array([0.5, 0, 0.8]), quat_wxyz=DOWN),
             timestamp_s=time.monotonic(),
             serial="toy",
+            fine_colour=np.full((8, 12, 3), 10 * self._taken, np.uint8) if self._fine else None,
         )
 
 
