@@ -14,7 +14,7 @@ from hal.cell import Cell
 from hal.errors import HalError
 from mskgrasp.cli import make_folder, parse, run
 from mskgrasp.config import Config
-from mskgrasp.networks import load_models
+from mskgrasp.models import load_models
 from mskgrasp.pictures import draw_plan
 from mskgrasp.planner import GraspPlan, Planner, PlannerConfig
 

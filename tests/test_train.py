@@ -11,8 +11,9 @@ from mskgrasp import cli, train
 from mskgrasp.dataset import shard_path, write_shard
 from mskgrasp.errors import BadDataset, BadModel, UsageError
 from mskgrasp.grasp import centre_in_grasp_frame
-from mskgrasp.networks import NetworkConfig, load_models
-from mskgrasp.samples import mirror_and_turn, read_samples, validation_parts
+from mskgrasp.models import load_models
+from mskgrasp.networks import NetworkConfig
+from mskgrasp.samples import mirror_and_turn, part_sides, read_samples
 from mskgrasp.training import (
     LearningConfig,
     Reporter,
@@ -58,7 +59,7 @@ def dataset(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def samples(dataset):
-    return read_samples(dataset, patch_pixels=40, patch_side=0.128)
+    return read_samples(dataset, SMALL)
 
 
 def program(config: LearningConfig, **changes) -> train.TrainConfig:
@@ -76,28 +77,32 @@ def test_samples_hold_every_attempt_with_its_displacement_seen_from_the_estimate
     assert float(sideways.abs().max()) < 0.0025
 
 
+def held_out_of(names: tuple[str, ...], fraction: float) -> set[str]:
+    return {name for name, side in part_sides(names, fraction, "name").items() if side == "validation"}
+
+
 def test_parts_are_split_by_name_and_stay_on_their_side():
     names = tuple(f"part_{k}" for k in range(400))
-    held_out = set(validation_parts(names, 0.2))
+    held_out = held_out_of(names, 0.2)
     assert 50 < len(held_out) < 110
     fewer = names[:200]
-    assert set(validation_parts(fewer, 0.2)) == held_out & set(fewer)
-    assert all(len(validation_parts(("a", "b"), share)) == 1 for share in (0.01, 0.99))
+    assert held_out_of(fewer, 0.2) == held_out & set(fewer)
+    assert all(len(held_out_of(("a", "b"), share)) == 1 for share in (0.01, 0.99))
     with pytest.raises(BadDataset, match="at least 2 parts"):
-        validation_parts(("lonely",), 0.2)
+        part_sides(("lonely",), 0.2, "name")
 
 
 def test_validation_never_sees_a_part_of_training(samples):
-    training_rows, rows = split(samples, 0.2)
-    assert not set(samples.part[training_rows].tolist()) & set(samples.part[rows].tolist())
-    assert len(training_rows) + len(rows) == len(samples)
+    sides = split(samples, CONFIG)
+    assert not set(samples.part[sides.training].tolist()) & set(samples.part[sides.validation].tolist())
+    assert len(sides.training) + len(sides.validation) == len(samples) and not len(sides.test)
 
 
 @pytest.mark.parametrize(("success", "words"), [(True, "no failure"), (False, "no success")])
 def test_data_of_one_outcome_are_told(samples, success, words):
     alike = dataclasses.replace(samples, success=torch.full((len(samples),), success))
     with pytest.raises(BadDataset, match=words):
-        split(alike, 0.2)
+        split(alike, CONFIG)
 
 
 def test_turned_and_mirrored_samples_are_what_the_turned_and_mirrored_scene_would_give():
@@ -285,7 +290,7 @@ def test_the_configurations_that_are_shipped_can_be_read(name):
 
 
 def test_parts_outside_the_success_range_are_left_out(dataset):
-    samples = read_samples(dataset, patch_pixels=40, patch_side=0.128)
+    samples = read_samples(dataset, SMALL)
     rates = sorted(
         float(samples.success[samples.part == i].float().mean()) for i in range(len(samples.parts))
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 
 from hal import go_home, open_cell
-from mskgrasp.networks import load_models
+from mskgrasp.models import load_models
 from mskgrasp.planner import Planner, PlannerConfig
 from mskgrasp.trial import Trial, run_trial
 
