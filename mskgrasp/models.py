@@ -27,6 +27,8 @@ from mskgrasp.networks import (
 SCHEMA_VERSION = 1
 WEIGHTS = "model.safetensors"
 DESCRIPTION = "model.json"
+PRETRAINED = Path(__file__).parent / "pretrained"
+"""The model that is shipped."""
 
 
 class Calibration(Config):
@@ -70,10 +72,19 @@ class Models:
         return self._probability(self.gqn(self._inputs(patches), centre_grasp.to(patches.dtype)))
 
     @torch.inference_mode()
-    def grasp_displacement(self, patches: Tensor, centre_grasp: Tensor) -> tuple[Tensor, Tensor | None]:
-        """Mean and variance (n, 4) of the grasp displacement, of patches (n, 1, p, p) in metres."""
+    def grasp_displacement(
+        self, patches: Tensor, centre_grasp: Tensor, theta: Tensor | None = None
+    ) -> tuple[Tensor, Tensor | None]:
+        """Mean and variance (n, 4) of the grasp displacement, of patches (n, 1, p, p) in metres.
+
+        Args:
+            patches: Around the grasps and turned with them; around the part and not turned where the network
+                has ``image: object``.
+            centre_grasp: (n, 3) object centre in the grasp frame, metres.
+            theta: (n,) the grasps' angles, for ``image: object``.
+        """
         self._check(patches)
-        return self._calibrated(*self.gdn(self._inputs(patches), centre_grasp.to(patches.dtype)))
+        return self._calibrated(*self.gdn(self._inputs(patches), centre_grasp.to(patches.dtype), theta=theta))
 
     @torch.inference_mode()
     def shared_quality(self, maps: Tensor, where: Tensor, centre_grasp: Tensor) -> Tensor:

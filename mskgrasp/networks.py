@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 import torch
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 from torch import Tensor, nn
 
 from mskgrasp.config import Config
@@ -27,6 +27,9 @@ class NetworkConfig(Config):
 
     architecture: Literal["patch", "field"] = "patch"
     """patch: the paper's, every grasp sees a picture of its own; field: grasps share features."""
+    image: Literal["grasp", "object"] = "grasp"
+    """What the displacement network sees: the patch around the grasp (the paper's GCIP), or one around the
+    part, not turned, beside the grasp's angle (OCFI). The quality network always sees the grasp's."""
     patch_pixels: int = Field(default=64, ge=32, le=256)
     patch_side: float = Field(default=0.128, gt=0.0, le=1.0)
     channels: int = Field(default=32, ge=1)
@@ -48,6 +51,12 @@ class NetworkConfig(Config):
     Most parts do not rise in the hand by 0.1 mm, some rise by 10 mm: without a floor the likelihood drives
     the variance of z so low that one such part costs more than all others gain.
     """
+
+    @model_validator(mode="after")
+    def _check(self) -> NetworkConfig:
+        if self.image == "object" and self.architecture != "patch":
+            raise ValueError("image: object needs architecture: patch")
+        return self
 
     @field_validator("least_std")
     @classmethod
@@ -103,7 +112,7 @@ def standardise(patches: Tensor) -> Tensor:
 class PatchFeatures(nn.Module):
     """The paper's (figure 3): a patch and an action become one vector."""
 
-    def __init__(self, config: NetworkConfig, normalisation: Normalisation):
+    def __init__(self, config: NetworkConfig, normalisation: Normalisation, n_action: int = 3):
         super().__init__()
         width = config.channels
         self.convolutions = nn.Sequential(
@@ -123,10 +132,11 @@ class PatchFeatures(nn.Module):
         self.image = nn.Sequential(
             nn.Flatten(), nn.Linear(width * left * left, config.trunk_width), nn.ReLU(), dropout
         )
-        self.action = nn.Sequential(nn.Linear(3, config.action_width), nn.ReLU(), dropout)
+        self.action = nn.Sequential(nn.Linear(n_action, config.action_width), nn.ReLU(), dropout)
         self.n_features = config.trunk_width + config.action_width
         self.action_scale: Tensor
-        self.register_buffer("action_scale", torch.tensor(normalisation.action_scale), persistent=False)
+        scale = (*normalisation.action_scale, torch.pi / 2)
+        self.register_buffer("action_scale", torch.tensor(scale[:n_action]), persistent=False)
 
     def prepare(self, patches: Tensor) -> Tensor:
         """What the network takes of patches (n, 1, p, p) in metres above the table."""
@@ -184,7 +194,12 @@ class GraspDisplacementNetwork(nn.Module):
 
     def __init__(self, config: NetworkConfig, normalisation: Normalisation):
         super().__init__()
-        self.features = make_features(config, normalisation)
+        self.sees_object = config.image == "object"
+        self.features = (
+            PatchFeatures(config, normalisation, n_action=4)
+            if self.sees_object
+            else make_features(config, normalisation)
+        )
         self.mean_head = _head(self.features.n_features, config, 4)
         self.variance_head = _head(self.features.n_features, config, 4) if config.variance else None
         self.target_mean: Tensor
@@ -197,7 +212,11 @@ class GraspDisplacementNetwork(nn.Module):
         self.register_buffer("least_variance", floor, persistent=False)
 
     def forward(
-        self, patches: Tensor, centre_grasp: Tensor, offset: Tensor | None = None
+        self,
+        patches: Tensor,
+        centre_grasp: Tensor,
+        offset: Tensor | None = None,
+        theta: Tensor | None = None,
     ) -> tuple[Tensor, Tensor | None]:
         """Mean (n, 4) and variance (n, 4) of the grasp displacement, in metres and radians (squared).
 
@@ -207,8 +226,21 @@ class GraspDisplacementNetwork(nn.Module):
             patches: (n, 1, p, p), prepared (`PatchFeatures.prepare`).
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
             offset: (2,) of the grasps from the patches' middle, metres; field architecture alone.
+            theta: (n,) the grasps' angles, for ``image: object``, whose patches are not turned.
         """
-        return self.outputs(self.features(patches, centre_grasp, offset))
+        if not self.sees_object:
+            return self.outputs(self.features(patches, centre_grasp, offset))
+        assert theta is not None, "a picture that is not turned needs the grasps' angles"
+        # Within, all is along the picture's axes.
+        centre = torch.cat([_turned(centre_grasp, theta), theta[:, None]], dim=-1)
+        mean, variance = self.outputs(self.features(patches, centre))
+        mean = torch.cat([_turned(mean[:, :3], -theta), mean[:, 3:]], dim=-1)
+        if variance is None:
+            return mean, None
+        cos, sin = theta.cos().square(), theta.sin().square()
+        x, y = variance[:, 0], variance[:, 1]
+        along = torch.stack([cos * x + sin * y, sin * x + cos * y], dim=-1)
+        return mean, torch.cat([along, variance[:, 2:]], dim=-1)
 
     def outputs(self, features: Tensor) -> tuple[Tensor, Tensor | None]:
         """The same from the features (n, f)."""
@@ -221,9 +253,18 @@ class GraspDisplacementNetwork(nn.Module):
 
     def start_from(self, gqn: GraspQualityNetwork) -> None:
         """Copies the convolutions' weights of a trained GQN (paper, figure 3)."""
+        if self.sees_object:
+            return  # other pictures: the paper starts these at random
         for name in ("convolutions", "stem", "blocks"):
             if hasattr(gqn.features, name):
                 getattr(self.features, name).load_state_dict(getattr(gqn.features, name).state_dict())
+
+
+def _turned(vectors: Tensor, angle: Tensor) -> Tensor:
+    """Vectors (n, 3) turned about z by angles (n,)."""
+    cos, sin = angle.cos(), angle.sin()
+    x, y = vectors[:, 0], vectors[:, 1]
+    return torch.stack([cos * x - sin * y, sin * x + cos * y, vectors[:, 2]], dim=-1)
 
 
 def displacement_error(mean: Tensor, target: Tensor) -> Tensor:

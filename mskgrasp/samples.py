@@ -32,6 +32,8 @@ class Samples:
     Attributes:
         patches: (n, 1, q, q) int16, 0.1 mm above the table, each turned to its grasp; ``margin`` pixels wider
             on every side than what the network takes.
+        object_patches: (n, 1, p, p) int16, around the part and not turned; None where no network sees them.
+        theta: (n,) float32 angle of the grasp.
         centre_grasp: (n, 3) float32 object centre, estimated from the image, in the grasp frame, metres.
         success: (n,) bool.
         displacement: (n, 4) float32 true object displacement, NaN where the grasp failed.
@@ -46,6 +48,8 @@ class Samples:
 
     patches: Tensor
     margin: int
+    object_patches: Tensor | None
+    theta: Tensor
     centre_grasp: Tensor
     success: Tensor
     displacement: Tensor
@@ -65,6 +69,14 @@ class Samples:
             patches = patches[..., self.margin : -self.margin, self.margin : -self.margin]
         return patches.to(device).float() * HEIGHT_STEP
 
+    def displacement_heights(
+        self, rows: Tensor, device: torch.device | str, *, whole: bool = False
+    ) -> Tensor:
+        """What the displacement network sees of some rows, (n, 1, p, p) metres."""
+        if self.object_patches is None:
+            return self.heights(rows, device, whole=whole)
+        return self.object_patches[rows].to(device).float() * HEIGHT_STEP
+
     def of_parts_between(self, low: float, high: float) -> Samples:
         """The samples of the parts of which a share in [low, high] of the grasps succeeded.
 
@@ -82,6 +94,8 @@ class Samples:
         return replace(
             self,
             patches=self.patches[rows],
+            object_patches=None if self.object_patches is None else self.object_patches[rows],
+            theta=self.theta[rows],
             centre_grasp=self.centre_grasp[rows],
             success=self.success[rows],
             displacement=self.displacement[rows],
@@ -129,12 +143,14 @@ def read_samples(
     if not pieces:
         reason = f": {skipped.most_common(1)[0][0]}" if skipped else ""
         raise BadDataset(f"no usable attempt in {folder}{reason}; collect again")
-    patches, centre, success, displacement, grasp_displacement, part = (
+    patches, object_patches, theta, centre, success, displacement, grasp_displacement, part = (
         torch.cat(arrays) for arrays in zip(*pieces, strict=True)
     )
     return Samples(
         patches=patches,
         margin=margin_of(network),
+        object_patches=object_patches if network.image == "object" else None,
+        theta=theta,
         centre_grasp=centre,
         success=success,
         displacement=displacement,
@@ -169,17 +185,24 @@ def _shard_samples(
     displacement = attempts.displacement[rows].astype(np.float64)
     centre_grasp = centre_in_grasp_frame(np.array(centres), grasp)
     heights = height_image(torch.from_numpy(depth[rows]), info.intrinsics, info.T_base_camera, info.table_z)
-    n_pixels = network.patch_pixels + 2 * margin_of(network)
-    patches = crop_patches(
-        heights,
-        torch.from_numpy(patch_plane(network, grasp, np.array(centres))),
-        info.intrinsics,
-        info.T_base_camera,
-        n_pixels=n_pixels,
-        side=n_pixels * network.patch_side / network.patch_pixels,
-    )
+
+    def crop(planes: np.ndarray, n_pixels: int) -> Tensor:
+        patches = crop_patches(
+            heights,
+            torch.from_numpy(planes),
+            info.intrinsics,
+            info.T_base_camera,
+            n_pixels=n_pixels,
+            side=n_pixels * network.patch_side / network.patch_pixels,
+        )
+        return (patches / HEIGHT_STEP).round().clamp(-32768, 32767).to(torch.int16)
+
+    n_pixels = network.patch_pixels
+    around = np.column_stack([np.array(centres), np.zeros(len(rows))])
     return (
-        (patches / HEIGHT_STEP).round().clamp(-32768, 32767).to(torch.int16),
+        crop(patch_plane(network, grasp, np.array(centres)), n_pixels + 2 * margin_of(network)),
+        crop(around, n_pixels) if network.image == "object" else torch.zeros(len(rows), 0),
+        torch.from_numpy(grasp[:, 3]).float(),
         torch.from_numpy(centre_grasp).float(),
         torch.from_numpy(attempts.success[rows]),
         torch.from_numpy(displacement).float(),

@@ -73,11 +73,27 @@ def displacements(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean and variance (n, 4) of the grasps' displacement; NaN variance where the model knows none."""
     means, variances = [], []
-    for inputs in _patches(models, scene, grasps, chunk):
-        mean, variance = models.grasp_displacement(*inputs)
+    for patches, centres, theta in _displacement_inputs(models, scene, grasps, chunk):
+        mean, variance = models.grasp_displacement(patches, centres, theta)
         means.append(mean)
         variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
     return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
+
+
+def _displacement_inputs(
+    models: Models, scene: Scene, grasps: np.ndarray, chunk: int
+) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
+    """Patches, object centres and angles for the displacement network, a chunk at a time."""
+    network = models.meta.network
+    angles = torch.as_tensor(grasps[:, 3], dtype=torch.float32, device=models.device)
+    chunks = zip(_patches(models, scene, grasps, chunk), angles.split(chunk), strict=True)
+    if network.image == "grasp":
+        yield from ((*inputs, theta) for inputs, theta in chunks)
+        return
+    around = np.append(scene.view.centre_base, 0.0)[None]
+    patch = scene.crop(around, network.patch_pixels, network.patch_side)
+    for (_, centres), theta in chunks:
+        yield patch.expand(len(theta), -1, -1, -1), centres, theta
 
 
 def _patches(models: Models, scene: Scene, grasps: np.ndarray, chunk: int) -> Iterator[tuple[Tensor, Tensor]]:
@@ -99,7 +115,8 @@ def _shared_qualities(
     centre = scene.view.centre_base
     points = _in_turned_frame(grasps, centre)
     reach = np.abs(points).max() + (max(network.grid) - 1) / 2 * network.grid_step + _MARGIN
-    n_pixels = int(np.ceil(2 * reach / pixel / STRIDE)) * STRIDE
+    # In steps of two cells: the middle then lies between cells as it does in a patch.
+    n_pixels = int(np.ceil(2 * reach / pixel / (2 * STRIDE))) * 2 * STRIDE
     middles = np.column_stack([np.tile(centre, (len(angles), 1)), angles])
     maps = scene.crop(middles, n_pixels, n_pixels * pixel)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import torch
-from pydantic import Field
+from pydantic import Field, model_validator
 from torch import Tensor, nn
 
 from mskgrasp import metrics, validation
@@ -66,6 +66,12 @@ class LearningConfig(Config):
     """Keep the epoch of lowest validation loss instead of the last."""
     gqn: StageConfig = StageConfig()
     gdn: StageConfig = StageConfig()
+
+    @model_validator(mode="after")
+    def _check(self) -> LearningConfig:
+        if self.symmetric and self.network.image == "object":
+            raise ValueError("symmetric: true turns patches with their grasp; image: object has none")
+        return self
 
 
 class Reporter:
@@ -238,7 +244,8 @@ class Stage:
         Turned, mirrored, moved and with noise, all at once on the networks' device.
         """
         s, device = self.samples, self.models.device
-        patches, centre = s.heights(rows, device, whole=True), s.centre_grasp[rows].to(device)
+        look = s.heights if self.name == "gqn" else s.displacement_heights
+        patches, centre = look(rows, device, whole=True), s.centre_grasp[rows].to(device)
         target = s.grasp_displacement[rows].to(device)
         if self.config.symmetric:
             patches, centre, target = mirror_and_turn(patches, centre, target, generator)
@@ -255,7 +262,7 @@ class Stage:
             loss = nn.functional.cross_entropy(self.models.gqn(inputs, centre, offset), success.long())
         else:
             gdn = self.models.gdn
-            mean, variance = gdn(inputs, centre, offset)
+            mean, variance = gdn(inputs, centre, offset, self.samples.theta[rows].to(inputs.device))
             loss = displacement_loss(mean, variance, target, gdn.target_std, beta=self.config.beta)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()

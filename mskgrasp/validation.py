@@ -36,7 +36,9 @@ def predict_grasp_displacement(
     means, variances = [], []
     for r in rows.split(_CHUNK):
         mean, variance = models.grasp_displacement(
-            samples.heights(r, models.device), samples.centre_grasp[r].to(models.device)
+            samples.displacement_heights(r, models.device),
+            samples.centre_grasp[r].to(models.device),
+            samples.theta[r].to(models.device),
         )
         means.append(mean)
         variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)

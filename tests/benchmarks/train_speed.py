@@ -1,7 +1,7 @@
 """How fast networks are trained. Run: python -m tests.benchmarks.train_speed --help.
 
-In one run, in turn: steps of our networks and of the paper's, on the same number of samples that lie in memory
-as a dataset's do. A step is everything from the stored samples to the new weights.
+In one run, in turn: steps of our networks and of the paper's, on the same number of samples that lie in
+memory as a dataset's do. A step is everything from the stored samples to the new weights.
 """
 
 from __future__ import annotations
@@ -95,6 +95,8 @@ def random_samples(config: LearningConfig, n: int) -> Samples:
     return Samples(
         patches=torch.randint(0, 400, (n, 1, side, side), generator=generator, dtype=torch.int16),
         margin=margin,
+        object_patches=None,
+        theta=torch.zeros(n),
         centre_grasp=0.02 * torch.randn((n, 3), generator=generator),
         success=success,
         displacement=shift,
