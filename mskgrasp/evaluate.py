@@ -18,7 +18,7 @@ from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.cli import make_folder, parse, run
 from mskgrasp.config import Config, read_config, write_config
 from mskgrasp.errors import BadDataset, NoGraspFound, NoPartFound, UsageError
-from mskgrasp.networks import Models, load_models
+from mskgrasp.models import Models, load_models
 from mskgrasp.outcomes import draw_errors, print_report, summarise
 from mskgrasp.parts import find_part, starter_names
 from mskgrasp.pictures import draw_plan

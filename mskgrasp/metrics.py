@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from scipy.stats import norm, rankdata
 
@@ -58,6 +60,98 @@ def coverage(mean: np.ndarray, variance: np.ndarray, true: np.ndarray, level: fl
         return np.full(4, np.nan)
     half_width = norm.ppf((1 + level) / 2)
     return (np.abs(standardised_error(mean, variance, true)) <= half_width).mean(axis=0)
+
+
+def crps(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Continuous ranked probability score of Gaussians, an axis (4,), in the axes' units; 0 is perfect.
+
+    Gneiting and Raftery (2007), equation 21: sigma (z (2 Phi(z) - 1) + 2 phi(z) - 1 / sqrt(pi)).
+    """
+    z = standardised_error(mean, variance, true)
+    score = z * (2 * norm.cdf(z) - 1) + 2 * norm.pdf(z) - 1 / np.sqrt(np.pi)
+    return (np.sqrt(variance) * score).mean(axis=0) if len(z) else np.full(4, np.nan)
+
+
+def calibration_error(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Mean difference of level and coverage of the central intervals of 5, 10, ... 95 %, an axis (4,)."""
+    levels = np.linspace(0.05, 0.95, 19)
+    covered = np.stack([coverage(mean, variance, true, level) for level in levels])
+    return np.abs(covered - levels[:, None]).mean(axis=0)
+
+
+def sparsification(error: np.ndarray, uncertainty: np.ndarray, steps: int = 50) -> tuple[np.ndarray, ...]:
+    """RMSE of what is left when the most uncertain samples are dropped, beside dropping the worst ones.
+
+    Args:
+        error: (n,) not negative.
+        uncertainty: (n,) predicted; only its order matters.
+        steps: Shares that are dropped, from none to 1 - 1 / steps.
+
+    Returns:
+        Shares (steps,), RMSE by the prediction, RMSE by the oracle that knows the errors.
+    """
+    shares = np.arange(steps) / steps
+    squared = np.asarray(error, dtype=np.float64) ** 2
+    curves = []
+    for order in (np.argsort(uncertainty, kind="stable"), np.argsort(squared, kind="stable")):
+        kept = np.cumsum(squared[order]) / np.arange(1, len(squared) + 1)
+        last = np.maximum(1, np.round((1 - shares) * len(squared)).astype(int)) - 1
+        curves.append(np.sqrt(kept[last]))
+    return shares, curves[0], curves[1]
+
+
+def ause(error: np.ndarray, uncertainty: np.ndarray) -> float:
+    """Area between both curves of `sparsification` by that of dropping at random: 0 perfect, 1 of no use.
+
+    Ilg et al. 2018 (arXiv 1802.07095), divided by what an order that knows nothing has.
+    """
+    if len(error) < 2:
+        return float("nan")
+    _, predicted, oracle = sparsification(error, uncertainty)
+    at_random = np.full_like(predicted, predicted[0])
+    return float((predicted - oracle).sum() / (at_random - oracle).sum())
+
+
+def reliability(probability: np.ndarray, success: np.ndarray, bins: int = 10) -> np.ndarray:
+    """Rows (k, 3) of mean predicted probability, share of successes and count, of the bins that hold any."""
+    probability = np.asarray(probability, dtype=np.float64)
+    which = np.minimum((probability * bins).astype(int), bins - 1)
+    rows = [
+        (probability[which == k].mean(), np.asarray(success)[which == k].mean(), (which == k).sum())
+        for k in range(bins)
+        if (which == k).any()
+    ]
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+
+def bootstrap_interval(
+    values: Sequence[np.ndarray],
+    statistic: Callable[[np.ndarray], float],
+    *,
+    level: float = 0.95,
+    repeats: int = 1000,
+    seed: int = 0,
+) -> tuple[float, float]:
+    """Confidence interval of a statistic over objects: whole objects are drawn again, with replacement.
+
+    Grasps of one part resemble one another; drawing single grasps would make intervals too narrow.
+
+    Args:
+        values: One array (n_i, ...) of samples for each object.
+        statistic: Of the samples of the drawn objects together.
+        level: Of confidence.
+        repeats: Number of draws.
+        seed: Of the draws.
+    """
+    if not values:
+        return float("nan"), float("nan")
+    rng = np.random.default_rng(seed)
+    found = [
+        statistic(np.concatenate([values[i] for i in rng.integers(len(values), size=len(values))]))
+        for _ in range(repeats)
+    ]
+    low, high = np.nanquantile(found, [(1 - level) / 2, (1 + level) / 2])
+    return float(low), float(high)
 
 
 def brier(probability: np.ndarray, success: np.ndarray) -> float:

@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import os
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Literal
 
+import numpy as np
 import torch
-from pydantic import Field, ValidationError, field_validator
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from pydantic import Field, field_validator, model_validator
 from torch import Tensor, nn
 
 from mskgrasp.config import Config
-from mskgrasp.errors import BadModel
+from mskgrasp.field import FieldFeatures
 from mskgrasp.geometry import wrap_angle
 
-SCHEMA_VERSION = 1
-WEIGHTS = "model.safetensors"
-DESCRIPTION = "model.json"
 STANDARDISE_EPSILON = 1e-4
 """Metres added to a patch's standard deviation: the resolution of a stored depth."""
 _LOG_VARIANCE_LIMIT = 12.0
@@ -33,6 +25,11 @@ class NetworkConfig(Config):
     The paper does not state the padding. Convolutions are "valid", the default of Keras at the time.
     """
 
+    architecture: Literal["patch", "field"] = "patch"
+    """patch: the paper's, every grasp sees a picture of its own; field: grasps share features."""
+    image: Literal["grasp", "object"] = "grasp"
+    """What the displacement network sees: the patch around the grasp (the paper's GCIP), or one around the
+    part, not turned, beside the grasp's angle (OCFI). The quality network always sees the grasp's."""
     patch_pixels: int = Field(default=64, ge=32, le=256)
     patch_side: float = Field(default=0.128, gt=0.0, le=1.0)
     channels: int = Field(default=32, ge=1)
@@ -42,6 +39,12 @@ class NetworkConfig(Config):
     dropout: float = Field(default=0.5, ge=0.0, lt=1.0)
     variance: bool = True
     """False: the displacement network predicts the mean alone (the paper's GCIP-M)."""
+    blocks: int = Field(default=2, ge=0, le=8)
+    """field: residual convolutions after the two that halve the picture."""
+    grid: tuple[int, int] = (7, 9)
+    """field: points across and along the closing direction at which a grasp reads the features."""
+    grid_step: float = Field(default=0.012, gt=0.0, le=0.1)
+    """field: distance of these points, metres."""
     least_std: tuple[float, float] = (0.0, 0.0)
     """Deviation, metres and radians, below which no displacement is claimed to be known (paper: none).
 
@@ -49,12 +52,31 @@ class NetworkConfig(Config):
     the variance of z so low that one such part costs more than all others gain.
     """
 
+    @model_validator(mode="after")
+    def _check(self) -> NetworkConfig:
+        if self.image == "object" and self.architecture != "patch":
+            raise ValueError("image: object needs architecture: patch")
+        return self
+
     @field_validator("least_std")
     @classmethod
     def _not_negative(cls, values: tuple[float, float]) -> tuple[float, float]:
         if not all(0 <= value < float("inf") for value in values):
             raise ValueError("deviations must not be negative")
         return values
+
+
+def patch_plane(network: NetworkConfig, grasps: np.ndarray, centre_base: np.ndarray) -> np.ndarray:
+    """Grasps (n, 4) moved to the height at which their patches are cropped.
+
+    The paper's patches lie at the height of the grasp, as DESIGN says; those that share a map must lie at one
+    height, half that of the part.
+    """
+    if network.architecture == "patch":
+        return grasps
+    moved = np.array(grasps, dtype=np.float64)
+    moved[:, 2] = np.asarray(centre_base)[..., 2]
+    return moved
 
 
 class Normalisation(Config):
@@ -76,30 +98,21 @@ class Normalisation(Config):
         return values
 
 
-def preprocess(
-    patches: Tensor, *, noise_std: float = 0.0, generator: torch.Generator | None = None
-) -> Tensor:
-    """Makes height patches what the networks take (paper, section 4.2).
+def with_noise(patches: Tensor, std: float, generator: torch.Generator) -> Tensor:
+    """Patches (n, 1, p, p) with uncorrelated noise of a standard deviation in their unit, for training."""
+    return patches + torch.empty_like(patches).normal_(0.0, std, generator=generator)
 
-    Args:
-        patches: (n, 1, p, p) metres above the table.
-        noise_std: Standard deviation of the uncorrelated noise added to each pixel, metres; training only.
-        generator: Source of that noise, on the device of the patches.
 
-    Returns:
-        (n, 1, p, p), each patch of zero mean and about unit standard deviation.
-    """
-    if noise_std > 0:
-        noise = torch.empty_like(patches).normal_(0.0, noise_std, generator=generator)
-        patches = patches + noise
+def standardise(patches: Tensor) -> Tensor:
+    """Each patch (n, 1, p, p) with zero mean and about unit standard deviation (paper, section 4.2)."""
     centred = patches - patches.mean(dim=(1, 2, 3), keepdim=True)
     return centred / (centred.square().mean(dim=(1, 2, 3), keepdim=True).sqrt() + STANDARDISE_EPSILON)
 
 
-class GraspFeatures(nn.Module):
-    """What both networks share in shape, not in weights: a patch and an action become one vector."""
+class PatchFeatures(nn.Module):
+    """The paper's (figure 3): a patch and an action become one vector."""
 
-    def __init__(self, config: NetworkConfig, normalisation: Normalisation):
+    def __init__(self, config: NetworkConfig, normalisation: Normalisation, n_action: int = 3):
         super().__init__()
         width = config.channels
         self.convolutions = nn.Sequential(
@@ -119,15 +132,28 @@ class GraspFeatures(nn.Module):
         self.image = nn.Sequential(
             nn.Flatten(), nn.Linear(width * left * left, config.trunk_width), nn.ReLU(), dropout
         )
-        self.action = nn.Sequential(nn.Linear(3, config.action_width), nn.ReLU(), dropout)
+        self.action = nn.Sequential(nn.Linear(n_action, config.action_width), nn.ReLU(), dropout)
         self.n_features = config.trunk_width + config.action_width
         self.action_scale: Tensor
-        self.register_buffer("action_scale", torch.tensor(normalisation.action_scale), persistent=False)
+        scale = (*normalisation.action_scale, torch.pi / 2)
+        self.register_buffer("action_scale", torch.tensor(scale[:n_action]), persistent=False)
 
-    def forward(self, patches: Tensor, centre_grasp: Tensor) -> Tensor:
-        """Features (n, f) of preprocessed patches (n, 1, p, p) and object centres (n, 3), metres."""
+    def prepare(self, patches: Tensor) -> Tensor:
+        """What the network takes of patches (n, 1, p, p) in metres above the table."""
+        return standardise(patches)
+
+    def forward(self, patches: Tensor, centre_grasp: Tensor, offset: Tensor | None = None) -> Tensor:
+        """Features (n, f) of prepared patches (n, 1, p, p) and object centres (n, 3), metres."""
+        assert offset is None, "a patch of its own has the grasp in its middle"
         image = self.image(self.convolutions(patches))
         return torch.cat([image, self.action(centre_grasp / self.action_scale)], dim=-1)
+
+
+def make_features(config: NetworkConfig, normalisation: Normalisation) -> PatchFeatures | FieldFeatures:
+    """What both networks share in shape, not in weights."""
+    if config.architecture == "field":
+        return FieldFeatures(config, normalisation)
+    return PatchFeatures(config, normalisation)
 
 
 def _head(n_features: int, config: NetworkConfig, n_outputs: int) -> nn.Sequential:
@@ -142,20 +168,21 @@ class GraspQualityNetwork(nn.Module):
 
     def __init__(self, config: NetworkConfig, normalisation: Normalisation):
         super().__init__()
-        self.features = GraspFeatures(config, normalisation)
+        self.features = make_features(config, normalisation)
         self.head = _head(self.features.n_features, config, 2)
         odds = normalisation.base_rate / (1 - normalisation.base_rate)
         self.log_prior_odds: Tensor
         self.register_buffer("log_prior_odds", torch.tensor(odds).log(), persistent=False)
 
-    def forward(self, patches: Tensor, centre_grasp: Tensor) -> Tensor:
+    def forward(self, patches: Tensor, centre_grasp: Tensor, offset: Tensor | None = None) -> Tensor:
         """Logits (n, 2) of failure and success among balanced data.
 
         Args:
-            patches: (n, 1, p, p), preprocessed.
+            patches: (n, 1, p, p), prepared (`PatchFeatures.prepare`).
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
+            offset: (2,) of the grasps from the patches' middle, metres; field architecture alone.
         """
-        return self.head(self.features(patches, centre_grasp))
+        return self.head(self.features(patches, centre_grasp, offset))
 
     def quality(self, logits: Tensor) -> Tensor:
         """Probabilities (n,) of success, corrected from balanced data to the true share of successes."""
@@ -167,7 +194,12 @@ class GraspDisplacementNetwork(nn.Module):
 
     def __init__(self, config: NetworkConfig, normalisation: Normalisation):
         super().__init__()
-        self.features = GraspFeatures(config, normalisation)
+        self.sees_object = config.image == "object"
+        self.features = (
+            PatchFeatures(config, normalisation, n_action=4)
+            if self.sees_object
+            else make_features(config, normalisation)
+        )
         self.mean_head = _head(self.features.n_features, config, 4)
         self.variance_head = _head(self.features.n_features, config, 4) if config.variance else None
         self.target_mean: Tensor
@@ -179,16 +211,39 @@ class GraspDisplacementNetwork(nn.Module):
         floor = torch.tensor([metres, metres, metres, radians]).square()
         self.register_buffer("least_variance", floor, persistent=False)
 
-    def forward(self, patches: Tensor, centre_grasp: Tensor) -> tuple[Tensor, Tensor | None]:
+    def forward(
+        self,
+        patches: Tensor,
+        centre_grasp: Tensor,
+        offset: Tensor | None = None,
+        theta: Tensor | None = None,
+    ) -> tuple[Tensor, Tensor | None]:
         """Mean (n, 4) and variance (n, 4) of the grasp displacement, in metres and radians (squared).
 
         A network that predicts the mean alone gives None for the variance.
 
         Args:
-            patches: (n, 1, p, p), preprocessed.
+            patches: (n, 1, p, p), prepared (`PatchFeatures.prepare`).
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
+            offset: (2,) of the grasps from the patches' middle, metres; field architecture alone.
+            theta: (n,) the grasps' angles, for ``image: object``, whose patches are not turned.
         """
-        features = self.features(patches, centre_grasp)
+        if not self.sees_object:
+            return self.outputs(self.features(patches, centre_grasp, offset))
+        assert theta is not None, "a picture that is not turned needs the grasps' angles"
+        # Within, all is along the picture's axes.
+        centre = torch.cat([_turned(centre_grasp, theta), theta[:, None]], dim=-1)
+        mean, variance = self.outputs(self.features(patches, centre))
+        mean = torch.cat([_turned(mean[:, :3], -theta), mean[:, 3:]], dim=-1)
+        if variance is None:
+            return mean, None
+        cos, sin = theta.cos().square(), theta.sin().square()
+        x, y = variance[:, 0], variance[:, 1]
+        along = torch.stack([cos * x + sin * y, sin * x + cos * y], dim=-1)
+        return mean, torch.cat([along, variance[:, 2:]], dim=-1)
+
+    def outputs(self, features: Tensor) -> tuple[Tensor, Tensor | None]:
+        """The same from the features (n, f)."""
         mean = self.target_mean + self.target_std * self.mean_head(features)
         if self.variance_head is None:
             return mean, None
@@ -198,7 +253,18 @@ class GraspDisplacementNetwork(nn.Module):
 
     def start_from(self, gqn: GraspQualityNetwork) -> None:
         """Copies the convolutions' weights of a trained GQN (paper, figure 3)."""
-        self.features.convolutions.load_state_dict(gqn.features.convolutions.state_dict())
+        if self.sees_object:
+            return  # other pictures: the paper starts these at random
+        for name in ("convolutions", "stem", "blocks"):
+            if hasattr(gqn.features, name):
+                getattr(self.features, name).load_state_dict(getattr(gqn.features, name).state_dict())
+
+
+def _turned(vectors: Tensor, angle: Tensor) -> Tensor:
+    """Vectors (n, 3) turned about z by angles (n,)."""
+    cos, sin = angle.cos(), angle.sin()
+    x, y = vectors[:, 0], vectors[:, 1]
+    return torch.stack([cos * x - sin * y, sin * x + cos * y, vectors[:, 2]], dim=-1)
 
 
 def displacement_error(mean: Tensor, target: Tensor) -> Tensor:
@@ -231,139 +297,3 @@ def displacement_loss(
     if beta > 0:
         terms = terms * variance.detach().pow(beta)
     return terms.sum(dim=-1).mean()
-
-
-class ModelMeta(Config):
-    """What ``model.json`` says about the weights beside it."""
-
-    schema_version: int = SCHEMA_VERSION
-    network: NetworkConfig
-    normalisation: Normalisation
-    training: dict[str, Any] = {}
-    metrics: dict[str, Any] = {}
-
-
-@dataclass(frozen=True)
-class Models:
-    """A trained pair of networks, in evaluation mode, with their description."""
-
-    gqn: GraspQualityNetwork
-    gdn: GraspDisplacementNetwork
-    meta: ModelMeta
-
-    @property
-    def device(self) -> torch.device:
-        """Where the weights lie."""
-        return next(self.gqn.parameters()).device
-
-    @torch.inference_mode()
-    def quality(self, patches: Tensor, centre_grasp: Tensor) -> Tensor:
-        """Probability of success (n,) of height patches (n, 1, p, p) in metres and centres (n, 3)."""
-        self._check(patches)
-        return self.gqn.quality(self.gqn(self._inputs(patches), centre_grasp.to(patches.dtype)))
-
-    @torch.inference_mode()
-    def grasp_displacement(self, patches: Tensor, centre_grasp: Tensor) -> tuple[Tensor, Tensor | None]:
-        """Mean and variance (n, 4) of the grasp displacement, of patches (n, 1, p, p) in metres."""
-        self._check(patches)
-        return self.gdn(self._inputs(patches), centre_grasp.to(patches.dtype))
-
-    def _inputs(self, patches: Tensor) -> Tensor:
-        # Measured on a CPU: channels last takes about 40 % off the time of the convolutions.
-        return preprocess(patches).contiguous(memory_format=torch.channels_last)
-
-    def _check(self, patches: Tensor) -> None:
-        p = self.meta.network.patch_pixels
-        if tuple(patches.shape[1:]) != (1, p, p):
-            raise BadModel(f"patches have shape {tuple(patches.shape)}, this model takes (n, 1, {p}, {p})")
-
-
-def build_models(meta: ModelMeta, device: torch.device | str = "cpu") -> Models:
-    """Networks with fresh weights, in evaluation mode."""
-    gqn = GraspQualityNetwork(meta.network, meta.normalisation)
-    gdn = GraspDisplacementNetwork(meta.network, meta.normalisation)
-    for network in (gqn, gdn):
-        network.to(device=device, memory_format=torch.channels_last).eval()  # pyright: ignore
-    return Models(gqn, gdn, meta)
-
-
-def save_model(folder: Path, models: Models) -> None:
-    """Writes ``model.safetensors`` and ``model.json``, each whole or not at all.
-
-    Raises:
-        BadModel: A weight is not finite.
-    """
-    weights = _weights(models)
-    _check_finite(weights, "the trained networks", "train again with a lower learning rate")
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    temporary = folder / (WEIGHTS + ".tmp")
-    save_file({name: value.contiguous().cpu() for name, value in weights.items()}, temporary)
-    temporary.chmod(0o644)  # safetensors makes it readable for its owner alone
-    os.replace(temporary, folder / WEIGHTS)
-    temporary = folder / (DESCRIPTION + ".tmp")
-    temporary.write_text(json.dumps(models.meta.model_dump(mode="json"), indent=2) + "\n", encoding="utf-8")
-    os.replace(temporary, folder / DESCRIPTION)
-
-
-def load_models(folder: Path, device: torch.device | str = "cpu") -> Models:
-    """Reads a model folder.
-
-    Raises:
-        BadModel: It is missing, damaged, of another schema, or the weights do not fit the description.
-    """
-    folder = Path(folder)
-    for name in (DESCRIPTION, WEIGHTS):
-        if not (folder / name).is_file():
-            raise BadModel(f"no {name} in {folder}; train a model: python -m mskgrasp.train --out {folder}")
-    meta = _read_meta(folder / DESCRIPTION)
-    path = folder / WEIGHTS
-    try:
-        weights = load_file(path)
-    except (SafetensorError, OSError) as error:
-        raise BadModel(f"{path} is damaged ({error}); copy it again or train again") from error
-    models = build_models(meta)
-    expected = _weights(models)
-    for name in sorted(expected.keys() ^ weights.keys()):
-        state = "lacks" if name in expected else "has the unknown"
-        raise BadModel(f"{path} {state} weight {name}; it does not belong to the {DESCRIPTION} beside it")
-    for name, value in expected.items():
-        if weights[name].shape != value.shape:
-            raise BadModel(
-                f"{path}: {name} has shape {tuple(weights[name].shape)}, {DESCRIPTION} (patches of "
-                f"{meta.network.patch_pixels} pixels) needs {tuple(value.shape)}; use the pair that was saved"
-            )
-    _check_finite(weights, str(path), "train again")
-    with torch.no_grad():
-        for name, value in expected.items():
-            value.copy_(weights[name])
-    models.gqn.to(device)
-    models.gdn.to(device)
-    return models
-
-
-def _read_meta(path: Path) -> ModelMeta:
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise BadModel(f"{path} is damaged ({error}); copy it again or train again") from error
-    version = values.get("schema_version") if isinstance(values, dict) else None
-    if version != SCHEMA_VERSION:
-        raise BadModel(f"{path} has schema version {version}, legal: {SCHEMA_VERSION}; train again")
-    try:
-        return ModelMeta.model_validate(values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise BadModel(f"{path}: '{key}': {first['msg'].lower()}; copy it again or train again") from error
-
-
-def _weights(models: Models) -> dict[str, Tensor]:
-    pairs = (("gqn", models.gqn), ("gdn", models.gdn))
-    return {f"{name}.{key}": value for name, net in pairs for key, value in net.state_dict().items()}
-
-
-def _check_finite(weights: dict[str, Tensor], source: str, remedy: str) -> None:
-    for name, value in weights.items():
-        if not torch.isfinite(value).all():
-            raise BadModel(f"{source}: weight {name} is not finite; {remedy}")

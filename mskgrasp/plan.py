@@ -14,27 +14,34 @@ from hal.cell import Cell
 from hal.errors import HalError
 from mskgrasp.cli import make_folder, parse, run
 from mskgrasp.config import Config
-from mskgrasp.networks import load_models
+from mskgrasp.models import PRETRAINED, load_models
+from mskgrasp.parts.mesh_files import Unit
 from mskgrasp.pictures import draw_plan
 from mskgrasp.planner import GraspPlan, Planner, PlannerConfig
 
 DESCRIPTION = """Takes a depth image of the cell and plans a precise grasp of the part in it.
 
 Samples grasps over the part, keeps those of the best predicted quality, and chooses the one whose
-displacement in the hand is best known. Nothing moves. Writes plan.png and plan.json."""
+displacement in the hand is best known. Nothing moves. Writes plan.png and plan.json.
+
+A part of your own: python -m mskgrasp.plan --part my_bracket.stl"""
+
+SIMULATED_CELL = Path(__file__).resolve().parents[1] / "configs" / "cells" / "sapien.yaml"
 
 
 class PlanConfig(Config):
     """Settings of one planning."""
 
-    cell: Path
-    """YAML file of the cell, for example configs/cells/sapien.yaml."""
-    models: Path
-    """Folder with model.safetensors and model.json, as mskgrasp.train writes it."""
+    cell: Path = SIMULATED_CELL
+    """YAML file of the cell; by default the simulated one."""
+    models: Path = PRETRAINED
+    """Folder with model.safetensors and model.json, as mskgrasp.train writes it; by default the shipped."""
     out: Path = Path("out/plan")
     """Folder for plan.png and plan.json."""
     part: str | None = None
-    """Lay this part (a name or a folder) on the table first; the cell needs a feeder."""
+    """Lay this part (a name, a folder or a CAD file) on the table first; the cell needs a feeder."""
+    unit: Unit | None = None
+    """Of a CAD file's coordinates, where the format does not say; mm if not given."""
     seed: int = Field(default=0, ge=0)
     """Candidates, and the place of --part, follow from it."""
     planner: PlannerConfig = PlannerConfig()
@@ -69,6 +76,20 @@ def present(cell: Cell, part: str, seed: int) -> None:
     cell.feeder.present(part, seed)
 
 
+def part_name(text: str, unit: Unit | None = None) -> str:
+    """The name of a part, or its folder, from what a user says; a CAD file is made a part first.
+
+    Raises:
+        BadPart: The file cannot be made one part.
+    """
+    path = Path(text)
+    if not path.is_file():
+        return text
+    from mskgrasp.parts.importing import import_part  # most parts need no decomposition
+
+    return import_part(path, unit=unit).name
+
+
 def describe(plan: GraspPlan) -> str:
     """The plan in words, with units."""
     x, y, z, theta = plan.grasp
@@ -92,11 +113,12 @@ def describe(plan: GraspPlan) -> str:
 def main() -> int:
     """Captures, plans, writes."""
     config = parse(PlanConfig, prog="python -m mskgrasp.plan", description=DESCRIPTION)
+    part = None if config.part is None else part_name(config.part, config.unit)
     make_folder(config.out)
     with open_cell(config.cell) as cell:
         planner = make_planner(config.models, config.planner, cell)
-        if config.part is not None:
-            present(cell, config.part, config.seed)
+        if part is not None:
+            present(cell, part, config.seed)
         frame = cell.camera.capture()
         plan = planner.plan(frame, np.random.default_rng(config.seed))
     print(describe(plan))

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import torch
@@ -14,8 +15,14 @@ from torch import Tensor
 
 from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard, u16_to_depth
 from mskgrasp.errors import BadDataset, NoPartFound
+from mskgrasp.field import STRIDE
 from mskgrasp.grasp import centre_in_grasp_frame, to_grasp_displacement
 from mskgrasp.images import crop_patches, height_image, view_part
+from mskgrasp.networks import NetworkConfig, patch_plane
+from mskgrasp.parts.catalogue import Split, read_index
+
+HEIGHT_STEP = 1e-4
+"""Metres; what depth is stored in."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,11 +30,15 @@ class Samples:
     """n attempts.
 
     Attributes:
-        patches: (n, 1, p, p) float32, metres above the table.
+        patches: (n, 1, q, q) int16, 0.1 mm above the table, each turned to its grasp; ``margin`` pixels wider
+            on every side than what the network takes.
+        object_patches: (n, 1, p, p) int16, around the part and not turned; None where no network sees them.
+        theta: (n,) float32 angle of the grasp.
         centre_grasp: (n, 3) float32 object centre, estimated from the image, in the grasp frame, metres.
         success: (n,) bool.
         displacement: (n, 4) float32 true object displacement, NaN where the grasp failed.
         grasp_displacement: (n, 4) float32, the same as grasp displacement: what is learned.
+        margin: Pixels by which training may move a patch, so that grasps lie anywhere in a cell of features.
         part: (n,) int64, index into ``parts``.
         parts: Names of the parts.
         skipped: Why and how many attempts could not be used: at run time, too, the planner would find
@@ -36,6 +47,9 @@ class Samples:
     """
 
     patches: Tensor
+    margin: int
+    object_patches: Tensor | None
+    theta: Tensor
     centre_grasp: Tensor
     success: Tensor
     displacement: Tensor
@@ -47,6 +61,21 @@ class Samples:
 
     def __len__(self) -> int:
         return len(self.success)
+
+    def heights(self, rows: Tensor, device: torch.device | str, *, whole: bool = False) -> Tensor:
+        """Patches (n, 1, p, p) in metres on a device; with the margin where ``whole``."""
+        patches = self.patches[rows]
+        if self.margin and not whole:
+            patches = patches[..., self.margin : -self.margin, self.margin : -self.margin]
+        return patches.to(device).float() * HEIGHT_STEP
+
+    def displacement_heights(
+        self, rows: Tensor, device: torch.device | str, *, whole: bool = False
+    ) -> Tensor:
+        """What the displacement network sees of some rows, (n, 1, p, p) metres."""
+        if self.object_patches is None:
+            return self.heights(rows, device, whole=whole)
+        return self.object_patches[rows].to(device).float() * HEIGHT_STEP
 
     def of_parts_between(self, low: float, high: float) -> Samples:
         """The samples of the parts of which a share in [low, high] of the grasps succeeded.
@@ -65,6 +94,8 @@ class Samples:
         return replace(
             self,
             patches=self.patches[rows],
+            object_patches=None if self.object_patches is None else self.object_patches[rows],
+            theta=self.theta[rows],
             centre_grasp=self.centre_grasp[rows],
             success=self.success[rows],
             displacement=self.displacement[rows],
@@ -76,19 +107,17 @@ class Samples:
 
 def read_samples(
     folder: Path,
+    network: NetworkConfig,
     *,
-    patch_pixels: int,
-    patch_side: float,
     advance: Callable[[int, int], None] = lambda done, total: None,
 ) -> Samples:
     """Reads all shards of a dataset and crops every attempt's patch.
 
-    Only the patches stay in memory (16 kB an attempt of 64 pixels), never the images of two shards.
+    Only the patches stay in memory (8 kB an attempt of 64 pixels), never the images of two shards.
 
     Args:
         folder: The dataset.
-        patch_pixels: Pixels along a patch's side.
-        patch_side: Length of a patch's side, metres.
+        network: What will learn from them: it decides the patches' size and plane.
         advance: Called with the shards done and their number.
 
     Raises:
@@ -106,7 +135,7 @@ def read_samples(
             parts.append(info.part)
         for array in (attempts.grasp, attempts.success, attempts.displacement):
             digest.update(np.ascontiguousarray(array).tobytes())
-        piece, missing = _shard_samples(attempts, info, patch_pixels, patch_side)
+        piece, missing = _shard_samples(attempts, info, network)
         skipped.update(missing)
         if piece is not None:
             pieces.append((*piece, torch.full((len(piece[0]),), parts.index(info.part))))
@@ -114,11 +143,14 @@ def read_samples(
     if not pieces:
         reason = f": {skipped.most_common(1)[0][0]}" if skipped else ""
         raise BadDataset(f"no usable attempt in {folder}{reason}; collect again")
-    patches, centre, success, displacement, grasp_displacement, part = (
+    patches, object_patches, theta, centre, success, displacement, grasp_displacement, part = (
         torch.cat(arrays) for arrays in zip(*pieces, strict=True)
     )
     return Samples(
         patches=patches,
+        margin=margin_of(network),
+        object_patches=object_patches if network.image == "object" else None,
+        theta=theta,
         centre_grasp=centre,
         success=success,
         displacement=displacement,
@@ -131,7 +163,7 @@ def read_samples(
 
 
 def _shard_samples(
-    attempts: Attempts, info: ShardInfo, patch_pixels: int, patch_side: float
+    attempts: Attempts, info: ShardInfo, network: NetworkConfig
 ) -> tuple[tuple[Tensor, ...] | None, Counter[str]]:
     skipped: Counter[str] = Counter()
     depth = u16_to_depth(attempts.depth)
@@ -153,16 +185,24 @@ def _shard_samples(
     displacement = attempts.displacement[rows].astype(np.float64)
     centre_grasp = centre_in_grasp_frame(np.array(centres), grasp)
     heights = height_image(torch.from_numpy(depth[rows]), info.intrinsics, info.T_base_camera, info.table_z)
-    patches = crop_patches(
-        heights,
-        torch.from_numpy(grasp),
-        info.intrinsics,
-        info.T_base_camera,
-        n_pixels=patch_pixels,
-        side=patch_side,
-    )
+
+    def crop(planes: np.ndarray, n_pixels: int) -> Tensor:
+        patches = crop_patches(
+            heights,
+            torch.from_numpy(planes),
+            info.intrinsics,
+            info.T_base_camera,
+            n_pixels=n_pixels,
+            side=n_pixels * network.patch_side / network.patch_pixels,
+        )
+        return (patches / HEIGHT_STEP).round().clamp(-32768, 32767).to(torch.int16)
+
+    n_pixels = network.patch_pixels
+    around = np.column_stack([np.array(centres), np.zeros(len(rows))])
     return (
-        patches,
+        crop(patch_plane(network, grasp, np.array(centres)), n_pixels + 2 * margin_of(network)),
+        crop(around, n_pixels) if network.image == "object" else torch.zeros(len(rows), 0),
+        torch.from_numpy(grasp[:, 3]).float(),
         torch.from_numpy(centre_grasp).float(),
         torch.from_numpy(attempts.success[rows]),
         torch.from_numpy(displacement).float(),
@@ -170,22 +210,46 @@ def _shard_samples(
     ), skipped
 
 
-def validation_parts(parts: tuple[str, ...], fraction: float) -> tuple[str, ...]:
-    """The parts that training never sees, chosen by a hash of their names.
+def margin_of(network: NetworkConfig) -> int:
+    """Pixels by which the patches of a network are moved in training."""
+    return STRIDE if network.architecture == "field" else 0
 
-    A part stays on its side when other parts join the dataset. At least one part is on either side.
+
+def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "catalogue"]) -> dict[str, Split]:
+    """The side of each part: training, validation, or test.
+
+    A part stays on its side when other parts join the dataset. By name, at least one part is on either side.
+
+    Args:
+        parts: Names.
+        fraction: Share of the validation parts, by name.
+        by: A hash of the name; or the catalogue, which keeps near-duplicates together. Parts that are not in
+            it are then split by name.
 
     Raises:
-        BadDataset: There are fewer than two parts.
+        BadDataset: There are fewer than two parts, or no catalogue.
     """
     if len(parts) < 2:
         raise BadDataset(
             f"the dataset has one part ({', '.join(parts)}), validation needs another that training never "
             "sees; collect at least 2 parts"
         )
+    sides: dict[str, Split] = {
+        name: "validation" if _name_hash(name) < fraction else "train" for name in parts
+    }
+    if by == "catalogue":
+        index = read_index().parts
+        if not index:
+            raise BadDataset(
+                "sides: catalogue needs the catalogue: python -m mskgrasp.parts build --catalogue"
+            )
+        sides |= {name: index[name].split for name in parts if name in index}
     order = sorted(parts, key=_name_hash)
-    n = sum(_name_hash(part) < fraction for part in order)
-    return tuple(order[: min(max(n, 1), len(order) - 1)])
+    if "validation" not in sides.values():
+        sides[order[0]] = "validation"
+    if "train" not in sides.values():
+        sides[order[-1]] = "train"
+    return sides
 
 
 def _name_hash(name: str) -> float:

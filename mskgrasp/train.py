@@ -17,7 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from mskgrasp import cli
 from mskgrasp.config import read_config, write_config
 from mskgrasp.errors import UsageError
-from mskgrasp.networks import DESCRIPTION, WEIGHTS, save_model
+from mskgrasp.models import DESCRIPTION, WEIGHTS, save_model
 from mskgrasp.pictures import draw_curves
 from mskgrasp.samples import Samples, read_samples
 from mskgrasp.training import LearningConfig, Reporter, split, train
@@ -86,9 +86,10 @@ def run(config: TrainConfig) -> int:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, TextColumn("{task.fields[loss]}"), console=console) as progress:
         samples = _read(config, config.data, progress)
-        training_rows, rows = split(samples, config.validation_fraction)
+        sides = split(samples, config)
         console.print(
-            f"{len(training_rows)} attempts to learn from, {len(rows)} at parts never seen; "
+            f"{len(sides.training)} attempts to learn from, "
+            f"{len(sides.validation) + len(sides.test)} at parts never seen; "
             f"{float(samples.success.double().mean()):.0%} succeed; on {device}"
         )
         if samples.skipped:
@@ -142,8 +143,7 @@ def _read(config: TrainConfig, data: Path, progress: Progress) -> Samples:
     task = progress.add_task("read shards", total=None, loss="")
     samples = read_samples(
         data,
-        patch_pixels=config.network.patch_pixels,
-        patch_side=config.network.patch_side,
+        config.network,
         advance=lambda done, total: progress.update(task, completed=done, total=total),
     )
     progress.remove_task(task)

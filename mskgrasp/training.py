@@ -5,27 +5,21 @@ from __future__ import annotations
 import math
 import time
 import zlib
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import torch
-from pydantic import Field
+from pydantic import Field, model_validator
 from torch import Tensor, nn
 
 from mskgrasp import metrics, validation
 from mskgrasp.checkpoint import Checkpoint, optimiser_tensors, read_checkpoint, restore, write_checkpoint
 from mskgrasp.config import Config
 from mskgrasp.errors import BadDataset, MskgraspError, UsageError
-from mskgrasp.networks import (
-    ModelMeta,
-    Models,
-    NetworkConfig,
-    Normalisation,
-    build_models,
-    displacement_loss,
-    preprocess,
-)
-from mskgrasp.samples import Samples, mirror_and_turn, validation_parts
+from mskgrasp.models import ModelMeta, Models, build_models
+from mskgrasp.networks import NetworkConfig, Normalisation, displacement_loss, with_noise
+from mskgrasp.samples import Samples, mirror_and_turn, part_sides
 
 _LEAST_TARGET_STD = (1e-4, 1e-4, 1e-4, 1e-3)
 """Metres and radians: what varies less (parts that never rise in the hand) is noise of the simulation."""
@@ -52,8 +46,13 @@ class LearningConfig(Config):
     """What is learned and how; the same settings, data and device type give the same model."""
 
     seed: int = Field(default=0, ge=0)
+    sides: Literal["name", "catalogue"] = "name"
+    """How parts are split: by a hash of their name, or as the catalogue says (near-duplicates on one side,
+    and test parts beside those of validation)."""
     validation_fraction: float = Field(default=0.2, gt=0.0, lt=1.0)
-    """Share of the parts that training never sees."""
+    """Share of the parts that training never sees, where they are split by name."""
+    calibrate: bool = True
+    """Correct quality and variances on the validation parts, at the end."""
     success_range: tuple[float, float] = (0.0, 1.0)
     """Parts whose share of successful random grasps lies outside are left out (paper: 0.05 to 0.40)."""
     network: NetworkConfig = NetworkConfig()
@@ -67,6 +66,12 @@ class LearningConfig(Config):
     """Keep the epoch of lowest validation loss instead of the last."""
     gqn: StageConfig = StageConfig()
     gdn: StageConfig = StageConfig()
+
+    @model_validator(mode="after")
+    def _check(self) -> LearningConfig:
+        if self.symmetric and self.network.image == "object":
+            raise ValueError("symmetric: true turns patches with their grasp; image: object has none")
+        return self
 
 
 class Reporter:
@@ -82,21 +87,41 @@ class Reporter:
         """An epoch is finished and saved; its row is the last."""
 
 
-def split(samples: Samples, fraction: float) -> tuple[Tensor, Tensor]:
-    """Rows of the training parts and of the validation parts.
+@dataclass(frozen=True, kw_only=True)
+class Sides:
+    """Rows of a dataset's samples, no part on two sides.
+
+    Attributes:
+        training: What is learned from.
+        validation: Decides when to stop, and calibrates.
+        test: Never looked at before the end; empty where parts are split by name.
+    """
+
+    training: Tensor
+    validation: Tensor
+    test: Tensor
+
+
+def split(samples: Samples, config: LearningConfig) -> Sides:
+    """Splits the samples by their parts.
 
     Raises:
-        BadDataset: Either side lacks successes or failures.
+        BadDataset: Training or validation lacks successes or failures.
     """
-    held_out = validation_parts(samples.parts, fraction)
-    unseen = torch.isin(samples.part, torch.tensor([samples.parts.index(part) for part in held_out]))
-    training_rows, rows = torch.nonzero(~unseen)[:, 0], torch.nonzero(unseen)[:, 0]
-    for name, side in (("training", training_rows), ("validation", rows)):
+    sides = part_sides(samples.parts, config.validation_fraction, config.sides)
+    rows = [
+        torch.nonzero(torch.isin(samples.part, torch.tensor(numbers, dtype=torch.int64)))[:, 0]
+        for numbers in (
+            [number for number, name in enumerate(samples.parts) if sides[name] == side]
+            for side in ("train", "validation", "test")
+        )
+    ]
+    for name, side in zip(("training", "validation"), rows, strict=False):
         n, n_success = len(side), int(samples.success[side].sum())
         if n_success in (0, n):
             kind = "success" if n_success == 0 else "failure"
             raise BadDataset(f"no {kind} among the {n} attempts at the {name} parts; collect more attempts")
-    return training_rows, rows
+    return Sides(training=rows[0], validation=rows[1], test=rows[2])
 
 
 def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) -> ModelMeta:
@@ -111,7 +136,7 @@ def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) ->
         std = target.square().mean(dim=0).sqrt().clamp(min=torch.tensor(_LEAST_TARGET_STD).double())
         std[2] = target[:, 2].std(correction=0).clamp(min=_LEAST_TARGET_STD[2])
         mean = mean * torch.tensor([0.0, 0.0, 1.0, 0.0])
-    seen = set(samples.part[training_rows].tolist())
+    sides = part_sides(samples.parts, config.validation_fraction, config.sides)
     return ModelMeta(
         network=config.network,
         normalisation=Normalisation(
@@ -123,8 +148,9 @@ def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) ->
         training={
             "attempts": len(training_rows),
             "successes": int(success.sum()),
-            "training_parts": [name for i, name in enumerate(samples.parts) if i in seen],
-            "validation_parts": [name for i, name in enumerate(samples.parts) if i not in seen],
+            "training_parts": [name for name in samples.parts if sides[name] == "train"],
+            "validation_parts": [name for name in samples.parts if sides[name] == "validation"],
+            "test_parts": [name for name in samples.parts if sides[name] == "test"],
             "skipped": samples.skipped,
             "data_fingerprint": samples.fingerprint,
             "settings": config.model_dump(mode="json"),
@@ -132,7 +158,7 @@ def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) ->
     )
 
 
-class _Stage:
+class Stage:
     """The training of one of the two networks."""
 
     def __init__(
@@ -140,12 +166,12 @@ class _Stage:
         name: str,
         models: Models,
         samples: Samples,
-        sides: tuple[Tensor, Tensor],
+        sides: Sides,
         config: LearningConfig,
     ):
         self.name = name
         self.models, self.samples, self.config = models, samples, config
-        self.training_rows, self.rows = sides
+        self.training_rows, self.rows = sides.training, sides.validation
         self.network: nn.Module = models.gqn if name == "gqn" else models.gdn
         self.settings = config.gqn if name == "gqn" else config.gdn
         n_success = int(samples.success[self.training_rows].sum())
@@ -162,6 +188,7 @@ class _Stage:
             self.optimiser = torch.optim.RMSprop(parameters, lr=rate, alpha=0.9, eps=1e-7)
 
     def learning_rate(self, step: int) -> float:
+        """The rate of a step, counted from the first of the first epoch."""
         s = self.settings
         rate = s.learning_rate / (1 + s.decay * step)
         if s.schedule == "cosine":
@@ -182,10 +209,10 @@ class _Stage:
         with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
             torch.manual_seed(seed)  # dropout takes no generator
             self.network.train()
-            for index, rows in enumerate(self._rows(order).split(self.settings.batch_size)):
+            for index, rows in enumerate(self.order(order).split(self.settings.batch_size)):
                 for group in self.optimiser.param_groups:
                     group["lr"] = self.learning_rate(number * self.batches + index)
-                losses.append(self._learn(rows, noise))
+                losses.append(self.learn(rows, noise))
                 if not math.isfinite(losses[-1]):
                     raise TrainingDiverged(
                         f"the {self.name}'s loss became {losses[-1]} in epoch {number + 1}; train into "
@@ -196,7 +223,8 @@ class _Stage:
         row = {"stage": self.name, "epoch": number + 1, "train_loss": sum(losses) / len(losses)}
         return row | self._validate() | {"seconds": round(time.perf_counter() - started, 2)}
 
-    def _rows(self, generator: torch.Generator) -> Tensor:
+    def order(self, generator: torch.Generator) -> Tensor:
+        """The rows of an epoch in random order; the GQN sees as many failures as successes."""
         success = self.samples.success[self.training_rows]
         kinds = (self.training_rows[success], self.training_rows[~success])
         if self.name == "gqn":
@@ -208,25 +236,50 @@ class _Stage:
             rows = kinds[0]
         return rows[torch.randperm(len(rows), generator=generator)]
 
-    def _learn(self, rows: Tensor, generator: torch.Generator) -> float:
+    def batch(
+        self, rows: Tensor, generator: torch.Generator
+    ) -> tuple[Tensor, Tensor, Tensor | None, Tensor, Tensor]:
+        """Inputs, object centres, the grasps' offset, displacements and successes of some rows.
+
+        Turned, mirrored, moved and with noise, all at once on the networks' device.
+        """
         s, device = self.samples, self.models.device
-        patches, centre = s.patches[rows].to(device), s.centre_grasp[rows].to(device)
+        look = s.heights if self.name == "gqn" else s.displacement_heights
+        patches, centre = look(rows, device, whole=True), s.centre_grasp[rows].to(device)
         target = s.grasp_displacement[rows].to(device)
         if self.config.symmetric:
             patches, centre, target = mirror_and_turn(patches, centre, target, generator)
-        inputs = preprocess(patches, noise_std=self.config.noise_std, generator=generator)
-        inputs = inputs.contiguous(memory_format=torch.channels_last)
+        patches, offset = self._moved(patches, generator)
+        if self.config.noise_std > 0:
+            patches = with_noise(patches, self.config.noise_std, generator)
+        inputs = self.models.gqn.features.prepare(patches).contiguous(memory_format=torch.channels_last)
+        return inputs, centre, offset, target, s.success[rows].to(device)
+
+    def learn(self, rows: Tensor, generator: torch.Generator) -> float:
+        """One step of the optimiser; the loss before it."""
+        inputs, centre, offset, target, success = self.batch(rows, generator)
         if self.name == "gqn":
-            logits = self.models.gqn(inputs, centre)
-            loss = nn.functional.cross_entropy(logits, s.success[rows].long().to(device))
+            loss = nn.functional.cross_entropy(self.models.gqn(inputs, centre, offset), success.long())
         else:
             gdn = self.models.gdn
-            mean, variance = gdn(inputs, centre)
+            mean, variance = gdn(inputs, centre, offset, self.samples.theta[rows].to(inputs.device))
             loss = displacement_loss(mean, variance, target, gdn.target_std, beta=self.config.beta)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         self.optimiser.step()
         return float(loss.detach())
+
+    def _moved(self, patches: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor | None]:
+        """The patches without their margin, moved by up to it, and where that leaves the grasps."""
+        margin = self.samples.margin
+        if not margin:
+            return patches, None
+        down, right = torch.randint(2 * margin + 1, (2,), generator=generator, device=patches.device).tolist()
+        side = patches.shape[-1] - 2 * margin
+        network = self.config.network
+        pixel = network.patch_side / network.patch_pixels
+        offset = torch.tensor([margin - right, down - margin], device=patches.device) * pixel
+        return patches[..., down : down + side, right : right + side], offset
 
     def _validate(self) -> dict[str, float]:
         if self.name == "gqn":
@@ -278,8 +331,8 @@ def train(
         TrainingDiverged: The loss is no number any more.
     """
     reporter = reporter or Reporter()
-    sides = split(samples, config.validation_fraction)
-    meta = describe(samples, sides[0], config)
+    sides = split(samples, config)
+    meta = describe(samples, sides.training, config)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         models = build_models(meta)
@@ -294,7 +347,7 @@ def train(
     for name, network in networks.items():
         if saved is not None and saved.stage == "gdn" and name == "gqn":
             continue
-        stage = _Stage(name, models, samples, sides, config)
+        stage = Stage(name, models, samples, sides, config)
         best: dict[str, Tensor] = {}
         done = 0
         if saved is not None and saved.stage == name:
@@ -326,8 +379,10 @@ def train(
             reporter.epoch(history)
         network.load_state_dict(best)
 
-    report = {
-        "gqn": validation.quality_metrics(models, samples, sides[1]),
-        "gdn": validation.displacement_metrics(models, samples, *sides),
-    }
-    return Models(models.gqn, models.gdn, meta.model_copy(update={"metrics": report})), history
+    if config.calibrate:
+        found = validation.calibrate(models, samples, sides.validation)
+        models = replace(models, meta=meta.model_copy(update={"calibration": found}))
+    report = validation.report(models, samples, sides.training, sides.validation)
+    if len(sides.test):
+        report["test"] = validation.report(models, samples, sides.training, sides.test)
+    return replace(models, meta=models.meta.model_copy(update={"metrics": report})), history

@@ -6,19 +6,24 @@ from typing import Any
 
 import numpy as np
 import torch
+from scipy.optimize import minimize
+from scipy.special import logit
+from scipy.stats import norm
 
 from mskgrasp import metrics
 from mskgrasp.grasp import to_object_displacement
-from mskgrasp.networks import Models
+from mskgrasp.models import Calibration, Models
 from mskgrasp.samples import Samples
 
 _CHUNK = 64
+_LEAST_TO_SCALE = 50
+"""Successes under which a 90 % quantile is chance."""
 
 
 def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.ndarray:
     """Predicted probabilities of success (n,)."""
     pieces = [
-        models.quality(samples.patches[r].to(models.device), samples.centre_grasp[r].to(models.device))
+        models.quality(samples.heights(r, models.device), samples.centre_grasp[r].to(models.device))
         for r in rows.split(_CHUNK)
     ]
     return torch.cat(pieces).cpu().double().numpy()
@@ -31,11 +36,54 @@ def predict_grasp_displacement(
     means, variances = [], []
     for r in rows.split(_CHUNK):
         mean, variance = models.grasp_displacement(
-            samples.patches[r].to(models.device), samples.centre_grasp[r].to(models.device)
+            samples.displacement_heights(r, models.device),
+            samples.centre_grasp[r].to(models.device),
+            samples.theta[r].to(models.device),
         )
         means.append(mean)
         variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
     return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
+
+
+def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> Calibration:
+    """Corrections that make probabilities and 90 % intervals true of these rows.
+
+    The quality's log odds are stretched and shifted (Platt 1999); each variance is scaled by
+    (q / 1.645)^2, q the 90 % quantile of |error| / deviation, so that heavy tails do not widen the whole.
+    """
+    quality = predict_quality(models, samples, rows)
+    slope, offset = _platt(logit(np.clip(quality, 1e-9, 1 - 1e-9)), samples.success[rows].numpy())
+    scale = (1.0, 1.0, 1.0, 1.0)
+    held = rows[samples.success[rows]]
+    mean, variance = predict_grasp_displacement(models, samples, held)
+    if np.isfinite(variance).all() and len(held) >= _LEAST_TO_SCALE:
+        target = samples.grasp_displacement[held].double().numpy()
+        off = np.quantile(np.abs(metrics.standardised_error(mean, variance, target)), 0.9, axis=0)
+        scale = tuple(np.maximum((off / norm.ppf(0.95)) ** 2, 1e-6))
+    return Calibration(quality_slope=slope, quality_offset=offset, variance_scale=scale)
+
+
+def _platt(odds: np.ndarray, success: np.ndarray) -> tuple[float, float]:
+    """Slope and offset of the log odds, of greatest likelihood; Platt's targets keep away from 0 and 1."""
+    n_success, n_failure = int(success.sum()), int((~success).sum())
+    target = np.where(success, (n_success + 1) / (n_success + 2), 1 / (n_failure + 2))
+
+    def loss(values: np.ndarray) -> float:
+        z = np.exp(values[0]) * odds + values[1]
+        return float((np.logaddexp(0.0, z) - target * z).mean())
+
+    found = minimize(loss, np.zeros(2), method="Nelder-Mead").x
+    return float(np.exp(found[0])), float(found[1])
+
+
+def report(
+    models: Models, samples: Samples, training_rows: torch.Tensor, rows: torch.Tensor
+) -> dict[str, Any]:
+    """All metrics of both networks on some rows."""
+    return {
+        "gqn": quality_metrics(models, samples, rows),
+        "gdn": displacement_metrics(models, samples, training_rows, rows),
+    }
 
 
 def quality_metrics(models: Models, samples: Samples, rows: torch.Tensor) -> dict[str, Any]:

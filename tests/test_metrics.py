@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 import torch
-from scipy.stats import binomtest, mannwhitneyu
+from scipy.stats import binomtest, mannwhitneyu, norm
 
+from mskgrasp import metrics
 from mskgrasp.metrics import (
     auroc,
     balanced_accuracy,
@@ -64,3 +65,40 @@ def test_wilson_interval_agrees_with_scipy(k, n):
 
 def test_no_trial_tells_nothing():
     assert wilson_interval(0, 0) == (0.0, 1.0)
+
+
+def test_crps_is_the_integral_of_its_definition():
+    mean, std, true = 0.3, 0.7, 1.1
+    x = np.linspace(-8, 8, 200_001)
+    expected = np.trapezoid((norm.cdf(x, mean, std) - (x >= true)) ** 2, x)
+    found = metrics.crps(np.full((1, 4), mean), np.full((1, 4), std**2), np.full((1, 4), true))
+    assert np.allclose(found, expected, atol=1e-4)
+
+
+def test_calibration_error_is_none_of_honest_gaussians_and_large_of_boastful_ones():
+    rng = np.random.default_rng(0)
+    std = rng.uniform(0.001, 0.01, (20_000, 4))
+    true = rng.normal(0, std)
+    honest = metrics.calibration_error(np.zeros_like(std), std**2, true)
+    boastful = metrics.calibration_error(np.zeros_like(std), (std / 3) ** 2, true)
+    assert (honest < 0.01).all() and (boastful > 0.2).all()
+
+
+def test_ause_is_none_of_an_order_that_knows_and_one_of_an_order_that_does_not():
+    rng = np.random.default_rng(0)
+    error = np.abs(rng.normal(0, 1, 20_000))
+    assert metrics.ause(error, error) == pytest.approx(0.0)
+    assert metrics.ause(error, rng.random(20_000)) == pytest.approx(1.0, abs=0.05)
+    assert metrics.ause(error, -error) > 1.5
+
+
+def test_reliability_counts_what_happened_at_each_probability():
+    rows = metrics.reliability(np.array([0.05, 0.05, 0.95, 1.0]), np.array([0, 1, 1, 1]))
+    assert rows.tolist() == [[0.05, 0.5, 2.0], [0.975, 1.0, 2.0]]
+
+
+def test_bootstrap_draws_whole_objects():
+    # Within an object all is equal: drawn sample by sample, the interval would be ten times narrower.
+    objects = [np.full(100, float(value)) for value in np.random.default_rng(0).normal(0, 1, 25)]
+    low, high = metrics.bootstrap_interval(objects, lambda drawn: float(drawn.mean()))
+    assert 0.5 < high - low < 1.1 and low < np.mean(objects) < high

@@ -9,7 +9,8 @@ from hypothesis import given
 from mskgrasp.errors import BadModel, NoGraspFound, NoPartFound
 from mskgrasp.geometry import wrap_angle
 from mskgrasp.grasp import centre_in_grasp_frame, to_object_displacement
-from mskgrasp.networks import ModelMeta, NetworkConfig, Normalisation, build_models
+from mskgrasp.models import ModelMeta, build_models
+from mskgrasp.networks import NetworkConfig, Normalisation
 from mskgrasp.pictures import draw_plan
 from mskgrasp.planner import (
     Planner,

@@ -11,13 +11,16 @@ from mskgrasp import cli, train
 from mskgrasp.dataset import shard_path, write_shard
 from mskgrasp.errors import BadDataset, BadModel, UsageError
 from mskgrasp.grasp import centre_in_grasp_frame
-from mskgrasp.networks import NetworkConfig, load_models
-from mskgrasp.samples import mirror_and_turn, read_samples, validation_parts
+from mskgrasp.models import build_models, load_models, save_model
+from mskgrasp.networks import NetworkConfig
+from mskgrasp.samples import mirror_and_turn, part_sides, read_samples
 from mskgrasp.training import (
     LearningConfig,
     Reporter,
+    Stage,
     StageConfig,
     TrainingDiverged,
+    describe,
     split,
 )
 from mskgrasp.training import train as learn
@@ -58,7 +61,7 @@ def dataset(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def samples(dataset):
-    return read_samples(dataset, patch_pixels=40, patch_side=0.128)
+    return read_samples(dataset, SMALL)
 
 
 def program(config: LearningConfig, **changes) -> train.TrainConfig:
@@ -76,28 +79,32 @@ def test_samples_hold_every_attempt_with_its_displacement_seen_from_the_estimate
     assert float(sideways.abs().max()) < 0.0025
 
 
+def held_out_of(names: tuple[str, ...], fraction: float) -> set[str]:
+    return {name for name, side in part_sides(names, fraction, "name").items() if side == "validation"}
+
+
 def test_parts_are_split_by_name_and_stay_on_their_side():
     names = tuple(f"part_{k}" for k in range(400))
-    held_out = set(validation_parts(names, 0.2))
+    held_out = held_out_of(names, 0.2)
     assert 50 < len(held_out) < 110
     fewer = names[:200]
-    assert set(validation_parts(fewer, 0.2)) == held_out & set(fewer)
-    assert all(len(validation_parts(("a", "b"), share)) == 1 for share in (0.01, 0.99))
+    assert held_out_of(fewer, 0.2) == held_out & set(fewer)
+    assert all(len(held_out_of(("a", "b"), share)) == 1 for share in (0.01, 0.99))
     with pytest.raises(BadDataset, match="at least 2 parts"):
-        validation_parts(("lonely",), 0.2)
+        part_sides(("lonely",), 0.2, "name")
 
 
 def test_validation_never_sees_a_part_of_training(samples):
-    training_rows, rows = split(samples, 0.2)
-    assert not set(samples.part[training_rows].tolist()) & set(samples.part[rows].tolist())
-    assert len(training_rows) + len(rows) == len(samples)
+    sides = split(samples, CONFIG)
+    assert not set(samples.part[sides.training].tolist()) & set(samples.part[sides.validation].tolist())
+    assert len(sides.training) + len(sides.validation) == len(samples) and not len(sides.test)
 
 
 @pytest.mark.parametrize(("success", "words"), [(True, "no failure"), (False, "no success")])
 def test_data_of_one_outcome_are_told(samples, success, words):
     alike = dataclasses.replace(samples, success=torch.full((len(samples),), success))
     with pytest.raises(BadDataset, match=words):
-        split(alike, 0.2)
+        split(alike, CONFIG)
 
 
 def test_turned_and_mirrored_samples_are_what_the_turned_and_mirrored_scene_would_give():
@@ -285,7 +292,7 @@ def test_the_configurations_that_are_shipped_can_be_read(name):
 
 
 def test_parts_outside_the_success_range_are_left_out(dataset):
-    samples = read_samples(dataset, patch_pixels=40, patch_side=0.128)
+    samples = read_samples(dataset, SMALL)
     rates = sorted(
         float(samples.success[samples.part == i].float().mean()) for i in range(len(samples.parts))
     )
@@ -298,3 +305,64 @@ def test_parts_outside_the_success_range_are_left_out(dataset):
         assert torch.equal(kept.patches[kept.part == i], samples.patches[rows])
     with pytest.raises(BadDataset, match="widen success_range"):
         samples.of_parts_between(0.999, 0.9991)
+
+
+FIELD = CONFIG.model_copy(
+    update={
+        "network": NetworkConfig(
+            architecture="field",
+            patch_pixels=64,
+            patch_side=0.128,
+            channels=8,
+            trunk_width=32,
+            head_width=32,
+            dropout=0.0,
+        ),
+        "gqn": StageConfig(learning_rate=2e-3, epochs=6, batch_size=32),
+        "gdn": StageConfig(learning_rate=2e-3, epochs=12, batch_size=16),
+    }
+)
+
+
+def test_the_field_network_learns_and_its_intervals_hold_what_they_say(dataset, tmp_path):
+    samples = read_samples(dataset, FIELD.network)
+    assert samples.patches.shape == (640, 1, 72, 72) and samples.patches.dtype == torch.int16
+    models, _ = learn(samples, FIELD, checkpoint_path=tmp_path / "checkpoint")
+    report, found = models.meta.metrics, models.meta.calibration
+    assert report["gqn"]["auroc"] > 0.85
+    assert report["gdn"]["translation_rmse"] < 0.8 * report["gdn"]["zero_displacement"]["translation_rmse"]
+    # Scaled on these very rows, 90 % of them lie inside.
+    assert all(0.87 <= share <= 0.93 for share in report["gdn"]["coverage_90"].values())
+    assert found.quality_slope > 0 and min(found.variance_scale) > 0
+    save_model(tmp_path / "model", models)
+    assert load_models(tmp_path / "model").meta.calibration == found
+
+
+def test_the_patch_in_the_middle_is_the_paper_s_patch(dataset):
+    wide = NetworkConfig(architecture="field", patch_pixels=64, patch_side=0.128)
+    one, other = read_samples(dataset, wide), read_samples(dataset, NetworkConfig())
+    rows = torch.arange(20)
+    # Both look at the same place; the field's plane is half way up the part instead of at the grasp.
+    difference = (one.heights(rows, "cpu") - other.heights(rows, "cpu")).abs()
+    assert one.heights(rows, "cpu").shape == (20, 1, 64, 64) and float(difference.median()) == 0
+
+
+def test_the_catalogue_decides_the_sides_where_it_is_asked_to(monkeypatch, tmp_path):
+    names = tuple(f"part_{k}" for k in range(6))
+    with pytest.raises(BadDataset, match="build --catalogue"):
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+        part_sides(names, 0.2, "catalogue")
+
+
+def test_turned_samples_need_pictures_that_turn(dataset):
+    with pytest.raises(ValueError, match="symmetric"):
+        LearningConfig(network=NetworkConfig(image="object"), symmetric=True)
+    network = SMALL.model_copy(update={"image": "object"})
+    samples = read_samples(dataset, network)
+    assert samples.object_patches.shape == samples.patches.shape
+    config = SHORT.model_copy(update={"network": network, "symmetric": False})
+    rows = torch.arange(8)
+    stage = Stage("gdn", build_models(describe(samples, split(samples, config).training, config)), samples,
+                  split(samples, config), config)  # fmt: skip
+    inputs = stage.batch(rows, torch.Generator().manual_seed(0))[0]
+    assert inputs.shape == (8, 1, 40, 40)

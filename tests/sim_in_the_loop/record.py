@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 
 from hal import go_home, open_cell
-from mskgrasp.networks import load_models
+from mskgrasp.models import load_models
 from mskgrasp.planner import Planner, PlannerConfig
 from mskgrasp.trial import Trial, run_trial
 
@@ -27,7 +27,7 @@ def run_scenario() -> list[Trial]:
     with open_cell(CELL) as cell:
         planner = Planner(
             models,
-            PlannerConfig(n_candidates=N_CANDIDATES),
+            PlannerConfig(n_candidates=N_CANDIDATES, n_angles=0),
             table_z=cell.workspace.table_z,
             region=cell.workspace.region,
         )

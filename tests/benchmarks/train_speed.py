@@ -1,0 +1,112 @@
+"""How fast networks are trained. Run: python -m tests.benchmarks.train_speed --help.
+
+In one run, in turn: steps of our networks and of the paper's, on the same number of samples that lie in
+memory as a dataset's do. A step is everything from the stored samples to the new weights.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import torch
+from rich.console import Console
+from rich.table import Table
+from tqdm import tqdm
+
+from mskgrasp.config import read_config
+from mskgrasp.models import build_models
+from mskgrasp.samples import Samples, margin_of
+from mskgrasp.training import LearningConfig, Stage, describe, split
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+def main() -> None:
+    """Prints a table and, last, one JSON object."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--samples", type=int, default=2048, help="samples to learn from (default 2048)")
+    parser.add_argument("--seconds", type=float, default=20.0, help="for each network (default 20)")
+    options = parser.parse_args()
+    torch.set_num_threads(min(2, os.cpu_count() or 1))
+    device = "cuda" if torch.cuda.is_available() else "cpu"
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column(f"learning on {device}")
+    for header in ("GQN samples/s", "GDN samples/s", "share in the network"):
+        table.add_column(header, justify="right")
+    found: dict[str, dict[str, float]] = {}
+    for name in tqdm(("default", "paper"), unit="network", file=sys.stderr, disable=None):
+        config = read_config(LearningConfig, REPOSITORY / "configs" / "train" / f"{name}.yaml")
+        found[name] = measure(random_samples(config, options.samples), config, device, options.seconds / 2)
+        rates = (f"{found[name][stage]:.0f}" for stage in ("gqn", "gdn"))
+        table.add_row("ours" if name == "default" else name, *rates, f"{found[name]['share']:.0%}")
+    Console(width=100).print(table)
+    ours, paper = found["default"], found["paper"]
+    result = {
+        "samples_per_s": round(ours["gqn"]),
+        "paper_samples_per_s": round(paper["gqn"]),
+        "network_share": round(ours["share"], 3),
+    }
+    print(json.dumps(result))
+
+
+def measure(samples: Samples, config: LearningConfig, device: str, seconds: float) -> dict[str, float]:
+    """Samples/s of both networks, and the share of the GQN's time that is not spent on preparing samples."""
+    sides = split(samples, config)
+    models = build_models(describe(samples, sides.training, config), device)
+    stages = {name: Stage(name, models, samples, sides, config) for name in ("gqn", "gdn")}
+    for stage in stages.values():
+        stage.network.train()
+    rates = {name: rate(stage, stage.learn, seconds) for name, stage in stages.items()}
+    preparing = rate(stages["gqn"], stages["gqn"].batch, seconds / 4)
+    return rates | {"share": 1 - rates["gqn"] / preparing}
+
+
+def rate(stage: Stage, work: Callable[[torch.Tensor, torch.Generator], object], seconds: float) -> float:
+    """Samples/s of some work on a stage's batches, the first few not counted."""
+    order, noise = torch.Generator().manual_seed(0), torch.Generator(stage.models.device).manual_seed(0)
+    done, began = -3, 0.0
+    batch = stage.settings.batch_size
+    while done < 1 or time.perf_counter() - began < seconds:
+        for rows in stage.order(order).split(batch):
+            if done == 0:
+                began = time.perf_counter()
+            work(rows, noise)
+            done += 1
+            if done > 0 and time.perf_counter() - began > seconds:
+                break
+    if stage.models.device.type == "cuda":
+        torch.cuda.synchronize()
+    return done * batch / (time.perf_counter() - began)
+
+
+def random_samples(config: LearningConfig, n: int) -> Samples:
+    """Noise in the shape of a dataset: what it shows makes no step slower."""
+    network, margin = config.network, margin_of(config.network)
+    generator = torch.Generator().manual_seed(0)
+    side = network.patch_pixels + 2 * margin
+    success = torch.rand(n, generator=generator) < 0.5
+    shift = 0.003 * torch.randn((n, 4), generator=generator)
+    return Samples(
+        patches=torch.randint(0, 400, (n, 1, side, side), generator=generator, dtype=torch.int16),
+        margin=margin,
+        object_patches=None,
+        theta=torch.zeros(n),
+        centre_grasp=0.02 * torch.randn((n, 3), generator=generator),
+        success=success,
+        displacement=shift,
+        grasp_displacement=shift,
+        part=torch.arange(n) % 20,
+        parts=tuple(f"part_{number}" for number in range(20)),
+        skipped={},
+        fingerprint="noise",
+    )
+
+
+if __name__ == "__main__":
+    main()
