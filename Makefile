@@ -5,7 +5,7 @@ READY := $(VENV)/.ready
 TESTABLE := $(VENV)/.testable
 RUN := $(VENV)/bin/python -m
 
-.PHONY: help setup collect train plan evaluate test bench-parts bench-collect check format clean
+.PHONY: help setup collect train plan evaluate test bench-parts bench-collect bench-train bench-plan check format clean
 .DEFAULT_GOAL := help
 
 help: ## Explain the targets
@@ -42,6 +42,12 @@ bench-parts: $(TESTABLE) ## Seconds to make a part, by family and stage
 
 bench-collect: $(TESTABLE) ## Grasps/s of the collector beside plain ManiSkill and raw SAPIEN
 	$(RUN) tests.benchmarks.collect_speed
+
+bench-train: $(TESTABLE) ## Samples/s of training, our network beside the paper's
+	$(RUN) tests.benchmarks.train_speed
+
+bench-plan: $(TESTABLE) ## Milliseconds of a plan, our network beside the paper's
+	$(RUN) tests.benchmarks.plan_speed
 
 check: $(TESTABLE) ## Check style, types and the floors of the house
 	$(RUN) ruff format --check .

@@ -27,8 +27,6 @@ from mskgrasp.networks import (
 SCHEMA_VERSION = 1
 WEIGHTS = "model.safetensors"
 DESCRIPTION = "model.json"
-PRETRAINED = Path(__file__).parent / "pretrained"
-"""The model that is shipped."""
 
 
 class Calibration(Config):
