@@ -13,10 +13,10 @@ from mskgrasp.plan import part_name
 def test_a_cad_file_is_made_a_part(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     file = tmp_path / "My Bracket.stl"
-    trimesh.creation.box((40, 20, 10)).export(file)
+    trimesh.creation.box((4, 2, 1.5)).export(file)
     name = part_name(str(file))
-    assert find_part(name).longest_axis == pytest.approx(0.04)
-    assert part_name(str(file), "in") == name and find_part(name).longest_axis == pytest.approx(0.04 * 25.4)
+    assert find_part(name).longest_axis == pytest.approx(0.004)
+    assert part_name(str(file), "in") == name and find_part(name).longest_axis == pytest.approx(0.004 * 25.4)
 
 
 def test_names_and_folders_stay_what_they_are(tmp_path):
