@@ -63,11 +63,11 @@ def collect(config: CollectConfig) -> None:
     parts = chosen_parts(config)
     config = config.model_copy(update={"parts": tuple(word for word, _ in parts)})
     check_out(config)
-    make_folder(config.out)
-    with only_here(config.out) as alone:
-        if not alone:
-            raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
-        with contextlib.nullcontext() if config.cluster is None else connected(config.cluster):
+    with contextlib.nullcontext() if config.cluster is None else connected(config.cluster):
+        make_folder(config.out)
+        with only_here(config.out) as alone:
+            if not alone:
+                raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
             _collect(config, [part for _, part in parts])
 
 

@@ -52,7 +52,7 @@ def test_markdown_is_made_of_well_formed_tables(collected, capsys):
     page = capsys.readouterr().out
     assert page.startswith("# Dataset data\n")
     blocks = re.findall(r"(?:^\|.*\n)+", page, flags=re.MULTILINE)
-    assert len(blocks) == 6
+    assert len(blocks) == 7
     for block in blocks:
         lines = block.splitlines()
         assert set(lines[1]) <= {"|", "-"}

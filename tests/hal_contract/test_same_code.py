@@ -17,7 +17,7 @@ from hal import Cell, cell_from_yaml, execute_grasp, go_home
 from hal.arm import POSITION_TOLERANCE, ROTATION_TOLERANCE, Arm
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import MAX_OPENING, pose_base_tcp
-from mskgrasp.networks import load_models
+from mskgrasp.models import load_models
 from mskgrasp.planner import Planner, PlannerConfig
 from tests.franka.robots import franky_sim, write_cell
 from tests.hal_contract.conftest import CELLS

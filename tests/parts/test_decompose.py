@@ -15,7 +15,7 @@ from mskgrasp.parts import decompose
 from mskgrasp.parts import shape as h
 from mskgrasp.parts import solid as s
 from mskgrasp.parts.decompose import MOST_HULLS, convex_pieces, fewest_hulls
-from mskgrasp.parts.measure import hull_fit
+from mskgrasp.parts.measure import MeshSurface, hull_fit
 
 DIGEST = """
 import hashlib
@@ -141,4 +141,4 @@ def test_a_sliver_is_taken_up_by_its_neighbour_instead_of_being_cut_to_pieces():
     pieces = [np.asarray(box.vertices) for box in boxes]
     mesh = trimesh.creation.box(bounds=[[0, 0, 0], [60, 30, 20]])
     assert len(decompose._stout(pieces)) > 3
-    assert len(decompose._join(mesh, pieces, 0.7, 1.1, finish=decompose._stout)) == 1
+    assert len(decompose._join(MeshSurface(mesh), pieces, 0.7, 1.1, finish=decompose._stout)) == 1
