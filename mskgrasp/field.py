@@ -9,13 +9,10 @@ learned.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import torch
 from torch import Tensor, nn
 
-if TYPE_CHECKING:
-    from mskgrasp.networks import NetworkConfig, Normalisation
+from mskgrasp.network_config import NetworkConfig, Normalisation
 
 STRIDE = 4
 """Pixels of the height map to a cell of the features."""

@@ -18,7 +18,7 @@ from mskgrasp.errors import BadDataset, NoPartFound
 from mskgrasp.field import STRIDE
 from mskgrasp.grasp import centre_in_grasp_frame, to_grasp_displacement
 from mskgrasp.images import crop_patches, height_image, view_part
-from mskgrasp.networks import NetworkConfig, patch_plane
+from mskgrasp.network_config import NetworkConfig, patch_plane
 from mskgrasp.parts.catalogue import Split, read_index
 
 HEIGHT_STEP = 1e-4

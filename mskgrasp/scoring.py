@@ -15,7 +15,7 @@ from mskgrasp.geometry import Pose
 from mskgrasp.grasp import PartView, centre_in_grasp_frame
 from mskgrasp.images import crop_patches, height_image
 from mskgrasp.models import Models
-from mskgrasp.networks import patch_plane
+from mskgrasp.network_config import patch_plane
 
 _MARGIN = 0.016
 """Metres around the outermost points that are read, which the convolutions see."""
