@@ -40,6 +40,7 @@ class Comparison:
         turn_p90: Its 90th percentile, rad.
         p_value: Least p of two-sample Kolmogorov-Smirnov tests of dx, dy, dz, dtheta, times four: whether the
             distributions over all successes differ by more than a shift of ``NOTICED``.
+        plain_p_value: The same of the tests as they are: whether they differ at all.
         bias: Largest mean difference of dx, dy, dz over grasps that succeeded under both, m, without the
             tenth that differs most either way: what is wrong on the whole, not grasp by grasp.
         bias_p: Least p of paired Wilcoxon signed-rank tests of the four differences, times four.
@@ -55,6 +56,7 @@ class Comparison:
     turn_median: float
     turn_p90: float
     p_value: float
+    plain_p_value: float
     bias: float
     bias_p: float
     cpu_ms: float
@@ -73,9 +75,10 @@ def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:
     shift = np.linalg.norm(difference[:, :3], axis=1)
     turn = np.abs(wrap_angle(difference[:, 3]))
     ours, theirs = (one.displacement[one.success] for one in (outcomes, reference))
-    p = float("nan")
+    p = plain = float("nan")
     if min(len(ours), len(theirs)) > 1:
         p = min(_p_beyond(ours[:, axis], theirs[:, axis], NOTICED[axis]) for axis in range(4))
+        plain = min(_p_beyond(ours[:, axis], theirs[:, axis], 0.0) for axis in range(4))
     return Comparison(
         success_rate=float(outcomes.success.mean()),
         agreement=float((outcomes.success == reference.success).mean()),
@@ -84,6 +87,7 @@ def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:
         turn_median=_percentile(turn, 50),
         turn_p90=_percentile(turn, 90),
         p_value=float(np.minimum(1.0, 4 * p)),
+        plain_p_value=float(np.minimum(1.0, 4 * plain)),
         bias=_bias(difference),
         bias_p=_bias_p(np.column_stack([difference[:, :3], wrap_angle(difference[:, 3])])),
         cpu_ms=1e3 * float(outcomes.cpu_seconds.mean()),

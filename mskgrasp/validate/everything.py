@@ -49,7 +49,7 @@ def validate(config: ValidateConfig) -> int:
         reference = found[REFERENCE].success_rate
         failed += [
             f"{config.production}: {said}"
-            for said in complaints(found[config.production], found[CELL_FLOOR], reference)
+            for said in complaints(found[config.production], found[FLOOR], reference)
         ]
     results["failed"] = failed
     write_json(config.out / "validate.json", config, results)
