@@ -221,7 +221,7 @@ def _draw_cost(
         axis.set_major_formatter(ScalarFormatter())
         axis.set_minor_formatter(NullFormatter())
     axes.set_xticks([50, 100, 200, 400])
-    axes.set_title("floors: starts moved by 0.1 mm (--), 10 um (..)", loc="left", fontsize=9)
+    axes.set_title("floors: 10 um (..), 0.1 mm (--)", loc="left", fontsize=9)
     axes.spines[["top", "right"]].set_visible(False)
 
 
