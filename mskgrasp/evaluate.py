@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import sys
 from pathlib import Path
@@ -16,14 +15,15 @@ from tqdm import tqdm
 from hal import Cell, go_home, open_cell, put_down
 from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.cli import make_folder, parse, run
-from mskgrasp.config import Config, read_config, write_config
-from mskgrasp.errors import BadDataset, NoGraspFound, NoPartFound, UsageError
-from mskgrasp.models import Models, load_models
+from mskgrasp.config import Config
+from mskgrasp.errors import NoGraspFound, NoPartFound
+from mskgrasp.models import load_models
 from mskgrasp.outcomes import draw_errors, print_report, summarise
-from mskgrasp.parts import find_part, starter_names
+from mskgrasp.parts import find_part
 from mskgrasp.pictures import draw_plan
 from mskgrasp.plan import make_planner, present
 from mskgrasp.planner import Planner, PlannerConfig
+from mskgrasp.runs import TRIALS, append, begin, inputs_of, part_names, read
 from mskgrasp.trial import Trial, run_trial
 
 DESCRIPTION = """Plans and executes grasps on a cell and reports how often the part was lifted and how well
@@ -68,9 +68,11 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
         UsageError: The folder holds a run with other settings, another model or another cell.
     """
     models = load_models(config.models)
-    names = chosen_parts(config, models)
-    begin(config, names)
-    finished = read_trials(config.out / "trials.jsonl")
+    names = part_names(config.parts, models.meta.training)
+    inputs = inputs_of(config.cell, config.models, names)
+    begin(config, config.out, inputs, may_change=("out", "trials", "parts"))
+    make_folder(config.out / "plans")
+    finished = {(trial.part, trial.number): trial for trial in read(config.out / TRIALS, Trial.from_json)}
     missing = [
         (name, number)
         for name in names
@@ -85,8 +87,7 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
                 trial = _one(cell, planner, config, name, number)
                 finished[trial.part, trial.number] = trial
                 # Stored before the arm moves again: what comes now must not cost what is known.
-                with (config.out / "trials.jsonl").open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(trial.to_json(), allow_nan=False) + "\n")
+                append(config.out / TRIALS, trial.to_json())
                 finish(cell, trial)
             clear(cell)
     trials = [finished[key] for key in sorted(finished)]
@@ -134,92 +135,6 @@ def _one(cell: Cell, planner: Planner, config: EvaluateConfig, name: str, number
         )  # fmt: skip
     draw_plan(frame, plan, config.out / "plans" / f"{part}-{number:03d}.png")
     return trial
-
-
-def chosen_parts(config: EvaluateConfig, models: Models) -> list[str]:
-    """Names or folders of the parts to try.
-
-    Raises:
-        BadPart: A part is unknown.
-    """
-    names: list[str] = []
-    for name in config.parts:
-        if name == "validation":
-            names += models.meta.training.get("validation_parts", [])
-        elif name == "all":
-            names += starter_names()
-        else:
-            names.append(name)
-    for name in names:
-        find_part(name)
-    return list(dict.fromkeys(names))
-
-
-def begin(config: EvaluateConfig, names: list[str]) -> None:
-    """Opens the folder of the run: new, or begun with the same settings, model, cell and parts.
-
-    Raises:
-        UsageError: It holds something else.
-    """
-    inputs = {
-        "cell": _digest(config.cell),
-        "model.json": _digest(config.models / "model.json"),
-        "model.safetensors": _digest(config.models / "model.safetensors"),
-    } | {f"part {name}": find_part(name).content_hash for name in names}
-    settings, fingerprint = config.out / "config.yaml", config.out / "inputs.json"
-    if settings.exists() and fingerprint.exists():
-        before = read_config(EvaluateConfig, settings)
-        changed = [
-            name
-            for name in EvaluateConfig.model_fields
-            if name not in ("out", "trials", "parts") and getattr(before, name) != getattr(config, name)
-        ]
-        known = json.loads(fingerprint.read_text(encoding="utf-8"))
-        changed += [name for name, value in inputs.items() if known.get(name, value) != value]
-        if changed:
-            raise UsageError(
-                f"{config.out} was begun with other inputs ({', '.join(changed)} differ); "
-                "choose another --out"
-            )
-        inputs = known | inputs
-    elif config.out.is_dir() and any(config.out.iterdir()):
-        raise UsageError(f"--out {config.out} holds other files; choose a new folder")
-    make_folder(config.out / "plans")
-    write_config(config, settings)
-    fingerprint.write_text(json.dumps(inputs, indent=1) + "\n", encoding="utf-8")
-
-
-def _digest(path: Path) -> str:
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise UsageError(f"cannot read {path}: {error.strerror}") from error
-
-
-def read_trials(path: Path) -> dict[tuple[str, int], Trial]:
-    """Trials already done, by part and number; a last line cut short by a kill is dropped.
-
-    Raises:
-        BadDataset: The file holds something else.
-    """
-    if not path.exists():
-        return {}
-    lines = path.read_text(encoding="utf-8").split("\n")
-    found = {}
-    for i, line in enumerate(lines[:-1]):
-        try:
-            values = json.loads(line)
-            if values["predicted_std"] is not None:
-                values["predicted_std"] = [np.nan if v is None else v for v in values["predicted_std"]]
-            trial = Trial(**values)
-        except (ValueError, TypeError, KeyError) as error:
-            raise BadDataset(
-                f"{path}: line {i + 1} is no trial; delete it or choose another --out"
-            ) from error
-        found[trial.part, trial.number] = trial
-    if lines[-1]:
-        path.write_text("\n".join(lines[:-1]) + ("\n" if len(lines) > 1 else ""), encoding="utf-8")
-    return found
 
 
 if __name__ == "__main__":

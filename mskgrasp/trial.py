@@ -53,6 +53,13 @@ class Trial:
             values["predicted_std"] = [v if np.isfinite(v) else None for v in self.predicted_std]
         return values
 
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> Trial:
+        """The trial that `to_json` wrote."""
+        if values["predicted_std"] is not None:
+            values["predicted_std"] = [np.nan if v is None else v for v in values["predicted_std"]]
+        return cls(**values)
+
 
 def run_trial(
     cell: Cell, planner: Planner, *, part: str, number: int, seed: int

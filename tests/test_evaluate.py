@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from mskgrasp.errors import BadDataset
-from mskgrasp.evaluate import read_trials
 from mskgrasp.outcomes import summarise
+from mskgrasp.runs import read
 from mskgrasp.trial import Trial
 
 REPOSITORY = Path(__file__).parents[1]
@@ -58,13 +58,13 @@ def test_trials_survive_the_file_and_a_line_cut_short(tmp_path):
     first, second = trial(predicted_std=[np.nan] * 4), trial(number=1)
     lines = [json.dumps(one.to_json(), allow_nan=False) for one in (first, second)]
     path.write_text(lines[0] + "\n" + lines[1][:40])
-    found = read_trials(path)
-    assert list(found) == [("a", 0)]
-    assert np.isnan(found["a", 0].predicted_std).all() and found["a", 0].measured == first.measured
+    (found,) = read(path, Trial.from_json)
+    assert (found.part, found.number) == ("a", 0)
+    assert np.isnan(found.predicted_std).all() and found.measured == first.measured
     assert path.read_text() == lines[0] + "\n"
     path.write_text("no json\n")
     with pytest.raises(BadDataset, match="line 1 is no trial"):
-        read_trials(path)
+        read(path, Trial.from_json)
 
 
 def test_an_evaluation_goes_on_and_refuses_another_model(tmp_path):
