@@ -48,15 +48,19 @@ class Scene:
         )
 
     def crop(self, grasps: np.ndarray, network: NetworkConfig) -> Tensor:
-        """Patches (n, 1, r, c) around grasps (n, 4)."""
+        """Patches (n, 1, r, c) around grasps (n, 4), as a network takes them."""
+        return self.crop_of(grasps, network.patch_pixels, network.patch_side, network.patch_columns)
+
+    def crop_of(self, grasps: np.ndarray, n_pixels: int, side: float, n_columns: int | None = None) -> Tensor:
+        """Patches of any size: `images.crop_patches`."""
         return crop_patches(
             self.heights,
             torch.as_tensor(grasps),
             self.intrinsics,
             self.T_base_camera,
-            n_pixels=network.patch_pixels,
-            side=network.patch_side,
-            n_columns=network.patch_columns,
+            n_pixels=n_pixels,
+            side=side,
+            n_columns=n_columns,
         )
 
 
@@ -66,7 +70,7 @@ def qualities(models: Models, scene: Scene, grasps: np.ndarray, chunk: int) -> n
         models.quality(scene.crop(grasps[rows], models.meta.network), centre, height)
         for rows, centre, height, _ in _chunks(models, scene, grasps, chunk)
     ]
-    return torch.cat(found).cpu().double().numpy()
+    return torch.cat(found).cpu().double().numpy() if found else np.zeros(0)
 
 
 def displacements(
@@ -83,6 +87,8 @@ def displacements(
         mean, variance = models.grasp_displacement(patches, centre, height, theta)
         means.append(mean)
         variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
+    if not means:
+        return np.zeros((0, 4)), np.zeros((0, 4))
     return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
 
 

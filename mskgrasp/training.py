@@ -280,15 +280,15 @@ class Stage:
                 "validation_loss": float(balanced),
                 "auroc": metrics.auroc(quality.numpy(), success.numpy() > 0),
             }
-        report = validation.displacement_metrics(self.models, self.samples, self.training_rows, self.rows)
         rows = self.rows[self.samples.success[self.rows]]
         mean, variance = validation.predict_grasp_displacement(self.models, self.samples, rows)
         known = torch.from_numpy(variance) if self.config.network.variance else None
         std = self.models.gdn.target_std.cpu().double()
         target = self.samples.grasp_displacement[rows].double()
         loss = displacement_loss(torch.from_numpy(mean), known, target, std)
+        errors = validation.displacement_errors(self.samples, rows, mean, variance)
         return {"validation_loss": float(loss)} | {
-            name: report[name] for name in ("translation_rmse", "rotation_rmse")
+            name: errors[name] for name in ("translation_rmse", "rotation_rmse")
         }
 
 
