@@ -23,6 +23,9 @@ from mskgrasp.networks import (
     Normalisation,
 )
 
+PRETRAINED = Path(__file__).parent / "pretrained"
+"""The model that ships."""
+
 SCHEMA_VERSION = 1
 WEIGHTS = "model.safetensors"
 DESCRIPTION = "model.json"

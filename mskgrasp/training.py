@@ -299,6 +299,7 @@ def train(
     checkpoint_path: Path,
     device: torch.device | str = "cpu",
     reporter: Reporter | None = None,
+    sides: Sides | None = None,
 ) -> tuple[Models, list[dict[str, Any]]]:
     """Trains both networks, from a checkpoint where there is one.
 
@@ -308,6 +309,7 @@ def train(
         checkpoint_path: Replaced after every epoch.
         device: Where the networks run.
         reporter: Is told how it goes.
+        sides: Of the samples; None: as the settings say.
 
     Returns:
         The networks with their metrics on the parts never seen, and one row an epoch.
@@ -318,7 +320,7 @@ def train(
         TrainingDiverged: The loss is no number any more.
     """
     reporter = reporter or Reporter()
-    sides = split(samples, config)
+    sides = sides or split(samples, config)
     meta = describe(samples, sides.training, config)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)

@@ -17,7 +17,7 @@ from mskgrasp.models import Calibration, Models
 from mskgrasp.samples import Samples
 
 _CHUNK = 64
-_AXES = ("x", "y", "z", "theta")
+AXES = ("x", "y", "z", "theta")
 _REPEATS = 200
 """Draws of parts for an interval of scores that take a sort each."""
 _RADIUS = 0.03
@@ -177,7 +177,7 @@ def _spread(samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np
         for level in (50, 80, 90, 95)
     }
     return report | {
-        "axes": {name: dict(zip(_AXES, map(float, values), strict=True)) for name, values in axes.items()},
+        "axes": {name: dict(zip(AXES, map(float, values), strict=True)) for name, values in axes.items()},
         "ause_translation": metrics.ause(shift, variance[:, :3].sum(axis=1)),
         "ause_rotation": metrics.ause(turn, variance[:, 3]),
         "least_uncertain": {
@@ -217,5 +217,5 @@ def displacement_errors(
         "translation_rmse": metrics.translation_rmse(predicted, displacement),
         "rotation_rmse": metrics.rotation_rmse(predicted, displacement),
         "nll": metrics.gaussian_nll(mean, variance, target) if known else None,
-        "coverage_90": dict(zip(_AXES, covered.tolist(), strict=True)) if known else None,
+        "coverage_90": dict(zip(AXES, covered.tolist(), strict=True)) if known else None,
     }

@@ -112,7 +112,6 @@ def test_what_stands_outside_the_region_is_not_the_part():
         (render([]) * 1000, "millimetres"),
         ((render([]) * 1000).astype(np.uint16), "millimetres"),
         (render([]) + np.linspace(-0.015, 0.015, 160, dtype=np.float32), "the table is tilted"),
-        (render([Box(x=0.45, y=0.1, yaw=0.0, size=(0.3, 0.05, 0.03))]), "cut off by the border"),
         (render([Box(x=0.6, y=0.0, yaw=0.0, size=(0.04, 0.04, 0.03))]), "outside the region"),
     ],
 )
