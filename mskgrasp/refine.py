@@ -27,7 +27,7 @@ def fingers_free(scene: Scene, grasps: np.ndarray) -> np.ndarray:
     rows, columns = 2 * int(np.ceil(reach / _STEP)) + 1, 2 * int(np.ceil(FINGER_HALF_WIDTH / _STEP)) + 1
     along = np.abs((np.arange(rows) - (rows - 1) / 2) * _STEP)
     fingers = (along >= MAX_OPENING / 2) & (along <= reach)
-    heights = scene.crop_of(grasps, rows, rows * _STEP, columns)[:, 0, fingers]
+    heights = scene.crop_of(grasps, (rows, columns), _STEP)[:, 0, fingers]
     tips = grasps[:, 2] - scene.table_z - PAD_REACH
     return heights.amax(dim=(1, 2)).cpu().double().numpy() <= tips
 

@@ -242,8 +242,11 @@ class Stage:
         Turned, mirrored and with noise, all at once on the networks' device.
         """
         s, device = self.samples, self.models.device
-        look = s.patches_of if self.name == "gqn" else s.displacement_patches_of
-        patches, centre = look(rows, device), s.centre_grasp[rows].to(device)
+        if self.name == "gqn":
+            patches = s.patches_of(rows, device, self.config.network.quality_stride)
+        else:
+            patches = s.displacement_patches_of(rows, device)
+        centre = s.centre_grasp[rows].to(device)
         target = s.grasp_displacement[rows].to(device)
         if self.config.symmetric:
             patches, centre, target = mirror_and_turn(patches, centre, target, generator)

@@ -310,9 +310,12 @@ HAND = CONFIG.model_copy(
     update={
         "network": NetworkConfig(
             architecture="hand",
-            patch_pixels=32,
-            patch_columns=16,
+            patch_pixels=33,
+            patch_columns=17,
+            patch_side=0.132,
+            quality_stride=2,
             layers=(8, 8),
+            displacement_layers=(8, 16),
             trunk_width=32,
             action_width=32,
             head_width=32,
@@ -327,7 +330,7 @@ HAND = CONFIG.model_copy(
 def test_our_network_learns_and_its_intervals_hold_what_they_say(tmp_path):
     dataset = synthetic.write_dataset(tmp_path, n_parts=8, n_attempts=250, seed=1)
     samples = read_samples(dataset, HAND.network)
-    assert samples.patches.shape == (2000, 1, 32, 16) and samples.patches.dtype == torch.int16
+    assert samples.patches.shape == (2000, 1, 33, 17) and samples.patches.dtype == torch.int16
     models, _ = learn(samples, HAND, checkpoint_path=tmp_path / "checkpoint")
     report, found = models.meta.metrics, models.meta.calibration
     assert report["gqn"]["auroc"] > 0.85

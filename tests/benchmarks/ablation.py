@@ -1,7 +1,7 @@
 """What each choice of our network is worth. Run: python -m tests.benchmarks.ablation --help.
 
-Every line trains both networks anew on the same attempts, with one choice of configs/train/default.yaml undone,
-and scores them on the validation parts, which training never saw; test parts are not looked at.
+Every line trains both networks anew on the same attempts, with one choice of configs/train/default.yaml
+undone, and scores them on the validation parts, which training never saw; test parts are not looked at.
 """
 
 from __future__ import annotations
@@ -40,11 +40,18 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
     return {
         "ours": ours,
         "the paper's network, trained as ours": ours.model_copy(update={"network": paper}),
-        "twice the resolution": with_(
-            network={"patch_pixels": 65, "patch_columns": 33, "layers": (16, 32, 32)}
+        "quality sees all pixels": with_(network={"quality_stride": 1, "layers": (16, 32, 32)}),
+        "displacement sees every second pixel": with_(
+            network={
+                "patch_pixels": 33,
+                "patch_columns": 17,
+                "patch_side": 0.132,
+                "quality_stride": 1,
+                "displacement_layers": (16, 32),
+            }
         ),
-        "half the channels": with_(network={"layers": (8, 16)}),
-        "twice the channels": with_(network={"layers": (32, 64)}),
+        "half the channels": with_(network={"layers": (8, 16), "displacement_layers": (8, 16, 16)}),
+        "twice the channels": with_(network={"layers": (32, 64), "displacement_layers": (32, 64, 64)}),
         "no half turns and mirror images": with_(symmetric=False),
         "plain likelihood (beta 0)": with_(beta=0.0),
         "beta 1": with_(beta=1.0),
