@@ -18,6 +18,7 @@ from mskgrasp import cli
 from mskgrasp.config import read_config, write_config
 from mskgrasp.errors import UsageError
 from mskgrasp.metric_pictures import draw_uncertainty
+from mskgrasp.model_card import model_card
 from mskgrasp.models import DESCRIPTION, WEIGHTS, save_model
 from mskgrasp.pictures import draw_curves
 from mskgrasp.samples import Samples, read_samples
@@ -112,6 +113,7 @@ def run(config: TrainConfig) -> int:
         )
     _write(out / "metrics.json", json.dumps(_finite(models.meta.metrics), indent=2, allow_nan=False) + "\n")
     save_model(out, models)
+    _write(out / "card.md", model_card(models.meta))
     (out / CHECKPOINT).unlink(missing_ok=True)
     _summarise(console, models.meta.metrics, out)
     return 0

@@ -153,7 +153,8 @@ def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) ->
             "test_parts": [name for name in samples.parts if sides[name] == "test"],
             "skipped": samples.skipped,
             "data_fingerprint": samples.fingerprint,
-            "settings": config.model_dump(mode="json"),
+            # Where the data lay and the model went is nobody's business.
+            "settings": config.model_dump(mode="json", include=set(LearningConfig.model_fields)),
         },
     )
 

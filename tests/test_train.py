@@ -155,11 +155,19 @@ def test_a_small_dataset_is_learned_and_beats_the_trivial_predictors(dataset, tm
     with open(out / "log.csv") as file:
         rows = list(csv.DictReader(file))
     assert [row["stage"] for row in rows] == ["gqn"] * 12 + ["gdn"] * 30
+    card = (out / "card.md").read_text()
+    assert f"{gqn['auroc']:.3f}" in card and f"{1e3 * gdn['translation_rmse']:.2f}" in card
+    assert str(dataset) not in card + (out / "model.json").read_text()
+    assert (
+        0 < gdn["ause_translation"] < 1 and gdn["intervals"]["translation_rmse"][0] < gdn["translation_rmse"]
+    )
     files = {path.name for path in out.iterdir()}
     assert files == {
         "model.safetensors",
         "model.json",
         "metrics.json",
+        "card.md",
+        "uncertainty.png",
         "log.csv",
         "curves.png",
         "config.yaml",
@@ -321,8 +329,8 @@ HAND = CONFIG.model_copy(
             head_width=32,
             dropout=0.0,
         ),
-        "gqn": StageConfig(learning_rate=2e-3, epochs=8, batch_size=32),
-        "gdn": StageConfig(learning_rate=2e-3, epochs=8, batch_size=16),
+        "gqn": StageConfig(learning_rate=4e-3, epochs=14, batch_size=32),
+        "gdn": StageConfig(learning_rate=4e-3, epochs=10, batch_size=16),
     }
 )
 
