@@ -11,7 +11,7 @@ _LIMITS = """\
 - Made for a Franka Hand with its standard pads (80 mm opening) that comes down from above on a part that lies
   alone on a flat table, seen by a depth camera from above. Another gripper, slanted grasps or clutter are
   another task.
-- Labels are simulated: rigid parts of uniform density, one friction for all. Soft, wet or magnetic ones behave
+- Labels are simulated: rigid parts, uniform density, one friction for all. Soft, wet or magnetic ones behave
   differently.
 - The displacement is that of grasps that succeed. What happens when a grasp fails is not predicted.
 - Large displacements, above all of round parts that roll between the pads, are predicted as what they are:
