@@ -55,6 +55,10 @@ class SapienWorld:
         self._fine_colour: FineColour | None = None
         self._users = 0
         self._gym: gymnasium.Env | None = None
+        self.presented = 0
+        """How many parts have been laid down so far."""
+        self.presented_seed = seed
+        """The place and turn of the last one follow from it."""
 
     @property
     def env(self) -> GraspDisplacementEnv:
@@ -114,6 +118,7 @@ class SapienWorld:
         """
         folder = str(find_part(part).folder)
         self._fine_colour = None
+        self.presented, self.presented_seed = self.presented + 1, seed
         # A fresh scene each time, so that a trial does not depend on those before it.
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
         self.env.motion.place(self._home)

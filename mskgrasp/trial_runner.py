@@ -1,0 +1,133 @@
+"""The trials of an experiment on one cell, one after another: what a process does, alone or beside others."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from hal import Cell, open_cell
+from mskgrasp.choosing import Candidates, Chooser
+from mskgrasp.errors import TapeDoesNotFit
+from mskgrasp.lowess import Lowess
+from mskgrasp.models import load_models
+from mskgrasp.parts import find_part
+from mskgrasp.plan import make_planner, present
+from mskgrasp.planner import PlannerConfig
+from mskgrasp.predictors import LOWESS, LowessPredictor, NetworkPredictor, Predictor
+from mskgrasp.settings import Tape
+from mskgrasp.trial import Policy, Trial, clear, finish, run_trial, trial_key
+from mskgrasp.trial_files import trial_file, write_trial
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialTask:
+    """A trial to be made.
+
+    Attributes:
+        part: Name or folder of the part.
+        number: Which trial of it; trials of one part and number see the same scene.
+        seed: Of the run.
+        policy: How the grasp is chosen.
+        chosen_by: Label of the model whose variances choose it; empty: the run's own.
+    """
+
+    part: str
+    number: int
+    seed: int
+    policy: Policy
+    chosen_by: str = ""
+
+    @property
+    def key(self) -> str:
+        """As `Trial.key`."""
+        return trial_key(find_part(self.part).name, self.number, self.chosen_by)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """What the trials of a run share.
+
+    Attributes:
+        cell: YAML file of the cell.
+        models: Folder of the model whose qualities count, and that predicts where no other does.
+        planner: How grasps are chosen.
+        choosers: Folders of the models that choose by their variances, by label.
+        lowess: LOWESS of the known parts.
+        tape: Sizes of the squares of tape to measure by; None: the cell's tracker measures.
+        out: Folder of the run.
+    """
+
+    cell: Path
+    models: Path
+    planner: PlannerConfig
+    out: Path
+    choosers: dict[str, Path] = field(default_factory=dict)
+    lowess: dict[str, Lowess] = field(default_factory=dict)
+    tape: Tape | None = None
+
+
+def scene_seed(seed: int, part: str, number: int) -> int:
+    """The seed of a trial: the part's place and turn, the camera's errors and the candidates follow from it."""
+    words = [seed, zlib.crc32(part.encode()), number]
+    return int(np.random.SeedSequence(words).generate_state(1)[0] >> 1)
+
+
+class TrialRunner:
+    """Makes trials on a connected cell."""
+
+    def __init__(self, cell: Cell, setup: Setup):
+        self._cell = cell
+        self._setup = setup
+        planner = make_planner(setup.models, setup.planner, cell)
+        chunk, device = setup.planner.chunk_size, planner.models.device
+        self._candidates = Candidates(planner)
+        self._predictors: dict[str, Predictor] = {"": NetworkPredictor(planner.models, chunk)}
+        for label, folder in setup.choosers.items():
+            self._predictors[label] = NetworkPredictor(load_models(folder, device), chunk)
+        if setup.lowess:
+            self._predictors[LOWESS] = LowessPredictor(setup.lowess)
+
+    def run(self, task: TrialTask, report: Callable[[Trial], None]) -> None:
+        """Makes a trial, writes its file and reports it, and only then lets the arm move again.
+
+        Raises:
+            HalError: The cell was lost.
+        """
+        part = find_part(task.part)
+        seed = scene_seed(task.seed, part.name, task.number)
+        clear(self._cell)
+        no_tape = ""
+        try:
+            present(self._cell, task.part, seed)
+        except TapeDoesNotFit as error:
+            no_tape = f"no room for tape: {error}"  # it lies there all the same, and may be grasped
+        chooser = Chooser(
+            self._candidates, self._predictors[task.chosen_by], task.policy, part.name, self._cell.tracker
+        )
+        record = run_trial(
+            self._cell, chooser, part=part.name, number=task.number, seed=seed, tape=self._setup.tape
+        )
+        trial = replace(record.trial, family=part.family, policy=task.policy, chosen_by=task.chosen_by)
+        if trial.unmeasured and no_tape:
+            trial = replace(trial, unmeasured=no_tape)
+        write_trial(trial_file(self._setup.out, trial.key), record.frame, record.plan, record.after)
+        report(trial)
+        finish(self._cell, record)
+
+    def close(self) -> None:
+        """Brings the arm home."""
+        clear(self._cell)
+
+
+@contextmanager
+def trial_runner(setup: Setup) -> Iterator[TrialRunner]:
+    """A runner on the cell of a setup, connected until the end of the block."""
+    with open_cell(setup.cell) as cell:
+        runner = TrialRunner(cell, setup)
+        yield runner
+        runner.close()
