@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -92,8 +92,8 @@ class TrialRunner:
         if setup.lowess:
             self._predictors[LOWESS] = LowessPredictor(setup.lowess)
 
-    def run(self, task: TrialTask, report: Callable[[Trial], None]) -> None:
-        """Makes a trial, writes its file and reports it, and only then lets the arm move again.
+    def run(self, task: TrialTask) -> Iterator[Trial]:
+        """Makes a trial, writes its file and yields it; only then the arm moves again, to put the part down.
 
         Raises:
             HalError: The cell was lost.
@@ -116,7 +116,7 @@ class TrialRunner:
         if trial.unmeasured and no_tape:
             trial = replace(trial, unmeasured=no_tape)
         write_trial(trial_file(self._setup.out, trial.key), record.frame, record.plan, record.after)
-        report(trial)
+        yield trial
         finish(self._cell, record)
 
     def close(self) -> None:

@@ -120,7 +120,8 @@ def _work(connection: Connection, setup: Setup) -> None:
         with trial_runner(setup) as runner:
             while True:
                 for task in connection.recv():
-                    runner.run(task, lambda trial: connection.send(("trial", trial)))
+                    for trial in runner.run(task):
+                        connection.send(("trial", trial))
     except (EOFError, BrokenPipeError):
         pass
     except HalError as error:
