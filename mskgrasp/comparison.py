@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mskgrasp.outcomes import SCHEMA_VERSION, numbers, own_prediction, tape_against_truth
-from mskgrasp.predictors import Predictor
+from mskgrasp.predictors import LOWESS, Predictor
 from mskgrasp.trial import Policy, Prediction, Trial
 
 POLICIES: tuple[Policy, ...] = ("quality", "low_variance")
@@ -42,9 +42,11 @@ def compare(trials: Sequence[Trial], predictors: Mapping[str, Predictor]) -> dic
     A model's novel parts are those that it was not made from. What is not measured is absent (None).
     """
     best = [trial for trial in trials if not trial.chosen_by]
-    models = {}
+    models, policies = {}, {POLICY_NAMES["quality"]: numbers(best)}
     for label, predictor in predictors.items():
         chosen = [trial for trial in trials if trial.chosen_by == label]
+        if chosen:
+            policies[f"{POLICY_NAMES['low_variance']}, of {label}"] = numbers(chosen)
         models[label] = dict(
             has_variance=predictor.has_variance,
             quality=_sides(best, label, predictor),
@@ -53,21 +55,16 @@ def compare(trials: Sequence[Trial], predictors: Mapping[str, Predictor]) -> dic
     return dict(
         schema_version=SCHEMA_VERSION,
         models=models,
-        policies={
-            "quality": numbers(best),
-            **{f"low_variance of {label}": numbers(_chosen(trials, label)) for label in predictors
-               if _chosen(trials, label)},
-        },
+        policies=policies,
         tape_against_truth=tape_against_truth(trials),
         paper=PAPER,
-    )  # fmt: skip
-
-
-def _chosen(trials: Sequence[Trial], label: str) -> list[Trial]:
-    return [trial for trial in trials if trial.chosen_by == label]
+    )
 
 
 def _sides(trials: Sequence[Trial], label: str, predictor: Predictor) -> dict[str, Any]:
+    if label == LOWESS:  # it has nothing to say of other parts
+        trials = [trial for trial in trials if predictor.knows(trial.part)]
+
     def predicted(trial: Trial) -> Prediction | None:
         return own_prediction(trial) if trial.chosen_by else trial.predictions.get(label)
 

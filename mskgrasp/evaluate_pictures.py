@@ -101,7 +101,7 @@ def draw_comparison(report: dict[str, Any], path: Path) -> None:
     """Draws each model's RMSE with both policies, as the paper's figure 5, with the paper's own bars beside.
 
     A row for known and one for novel parts, a column for translation and one for rotation. The paper's bars
-    are of known and novel parts together, and stand in both rows.
+    are of known and novel parts together, and stand in both rows; bars without a line: one part alone.
     """
     models = report["models"]
     ours = {paper_label(label) or label: label for label in models}
@@ -114,7 +114,9 @@ def draw_comparison(report: dict[str, Any], path: Path) -> None:
                 row, ("translation", "rotation"), (100.0, 180 / np.pi), ("cm", "degrees"), strict=True
             ):
                 for x, name in enumerate(order):
-                    _bars(axes, x, models.get(ours.get(name, ""), {}), PAPER.get(name, {}), side, kind, scale)
+                    # What LOWESS knows are known parts.
+                    paper = {} if (name, side) == ("LOWESS", "novel") else PAPER.get(name, {})
+                    _bars(axes, x, models.get(ours.get(name, ""), {}), paper, side, kind, scale)
                 axes.set_title(f"{kind.capitalize()} RMSE, {side} parts", loc="left")
                 axes.set_ylabel(unit)
                 labels = [name if ours.get(name, name) == name else f"{name}\n{ours[name]}" for name in order]
@@ -123,7 +125,7 @@ def draw_comparison(report: dict[str, Any], path: Path) -> None:
                 axes.set_xlim(-0.6, len(order) - 0.4)
         handles = [
             Patch(color=colours[policy], label=f"{POLICY_NAMES[policy]}, {who}")
-            for who, colours in (("here", _OURS), ("paper", _PAPERS))
+            for who, colours in (("here", _OURS), ("paper (all parts)", _PAPERS))
             for policy in POLICIES
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
@@ -149,7 +151,7 @@ def _bars(
             if interval is not None:
                 reach = [[max(value - interval[0] * scale, 0)], [max(interval[1] * scale - value, 0)]]
                 axes.errorbar(x + (k - 1.5) * width, value, yerr=reach, color=_INK, lw=1, capsize=2.5)
-        elif found is not None:
+        elif found is not None and found["trials"]:
             axes.text(x + (k - 1.5) * width, 0, "-", ha="center", va="bottom", color=_OURS[policy])
         bar = paper.get(policy)
         if bar is not None:

@@ -162,12 +162,11 @@ def _displacement(report: dict[str, Any], folder: Path) -> list[Section]:
     for side in SIDES:
         for label, model in report["models"].items():
             for policy in POLICIES:
-                if model[policy] is None:
+                if model[policy] is None or not model[policy][side]["trials"]:
                     continue
                 rows.append((f"{label}", POLICY_NAMES[policy], side, *_error_row(model[policy][side])))
     lifted = tuple(
-        (name.replace("low_variance", POLICY_NAMES["low_variance"]).replace("quality of", "quality, of"),
-         f"{one['successes']} of {one['trials']}", interval_text(one["success_interval"]),
+        (name, f"{one['successes']} of {one['trials']}", interval_text(one["success_interval"]),
          counted(one["reasons"]), counted(one["unmeasured"]))
         for name, one in report["policies"].items()
     )  # fmt: skip

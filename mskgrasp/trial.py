@@ -13,7 +13,13 @@ from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
 from mskgrasp.errors import MarkersNotFound, NoGraspFound, NoPartFound
 from mskgrasp.geometry import Pose
-from mskgrasp.grasp import EJECTED_DISTANCE, MIN_RISE, object_displacement, pose_base_tcp
+from mskgrasp.grasp import (
+    EJECTED_DISTANCE,
+    MIN_RISE,
+    centre_in_grasp_frame,
+    object_displacement,
+    pose_base_tcp,
+)
 from mskgrasp.markers import find_markers, planar_displacement
 from mskgrasp.planner import GraspPlan
 from mskgrasp.settings import Tape
@@ -67,7 +73,8 @@ class Trial:
         policy: How the grasp was chosen.
         chosen_by: Label of the model whose variances chose it; empty where there is but one.
         unmeasured: Why a success was not measured; empty where it was.
-        true: (4,) what a tracker says where markers measure; None where nothing knows.
+        true: (4,) what a tracker says where markers measure: the displacement of the very point whose motion
+            they measure, the part's seen centre; None where nothing knows.
         pose_base_obj: (7,) x y z qw qx qy qz of the part before the grasp, where a tracker tells it.
         predictions: What other models expect of this grasp, by label.
     """
@@ -194,7 +201,19 @@ def run_trial(
         if trial.success and trial.measured is None:
             trial = replace(trial, unmeasured="no tracker: measure by tape (--measure markers)")
         return TrialRecord(trial=trial, frame=frame, plan=plan, in_hand=trial.success)
-    return _measure_by_tape(cell, tape, replace(trial, true=trial.measured, measured=None), frame, plan)
+    if trial.measured is not None and before is not None:
+        true = _of_seen_centre(np.array(trial.measured), before, plan)
+        trial = replace(trial, true=true.tolist(), measured=None)
+    return _measure_by_tape(cell, tape, trial, frame, plan)
+
+
+def _of_seen_centre(displacement: np.ndarray, before: Pose, plan: GraspPlan) -> np.ndarray:
+    """The displacement (4,) of the part's seen centre, from that of its origin; its tilt is left out."""
+    origin, centre = (
+        centre_in_grasp_frame(point, plan.grasp)[:2] for point in (before.position, plan.view.centre_base)
+    )
+    (x, y), cos, sin = centre - origin, np.cos(displacement[3]), np.sin(displacement[3])
+    return displacement + np.array([cos * x - sin * y - x, sin * x + cos * y - y, 0.0, 0.0])
 
 
 def _measure_by_tape(cell: Cell, tape: Tape, trial: Trial, frame: RgbdFrame, plan: GraspPlan) -> TrialRecord:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 
 import gymnasium
@@ -12,6 +13,7 @@ from hal.errors import NotConnected
 from hal.sim.board import show_board
 from hal.sim.colour import FineColour
 from hal.sim.tape import stick_tape
+from mskgrasp.errors import TapeDoesNotFit
 from mskgrasp.geometry import Pose
 from mskgrasp.parts import find_part
 from mskgrasp.settings import Overhead, Physics, Region, Tape
@@ -93,7 +95,9 @@ class SapienWorld:
             render_backend=render_backend(),
         )
         try:
-            self.present(part, seed)
+            # Programs lay down parts of their own: that this one has no room for tape must not stop them.
+            with contextlib.suppress(TapeDoesNotFit):
+                self.present(part, seed)
         except BaseException:
             self._free()
             raise
