@@ -17,6 +17,9 @@ SCHEMA_VERSION = 2
 COVERED = 0.9
 """The central interval whose coverage is told."""
 
+TILTED = float(np.radians(1.0))
+"""A part that hangs more askew than this is put down otherwise than it was held, radians."""
+
 PAPER_SUCCESS = {"simulated": 0.949, "real": 0.863}
 """Share of novel parts' grasps that lifted (Zhao et al. 2019, evaluation in simulation and on the robot)."""
 
@@ -118,15 +121,28 @@ def _interval(errors: np.ndarray, parts: np.ndarray) -> list[float] | None:
 
 
 def tape_against_truth(trials: Sequence[Trial]) -> dict[str, Any] | None:
-    """How far tape measures from what a tracker says; None where not both are known."""
+    """How far tape measures from what a tracker says; None where not both are known.
+
+    A part that hung tilted in the hand lies flat when it is put down, and has moved otherwise by then: those
+    are told apart, for tape cannot know.
+    """
     both = [t for t in trials if t.measured is not None and t.true is not None]
     if not both:
         return None
+    tilted = [t for t in both if (t.tilt or 0.0) > TILTED]
+    return dict(
+        flat=_tape_errors([t for t in both if t not in tilted]), tilted=_tape_errors(tilted), tilt=TILTED
+    )
+
+
+def _tape_errors(trials: Sequence[Trial]) -> dict[str, Any]:
+    if not trials:
+        return dict(trials=0)
     distance, angle = displacement_errors(
-        np.array([t.true for t in both]), np.array([t.measured for t in both])
+        np.array([t.true for t in trials]), np.array([t.measured for t in trials])
     )
     return dict(
-        trials=len(both),
+        trials=len(trials),
         translation_rmse=_rms(distance),
         translation_worst=float(distance.max()),
         rotation_rmse=_rms(angle),

@@ -223,7 +223,8 @@ def _measure_by_tape(cell: Cell, tape: Tape, trial: Trial, frame: RgbdFrame, pla
     try:
         before = find_markers(frame, tape, **table)
         try:
-            put_down(cell, plan.grasp)
+            # To the very place: where it falls, it shifts.
+            put_down(cell, plan.grasp, height=0.0)
         except MotionAborted as error:
             cell.arm.recover()
             raise MarkersNotFound("not put down: the part hangs lower in the hand than it lay") from error

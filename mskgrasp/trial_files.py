@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,7 @@ def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | Non
         BadDataset: The file is missing, damaged, or of another schema.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         if int(arrays["schema_version"]) != SCHEMA_VERSION:
             raise BadDataset(f"{path} has schema version {int(arrays['schema_version'])}, legal: {SCHEMA_VERSION}")
@@ -74,7 +75,16 @@ def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | Non
         return _frame("before", arrays), plan, after
     except FileNotFoundError as error:
         raise BadDataset(f"no {path}: the trial's file was removed; run it again in another --out") from error
-    except (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        EOFError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
         raise BadDataset(f"{path} is damaged ({' '.join(str(error).split())}); copy it again") from error
 
 
