@@ -93,7 +93,7 @@ def put_down(cell: Cell, grasp: np.ndarray, *, height: float = PUT_DOWN) -> None
     Args:
         cell: The hand holds the part over the table.
         grasp: (4,) at which it was grasped.
-        height: How much above that it is let go, metres; a fall of 2 mm shifts a part by up to half a millimetre.
+        height: How much above that it is let go, metres; falling 2 mm, a part may shift by half of one.
 
     Raises:
         MotionAborted: The part met the table early, because it hangs lower in the hand than it lay.

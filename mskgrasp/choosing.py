@@ -1,4 +1,4 @@
-"""Chooses grasps as the paper's experiments do: by quality, or among the best by the variance of some model."""
+"""Chooses grasps as the paper's experiments do: by quality, or among the best by some model's variance."""
 
 from __future__ import annotations
 

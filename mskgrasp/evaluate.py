@@ -67,9 +67,9 @@ class EvaluateConfig(Config):
     noise: Noise | None = None
     """How a simulated camera errs (iid: 3 mm a pixel), instead of what its cell's file says."""
     measure: Literal["truth", "markers"] = "truth"
-    """What tells the displacement: the cell's tracker, or two squares of tape on the part (docs/markers.md)."""
+    """truth: the cell's tracker tells the displacement. markers: two squares of tape do (docs/markers.md)."""
     tape: tuple[float, float] | None = None
-    """Sides of the larger and the smaller square, m; by default 12 and 8 mm, or as a simulated cell's file says."""
+    """Sides of both squares, m, the larger first; by default 0.012 0.008, or those of a simulated cell."""
     out: Path = Path("out/eval")
     """Folder for trials.jsonl, report.json and the pictures."""
     parts: tuple[str, ...] = ()
@@ -138,7 +138,9 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
     words = config.parts or PARTS[config.experiment]
     parts = {find_part(word).name: word for word in part_names(words, models.meta.training, config.n_parts)}
     if config.planner.policy == "low_variance" and not models.meta.network.variance:
-        raise BadModel(f"{config.models} predicts no variance; use --planner.policy quality, or another model")
+        raise BadModel(
+            f"{config.models} predicts no variance; use --planner.policy quality, or another model"
+        )
     cell = read_cell(config.cell, noise=config.noise, measure=config.measure, tape=config.tape)
     compared = None
     if config.experiment == "displacement":
@@ -149,7 +151,9 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
     begin(config, config.out, inputs, may_change=MAY_CHANGE)
     with only_here(config.out) as alone:
         if not alone:
-            raise UsageError(f"another evaluation writes into {config.out}; wait for it, or choose another --out")
+            raise UsageError(
+                f"another evaluation writes into {config.out}; wait for it, or choose another --out"
+            )
         tasks = scenes(parts, config.trials, config.seed, config.planner, compared)
         trials = _make_trials(config, cell, compared, tasks)
         if compared is not None:
@@ -187,7 +191,9 @@ def _make_trials(
     )
     n = sum(map(len, missing))
     done = sum(map(len, tasks)) - n
-    bar = tqdm(total=n + done, initial=done, unit="trial", file=sys.stderr, smoothing=0.05, dynamic_ncols=True)
+    bar = tqdm(
+        total=n + done, initial=done, unit="trial", file=sys.stderr, smoothing=0.05, dynamic_ncols=True
+    )
     n_lifted = 0
     with _made(config, cell, setup, missing) as made, bar:
         for k, trial in enumerate(made, 1):
@@ -232,7 +238,9 @@ def _one_by_one(setup: Setup, missing: Sequence[tuple[TrialTask, ...]]) -> Itera
                 yield from runner.run(task)
 
 
-def _with_predictions(config: EvaluateConfig, trials: dict[str, Trial], compared: Compared) -> dict[str, Trial]:
+def _with_predictions(
+    config: EvaluateConfig, trials: dict[str, Trial], compared: Compared
+) -> dict[str, Trial]:
     """Adds what each model expects of the grasps of best quality, where that is not known yet."""
     bar = tqdm(trials.items(), desc="predictions", leave=False, delay=5, file=sys.stderr)
     more = {key: with_predictions(trial, config.out, compared.predictors) for key, trial in bar}

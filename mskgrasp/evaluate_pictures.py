@@ -25,7 +25,7 @@ _MOST_ROWS = 40
 
 
 def draw_success(report: dict[str, Any], path: Path) -> None:
-    """Draws the share of lifted grasps by family, or by part where every family has one, and why others failed."""
+    """Draws how many grasps lifted, by family or, where every family has one part, by part; and why not."""
     overall = report["overall"]
     by = "families" if len(report["families"]) < len(report["parts"]) else "parts"
     rows = sorted(report[by].items(), key=lambda item: (item[1]["success_rate"], item[0]))
@@ -42,7 +42,10 @@ def draw_success(report: dict[str, Any], path: Path) -> None:
         low, high = overall["success_interval"]
         left.axvspan(low, high, color="#e7effc", zorder=0, lw=0)
         left.axvline(
-            overall["success_rate"], color=_OURS["quality"], lw=1.2, label=f"all: {overall['success_rate']:.1%}"
+            overall["success_rate"],
+            color=_OURS["quality"],
+            lw=1.2,
+            label=f"all: {overall['success_rate']:.1%}",
         )
         paper = report["paper"]["simulated"]
         left.axvline(paper, color=_INK, lw=1, ls="--", label=f"paper, simulated: {paper:.1%}")
@@ -52,7 +55,9 @@ def draw_success(report: dict[str, Any], path: Path) -> None:
         left.set_ylim(-0.7, len(shown) - 0.3)
         left.legend(frameon=False, fontsize=8, loc="upper left")
         reasons = overall["reasons"]
-        right.barh(list(reasons) or ["none"], list(reasons.values()) or [0], color=_OURS["low_variance"], height=0.5)
+        right.barh(
+            list(reasons) or ["none"], list(reasons.values()) or [0], color=_OURS["low_variance"], height=0.5
+        )
         right.set_title(f"Not lifted: {sum(reasons.values())} of {overall['trials']}", loc="left")
         right.xaxis.get_major_locator().set_params(integer=True)
         right.set_xlabel("grasps")

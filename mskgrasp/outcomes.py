@@ -1,4 +1,4 @@
-"""What a set of trials amounts to, in numbers: how many were lifted, how well displacements were predicted."""
+"""What trials amount to, in numbers: how many were lifted, how well displacements were predicted."""
 
 from __future__ import annotations
 
@@ -80,9 +80,7 @@ def _counted(words: Iterable[str]) -> dict[str, int]:
     return dict(sorted(Counter(words).items()))
 
 
-def _errors(
-    trials: Sequence[Trial], prediction: Callable[[Trial], Prediction | None]
-) -> dict[str, Any]:
+def _errors(trials: Sequence[Trial], prediction: Callable[[Trial], Prediction | None]) -> dict[str, Any]:
     rows = [(t.part, t.measured, prediction(t)) for t in trials if t.measured is not None]
     rows = [(part, measured, one) for part, measured, one in rows if one is not None]
     parts = np.array([part for part, _, _ in rows])
@@ -90,7 +88,9 @@ def _errors(
     expected = np.array([one.mean for _, _, one in rows]).reshape(-1, 4)
     found: dict[str, Any] = dict(measured=len(rows), measured_parts=len(set(parts.tolist())))
     for suffix, predicted in (("", expected), ("_of_zero", 0 * expected)):
-        for kind, errors in zip(("translation", "rotation"), displacement_errors(predicted, true), strict=True):
+        for kind, errors in zip(
+            ("translation", "rotation"), displacement_errors(predicted, true), strict=True
+        ):
             found[f"{kind}_rmse{suffix}"] = _rms(errors) if rows else None
             if not suffix:
                 found[f"{kind}_interval"] = _interval(errors, parts)

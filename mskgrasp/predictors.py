@@ -57,8 +57,8 @@ class Predictor(Protocol):
         """Of grasps (n, 4), base frame.
 
         Returns:
-            Mean (n, 4) of the grasp displacement, its variances (n, 4), NaN where it tells none, and the centre
-            (3,) of the part that it speaks of, base frame. Metres and radians, axes of the grasp frame.
+            Mean (n, 4) of the grasp displacement, its variances (n, 4), NaN where it tells none, both metres
+            and radians along the axes of the grasp frame; the part's centre (3,) that it speaks of, base.
         """
         ...
 

@@ -31,7 +31,9 @@ def find_trial(run: Path, key: str) -> Trial:
     trials = {trial.key: trial for trial in read(run / TRIALS, Trial.from_json)}
     if key not in trials:
         close = difflib.get_close_matches(key, trials, n=3, cutoff=0.4) or list(trials)[:3]
-        raise UsageError(f"no trial {key!r} in {run}; there are {', '.join(close)}, ... ({len(trials)} in all)")
+        raise UsageError(
+            f"no trial {key!r} in {run}; there are {', '.join(close)}, ... ({len(trials)} in all)"
+        )
     return trials[key]
 
 
@@ -59,7 +61,9 @@ def outcome_text(trial: Trial) -> str:
         return f"lifted, not measured ({trial.unmeasured.split(':')[0]})"
     dx, dy, dz, turn = trial.measured
     height = "" if np.isnan(dz) else f", dz {dz * 1e3:+.1f}"
-    text = f"lifted, moved dx {dx * 1e3:+.1f}, dy {dy * 1e3:+.1f}{height} mm, turn {np.degrees(turn):+.1f} deg"
+    text = (
+        f"lifted, moved dx {dx * 1e3:+.1f}, dy {dy * 1e3:+.1f}{height} mm, turn {np.degrees(turn):+.1f} deg"
+    )
     if trial.predicted is None:
         return text
     distance, angle = displacement_errors(np.array([trial.predicted]), np.array([trial.measured]))

@@ -20,7 +20,7 @@ from mskgrasp.grasp import (
     object_displacement,
     pose_base_tcp,
 )
-from mskgrasp.markers import find_markers, planar_displacement
+from mskgrasp.markers import Markers, find_markers, planar_displacement
 from mskgrasp.planner import GraspPlan
 from mskgrasp.settings import Tape
 
@@ -218,10 +218,13 @@ def _of_seen_centre(displacement: np.ndarray, before: Pose, plan: GraspPlan) -> 
 
 def _measure_by_tape(cell: Cell, tape: Tape, trial: Trial, frame: RgbdFrame, plan: GraspPlan) -> TrialRecord:
     """Puts the part down where it was grasped and looks how it lies; whatever is in doubt is no number."""
-    table = dict(table_z=cell.workspace.table_z, region=cell.workspace.region)
+
+    def look(at: RgbdFrame) -> Markers:
+        return find_markers(at, tape, table_z=cell.workspace.table_z, region=cell.workspace.region)
+
     after = None
     try:
-        before = find_markers(frame, tape, **table)
+        before = look(frame)
         try:
             # To the very place: where it falls, it shifts.
             put_down(cell, plan.grasp, height=0.0)
@@ -230,9 +233,7 @@ def _measure_by_tape(cell: Cell, tape: Tape, trial: Trial, frame: RgbdFrame, pla
             raise MarkersNotFound("not put down: the part hangs lower in the hand than it lay") from error
         clear(cell)
         after = _as_stored(cell.camera.capture())
-        dx, dy, dtheta = planar_displacement(
-            before, find_markers(after, tape, **table), plan.grasp, plan.view.centre_base
-        )
+        dx, dy, dtheta = planar_displacement(before, look(after), plan.grasp, plan.view.centre_base)
     except MarkersNotFound as error:
         return TrialRecord(
             trial=replace(trial, unmeasured=str(error)), frame=frame, plan=plan, after=after,
@@ -243,7 +244,7 @@ def _measure_by_tape(cell: Cell, tape: Tape, trial: Trial, frame: RgbdFrame, pla
 
 
 def _as_stored(frame: RgbdFrame) -> RgbdFrame:
-    """The frame as a file holds it, in the steps of the datasets: what is planned on can be planned on again."""
+    """The frame as a file holds it, in the datasets' steps: what is planned on can be planned on again."""
     depth = np.where(frame.depth > _MOST_DEPTH, np.nan, frame.depth)
     return replace(frame, depth=u16_to_depth(depth_to_u16(depth)))
 

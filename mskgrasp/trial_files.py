@@ -1,4 +1,4 @@
-"""A trial on disk: the frame that was seen, what was planned in it, and the frame afterwards where there is one."""
+"""A trial on disk: the frame that was seen, what was planned in it, and the frame afterwards, if any."""
 
 from __future__ import annotations
 
@@ -69,7 +69,9 @@ def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | Non
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         if int(arrays["schema_version"]) != SCHEMA_VERSION:
-            raise BadDataset(f"{path} has schema version {int(arrays['schema_version'])}, legal: {SCHEMA_VERSION}")
+            raise BadDataset(
+                f"{path} has schema version {int(arrays['schema_version'])}, legal: {SCHEMA_VERSION}"
+            )
         plan = _plan(arrays) if "plan_grasp" in arrays else None
         after = _frame("after", arrays) if "after_depth_u16_dmm" in arrays else None
         return _frame("before", arrays), plan, after
@@ -105,7 +107,9 @@ def _frame_arrays(name: str, frame: RgbdFrame, *, fine: bool) -> dict[str, Any]:
 def _frame(name: str, arrays: dict[str, np.ndarray]) -> RgbdFrame:
     depth, colour = arrays[f"{name}_depth_u16_dmm"], arrays[f"{name}_colour"]
     if depth.dtype != np.uint16 or depth.ndim != 2 or colour.shape != (*depth.shape, 3):
-        raise ValueError(f"depth of shape {depth.shape} and type {depth.dtype}, colour of shape {colour.shape}")
+        raise ValueError(
+            f"depth of shape {depth.shape} and type {depth.dtype}, colour of shape {colour.shape}"
+        )
     return RgbdFrame(
         colour=colour,
         depth=u16_to_depth(depth),
@@ -118,6 +122,8 @@ def _frame(name: str, arrays: dict[str, np.ndarray]) -> RgbdFrame:
 
 
 def _plan(arrays: dict[str, np.ndarray]) -> GraspPlan:
+    rest: dict[str, Any] = {name: arrays[f"plan_{name}"] for name in _ARRAYS}
+    rest |= {name: float(arrays[f"plan_{name}"]) for name in _NUMBERS}
     return GraspPlan(
         view=PartView(
             centre_base=arrays["view_centre_base"].reshape(3),
@@ -128,6 +134,5 @@ def _plan(arrays: dict[str, np.ndarray]) -> GraspPlan:
         ),
         candidates=arrays["plan_candidates"].astype(np.float64).reshape(-1, 4),
         seconds={},
-        **{name: arrays[f"plan_{name}"] for name in _ARRAYS},
-        **{name: float(arrays[f"plan_{name}"]) for name in _NUMBERS},
+        **rest,
     )

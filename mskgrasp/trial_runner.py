@@ -72,7 +72,7 @@ class Setup:
 
 
 def scene_seed(seed: int, part: str, number: int) -> int:
-    """The seed of a trial: the part's place and turn, the camera's errors and the candidates follow from it."""
+    """The seed of a trial, which the part's place, the camera's errors and the candidates follow from."""
     words = [seed, zlib.crc32(part.encode()), number]
     return int(np.random.SeedSequence(words).generate_state(1)[0] >> 1)
 

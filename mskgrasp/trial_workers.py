@@ -67,8 +67,8 @@ def run_trials(setup: Setup, scenes: Sequence[Scene], n_workers: int) -> Generat
                     deaths[key] = deaths.get(key, 0) + 1
                     if deaths[key] >= MAX_TRIES:
                         raise TrialsStopped(
-                            f"trial {key} could not be made in {MAX_TRIES} fresh processes ({told}); leave its "
-                            "part out with --parts"
+                            f"trial {key} could not be made in {MAX_TRIES} fresh processes ({told}); leave "
+                            "its part out with --parts"
                         )
                     waiting.appendleft(tuple(worker.left))
     finally:

@@ -83,7 +83,9 @@ def test_a_run_with_other_settings_or_another_model_is_refused(alone: Path, tmp_
         evaluate(config(alone, trials=3, noise="kinect2", models=models))
 
 
-def test_models_are_compared_and_another_one_joins_without_new_grasps_for_all(collected: Path, tmp_path: Path):
+def test_models_are_compared_and_another_one_joins_without_new_grasps_for_all(
+    collected: Path, tmp_path: Path
+):
     out, part = tmp_path / "out", "parallel_key_a16x10x56"
     settings = dict(experiment="displacement", parts=(part,), lowess_data=collected)
     report = evaluate(config(out, compare=(f"gcip_mv={MODEL}",), **settings))
@@ -130,8 +132,9 @@ def test_a_run_without_a_success_and_a_trial_drawn_again(tmp_path: Path):
     """As a user types it: nothing is good enough, so nothing is grasped."""
     out = tmp_path / "out"
     done = program(
-        "--models", str(MODEL), "--parts", "hex_nut_m30", "--trials", "1", "--workers", "1", "--out", str(out),
-        "--planner.n-candidates", "20", "--planner.min-quality", "1",
+        "--models", str(MODEL), "--parts", "hex_nut_m30", "--trials", "1", "--workers", "1",
+        "--out", str(out), "--planner.n-candidates", "20",
+        "--planner.min-quality", "1",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "0 of 1" in done.stdout and "NoGraspFound 1" in done.stdout and "nan" not in done.stdout

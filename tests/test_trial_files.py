@@ -91,7 +91,9 @@ def test_a_name_that_leads_out_of_the_folder_is_no_trial(tmp_path: Path):
         find_trial(tmp_path, "../../etc/passwd-000")
 
 
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut short", b"\x80\x04N."], ids=["empty", "zip", "pickle"])
+@pytest.mark.parametrize(
+    "content", [b"", b"PK\x03\x04 cut short", b"\x80\x04N."], ids=["empty", "zip", "pickle"]
+)
 def test_a_damaged_file_is_an_error_of_one_line(tmp_path: Path, content: bytes):
     path = trial_file(tmp_path, "a-000")
     with pytest.raises(BadDataset, match="no .*a-000.npz"):
