@@ -203,19 +203,8 @@ def _displacement(report: dict[str, Any], folder: Path) -> list[Section]:
         ),
         Section(
             title="Displacement in the hand",
-            text="RMSE over the measured successes [95 % interval over parts]; a part is known to a model that "
-            "was made from grasps of it",
-            columns=(
-                "model",
-                "policy",
-                "parts",
-                "measured",
-                "RMSE",
-                "of zero",
-                "turn RMSE",
-                "of zero",
-                "90 %",
-            ),
+            text=_EXPLAINED,
+            columns=_ERROR_COLUMNS,
             rows=tuple(rows),
             figures=((folder / "displacement.png", "As the paper's figure 5, with the paper's own bars"),),
         ),
@@ -256,8 +245,8 @@ def _tape(report: dict[str, Any]) -> list[Section]:
     return [
         Section(
             title="Measured by tape, against the truth",
-            text=f"in the plane; a part tilted by over {np.degrees(found['tilt']):.0f} degree in the hand lies "
-            "flat again when it is put down",
+            text=f"in the plane; a part tilted by over {np.degrees(found['tilt']):.0f} degree in the hand is flat "
+            "again when it is put down",
             columns=("in the hand", "trials", "RMS", "worst", "turn RMS", "worst"),
             rows=tuple(rows),
         )
