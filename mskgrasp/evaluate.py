@@ -192,8 +192,9 @@ def _make_trials(
     n = sum(map(len, missing))
     done = sum(map(len, tasks)) - n
     bar = tqdm(
-        total=n + done, initial=done, unit="trial", file=sys.stderr, smoothing=0.05, dynamic_ncols=True
-    )
+        total=n + done, initial=done, unit="trial", file=sys.stderr, smoothing=0.05, dynamic_ncols=True,
+        mininterval=0.5 if sys.stderr.isatty() else 15.0,
+    )  # fmt: skip
     n_lifted = 0
     with _made(config, cell, setup, missing) as made, bar:
         for k, trial in enumerate(made, 1):
@@ -264,7 +265,7 @@ def _report(
         experiment=config.experiment,
         **body,
         trials=[dict(trial=trial.key, outcome=outcome_text(trial)) for trial in trials],
-        worst=[(pictures[trial.key], f"{trial.key}: {outcome_text(trial)}") for trial in worst],
+        worst=[[pictures[trial.key], f"{trial.key}: {outcome_text(trial)}"] for trial in worst],
         settings=settings,
         versions=versions(),
     )

@@ -61,6 +61,7 @@ def draw_success(report: dict[str, Any], path: Path) -> None:
         right.set_title(f"Not lifted: {sum(reasons.values())} of {overall['trials']}", loc="left")
         right.xaxis.get_major_locator().set_params(integer=True)
         right.set_xlabel("grasps")
+        right.set_ylim(-0.7, max(len(reasons), 5) - 0.3)
         right.set_xlim(left=0, right=max([1, *reasons.values()]) * 1.1)
         figure.savefig(path, dpi=150)
 

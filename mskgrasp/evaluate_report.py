@@ -79,7 +79,7 @@ def print_report(report: dict[str, Any], folder: Path, console: Console) -> None
                 table.add_row(*row)
             console.print(table)
         if section.text:
-            console.print(section.text, highlight=False)
+            console.print(section.text, highlight=False, soft_wrap=True)
 
 
 _WORDS = (
@@ -245,8 +245,8 @@ def _tape(report: dict[str, Any]) -> list[Section]:
     return [
         Section(
             title="Measured by tape, against the truth",
-            text=f"in the plane; a part tilted by over {np.degrees(found['tilt']):.0f} degree in the hand is flat "
-            "again when it is put down",
+            text=f"in the plane; tilted: by over {np.degrees(found['tilt']):.0f} degree in the hand, "
+            "and flat again when it is put down",
             columns=("in the hand", "trials", "RMS", "worst", "turn RMS", "worst"),
             rows=tuple(rows),
         )
