@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
@@ -142,6 +142,8 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
             f"{config.models} predicts no variance; use --planner.policy quality, or another model"
         )
     cell = read_cell(config.cell, noise=config.noise, measure=config.measure, tape=config.tape)
+    if config.workers > 1 and not cell.simulated:
+        raise UsageError(f"--workers {config.workers}: there is one cell of {config.cell}; leave it away")
     compared = None
     if config.experiment == "displacement":
         chunk = config.planner.chunk_size
@@ -188,6 +190,7 @@ def _make_trials(
         choosers=compared.choosers if compared is not None else {},
         lowess=compared.lowess.fits if compared is not None and compared.lowess is not None else {},
         tape=cell.tape,
+        must_measure=compared is not None,
     )
     n = sum(map(len, missing))
     done = sum(map(len, tasks)) - n
@@ -213,26 +216,22 @@ def _made(
     config: EvaluateConfig, cell: CellFile, setup: Setup, missing: Sequence[tuple[TrialTask, ...]]
 ) -> Iterator[Iterator[Trial]]:
     """The missing trials, in this process or, of simulated cells, in several."""
-    if config.workers > 1 and not cell.simulated:
-        raise UsageError(f"--workers {config.workers}: there is one cell of {config.cell}; leave it away")
     n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
+    n_threads = torch.get_num_threads()
     if n_workers > 1:
         made = run_trials(setup, missing, n_workers)
-        try:
-            yield made
-        finally:
-            made.close()
-        return
-    n_threads = torch.get_num_threads()
-    if cell.simulated:
-        torch.set_num_threads(1)  # as in a process of its own: the same sums
+    else:
+        made = _one_by_one(setup, missing)
+        if cell.simulated:
+            torch.set_num_threads(1)  # as in a process of its own: the same sums
     try:
-        yield _one_by_one(setup, missing)
+        yield made
     finally:
+        made.close()
         torch.set_num_threads(n_threads)
 
 
-def _one_by_one(setup: Setup, missing: Sequence[tuple[TrialTask, ...]]) -> Iterator[Trial]:
+def _one_by_one(setup: Setup, missing: Sequence[tuple[TrialTask, ...]]) -> Generator[Trial, None, None]:
     with trial_runner(setup) as runner:
         for scene in missing:
             for task in scene:

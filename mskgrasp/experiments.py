@@ -136,7 +136,7 @@ def scenes(
     found = []
     for number in range(n_trials):
         for name, word in parts.items():
-            task = TrialTask(part=word, number=number, seed=seed, policy=planner.policy)
+            task = TrialTask(part=name, source=word, number=number, seed=seed, policy=planner.policy)
             if compared is None:
                 found.append((task,))
                 continue

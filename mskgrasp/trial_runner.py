@@ -12,7 +12,7 @@ import numpy as np
 
 from hal import Cell, open_cell
 from mskgrasp.choosing import Candidates, Chooser
-from mskgrasp.errors import TapeDoesNotFit
+from mskgrasp.errors import TapeDoesNotFit, UsageError
 from mskgrasp.lowess import Lowess
 from mskgrasp.models import load_models
 from mskgrasp.parts import find_part
@@ -29,7 +29,8 @@ class TrialTask:
     """A trial to be made.
 
     Attributes:
-        part: Name or folder of the part.
+        part: Name of the part.
+        source: Its name or its folder.
         number: Which trial of it; trials of one part and number see the same scene.
         seed: Of the run.
         policy: How the grasp is chosen.
@@ -37,6 +38,7 @@ class TrialTask:
     """
 
     part: str
+    source: str
     number: int
     seed: int
     policy: Policy
@@ -45,7 +47,7 @@ class TrialTask:
     @property
     def key(self) -> str:
         """As `Trial.key`."""
-        return trial_key(find_part(self.part).name, self.number, self.chosen_by)
+        return trial_key(self.part, self.number, self.chosen_by)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +61,7 @@ class Setup:
         choosers: Folders of the models that choose by their variances, by label.
         lowess: LOWESS of the known parts.
         tape: Sizes of the squares of tape to measure by; None: the cell's tracker measures.
+        must_measure: Trials that nothing measures are worth nothing.
         out: Folder of the run.
     """
 
@@ -69,6 +72,7 @@ class Setup:
     choosers: dict[str, Path] = field(default_factory=dict)
     lowess: dict[str, Lowess] = field(default_factory=dict)
     tape: Tape | None = None
+    must_measure: bool = False
 
 
 def scene_seed(seed: int, part: str, number: int) -> int:
@@ -78,9 +82,19 @@ def scene_seed(seed: int, part: str, number: int) -> int:
 
 
 class TrialRunner:
-    """Makes trials on a connected cell."""
+    """Makes trials on a connected cell.
+
+    Raises:
+        UsageError: The cell does not tell what the trials need to know.
+    """
 
     def __init__(self, cell: Cell, setup: Setup):
+        if cell.tracker is None and setup.must_measure and setup.tape is None:
+            raise UsageError("nothing in this cell tracks the part: measure by tape, --measure markers")
+        if cell.tracker is None and setup.lowess:
+            raise UsageError(
+                "LOWESS needs the part's pose and nothing here tells it: leave --lowess-data away"
+            )
         self._cell = cell
         self._setup = setup
         planner = make_planner(setup.models, setup.planner, cell)
@@ -98,21 +112,22 @@ class TrialRunner:
         Raises:
             HalError: The cell was lost.
         """
-        part = find_part(task.part)
-        seed = scene_seed(task.seed, part.name, task.number)
+        seed = scene_seed(task.seed, task.part, task.number)
         clear(self._cell)
         no_tape = ""
         try:
-            present(self._cell, task.part, seed)
+            present(self._cell, task.source, seed)
         except TapeDoesNotFit as error:
             no_tape = f"no room for tape: {error}"  # it lies there all the same, and may be grasped
         chooser = Chooser(
-            self._candidates, self._predictors[task.chosen_by], task.policy, part.name, self._cell.tracker
+            self._candidates, self._predictors[task.chosen_by], task.policy, task.part, self._cell.tracker
         )
         record = run_trial(
-            self._cell, chooser, part=part.name, number=task.number, seed=seed, tape=self._setup.tape
+            self._cell, chooser, part=task.part, number=task.number, seed=seed, tape=self._setup.tape
         )
-        trial = replace(record.trial, family=part.family, policy=task.policy, chosen_by=task.chosen_by)
+        trial = replace(
+            record.trial, family=find_part(task.source).family, policy=task.policy, chosen_by=task.chosen_by
+        )
         if trial.unmeasured and no_tape:
             trial = replace(trial, unmeasured=no_tape)
         write_trial(trial_file(self._setup.out, trial.key), record.frame, record.plan, record.after)

@@ -155,6 +155,7 @@ def test_a_run_without_a_success_and_a_trial_drawn_again(tmp_path: Path):
         (dict(tape=(0.012, 0.008)), "--measure markers"),
         (dict(measure="markers", tape=(0.008, 0.012)), "at least 1.25 times"),
         (dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml", noise="iid"), "for a simulated cell"),
+        (dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml", workers=2), "there is one cell"),
         (dict(experiment="displacement", compare=("a-b=x",)), "label=folder"),
         (dict(experiment="displacement", compare=("a",)), "label=folder"),
         (dict(experiment="displacement", compare=("a=typo",)), "no model.json in typo"),
