@@ -23,9 +23,8 @@ from mskgrasp.config import Config
 from mskgrasp.errors import BadModel, UsageError
 from mskgrasp.evaluate_pictures import draw_comparison, draw_errors, draw_success
 from mskgrasp.evaluate_report import print_report
-from mskgrasp.experiments import Compared, Experiment, load_compared, scenes, with_predictions
+from mskgrasp.experiments import Compared, Experiment, load_compared, open_model, scenes, with_predictions
 from mskgrasp.files import only_here, write_whole
-from mskgrasp.models import load_models
 from mskgrasp.outcomes import farthest_off, summarise, worst_trials
 from mskgrasp.parts import find_part
 from mskgrasp.plan import SIMULATED_CELL
@@ -134,7 +133,7 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
         MskgraspError: A model, a part or the cell cannot be used.
     """
     _check(config)
-    models = load_models(config.models)
+    models = open_model(config.models)
     words = config.parts or PARTS[config.experiment]
     parts = {find_part(word).name: word for word in part_names(words, models.meta.training, config.n_parts)}
     if config.planner.policy == "low_variance" and not models.meta.network.variance:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mskgrasp.errors import UsageError
 from mskgrasp.geometry import Pose
-from mskgrasp.models import load_models
+from mskgrasp.models import DESCRIPTION, Models, load_models
 from mskgrasp.planner import PlannerConfig
 from mskgrasp.predictors import (
     LOWESS,
@@ -31,6 +31,20 @@ from mskgrasp.trial_runner import TrialTask
 Experiment = Literal["success", "displacement"]
 # No hyphen: it parts a label from the number of a trial.
 _LABEL = re.compile(r"[A-Za-z][A-Za-z0-9_+.]*")
+
+
+def open_model(folder: Path) -> Models:
+    """The model of a folder that a user names.
+
+    Raises:
+        UsageError: There is none.
+        BadModel: It cannot be used.
+    """
+    if not (folder / DESCRIPTION).is_file():
+        raise UsageError(
+            f"no {DESCRIPTION} in {folder}; train a model: python -m mskgrasp.train --out {folder}"
+        )
+    return load_models(folder)
 
 
 def model_folders(compare: Iterable[str], models: Path) -> dict[str, Path]:
@@ -102,7 +116,7 @@ def load_compared(
     """
     folders = model_folders(compare, models)
     predictors: dict[str, Predictor] = {
-        label: NetworkPredictor(load_models(folder), chunk_size) for label, folder in folders.items()
+        label: NetworkPredictor(open_model(folder), chunk_size) for label, folder in folders.items()
     }
     inputs: dict[str, str] = {}
     for label, folder in folders.items():

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import sys
 import traceback
 from collections import deque
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from typing import Any
+
+from tqdm import tqdm
 
 from hal.errors import HalError
 from mskgrasp.cli import explain_os_error
@@ -70,6 +73,7 @@ def run_trials(setup: Setup, scenes: Sequence[Scene], n_workers: int) -> Generat
                             f"trial {key} could not be made in {MAX_TRIES} fresh processes ({told}); leave "
                             "its part out with --parts"
                         )
+                    tqdm.write(f"a process was lost ({told}); trial {key} is made again", file=sys.stderr)
                     waiting.appendleft(tuple(worker.left))
     finally:
         for worker in workers:

@@ -170,6 +170,7 @@ def test_what_cannot_be_used_is_told_in_a_line_and_leaves_nothing(
 
     with pytest.raises(MskgraspError, match=message) as raised:
         evaluate(config(tmp_path / "out", **changes))
+    assert raised.value.exit_code == (1 if "lowess_data" in changes else 2)
     assert "\n" not in str(raised.value) and not (tmp_path / "out").exists()
 
 
