@@ -135,7 +135,7 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
     _check(config)
     models = open_model(config.models)
     words = config.parts or PARTS[config.experiment]
-    parts = {find_part(word).name: word for word in part_names(words, models.meta.training, config.n_parts)}
+    parts = _parts(part_names(words, models.meta.training, config.n_parts))
     if config.planner.policy == "low_variance" and not models.meta.network.variance:
         raise BadModel(
             f"{config.models} predicts no variance; use --planner.policy quality, or another model"
@@ -167,6 +167,19 @@ def _check(config: EvaluateConfig) -> None:
         raise UsageError("--compare and --lowess-data are for --experiment displacement: add that")
     if config.experiment == "displacement" and config.planner.policy != "quality":
         raise UsageError("--experiment displacement runs both policies: leave --planner.policy away")
+
+
+def _parts(words: Sequence[str]) -> dict[str, str]:
+    """What the user called each part, by its name."""
+    parts: dict[str, str] = {}
+    for word in words:
+        name = find_part(word).name
+        if name in parts:
+            raise UsageError(f"--parts: {parts[name]} and {word} are both called {name!r}; leave one away")
+        parts[name] = word
+    if not parts:
+        raise UsageError("--parts names no part that the model was not trained on; name another set or parts")
+    return parts
 
 
 def _make_trials(

@@ -94,6 +94,8 @@ def _errors(trials: Sequence[Trial], prediction: Callable[[Trial], Prediction | 
             found[f"{kind}_rmse{suffix}"] = _rms(errors) if rows else None
             if not suffix:
                 found[f"{kind}_interval"] = _interval(errors, parts)
+    tilts = np.array([trial.tilt for trial in trials if trial.tilt is not None])
+    found["tilt_rms"] = _rms(tilts) if len(tilts) else None
     std = np.array([one.std for _, _, one in rows]).reshape(-1, 4)
     told = np.isfinite(std).all() and np.isfinite(true).all() and len(rows) > 0
     found["coverage_90"] = coverage(expected, std**2, true, COVERED).tolist() if told else None

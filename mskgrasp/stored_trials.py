@@ -67,7 +67,7 @@ def outcome_text(trial: Trial) -> str:
     if trial.predicted is None:
         return text
     distance, angle = displacement_errors(np.array([trial.predicted]), np.array([trial.measured]))
-    return f"{text}; expected to {millimetres(float(distance[0]))} and {degrees(float(angle[0]))}"
+    return f"{text}; prediction off by {millimetres(float(distance[0]))} and {degrees(float(angle[0]))}"
 
 
 def describe_trial(trial: Trial) -> str:
