@@ -280,6 +280,8 @@ def _report(
         settings=settings,
         versions=versions(),
     )
+    for earlier in (config.out / "worst").glob("*.png"):
+        earlier.unlink()
     for trial in worst:
         draw_trial(config.out, trial, config.out / pictures[trial.key])
     if compared is None:
