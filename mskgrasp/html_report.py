@@ -191,9 +191,7 @@ def _table(table: Table, names: set[str]) -> str:
     for row in table.rows:
         if len(row) != len(table.header):
             raise ValueError(f"a row of {len(row)} cells under a header of {len(table.header)}: {row}")
-    numeric = [
-        all(_NUMBER.fullmatch(_text(row[k])) for row in table.rows) for k in range(len(table.header))
-    ]
+    numeric = [all(_NUMBER.fullmatch(_text(row[k])) for row in table.rows) for k in range(len(table.header))]
     attributes = [' class="n"' if number else "" for number in numeric]
     head = "".join(
         f'<th scope="col"{attribute}>{escape(name)}</th>'
@@ -206,9 +204,7 @@ def _table(table: Table, names: set[str]) -> str:
         for row in table.rows
     )
     caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
-    return (
-        f'<div class="wide"><table>{caption}<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>'
-    )
+    return f'<div class="wide"><table>{caption}<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>'
 
 
 def _text(cell: object) -> str:

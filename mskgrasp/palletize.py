@@ -2,68 +2,80 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-import math
 import sys
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+import cv2
 import numpy as np
-import yaml
 from pydantic import Field, field_validator
 from rich.console import Console
 from tqdm import tqdm
 
-from hal import Cell, RgbdFrame, execute_grasp, open_cell
-from hal.errors import HalError, MotionAborted, OutOfWorkspace
+from hal import cell_from_yaml
 from mskgrasp.cli import make_folder, parse, run
-from mskgrasp.config import Config
-from mskgrasp.errors import NoGraspFound, NoPartFound, UsageError
-from mskgrasp.evaluate import clear
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import centre_in_grasp_frame, object_displacement, pose_base_tcp
-from mskgrasp.models import PRETRAINED, load_models
+from mskgrasp.config import Config, read_yaml
+from mskgrasp.errors import UsageError
+from mskgrasp.files import only_here
+from mskgrasp.models import load_models
+from mskgrasp.operator import Operator
+from mskgrasp.palletize_report import write_report
 from mskgrasp.parts import find_part
-from mskgrasp.placements import draw_pallet, draw_placements, print_placements, summarise_placements
-from mskgrasp.placing import Target, check_place, displacement_of_point, place, place_error, place_pose
-from mskgrasp.plan import SIMULATED_CELL, make_planner, present
-from mskgrasp.planner import GraspPlan, Planner, PlannerConfig
+from mskgrasp.placement_trial import Placer, Task
+from mskgrasp.placements import CORRECTIONS, Correction, Placement, print_placements
+from mskgrasp.plan import SIMULATED_CELL, make_planner
+from mskgrasp.planner import PlannerConfig
+from mskgrasp.processes import spread, use_one_core
 from mskgrasp.runs import TRIALS, append, begin, file_digest, inputs_of, part_names, read
+from mskgrasp.settings import Tape
+from mskgrasp.slots import Slot, check_reach, check_room, parse_target, read_slots
 
 DESCRIPTION = """Grasps parts, puts each where it shall lie, and measures how far from that it lies then.
 
-Every trial is made with the same grasp once for each correction: none (as if nothing moved in the hand),
-predicted (by the displacement network), truth (what the tracker saw, the best that any prediction could do).
-Writes placements.png, pallet.png, report.json; a stopped run goes on where it was."""
+Every trial is made once for each correction, with the same part in the same place: none (as if nothing moved in
+the hand), predicted (by the displacement network), truth (what the tracker saw, the best any prediction could do).
+Writes report.html, report.json and pictures; every finished placement is stored at once, a stopped run goes on.
 
-Correction = Literal["none", "predicted", "truth"]
+One target for all parts:  --target 0.5,0.06,90
+A pallet of several:       --cell configs/palletize/cell.yaml --slots configs/palletize/grid.yaml
+A cell without a feeder asks its operator for every part, and before the arm moves (--yes: it asks nothing)."""
 
 
 class PalletizeConfig(Config):
     """Settings of a palletizing run."""
 
+    models: Path
+    """Folder with model.safetensors and model.json, as mskgrasp.train writes it."""
     cell: Path = SIMULATED_CELL
     """YAML file of the cell; by default the simulated one."""
-    models: Path = PRETRAINED
-    """Folder with model.safetensors and model.json; by default the shipped one."""
     out: Path = Path("out/palletize")
-    """Folder for trials.jsonl, report.json and the pictures."""
+    """Folder for trials.jsonl, report.html and the pictures."""
     parts: tuple[str, ...] = ("test",)
     """Names, folders, or sets: test and validation (never seen by the model), starter, catalogue."""
     n_parts: int = Field(default=0, ge=0)
     """At most so many of these parts, evenly chosen; 0: all."""
     trials: int = Field(default=3, ge=1)
-    """Trials a part; trial k goes to slot k, over and over."""
+    """Trials a part; with --slots, pallets."""
     target: str = "0.5,0.06,90"
-    """Where a part shall lie: x and y of its centre in metres (base), and by how many degrees it shall be turned
-    from how it lay."""
+    """x and y of the centre, m (base), and the direction of the part's longer side seen from above, degrees."""
     slots: Path | None = None
-    """YAML file of slots instead: a list of {x, y, theta_deg} and, if parts must fit, {width, depth}, metres."""
-    corrections: tuple[Correction, ...] = ("none", "predicted", "truth")
-    """What is corrected by; truth needs a cell that tracks the part."""
+    """YAML file of slots instead, filled with the parts in turn; see configs/palletize/grid.yaml."""
+    corrections: tuple[Correction, ...] | None = None
+    """What is corrected by, of none, predicted, truth; by default all that the cell can."""
+    tape: Tape | None = None
+    """Sizes of two squares of tape on every part, to measure by; by default the cell's tracker measures, and
+    where it has none, nothing does."""
     seed: int = Field(default=0, ge=0)
     """Places, turns and candidates follow from it."""
+    workers: int = Field(default=1, ge=1, le=256)
+    """Processes, each with a simulated cell of its own; they change no result."""
+    yes: bool = False
+    """Ask no operator: the arm moves as soon as a grasp is planned."""
     planner: PlannerConfig = PlannerConfig()
     """How grasps are chosen."""
 
@@ -73,54 +85,24 @@ class PalletizeConfig(Config):
         parse_target(text)
         return text
 
-
-@dataclass(frozen=True, kw_only=True)
-class Slot:
-    """A place on the pallet.
-
-    Attributes:
-        target: Where the part's centre goes, and how it is turned.
-        size: Width and depth that there are, along base x and y, metres; None where it does not matter.
-    """
-
-    target: Target
-    size: tuple[float, float] | None = None
+    def all_slots(self) -> list[Slot]:
+        """The file's slots, or the one target."""
+        return [parse_target(self.target)] if self.slots is None else read_slots(self.slots)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Placement:
-    """What came of one part put down once; metres and radians.
+@dataclass(frozen=True)
+class Pallet:
+    """Tasks that are done one after another in the same process.
 
     Attributes:
-        part: Name of the part.
-        number: Which trial of the part.
-        correction: What was corrected by.
-        target: x, y, theta that were asked for.
-        placed: The part was let go at the target.
-        reason: Why not; empty where it was.
-        grasp: (4,) the grasp; None, as what follows, where there was none.
-        predicted: (4,) expected displacement of the part's seen centre in the hand.
-        measured: (4,) the true one; None where nothing tracks the part.
-        translation_error: Distance of the placed part's centre from its target; None where not placed.
-        rotation_error: Its turn's error; None where not placed.
+        name: For the file of its picture; empty where they are not a pallet but trials each for itself.
+        tasks: In their order.
+        done: Keys of those that are stored already.
     """
 
-    part: str
-    number: int
-    correction: str
-    target: tuple[float, float, float]
-    placed: bool
-    reason: str
-    grasp: list[float] | None = None
-    predicted: list[float] | None = None
-    measured: list[float] | None = None
-    translation_error: float | None = None
-    rotation_error: float | None = None
-
-    @classmethod
-    def from_json(cls, values: dict[str, Any]) -> Placement:
-        """The placement of a line of trials."""
-        return cls(**(values | {"target": tuple(values["target"])}))
+    name: str
+    tasks: tuple[Task, ...]
+    done: frozenset[tuple[str, int, int, Correction]]
 
 
 def main() -> int:
@@ -128,197 +110,146 @@ def main() -> int:
     config = parse(PalletizeConfig, prog="python -m mskgrasp.palletize", description=DESCRIPTION)
     report = palletize(config)
     print_placements(report, Console(width=None if sys.stdout.isatty() else 110))
-    print(f"wrote {config.out}/report.json, trials.jsonl, placements.png and pallet.png")
+    print(f"wrote {config.out}/report.html, report.json, trials.jsonl and a picture of every placement")
     return 0
 
 
 def palletize(config: PalletizeConfig) -> dict[str, Any]:
-    """Executes the trials that are missing and sums them up.
+    """Makes the placements that are missing and sums all up.
 
     Raises:
-        UsageError: The folder holds a run with other settings, or a slot cannot be used.
+        UsageError: The folder holds a run with other settings, a slot cannot be used, or there is no operator.
+        HalError: The cell was lost; what is finished is stored.
     """
     models = load_models(config.models)
     names = part_names(config.parts, models.meta.training)
+    if not names:
+        raise UsageError(
+            f"--parts {' '.join(config.parts)} names no part; `python -m mskgrasp.parts list` does"
+        )
     if config.n_parts and config.n_parts < len(names):
         names = [names[int(i)] for i in np.linspace(0, len(names) - 1, config.n_parts)]
-    slots = read_slots(config)
+    slots = config.all_slots()
+    corrections = _check(config, slots)
+    pallets = _pallets(config, names, slots, corrections)
+    check_room((find_part(task.part), task.slot) for pallet in pallets for task in pallet)
     inputs = inputs_of(config.cell, config.models, names)
     if config.slots is not None:
         inputs["slots"] = file_digest(config.slots)
-    begin(config, config.out, inputs, may_change=("out", "trials", "parts", "n_parts"))
-    make_folder(config.out / "frames")
-    done = {(one.part, one.number, one.correction): one for one in read(config.out / TRIALS, Placement.from_json)}
-    missing = [
-        (name, number, correction)
-        for name in names
-        for number in range(config.trials)
-        for correction in config.corrections
-        if (find_part(name).name, number, correction) not in done
-    ]
-    if missing:
-        with open_cell(config.cell) as cell:
-            check_slots(cell, slots)
-            if "truth" in config.corrections and cell.tracker is None:
-                raise UsageError("--corrections truth: nothing in this cell tracks the part; leave it away")
-            planner = make_planner(config.models, config.planner, cell)
-            for name, number, correction in tqdm(missing, unit="placement", file=sys.stderr):
-                clear(cell)
-                slot = slots[number % len(slots)]
-                one = _one(cell, planner, config, slot, (name, number, correction))
-                done[one.part, one.number, one.correction] = one
-                append(config.out / TRIALS, asdict(one))
-            clear(cell)
-    placements = [done[key] for key in sorted(done)]
-    report = summarise_placements(placements)
-    text = json.dumps(report, indent=1, allow_nan=False)
-    (config.out / "report.json").write_text(text + "\n", encoding="utf-8")
-    draw_placements(placements, config.out / "placements.png")
-    return report
+    may_change = ["out", "trials", "workers", "yes"]
+    # Which part comes into which slot follows from all of them.
+    may_change += ["parts", "n_parts"] if config.slots is None else []
+    begin(config, config.out, inputs, may_change=may_change)
+    with only_here(config.out) as mine:
+        if not mine:
+            raise UsageError(f"another run is at work in {config.out}; wait for it, or choose another --out")
+        make_folder(config.out / "placements")
+        placements = _place_all(config, pallets)
+    return write_report(config, config.out, placements, slots)
 
 
-def _one(
-    cell: Cell, planner: Planner, config: PalletizeConfig, slot: Slot, key: tuple[str, int, Correction]
-) -> Placement:
-    name, number, correction = key
-    part = find_part(name).name
-    seed = int(np.random.SeedSequence([config.seed, number]).generate_state(1)[0] >> 1)
-    target = (slot.target.x, slot.target.y, slot.target.theta)
-    failed = dict(part=part, number=number, correction=correction, target=target, placed=False)
-    present(cell, name, seed)
-    frame = cell.camera.capture()
-    try:
-        plan = planner.plan(frame, np.random.default_rng(seed))
-    except (NoPartFound, NoGraspFound) as error:
-        return Placement(**failed, reason=type(error).__name__)  # pyright: ignore[reportArgumentType]
-    failed["grasp"], failed["predicted"] = plan.grasp.tolist(), plan.displacement.tolist()
-    if slot.size is not None and not fits(plan.view.size[:2], slot):
-        return Placement(**failed, reason="slot too small")  # pyright: ignore[reportArgumentType]
-    before = None if cell.tracker is None else cell.tracker.part_pose()
-    try:
-        result = execute_grasp(cell, plan.grasp)
-        if result.aborted is not None or not result.holding:
-            if result.aborted is not None:
-                cell.arm.recover()
-            reason = "collided" if result.aborted is not None else "slipped" if result.lifted else "missed"
-            return Placement(**failed, reason=reason)  # pyright: ignore[reportArgumentType]
-        measured = None if before is None else _true_displacement(cell, plan, before, result.T_base_tcp)
-        failed["measured"] = None if measured is None else measured.tolist()
-        known = {"none": np.zeros(4), "predicted": plan.displacement, "truth": measured}[correction]
-        assert known is not None
-        pose = place_pose(plan.grasp, known, plan.view.centre_base, slot.target, cell.workspace.table_z)
-        place(cell, pose)
-    except OutOfWorkspace:
-        return Placement(**failed, reason="OutOfWorkspace")  # pyright: ignore[reportArgumentType]
-    except MotionAborted:
-        cell.arm.recover()
-        return Placement(**failed, reason="collided")  # pyright: ignore[reportArgumentType]
-    clear(cell)
-    return _measured(cell, config, plan, frame, before, slot.target, failed)
+def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[Correction, ...]:
+    """Refuses what cannot be done on this cell; nothing is connected, nothing moves.
 
-
-def _true_displacement(cell: Cell, plan: GraspPlan, before: Pose, T_base_tcp: Pose) -> np.ndarray:  # noqa: N803
-    """(4,) of the part's seen centre, from the tracker."""
-    assert cell.tracker is not None
-    found, _ = object_displacement(
-        pose_base_tcp(plan.grasp).inverse() @ before, T_base_tcp.inverse() @ cell.tracker.part_pose()
-    )
-    origin, centre = (
-        centre_in_grasp_frame(point, plan.grasp) for point in (before.position, plan.view.centre_base)
-    )
-    return displacement_of_point(np.asarray(found), origin, centre)
-
-
-def _measured(
-    cell: Cell,
-    config: PalletizeConfig,
-    plan: GraspPlan,
-    frame: RgbdFrame,
-    before: Pose | None,
-    target: Target,
-    values: dict[str, Any],
-) -> Placement:
-    values = values | dict(placed=True, reason="")
-    if cell.tracker is not None and before is not None:
-        after = cell.tracker.part_pose()
-        offset = plan.view.centre_base[:2] - before.position[:2]
-        missed, turned = place_error(before, after, offset, target)
-        values |= dict(translation_error=missed, rotation_error=turned)
-    name = f"{values['part']}-{values['number']:03d}-{values['correction']}.png"
-    draw_pallet(frame, cell.camera.capture(), plan, target, values, config.out / "frames" / name)
-    return Placement(**values)
-
-
-def parse_target(text: str) -> Target:
-    """``x,y,theta`` in metres and degrees.
-
-    Raises:
-        ValueError: It is something else.
+    Returns:
+        The corrections.
     """
-    try:
-        x, y, theta = (float(word) for word in text.split(","))
-    except ValueError:
-        raise ValueError(f"target {text!r} is not x,y,theta in metres and degrees, as 0.5,0.06,90") from None
-    if not all(math.isfinite(value) for value in (x, y, theta)):
-        raise ValueError(f"target {text!r} must be finite")
-    return Target(x=x, y=y, theta=math.radians(theta))
-
-
-def read_slots(config: PalletizeConfig) -> list[Slot]:
-    """The slots of the file, or the one target.
-
-    Raises:
-        UsageError: The file is none of slots.
-    """
-    if config.slots is None:
-        return [Slot(target=parse_target(config.target))]
-    try:
-        values = yaml.safe_load(config.slots.read_text(encoding="utf-8"))
-        slots = [_slot(**entry) for entry in values]
-    except OSError as error:
-        raise UsageError(f"cannot read {config.slots}: {error.strerror}") from error
-    except (yaml.YAMLError, TypeError, ValueError) as error:
-        reason = str(error).splitlines()[0]
+    cell = cell_from_yaml(config.cell)
+    simulated = read_yaml(config.cell).get("type") == "sapien"
+    if config.workers > 1 and not simulated:
         raise UsageError(
-            f"{config.slots} is no list of slots such as {{x: 0.5, y: 0.05, theta_deg: 90}}: {reason}"
-        ) from error
-    if not slots:
-        raise UsageError(f"{config.slots} holds no slot")
-    return slots
+            f"--workers {config.workers}: {config.cell} is one cell of which there are not several"
+        )
+    Operator(cell, yes=config.yes)  # refuses where nobody is there to answer
+    if simulated:
+        check_reach(cell, slots)
+    can = tuple(name for name in CORRECTIONS if name != "truth" or cell.tracker is not None)
+    wanted = can if config.corrections is None else tuple(dict.fromkeys(config.corrections))
+    if not wanted or not set(wanted) <= set(can):
+        raise UsageError(
+            f"--corrections {' '.join(wanted)}: nothing in this cell tracks the part; legal: {', '.join(can)}"
+        )
+    return wanted
 
 
-def _slot(
-    x: float, y: float, theta_deg: float = 0.0, width: float | None = None, depth: float | None = None
-) -> Slot:
-    numbers = [float(value) for value in (x, y, theta_deg, width or 1.0, depth or 1.0)]
-    if not all(math.isfinite(value) for value in numbers) or min(numbers[3:]) <= 0:
-        raise ValueError("numbers must be finite, width and depth positive")
-    if (width is None) != (depth is None):
-        raise ValueError("width and depth go together")
-    size = None if width is None else (numbers[3], numbers[4])
-    return Slot(target=Target(x=numbers[0], y=numbers[1], theta=math.radians(numbers[2])), size=size)
+def _pallets(
+    config: PalletizeConfig, names: list[str], slots: list[Slot], corrections: tuple[Correction, ...]
+) -> list[list[Task]]:
+    """What belongs together: the slots of a pallet, or a trial of a part under every correction."""
+
+    def task(name: str, number: int, index: int, correction: Correction) -> Task:
+        seed = int(np.random.SeedSequence([config.seed, number, index]).generate_state(1)[0] >> 1)
+        return Task(
+            part=name, number=number, index=index, slot=slots[index], correction=correction, seed=seed,
+            keep=index > 0,
+        )  # fmt: skip
+
+    if config.slots is None:
+        return [
+            [task(name, number, 0, correction) for correction in corrections]
+            for name in names
+            for number in range(config.trials)
+        ]
+    return [
+        [
+            task(names[(number * len(slots) + index) % len(names)], number, index, correction)
+            for index in range(len(slots))
+        ]
+        for number in range(config.trials)
+        for correction in corrections
+    ]
 
 
-def check_slots(cell: Cell, slots: list[Slot]) -> None:
-    """Refuses slots that the arm cannot reach, before anything moves.
+def _place_all(config: PalletizeConfig, pallets: list[list[Task]]) -> list[Placement]:
+    found = {one.key: one for one in read(config.out / TRIALS, Placement.from_json)}
+    keys = [task.key for pallet in pallets for task in pallet]
+    missing = [
+        Pallet(
+            name=f"pallet-{pallet[0].number:03d}-{pallet[0].correction}" if config.slots is not None else "",
+            tasks=tuple(pallet),
+            done=frozenset(task.key for task in pallet if task.key in found),
+        )
+        for pallet in pallets
+        if any(task.key not in found for task in pallet)
+    ]
+    left = sum(key not in found for key in keys)
+    if missing:
+        results = spread(placing_bench, config, missing, config.workers)
+        bar = tqdm(total=left, unit="placement", file=sys.stderr, disable=not sys.stderr.isatty() or None)
+        with contextlib.closing(results), bar:
+            for placement in results:
+                if placement.key not in found:
+                    append(config.out / TRIALS, placement.to_json())
+                    found[placement.key] = placement
+                    bar.update()
+    return [found[key] for key in keys]
 
-    Raises:
-        UsageError: Says which.
-    """
-    for number, slot in enumerate(slots, 1):
-        pose = np.array([slot.target.x, slot.target.y, cell.workspace.table_z + 0.02, 0.0])
-        try:
-            check_place(cell, pose)
-        except HalError as error:
-            raise UsageError(f"slot {number} at ({slot.target.x:g}, {slot.target.y:g}): {error}") from error
 
+@contextmanager
+def placing_bench(config: PalletizeConfig) -> Iterator[Callable[[Pallet], Iterator[Placement]]]:
+    """A connected cell with its planner, and the function that fills a pallet."""
+    cell = cell_from_yaml(config.cell)
+    operator = Operator(cell, yes=config.yes)
+    if not operator.asks:
+        use_one_core()  # networks round by the number of threads, and near-equal grasps would change places
+    with cell.connected():
+        check_reach(cell, config.all_slots())
+        planner = make_planner(config.models, config.planner, cell)
+        placer = Placer(cell, planner, operator, config.out / "placements", tape=config.tape)
 
-def fits(size: np.ndarray, slot: Slot) -> bool:
-    """Whether the box of a part (2,), as it lies, turned as the slot says, fits into it."""
-    assert slot.size is not None
-    cos, sin = abs(math.cos(slot.target.theta)), abs(math.sin(slot.target.theta))
-    turned = (cos * size[0] + sin * size[1], sin * size[0] + cos * size[1])
-    return turned[0] <= slot.size[0] and turned[1] <= slot.size[1]
+        def fill(pallet: Pallet) -> Iterator[Placement]:
+            for number, task in enumerate(pallet.tasks, 1):
+                # A real pallet is as it was left; a simulated one is filled anew from its first slot.
+                if task.key in pallet.done and (cell.feeder is None or not pallet.name):
+                    continue
+                where = f"slot {number} of {len(pallet.tasks)}" if pallet.name else f"trial {task.number + 1}"
+                yield placer.run(task, f"{where}, correction {task.correction}")
+            placer.home()
+            if pallet.name:
+                image = placer.look(config.all_slots())
+                cv2.imwrite(str(config.out / "placements" / f"{pallet.name}.png"), image[..., ::-1])
+
+        yield fill
 
 
 if __name__ == "__main__":

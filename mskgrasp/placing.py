@@ -11,6 +11,9 @@ from hal.execute import APPROACH, PUT_DOWN
 from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing, wrap_angle
 from mskgrasp.grasp import MAX_OPENING, centre_in_grasp_frame, lowest_grasp_z, pose_base_tcp
 
+RELEASE = 0.02
+"""By how much the fingers open to let go of a part, m."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
@@ -72,7 +75,12 @@ def place_error(before: Pose, after: Pose, centre_offset: np.ndarray, target: Ta
     x, y = centre_offset
     centre = after.position[:2] + [cos * x - sin * y, sin * x + cos * y]
     missed = float(np.hypot(*(centre - [target.x, target.y])))
-    return missed, float(abs(wrap_angle(turn - target.theta)))
+    return missed, turned_by(turn, target)
+
+
+def turned_by(turn: float, target: Target) -> float:
+    """By how much a part that made a turn missed the one it was asked for, radians, not negative."""
+    return float(abs(wrap_angle(turn - target.theta)))
 
 
 def displacement_of_point(displacement: np.ndarray, origin: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -100,7 +108,9 @@ def check_place(cell: Cell, pose: np.ndarray) -> None:
 
 
 def place(cell: Cell, pose: np.ndarray) -> None:
-    """Carries what the hand holds to a pose and lets it go.
+    """Carries what the hand holds to a pose, lets it go and rises.
+
+    The fingers open no farther than they must: what lies beside the place stays there.
 
     Args:
         cell: The arm has lifted the part.
@@ -114,7 +124,9 @@ def place(cell: Cell, pose: np.ndarray) -> None:
     above = np.array([pose[0], pose[1], _above(cell, pose), pose[3]])
     cell.arm.move_to_pose(pose_base_tcp(above), speed=0.25)
     cell.arm.move_to_pose(pose_base_tcp(pose), speed=0.1)
-    cell.arm.move_gripper(MAX_OPENING)
+    width = cell.arm.state().gripper_width
+    cell.arm.move_gripper(min(MAX_OPENING, width + RELEASE))
+    cell.arm.move_to_pose(pose_base_tcp(above), speed=0.25)
 
 
 def _above(cell: Cell, pose: np.ndarray) -> float:

@@ -33,7 +33,10 @@ def report(tmp_path: Path) -> Path:
                     rows=[
                         ("nut", "1.2 mm", Link(text=HOSTILE, to="worst")),
                         ("bolt", None, HOSTILE),
-                        *[(f"part_{k}", "12 mm", "a rather long remark about this row " * 3) for k in range(4)],
+                        *[
+                            (f"part_{k}", "12 mm", "a rather long remark about this row " * 3)
+                            for k in range(4)
+                        ],
                     ],
                     caption=HOSTILE,
                 )

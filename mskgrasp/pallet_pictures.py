@@ -1,0 +1,326 @@
+"""Pictures of parts that were put down: where each shall lie, and where it lies."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import matplotlib
+import numpy as np
+import torch
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from hal.camera import RgbdFrame
+from mskgrasp.errors import BadDataset
+from mskgrasp.files import write_whole
+from mskgrasp.geometry import quat_to_matrix
+from mskgrasp.grasp import MAX_OPENING
+from mskgrasp.images import crop_patches, height_image
+from mskgrasp.placements import CORRECTIONS, Correction, Placement, compared
+from mskgrasp.placing import Target
+from mskgrasp.planner import GraspPlan
+from mskgrasp.slots import Slot
+
+COLOURS: dict[Correction, str] = {"none": "#8b909a", "predicted": "#1f6feb", "truth": "#2b8a3e"}
+TITLES: dict[Correction, str] = {
+    "none": "no correction", "predicted": "corrected by the prediction", "truth": "by the truth",
+}  # fmt: skip
+_INK, _TARGET, _JAW, _MISS = "#22252b", "#2b8a3e", "#1f6feb", "#e8590c"
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans", "font.size": 10, "axes.titlesize": 10, "axes.titlelocation": "left",
+    "axes.spines.top": False, "axes.spines.right": False, "savefig.dpi": 130,
+}  # fmt: skip
+_N = 200
+_MM = 1e3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Views:
+    """A placement seen from above, before and after; squares with the base's axes, metres.
+
+    Attributes:
+        before: (n, n) heights over the table around the part as it lay, its centre in the middle.
+        after: (n, n) the same around the target; empty where the part was not placed.
+        side: Length of a side of both.
+        top: Height of the part.
+        grasp: (3,) x, y from the part's centre, and theta.
+        turn: By how much the part shall be turned, radians.
+        theta: Direction of its longer side at the target, radians.
+    """
+
+    before: np.ndarray
+    after: np.ndarray
+    side: float
+    top: float
+    grasp: np.ndarray
+    turn: float
+    theta: float
+
+
+def take_views(
+    before: RgbdFrame, after: RgbdFrame | None, plan: GraspPlan, target: Target, theta: float
+) -> Views:
+    """The views of a placement from its frames."""
+    view = plan.view
+    side = max(0.1, 1.6 * float(np.hypot(*view.size[:2])))
+    height = view.table_z + view.size[2]
+    return Views(
+        before=_heights(before, view.centre_base[:2], height, side, view.table_z),
+        after=np.empty((0, 0))
+        if after is None
+        else _heights(after, np.array([target.x, target.y]), height, side, view.table_z),
+        side=side,
+        top=float(view.size[2]),
+        grasp=np.array([*(plan.grasp[:2] - view.centre_base[:2]), plan.grasp[3]]),
+        turn=target.theta,
+        theta=theta,
+    )
+
+
+def write_views(views: Views, path: Path) -> None:
+    """Writes views as a compressed file, whole or not at all."""
+    values = {name: np.asarray(value) for name, value in asdict(views).items()}
+    for name in ("before", "after"):
+        values[name] = values[name].astype(np.float32)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **values)
+    write_whole(path, buffer.getvalue())
+
+
+def read_views(path: Path) -> Views:
+    """What `write_views` wrote.
+
+    Raises:
+        BadDataset: It is not there, or damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            values = {name: file[name] for name in file.files}
+        numbers = {name: float(values[name]) for name in ("side", "top", "turn", "theta")}
+        return Views(
+            before=values["before"], after=values["after"], grasp=values["grasp"].reshape(3), **numbers
+        )
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise BadDataset(f"{path} is missing or damaged; start again in another --out") from error
+
+
+def _heights(frame: RgbdFrame, centre: np.ndarray, height: float, side: float, table_z: float) -> np.ndarray:
+    heights = height_image(torch.from_numpy(frame.depth), frame.intrinsics, frame.T_base_camera, table_z)
+    # In the plane of the part's top there is no parallax.
+    square = torch.tensor([[*centre, height, 0.0]])
+    patch = crop_patches(heights, square, frame.intrinsics, frame.T_base_camera, n_pixels=_N, side=side)
+    return patch[0, 0].numpy()
+
+
+def draw_placement(views: Views, placement: Placement, path: Path) -> None:
+    """Draws one placement: the grasp, the target, where the part came to lie; millimetres from the target."""
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(9.2, 4.9), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        _show_before(left, views)
+        left.set(title="before, with the grasp", xlabel="mm along base x", ylabel="mm along base y")
+        _show_after(right, views)
+        right.set(title=f"after, {TITLES[placement.correction]}", xlabel="mm from the target, along base x")
+        figure.suptitle(f"{placement.part}: {outcome_text(placement)}", x=0.01, ha="left", fontsize=11)
+        figure.savefig(path)
+
+
+def outcome_text(placement: Placement) -> str:
+    """What came of it, in words."""
+    if not placement.placed:
+        return f"not placed ({placement.reason})"
+    if placement.translation_error is None or placement.rotation_error is None:
+        return "placed, not measured"
+    return f"{placement.translation_error * _MM:.1f} mm, {np.degrees(placement.rotation_error):.1f}° off"
+
+
+def _axes(axes: Axes, views: Views, heights: np.ndarray) -> None:
+    half = views.side / 2 * _MM
+    top = max(views.top, 1e-3)
+    axes.imshow(heights, extent=(-half, half, -half, half), cmap="Greys", vmin=-0.15 * top, vmax=1.5 * top)
+    axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
+    axes.tick_params(length=2, labelsize=8)
+
+
+def _show_before(axes: Axes, views: Views) -> None:
+    _axes(axes, views, views.before)
+    _outline(axes, views, 0.0, _INK, "-")
+    origin, theta = views.grasp[:2] * _MM, float(views.grasp[2])
+    closing = np.array([-np.sin(theta), np.cos(theta)])
+    reach = MAX_OPENING / 2 * _MM
+    axes.plot(*np.stack([origin - reach * closing, origin + reach * closing]).T, color=_JAW, lw=1.2, ls="--")
+    for start in (reach, -reach - 8.0):
+        corner = origin + start * closing - 10.0 * np.array([np.cos(theta), np.sin(theta)])
+        pad = Rectangle(tuple(corner), 20.0, 8.0, angle=np.degrees(theta), fc=_JAW, ec="white", lw=0.8)
+        axes.add_patch(pad)
+
+
+def _show_after(axes: Axes, views: Views) -> None:
+    if not views.after.size:
+        axes.text(0.5, 0.5, "not placed", transform=axes.transAxes, ha="center", color=_MISS)
+        axes.set(xticks=[], yticks=[])
+        return
+    _axes(axes, views, views.after)
+    _outline(axes, views, views.turn, _TARGET, "--")
+    _cross(axes, np.zeros(2), views.theta, 0.42 * views.side * _MM)
+
+
+def _cross(axes: Axes, at: np.ndarray, theta: float, length: float) -> None:
+    """The target as in the paper: its centre, and the orientation as the longer arm."""
+    for angle, share, width in ((theta, 1.0, 1.6), (theta + np.pi / 2, 0.4, 1.0)):
+        arm = share * length * np.array([np.cos(angle), np.sin(angle)])
+        axes.plot(*np.stack([at - arm, at + arm]).T, color=_TARGET, lw=width, alpha=0.9, zorder=6)
+
+
+def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> None:
+    """The part's outline as it lay, turned about its centre."""
+    n = len(views.before)
+    pitch = views.side * _MM / n
+    steps = (np.arange(n) - (n - 1) / 2) * pitch
+    x, y = np.meshgrid(steps, -steps)
+    # A camera pixel is several of these: without the blur the outline shows its stairs.
+    smooth = cv2.GaussianBlur(np.ascontiguousarray(views.before), (0, 0), 1.5 / pitch)
+    cos, sin = np.cos(turn), np.sin(turn)
+    level = [0.5 * max(float(smooth.max()), 1e-4)]
+    axes.contour(
+        cos * x - sin * y, sin * x + cos * y, smooth, levels=level, colors=[colour], linewidths=1.3,
+        linestyles=line, zorder=5,
+    )  # fmt: skip
+
+
+def draw_comparison(
+    rows: Sequence[tuple[Placement, dict[Correction, Views], dict[Correction, Placement]]], path: Path
+) -> None:
+    """Draws parts before and after, a row each: target in green, and a column for each correction.
+
+    Args:
+        rows: A placement of the row (any), the views and the placements by correction.
+        path: The picture, PNG.
+    """
+    names = [name for name in CORRECTIONS if rows and name in rows[0][1]]
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(
+            figsize=(2.45 * (1 + len(names)), 2.6 * max(1, len(rows)) + 0.2), layout="constrained"
+        )
+        grid = figure.subplots(max(1, len(rows)), 1 + len(names), squeeze=False)
+        for line, (first, views, placements) in zip(grid, rows, strict=False):
+            _show_before(line[0], next(iter(views.values())))
+            line[0].set_ylabel(first.part, fontsize=8)
+            for axes, name in zip(line[1:], names, strict=True):
+                _show_after(axes, views[name])
+                axes.set_xlabel(outcome_text(placements[name]), fontsize=9, color=COLOURS[name])
+            for axes in line:
+                axes.set(xticks=[], yticks=[])
+        for axes, title in zip(grid[0], ["before", *(TITLES[name] for name in names)], strict=True):
+            axes.set_title(title, fontsize=9)
+        figure.savefig(path)
+
+
+def draw_errors(placements: Sequence[Placement], path: Path) -> None:
+    """Draws how many placements err by no more than so much, and the medians of parts beside each other."""
+    groups = compared(placements)
+    names = [name for name in CORRECTIONS if any(one.correction == name for one in placements)]
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(11.5, 3.9), layout="constrained")
+        shift, turn, parts = figure.subplots(1, 3)
+        for axes, error, scale, unit in (
+            (shift, "translation", _MM, "mm"),
+            (turn, "rotation", 57.2958, "degrees"),
+        ):
+            for name in names:
+                values = np.sort([getattr(group[name], f"{error}_error") * scale for group in groups])
+                if len(values):
+                    shares = np.arange(1, len(values) + 1) / len(values)
+                    label = f"{TITLES[name]}: median {np.median(values):.1f}"
+                    axes.step(
+                        [0, *values], [0, *shares], where="post", color=COLOURS[name], lw=1.8, label=label
+                    )
+            axes.set(xlabel=f"{error} error, {unit}", ylim=(0, 1.02), xlim=(0, None))
+            if groups:
+                axes.legend(frameon=False, fontsize=8, loc="lower right")
+        shift.set_ylabel("share of placements")
+        _draw_parts(parts, groups)
+        if not groups:
+            shift.text(0.5, 0.5, "no placement was measured", transform=shift.transAxes, ha="center")
+        figure.savefig(path)
+
+
+def _draw_parts(axes: Axes, groups: list[dict[Correction, Placement]]) -> None:
+    if not groups or not {"none", "predicted"} <= set(groups[0]):
+        axes.axis("off")
+        return
+    names = sorted({group["none"].part for group in groups})
+    medians = np.array(
+        [
+            [
+                np.median([g[c].translation_error or 0.0 for g in groups if g[c].part == part]) * _MM
+                for c in ("none", "predicted")
+            ]
+            for part in names
+        ]
+    )
+    most = 1.1 * float(medians.max()) + 0.1
+    axes.plot([0, most], [0, most], color="#c5c9d0", lw=1)
+    axes.plot([0, most], [0, most / 2], color=_TARGET, lw=1, ls="--", label="half the error")
+    axes.plot(*medians.T, "o", color=COLOURS["predicted"], ms=5, alpha=0.8)
+    axes.set(xlim=(0, most), ylim=(0, most), aspect="equal", title="a part's median error, mm")
+    axes.set(xlabel="no correction", ylabel="corrected by the prediction")
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
+
+
+def pallet_image(frame: RgbdFrame, slots: Sequence[Slot], table_z: float) -> np.ndarray:
+    """(h, w, 3) uint8 RGB of the slots from above, x up and y to the left; 1 mm a pixel.
+
+    As the camera hangs in the cells here: its image's top is away from the base.
+    """
+    x_min, x_max, y_min, y_max = pallet_bounds(slots)
+    colour = frame.colour if frame.fine_colour is None else frame.fine_colour
+    scale = colour.shape[0] / frame.depth.shape[0]
+    corners = np.array([[x_max, y_max], [x_max, y_min], [x_min, y_min], [x_min, y_max]])
+    rotation = quat_to_matrix(np.asarray(frame.T_base_camera.quat_wxyz))
+    points = (np.column_stack([corners, np.full(4, table_z)]) - frame.T_base_camera.position) @ rotation
+    seen = points @ np.asarray(frame.intrinsics).T
+    pixels = ((seen[:, :2] / seen[:, 2:] + 0.5) * scale - 0.5).astype(np.float32)
+    w, h = round((y_max - y_min) * _MM), round((x_max - x_min) * _MM)
+    square = np.array([[0, 0], [w, 0], [w, h], [0, h]], dtype=np.float32)
+    return cv2.warpPerspective(colour, cv2.getPerspectiveTransform(pixels, square), (w, h))
+
+
+def pallet_bounds(slots: Sequence[Slot]) -> tuple[float, float, float, float]:
+    """x_min, x_max, y_min, y_max around the slots, metres."""
+    half = [np.array(slot.size or (0.1, 0.1)) / 2 + 0.01 for slot in slots]
+    low = np.min([[s.x, s.y] - h for s, h in zip(slots, half, strict=True)], axis=0)
+    high = np.max([[s.x, s.y] + h for s, h in zip(slots, half, strict=True)], axis=0)
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def draw_pallets(images: dict[Correction, np.ndarray], slots: Sequence[Slot], title: str, path: Path) -> None:
+    """Draws a pallet under each correction, with the targets in green and the slots' outlines."""
+    x_min, x_max, y_min, y_max = pallet_bounds(slots)
+    height = 4.2 * (x_max - x_min) / max(y_max - y_min, 1e-6)
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(4.2 * len(images), height + 0.9), layout="constrained")
+        for axes, (name, image) in zip(
+            figure.subplots(1, len(images), squeeze=False)[0], images.items(), strict=True
+        ):
+            # Right is -y and up is +x: as somebody sees it who stands behind the robot.
+            axes.imshow(image, extent=(-y_max * _MM, -y_min * _MM, x_min * _MM, x_max * _MM))
+            for slot in slots:
+                at = np.array([-slot.y, slot.x]) * _MM
+                length = 0.42 * (max(slot.size) if slot.size else 0.08) * _MM
+                _cross(axes, at, slot.theta + np.pi / 2, length)
+                if slot.size is not None:
+                    w, h = slot.size[1] * _MM, slot.size[0] * _MM
+                    axes.add_patch(
+                        Rectangle((at[0] - w / 2, at[1] - h / 2), w, h, fill=False, ec="white", lw=1.0)
+                    )
+            axes.set(title=TITLES[name], xticks=[], yticks=[], aspect="equal")
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+        figure.savefig(path)

@@ -1,0 +1,179 @@
+"""Where parts shall be put: a target on the command line, or the slots of a pallet in a YAML file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field
+
+from hal import Cell
+from hal.errors import OutOfWorkspace
+from mskgrasp.config import Config, read_config
+from mskgrasp.errors import UsageError
+from mskgrasp.footprint import Footprint, smallest_footprint
+from mskgrasp.geometry import wrap_half_turn
+from mskgrasp.parts import Part
+from mskgrasp.placing import Target, check_place
+
+SEEN_TOLERANCE = 0.003
+"""A depth image tells a part's sides to about a pixel, m; its CAD file tells them exactly, before it moves."""
+_ANGLES = np.radians([-90.0, -45.0, 0.0, 45.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slot:
+    """A place for one part.
+
+    Attributes:
+        x: Of the part's centre, base frame, metres.
+        y: The same.
+        theta: Direction of the part's longer side seen from above, radians from base x; which way round it
+            lies a depth image does not tell, and a half turn more is the same.
+        size: How much room there is along base x and y, metres; None where it does not matter.
+    """
+
+    x: float
+    y: float
+    theta: float
+    size: tuple[float, float] | None = None
+
+    def target(self, footprint: Footprint, grasp_theta: float) -> Target:
+        """What a part that lies so, grasped so, is asked for: of both ways round, that which the wrist reaches."""
+        hand = wrap_half_turn(np.asarray(grasp_theta + self.theta - footprint.theta))
+        return Target(x=self.x, y=self.y, theta=float(hand) - grasp_theta)
+
+    def fits(self, footprint: Footprint, tolerance: float = 0.0) -> bool:
+        """Whether a part has room in it, turned as it shall lie."""
+        if self.size is None:
+            return True
+        room = footprint.extent(self.theta)
+        return bool(np.all(room <= np.array(self.size) + tolerance))
+
+
+class SlotEntry(Config):
+    """A slot in a file."""
+
+    x: float = Field(allow_inf_nan=False)
+    y: float = Field(allow_inf_nan=False)
+    """Of the part's centre, base frame, m."""
+    theta_deg: float = Field(default=0.0, allow_inf_nan=False)
+    """Direction of its longer side, degrees from base x."""
+    size: tuple[float, float] | None = None
+    """Room along base x and y, m; null: not checked."""
+
+    def slot(self) -> Slot:
+        """The slot."""
+        return Slot(x=self.x, y=self.y, theta=math.radians(self.theta_deg), size=self.size)
+
+
+class Grid(Config):
+    """Slots in rows and columns."""
+
+    first: tuple[float, float]
+    """x and y of the slot nearest to the base's origin, m."""
+    pitch: tuple[float, float]
+    """From slot to slot along x and y, m."""
+    n: tuple[int, int]
+    """Slots along x and y."""
+    theta_deg: float = Field(default=0.0, allow_inf_nan=False)
+    """Direction of the parts' longer side, degrees from base x."""
+    size: tuple[float, float] | None = None
+    """Room in each along x and y, m; null: the pitch."""
+
+
+class Pallet(Config):
+    """A file of slots: a grid, or a list, or both."""
+
+    grid: Grid | None = None
+    slots: tuple[SlotEntry, ...] = ()
+
+    def all_slots(self) -> list[Slot]:
+        """Those of the grid, along x first, then those of the list."""
+        found = []
+        if self.grid is not None:
+            grid = self.grid
+            found = [
+                SlotEntry(
+                    x=grid.first[0] + column * grid.pitch[0],
+                    y=grid.first[1] + row * grid.pitch[1],
+                    theta_deg=grid.theta_deg,
+                    size=grid.size or grid.pitch,
+                )
+                for row in range(grid.n[1])
+                for column in range(grid.n[0])
+            ]
+        return [entry.slot() for entry in [*found, *self.slots]]
+
+
+def parse_target(text: str) -> Slot:
+    """``x,y,theta`` in metres and degrees.
+
+    Raises:
+        ValueError: It is something else.
+    """
+    try:
+        x, y, theta = (float(word) for word in text.split(","))
+    except ValueError:
+        raise ValueError(
+            f"target must be x,y,theta in metres and degrees, as 0.5,0.06,90, got {text!r}"
+        ) from None
+    if not all(math.isfinite(value) for value in (x, y, theta)):
+        raise ValueError(f"target must be finite, got {text!r}")
+    return Slot(x=x, y=y, theta=math.radians(theta))
+
+
+def read_slots(path: Path) -> list[Slot]:
+    """The slots of a file such as ``configs/palletize/grid.yaml``.
+
+    Raises:
+        BadConfig: It cannot be read, or says something else.
+        UsageError: It holds no slot.
+    """
+    slots = read_config(Pallet, path).all_slots()
+    if not slots:
+        raise UsageError(f"{path} holds no slot; give a grid, or a list of slots such as {{x: 0.5, y: 0.05}}")
+    return slots
+
+
+def check_reach(cell: Cell, slots: Sequence[Slot]) -> None:
+    """Refuses slots that the arm does not reach with the hand turned any way, before anything moves.
+
+    Raises:
+        UsageError: Says which, and what is legal.
+    """
+    for number, slot in enumerate(slots, 1):
+        for theta in _ANGLES:
+            try:
+                check_place(cell, np.array([slot.x, slot.y, cell.workspace.table_z + 0.02, theta]))
+            except OutOfWorkspace as error:
+                name = "the target" if len(slots) == 1 else f"slot {number}"
+                raise UsageError(
+                    f"{name} at ({slot.x:g}, {slot.y:g}) m cannot be used: {error}; move it"
+                ) from error
+
+
+def check_room(pairs: Iterable[tuple[Part, Slot]]) -> None:
+    """Refuses parts that fit into their slot on none of their sides.
+
+    Raises:
+        UsageError: Says which, how large they are, and the remedy.
+    """
+    too_large: dict[str, str] = {}
+    room = ""
+    for part, slot in pairs:
+        if slot.size is None or part.name in too_large:
+            continue
+        footprint = smallest_footprint(part)
+        if not slot.fits(footprint):
+            long, short = 1e3 * footprint.sides
+            too_large[part.name] = f"{part.name} ({long:.0f} x {short:.0f} mm)"
+            room = f"{1e3 * slot.size[0]:g} x {1e3 * slot.size[1]:g} mm"
+    if too_large:
+        raise UsageError(
+            f"a slot of {room} is smaller than {', '.join(too_large.values())}; give the slots more room, turn "
+            "them (theta_deg), or choose other --parts"
+        )
