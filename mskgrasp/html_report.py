@@ -35,7 +35,8 @@ a { color: #1f6feb; }
 table { border-collapse: collapse; font-size: 0.88rem; font-variant-numeric: tabular-nums; }
 caption { text-align: left; padding: 0 0 0.35rem; color: #5c626b; }
 th, td { padding: 0.3rem 0.75rem 0.3rem 0; text-align: left; vertical-align: top; }
-td { border-top: 1px solid #e3e6ea; overflow-wrap: anywhere; min-width: 4.5rem; }
+td { border-top: 1px solid #e3e6ea; min-width: 4rem; }
+td:first-child { white-space: nowrap; }
 th { border-bottom: 1px solid #8b909a; }
 .n { text-align: right; white-space: nowrap; }
 figure { margin: 1rem 0 1.6rem; }

@@ -188,7 +188,7 @@ def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> N
     # A camera pixel is several of these: without the blur the outline shows its stairs.
     smooth = cv2.GaussianBlur(np.ascontiguousarray(views.before), (0, 0), 1.5 / pitch)
     cos, sin = np.cos(turn), np.sin(turn)
-    level = [0.5 * max(float(smooth.max()), 1e-4)]
+    level = [0.25 * max(float(smooth.max()), 1e-4)]
     axes.contour(
         cos * x - sin * y, sin * x + cos * y, smooth, levels=level, colors=[colour], linewidths=1.3,
         linestyles=line, zorder=5,
@@ -218,6 +218,7 @@ def draw_comparison(
                 axes.set_xlabel(outcome_text(placements[name]), fontsize=9, color=COLOURS[name])
             for axes in line:
                 axes.set(xticks=[], yticks=[])
+                axes.spines[:].set_visible(False)
         for axes, title in zip(grid[0], ["before", *(TITLES[name] for name in names)], strict=True):
             axes.set_title(title, fontsize=9)
         figure.savefig(path)
@@ -228,7 +229,7 @@ def draw_errors(placements: Sequence[Placement], path: Path) -> None:
     groups = compared(placements)
     names = [name for name in CORRECTIONS if any(one.correction == name for one in placements)]
     with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(11.5, 3.9), layout="constrained")
+        figure = Figure(figsize=(11.5, 4.3), layout="constrained")
         shift, turn, parts = figure.subplots(1, 3)
         for axes, error, scale, unit in (
             (shift, "translation", _MM, "mm"),
@@ -244,7 +245,7 @@ def draw_errors(placements: Sequence[Placement], path: Path) -> None:
                     )
             axes.set(xlabel=f"{error} error, {unit}", ylim=(0, 1.02), xlim=(0, None))
             if groups:
-                axes.legend(frameon=False, fontsize=8, loc="lower right")
+                axes.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
         shift.set_ylabel("share of placements")
         _draw_parts(parts, groups)
         if not groups:

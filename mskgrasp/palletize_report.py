@@ -35,7 +35,7 @@ _DEFINITIONS = (
     "Error: distance of the placed part's centre from its target, and the difference between the turn it made and the "
     "one it was asked for. The centre and the direction of the longer side are those that the depth image showed "
     "before the grasp: what seeing them costs is in no column.",
-    "none places as if nothing had moved in the hand; predicted corrects by the displacement network; truth by what the "
+    "Correction none: as if nothing had moved in the hand; predicted: by the displacement network; truth: by what the "
     f"tracker saw in the hand, and is what no prediction can beat. Goal: the prediction leaves {GOAL:g} of the median "
     "error at most. Intervals: bootstrap over parts, 95 %.",
 )
@@ -86,7 +86,8 @@ def _pallets(out: Path, placements: Sequence[Placement], slots: Sequence[Slot]) 
     for number in sorted({one.number for one in placements}):
         images: dict[Correction, np.ndarray] = {}
         for name in CORRECTIONS:
-            image = cv2.imread(str(out / "placements" / f"pallet-{number:03d}-{name}.png"))
+            path = out / "placements" / f"pallet-{number:03d}-{name}.png"
+            image = cv2.imread(str(path)) if path.exists() else None
             if image is not None:
                 images[name] = image[..., ::-1]
         if images:

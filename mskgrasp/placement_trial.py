@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,7 +22,6 @@ from mskgrasp.pictures import draw_plan
 from mskgrasp.placements import Correction, Placement
 from mskgrasp.placing import (
     Target,
-    check_place,
     displacement_of_point,
     place,
     place_error,
@@ -30,7 +30,7 @@ from mskgrasp.placing import (
 )
 from mskgrasp.planner import GraspPlan, Planner
 from mskgrasp.settings import Region, Tape
-from mskgrasp.slots import SEEN_TOLERANCE, Slot
+from mskgrasp.slots import SEEN_TOLERANCE, Slot, first_reachable
 
 _NEAR = 0.001
 """Half a side of the region in which a placed part's tape is sought, m; `find_markers` adds its margin."""
@@ -117,7 +117,10 @@ class Placer:
         footprint = seen_footprint(frame, plan.view)
         if not task.slot.fits(footprint, SEEN_TOLERANCE):
             return replace(known, reason="slot too small")
-        target = task.slot.target(footprint, float(plan.grasp[3]))
+        try:
+            target = self._target(plan, task.slot.targets(footprint, float(plan.grasp[3])))
+        except OutOfWorkspace:
+            return replace(known, reason="OutOfWorkspace")
         done, after = self._carry(frame, plan, target, known)
         views = take_views(frame, after, plan, target, task.slot.theta)
         write_views(views, self._pictures / f"{done.name}.npz")
@@ -160,6 +163,14 @@ class Placer:
             f"grasp at x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees, quality {plan.quality:.2f}",
         )
 
+    def _target(self, plan: GraspPlan, targets: Sequence[Target]) -> Target:
+        """The target that the arm reaches, before anything moves."""
+        table_z = self._cell.workspace.table_z
+        poses = [
+            place_pose(plan.grasp, np.zeros(4), plan.view.centre_base, target, table_z) for target in targets
+        ]
+        return targets[first_reachable(self._cell, poses)]
+
     def _carry(
         self, frame: RgbdFrame, plan: GraspPlan, target: Target, known: Placement
     ) -> tuple[Placement, RgbdFrame | None]:
@@ -168,8 +179,6 @@ class Placer:
         before = None if tracker is None else tracker.part_pose()
         table_z, centre = cell.workspace.table_z, plan.view.centre_base
         try:
-            # Before anything moves, and not only when the part hangs in the hand.
-            check_place(cell, place_pose(plan.grasp, np.zeros(4), centre, target, table_z))
             result = execute_grasp(cell, plan.grasp)
         except OutOfWorkspace:
             return replace(known, reason="OutOfWorkspace"), None

@@ -17,6 +17,7 @@ CORRECTIONS: tuple[Correction, ...] = get_args(Correction)
 GOAL = 0.5
 """The correction is meant to leave no more than this share of the median error."""
 _ERRORS = ("translation", "rotation")
+_WORDS = {"predicted": "the prediction", "truth": "the truth"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -205,24 +206,24 @@ HEADER = ("correction", "placed", "measured", "median error", "95 %", "median tu
 
 
 def gain_lines(report: dict[str, Any]) -> list[str]:
-    """What correcting gains, in words."""
+    """What correcting gains, in sentences."""
     if not report["compared"]:
-        return ["no placement was measured under every correction: errors are unknown"]
-    parts = report["parts_compared"]
-    lines = [
-        f"medians of the {report['compared']} placements ({parts} parts) measured under every correction"
-    ]
+        return ["No placement was measured under every correction: errors are unknown."]
+    n, parts = report["compared"], report["parts_compared"]
+    lines = [f"Medians are of {n} placements of {parts} parts, those measured under every correction."]
     for name, gain in report["gain"].items():
-        ratio, turn = gain["translation_ratio"], gain["rotation_ratio"]
-        text = (
-            f"{name}: {ratio:.2f} {interval_text(gain['translation_ratio_interval'], 1, '({})')}of the median "
-            f"error without correction, {turn:.2f} {interval_text(gain['rotation_ratio_interval'], 1, '({})')}"
-            "of the turn's"
-        )
+        ratio, turn = (_share(gain, error) for error in _ERRORS)
+        text = f"Corrected by {_WORDS[name]}, the median error is {ratio} of that without, the turn's {turn}"
         if name == "predicted":
-            text += f"; goal: {GOAL:g} at most, {'met' if ratio <= GOAL else 'not met'}"
-        lines.append(text)
+            met = gain["translation_ratio"] <= GOAL
+            text += f"; the goal is {GOAL:g} at most: {'met' if met else 'not met'}"
+        lines.append(text + ".")
     return lines
+
+
+def _share(gain: dict[str, Any], error: str) -> str:
+    text, interval = f"{gain[f'{error}_ratio']:.2f}", gain[f"{error}_ratio_interval"]
+    return text if interval is None else f"{text} ({interval_text(interval, 1)})"
 
 
 def print_placements(report: dict[str, Any], console: Console) -> None:
@@ -247,10 +248,9 @@ def degrees(value: float | None) -> str:
     return "-" if value is None else f"{np.degrees(value):.1f} deg"
 
 
-def interval_text(interval: Sequence[float] | None, scale: float, form: str = "{}") -> str:
-    """An interval for people; a dash, or nothing within brackets, where it is unknown."""
+def interval_text(interval: Sequence[float] | None, scale: float) -> str:
+    """An interval for people; a dash where it is unknown."""
     if interval is None:
-        return "-" if form == "{}" else ""
+        return "-"
     digits = 2 if scale == 1 else 1
-    text = " - ".join(f"{value * scale:.{digits}f}" for value in interval)
-    return text if form == "{}" else form.format(text) + " "
+    return " - ".join(f"{value * scale:.{digits}f}" for value in interval)

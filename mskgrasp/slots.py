@@ -41,10 +41,12 @@ class Slot:
     theta: float
     size: tuple[float, float] | None = None
 
-    def target(self, footprint: Footprint, grasp_theta: float) -> Target:
-        """What a part that lies so, grasped so, is asked for: of both ways round, that which the wrist reaches."""
-        hand = wrap_half_turn(np.asarray(grasp_theta + self.theta - footprint.theta))
-        return Target(x=self.x, y=self.y, theta=float(hand) - grasp_theta)
+    def targets(self, footprint: Footprint, grasp_theta: float) -> tuple[Target, Target]:
+        """Both ways round in which a part that lies so, grasped so, may be put; first that of the lesser hand turn."""
+        hand = float(wrap_half_turn(np.asarray(grasp_theta + self.theta - footprint.theta)))
+        other = hand - np.copysign(np.pi, hand)
+        first, second = (Target(x=self.x, y=self.y, theta=turned - grasp_theta) for turned in (hand, other))
+        return first, second
 
     def fits(self, footprint: Footprint, tolerance: float = 0.0) -> bool:
         """Whether a part has room in it, turned as it shall lie."""
@@ -140,20 +142,40 @@ def read_slots(path: Path) -> list[Slot]:
 
 
 def check_reach(cell: Cell, slots: Sequence[Slot]) -> None:
-    """Refuses slots that the arm does not reach with the hand turned any way, before anything moves.
+    """Refuses slots where the arm cannot put a part that it holds at any angle, before anything moves.
 
     Raises:
         UsageError: Says which, and what is legal.
     """
     for number, slot in enumerate(slots, 1):
         for theta in _ANGLES:
+            ways = [
+                np.array([slot.x, slot.y, cell.workspace.table_z + 0.02, theta + turn])
+                for turn in (0.0, np.pi)
+            ]
             try:
-                check_place(cell, np.array([slot.x, slot.y, cell.workspace.table_z + 0.02, theta]))
+                first_reachable(cell, ways)
             except OutOfWorkspace as error:
                 name = "the target" if len(slots) == 1 else f"slot {number}"
                 raise UsageError(
                     f"{name} at ({slot.x:g}, {slot.y:g}) m cannot be used: {error}; move it"
                 ) from error
+
+
+def first_reachable(cell: Cell, poses: Sequence[np.ndarray]) -> int:
+    """Index of the first of some poses (4,) of the hand at which the arm can let go of a part.
+
+    Raises:
+        OutOfWorkspace: It reaches none; why not the first.
+    """
+    refused = []
+    for index, pose in enumerate(poses):
+        try:
+            check_place(cell, pose)
+            return index
+        except OutOfWorkspace as error:
+            refused.append(error)
+    raise refused[0]
 
 
 def check_room(pairs: Iterable[tuple[Part, Slot]]) -> None:
