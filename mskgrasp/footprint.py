@@ -69,10 +69,9 @@ def seen_footprint(frame: RgbdFrame, view: PartView) -> Footprint:
     return footprint_of(np.column_stack([columns - middle, middle - rows]) * pitch)
 
 
-def smallest_footprint(part: Part) -> Footprint:
-    """The footprint of a part on that of its sides on which it needs the least room; theta is 0."""
+def usual_footprint(part: Part) -> Footprint:
+    """The footprint of a part on the side on which it comes to lie most often; theta is 0."""
     mesh = trimesh.load_mesh(part.mesh_path)
-    vertices = np.asarray(mesh.vertices)
-    found = [footprint_of(quat_rotate(quat_wxyz, vertices)[:, :2]) for quat_wxyz in part.resting.quat_wxyz]
-    best = min(found, key=lambda footprint: float(footprint.sides.prod()))
-    return Footprint(sides=best.sides, theta=0.0)
+    quat_wxyz = part.resting.quat_wxyz[int(np.argmax(part.resting_probability))]
+    found = footprint_of(quat_rotate(quat_wxyz, np.asarray(mesh.vertices))[:, :2])
+    return Footprint(sides=found.sides, theta=0.0)

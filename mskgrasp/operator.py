@@ -1,4 +1,4 @@
-"""The person at a cell without a feeder: lays parts down, looks at a plan, says whether the arm may move."""
+"""The person at a real cell: lays parts down, looks at a plan, says whether the arm may move."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ class StoppedByOperator(MskgraspError):
 
 
 class Operator:
-    """Asks before anything moves, and stands in for the feeder that a real cell has not.
+    """Asks before a real arm moves, and stands in for the feeder that a real cell has not.
 
-    A cell with a feeder, such as the simulated one, is never held up by questions, and neither is any cell
-    with ``yes``.
+    A simulated cell is never held up by questions, and neither is any cell with ``yes``.
 
     Args:
         cell: Connected or not.
@@ -38,7 +37,7 @@ class Operator:
     def __init__(
         self, cell: Cell, *, yes: bool = False, answers: TextIO | None = None, prompts: TextIO | None = None
     ):
-        self.asks = cell.feeder is None and not yes
+        self.asks = not (yes or cell.arm.simulated)
         if self.asks and answers is None and not sys.stdin.isatty():
             raise UsageError(
                 "this cell asks its operator before the arm moves, and standard input is no terminal; start it in "

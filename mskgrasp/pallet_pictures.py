@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -276,17 +276,40 @@ def _draw_parts(axes: Axes, groups: list[dict[Correction, Placement]]) -> None:
     axes.legend(frameon=False, fontsize=8, loc="upper left")
 
 
-def pallet_image(frame: RgbdFrame, slots: Sequence[Slot], table_z: float) -> np.ndarray:
-    """(h, w, 3) uint8 RGB of the slots from above, x up and y to the left; 1 mm a pixel.
+def pallet_image(
+    frame: RgbdFrame, slots: Sequence[Slot], table_z: float, tops: Mapping[int, float]
+) -> np.ndarray:
+    """(h, w, 3) uint8 RGB of the slots from above, base x up and y to the left; 1 mm a pixel.
 
-    As the camera hangs in the cells here: its image's top is away from the base.
+    Args:
+        frame: Of the pallet, the arm out of sight.
+        slots: Of which some hold a part.
+        table_z: Height of the table, metres.
+        tops: Height of the part in a slot, metres. What stands on a table leans away from the middle of the
+            picture; within a slot of known size this is undone for the part's top.
     """
-    x_min, x_max, y_min, y_max = pallet_bounds(slots)
+    bounds = pallet_bounds(slots)
+    image = _seen_at(frame, bounds, table_z)
+    for index, top in tops.items():
+        size = slots[index].size
+        if size is not None:
+            half = np.array(size) / 2
+            low, high = (np.array([slots[index].x, slots[index].y]) + sign * half for sign in (-1, 1))
+            # Rows count from the greatest x, columns from the greatest y.
+            rows = slice(*np.rint((bounds[1] - np.array([high[0], low[0]])) * _MM).astype(int))
+            columns = slice(*np.rint((bounds[3] - np.array([high[1], low[1]])) * _MM).astype(int))
+            image[rows, columns] = _seen_at(frame, bounds, table_z + top)[rows, columns]
+    return image
+
+
+def _seen_at(frame: RgbdFrame, bounds: tuple[float, float, float, float], z: float) -> np.ndarray:
+    """What a frame shows of a rectangle at a height, as if it all lay in that plane."""
+    x_min, x_max, y_min, y_max = bounds
     colour = frame.colour if frame.fine_colour is None else frame.fine_colour
     scale = colour.shape[0] / frame.depth.shape[0]
     corners = np.array([[x_max, y_max], [x_max, y_min], [x_min, y_min], [x_min, y_max]])
     rotation = quat_to_matrix(np.asarray(frame.T_base_camera.quat_wxyz))
-    points = (np.column_stack([corners, np.full(4, table_z)]) - frame.T_base_camera.position) @ rotation
+    points = (np.column_stack([corners, np.full(4, z)]) - frame.T_base_camera.position) @ rotation
     seen = points @ np.asarray(frame.intrinsics).T
     pixels = ((seen[:, :2] / seen[:, 2:] + 0.5) * scale - 0.5).astype(np.float32)
     w, h = round((y_max - y_min) * _MM), round((x_max - x_min) * _MM)

@@ -13,6 +13,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import torch
 from pydantic import Field, field_validator
 from rich.console import Console
 from tqdm import tqdm
@@ -30,7 +31,7 @@ from mskgrasp.placement_trial import Placer, Task
 from mskgrasp.placements import CORRECTIONS, Correction, Placement, print_placements
 from mskgrasp.plan import SIMULATED_CELL, make_planner
 from mskgrasp.planner import PlannerConfig
-from mskgrasp.processes import spread, use_one_core
+from mskgrasp.processes import spread
 from mskgrasp.runs import TRIALS, append, begin, file_digest, inputs_of, part_names, read
 from mskgrasp.settings import Tape
 from mskgrasp.slots import Slot, check_reach, check_room, parse_target, read_slots
@@ -43,7 +44,7 @@ Writes report.html, report.json and pictures; every finished placement is stored
 
 One target for all parts:  --target 0.5,0.06,90
 A pallet of several:       --cell configs/palletize/cell.yaml --slots configs/palletize/grid.yaml
-A cell without a feeder asks its operator for every part, and before the arm moves (--yes: it asks nothing)."""
+A real cell asks its operator for every part, and before the arm moves (--yes: it asks nothing)."""
 
 
 class PalletizeConfig(Config):
@@ -155,13 +156,13 @@ def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[Correction, ...]
         The corrections.
     """
     cell = cell_from_yaml(config.cell)
-    simulated = read_yaml(config.cell).get("type") == "sapien"
-    if config.workers > 1 and not simulated:
+    kind = read_yaml(config.cell).get("type")
+    if config.workers > 1 and kind != "sapien":
         raise UsageError(
             f"--workers {config.workers}: {config.cell} is one cell of which there are not several"
         )
     Operator(cell, yes=config.yes)  # refuses where nobody is there to answer
-    if simulated:
+    if kind in ("sapien", "devices"):  # a recording answers only what comes in its order
         check_reach(cell, slots)
     can = tuple(name for name in CORRECTIONS if name != "truth" or cell.tracker is not None)
     wanted = can if config.corrections is None else tuple(dict.fromkeys(config.corrections))
@@ -230,8 +231,9 @@ def placing_bench(config: PalletizeConfig) -> Iterator[Callable[[Pallet], Iterat
     """A connected cell with its planner, and the function that fills a pallet."""
     cell = cell_from_yaml(config.cell)
     operator = Operator(cell, yes=config.yes)
-    if not operator.asks:
-        use_one_core()  # networks round by the number of threads, and near-equal grasps would change places
+    if cell.arm.simulated:
+        # Networks round by the number of threads, and near-equal grasps would change places.
+        torch.set_num_threads(1)
     with cell.connected():
         check_reach(cell, config.all_slots())
         planner = make_planner(config.models, config.planner, cell)

@@ -83,6 +83,7 @@ class Placer:
         self._operator = operator
         self._pictures = pictures
         self._tape = tape
+        self._tops: dict[int, float] = {}
         self._last: tuple[int, np.ndarray, GraspPlan] | None = None
 
     def run(self, task: Task, name: str = "") -> Placement:
@@ -122,6 +123,10 @@ class Placer:
         except OutOfWorkspace:
             return replace(known, reason="OutOfWorkspace")
         done, after = self._carry(frame, plan, target, known)
+        if not task.keep:
+            self._tops = {}
+        if done.placed:
+            self._tops[task.index] = float(plan.view.size[2])
         views = take_views(frame, after, plan, target, task.slot.theta)
         write_views(views, self._pictures / f"{done.name}.npz")
         draw_placement(views, done, self._pictures / f"{done.name}.png")
@@ -141,7 +146,7 @@ class Placer:
 
     def look(self, slots: list[Slot]) -> np.ndarray:
         """A picture (h, w, 3) of the pallet as it is now, the arm at home."""
-        return pallet_image(self._cell.camera.capture(), slots, self._cell.workspace.table_z)
+        return pallet_image(self._cell.camera.capture(), slots, self._cell.workspace.table_z, self._tops)
 
     def _plan(self, frame: RgbdFrame, seed: int) -> GraspPlan:
         """The plan; where the last picture was the same, as under another correction, the last plan."""

@@ -121,7 +121,7 @@ def _work(connection: Connection, bench: Bench[Any, Any, Any], settings: Any) ->
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     threading.Thread(target=_leave_with_parent, daemon=True).start()
     try:
-        use_one_core()
+        os.environ.setdefault("LP_NUM_THREADS", "1")
         with bench(settings) as work:
             while True:
                 for result in work(connection.recv()):
@@ -136,14 +136,6 @@ def _work(connection: Connection, bench: Bench[Any, Any, Any], settings: Any) ->
     except Exception as error:
         traceback.print_exc()  # a defect: its place is wanted, once
         connection.send(("error", f"a worker failed: {type(error).__name__}: {error}"))
-
-
-def use_one_core() -> None:
-    """Keeps this process to one core: results then do not depend on how many others work beside it."""
-    os.environ.setdefault("LP_NUM_THREADS", "1")
-    import torch
-
-    torch.set_num_threads(1)
 
 
 def _leave_with_parent() -> None:

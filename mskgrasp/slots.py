@@ -6,15 +6,16 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from hal import Cell
 from hal.errors import OutOfWorkspace
 from mskgrasp.config import Config, read_config
 from mskgrasp.errors import UsageError
-from mskgrasp.footprint import Footprint, smallest_footprint
+from mskgrasp.footprint import Footprint, usual_footprint
 from mskgrasp.geometry import wrap_half_turn
 from mskgrasp.parts import Part
 from mskgrasp.placing import Target, check_place
@@ -56,15 +57,20 @@ class Slot:
         return bool(np.all(room <= np.array(self.size) + tolerance))
 
 
+_Length = Annotated[float, Field(gt=0.0, le=1.0)]
+_Coordinate = Annotated[float, Field(allow_inf_nan=False)]
+_Count = Annotated[int, Field(ge=1, le=100)]
+
+
 class SlotEntry(Config):
     """A slot in a file."""
 
-    x: float = Field(allow_inf_nan=False)
-    y: float = Field(allow_inf_nan=False)
+    x: _Coordinate
+    y: _Coordinate
     """Of the part's centre, base frame, m."""
     theta_deg: float = Field(default=0.0, allow_inf_nan=False)
     """Direction of its longer side, degrees from base x."""
-    size: tuple[float, float] | None = None
+    size: tuple[_Length, _Length] | None = None
     """Room along base x and y, m; null: not checked."""
 
     def slot(self) -> Slot:
@@ -75,16 +81,24 @@ class SlotEntry(Config):
 class Grid(Config):
     """Slots in rows and columns."""
 
-    first: tuple[float, float]
+    first: tuple[_Coordinate, _Coordinate]
     """x and y of the slot nearest to the base's origin, m."""
-    pitch: tuple[float, float]
+    pitch: tuple[_Length, _Length]
     """From slot to slot along x and y, m."""
-    n: tuple[int, int]
+    n: tuple[_Count, _Count]
     """Slots along x and y."""
     theta_deg: float = Field(default=0.0, allow_inf_nan=False)
     """Direction of the parts' longer side, degrees from base x."""
-    size: tuple[float, float] | None = None
+    size: tuple[_Length, _Length] | None = None
     """Room in each along x and y, m; null: the pitch."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Grid:
+        size = self.size or self.pitch
+        for axis in (0, 1):
+            if self.n[axis] > 1 and size[axis] > self.pitch[axis]:
+                raise ValueError(f"slots of size {list(size)} overlap at a pitch of {list(self.pitch)} m")
+        return self
 
 
 class Pallet(Config):
@@ -179,7 +193,7 @@ def first_reachable(cell: Cell, poses: Sequence[np.ndarray]) -> int:
 
 
 def check_room(pairs: Iterable[tuple[Part, Slot]]) -> None:
-    """Refuses parts that fit into their slot on none of their sides.
+    """Refuses parts that do not fit into their slot as they come to lie most often.
 
     Raises:
         UsageError: Says which, how large they are, and the remedy.
@@ -189,7 +203,7 @@ def check_room(pairs: Iterable[tuple[Part, Slot]]) -> None:
     for part, slot in pairs:
         if slot.size is None or part.name in too_large:
             continue
-        footprint = smallest_footprint(part)
+        footprint = usual_footprint(part)
         if not slot.fits(footprint):
             long, short = 1e3 * footprint.sides
             too_large[part.name] = f"{part.name} ({long:.0f} x {short:.0f} mm)"

@@ -65,6 +65,7 @@ class RecordingArm(Arm):
 
     def __init__(self, arm: Arm, writer: RecordingWriter):
         super().__init__(arm.limits)
+        self.simulated = arm.simulated
         self._arm, self._writer = arm, writer
         self._open = False
 
