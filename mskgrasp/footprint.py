@@ -33,7 +33,7 @@ class Footprint:
     theta: float
 
     def extent(self, theta: float) -> np.ndarray:
-        """(2,) how far it reaches along two axes, metres, turned so that the longer side lies at ``theta``."""
+        """(2,) how far it reaches along base x and y with the longer side at ``theta``, metres."""
         cos, sin = abs(np.cos(theta)), abs(np.sin(theta))
         long, short = self.sides
         return np.array([cos * long + sin * short, sin * long + cos * short])

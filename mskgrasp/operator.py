@@ -40,8 +40,8 @@ class Operator:
         self.asks = not (yes or cell.arm.simulated)
         if self.asks and answers is None and not sys.stdin.isatty():
             raise UsageError(
-                "this cell asks its operator before the arm moves, and standard input is no terminal; start it in "
-                "one, or give --yes if the arm may move by itself"
+                "this cell asks its operator before the arm moves, and standard input is no terminal; start "
+                "it in one, or give --yes if the arm may move by itself"
             )
         self._answers = answers or sys.stdin
         self._prompts = prompts or sys.stderr
@@ -68,8 +68,8 @@ class Operator:
         self.tell(f"{name}: '{Path(part).name}'".removeprefix(": "))
         if self.asks:
             self._ask(
-                f"Shake the part in its box, tip it out into the region, {others}. Enter when your hands are out of "
-                "the cell, q to stop: ",
+                f"Shake the part in its box, tip it out into the region, {others}. Enter when your hands are "
+                "out of the cell, q to stop: ",
                 {"": True},
             )
 

@@ -23,7 +23,7 @@ from mskgrasp.files import write_whole
 from mskgrasp.geometry import quat_to_matrix
 from mskgrasp.grasp import MAX_OPENING
 from mskgrasp.images import crop_patches, height_image
-from mskgrasp.placements import CORRECTIONS, Correction, Placement, compared
+from mskgrasp.placements import CORRECTIONS, Correction, Placement, compared, corrections_of
 from mskgrasp.placing import Target
 from mskgrasp.planner import GraspPlan
 from mskgrasp.slots import Slot
@@ -86,7 +86,7 @@ def take_views(
 
 def write_views(views: Views, path: Path) -> None:
     """Writes views as a compressed file, whole or not at all."""
-    values = {name: np.asarray(value) for name, value in asdict(views).items()}
+    values: dict[str, Any] = {name: np.asarray(value) for name, value in asdict(views).items()}
     for name in ("before", "after"):
         values[name] = values[name].astype(np.float32)
     buffer = io.BytesIO()
@@ -204,7 +204,7 @@ def draw_comparison(
         rows: A placement of the row (any), the views and the placements by correction.
         path: The picture, PNG.
     """
-    names = [name for name in CORRECTIONS if rows and name in rows[0][1]]
+    names: list[Correction] = [name for name in CORRECTIONS if rows and name in rows[0][1]]
     with matplotlib.rc_context(_STYLE):
         figure = Figure(
             figsize=(2.45 * (1 + len(names)), 2.6 * max(1, len(rows)) + 0.2), layout="constrained"
@@ -227,7 +227,7 @@ def draw_comparison(
 def draw_errors(placements: Sequence[Placement], path: Path) -> None:
     """Draws how many placements err by no more than so much, and the medians of parts beside each other."""
     groups = compared(placements)
-    names = [name for name in CORRECTIONS if any(one.correction == name for one in placements)]
+    names = corrections_of(placements)
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(11.5, 4.3), layout="constrained")
         shift, turn, parts = figure.subplots(1, 3)

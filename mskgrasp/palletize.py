@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -38,13 +37,16 @@ from mskgrasp.slots import Slot, check_reach, check_room, parse_target, read_slo
 
 DESCRIPTION = """Grasps parts, puts each where it shall lie, and measures how far from that it lies then.
 
-Every trial is made once for each correction, with the same part in the same place: none (as if nothing moved in
-the hand), predicted (by the displacement network), truth (what the tracker saw, the best any prediction could do).
-Writes report.html, report.json and pictures; every finished placement is stored at once, a stopped run goes on.
+Every trial is made once for each correction, with the same part in the same place: none (as if nothing
+moved in the hand), predicted (by the displacement network), truth (what the tracker saw: the best that any
+prediction could do). Writes report.html, report.json and pictures. Every finished placement is stored at
+once; a stopped run goes on where it was.
 
-One target for all parts:  --target 0.5,0.06,90
-A pallet of several:       --cell configs/palletize/cell.yaml --slots configs/palletize/grid.yaml
-A real cell asks its operator for every part, and before the arm moves (--yes: it asks nothing)."""
+One target for all parts: --target 0.5,0.06,90
+
+A pallet of several: --cell configs/palletize/cell.yaml --slots configs/palletize/grid.yaml
+
+A real cell asks its operator to lay every part, and before the arm moves (--yes: it asks nothing)."""
 
 
 class PalletizeConfig(Config):
@@ -63,14 +65,14 @@ class PalletizeConfig(Config):
     trials: int = Field(default=3, ge=1)
     """Trials a part; with --slots, pallets."""
     target: str = "0.5,0.06,90"
-    """x and y of the centre, m (base), and the direction of the part's longer side seen from above, degrees."""
+    """x and y of the centre, m (base), and the direction of the part's longer side from above, degrees."""
     slots: Path | None = None
     """YAML file of slots instead, filled with the parts in turn; see configs/palletize/grid.yaml."""
-    corrections: tuple[Correction, ...] | None = None
+    corrections: tuple[Correction, ...] = ()
     """What is corrected by, of none, predicted, truth; by default all that the cell can."""
-    tape: Tape | None = None
-    """Sizes of two squares of tape on every part, to measure by; by default the cell's tracker measures, and
-    where it has none, nothing does."""
+    tape: tuple[float, float] | None = None
+    """Sides of the two squares of tape on every part to measure by, m, such as 0.012 0.008; by default the
+    cell's tracker measures, and where it has none, nothing does."""
     seed: int = Field(default=0, ge=0)
     """Places, turns and candidates follow from it."""
     workers: int = Field(default=1, ge=1, le=256)
@@ -85,6 +87,17 @@ class PalletizeConfig(Config):
     def _target(cls, text: str) -> str:
         parse_target(text)
         return text
+
+    @field_validator("tape")
+    @classmethod
+    def _tape(cls, sides: tuple[float, float] | None) -> tuple[float, float] | None:
+        if sides is not None:
+            Tape(large=sides[0], small=sides[1])
+        return sides
+
+    def squares(self) -> Tape | None:
+        """The tape to measure by."""
+        return None if self.tape is None else Tape(large=self.tape[0], small=self.tape[1])
 
     def all_slots(self) -> list[Slot]:
         """The file's slots, or the one target."""
@@ -119,7 +132,8 @@ def palletize(config: PalletizeConfig) -> dict[str, Any]:
     """Makes the placements that are missing and sums all up.
 
     Raises:
-        UsageError: The folder holds a run with other settings, a slot cannot be used, or there is no operator.
+        UsageError: The folder holds a run with other settings, a slot cannot be used, or there is nobody to
+            be asked.
         HalError: The cell was lost; what is finished is stored.
     """
     models = load_models(config.models)
@@ -164,9 +178,9 @@ def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[Correction, ...]
     Operator(cell, yes=config.yes)  # refuses where nobody is there to answer
     if kind in ("sapien", "devices"):  # a recording answers only what comes in its order
         check_reach(cell, slots)
-    can = tuple(name for name in CORRECTIONS if name != "truth" or cell.tracker is not None)
-    wanted = can if config.corrections is None else tuple(dict.fromkeys(config.corrections))
-    if not wanted or not set(wanted) <= set(can):
+    can: tuple[Correction, ...] = CORRECTIONS if cell.tracker is not None else CORRECTIONS[:2]
+    wanted = tuple(dict.fromkeys(config.corrections)) or can
+    if not set(wanted) <= set(can):
         raise UsageError(
             f"--corrections {' '.join(wanted)}: nothing in this cell tracks the part; legal: {', '.join(can)}"
         )
@@ -237,7 +251,7 @@ def placing_bench(config: PalletizeConfig) -> Iterator[Callable[[Pallet], Iterat
     with cell.connected():
         check_reach(cell, config.all_slots())
         planner = make_planner(config.models, config.planner, cell)
-        placer = Placer(cell, planner, operator, config.out / "placements", tape=config.tape)
+        placer = Placer(cell, planner, operator, config.out / "placements", tape=config.squares())
 
         def fill(pallet: Pallet) -> Iterator[Placement]:
             for number, task in enumerate(pallet.tasks, 1):

@@ -32,12 +32,12 @@ from mskgrasp.slots import Slot
 WORST = 10
 _ROWS = 6
 _DEFINITIONS = (
-    "Error: distance of the placed part's centre from its target, and the difference between the turn it made and the "
-    "one it was asked for. The centre and the direction of the longer side are those that the depth image showed "
-    "before the grasp: what seeing them costs is in no column.",
-    "Correction none: as if nothing had moved in the hand; predicted: by the displacement network; truth: by what the "
-    f"tracker saw in the hand, and is what no prediction can beat. Goal: the prediction leaves {GOAL:g} of the median "
-    "error at most. Intervals: bootstrap over parts, 95 %.",
+    "Error: distance of the placed part's centre from its target, and the difference between the turn it "
+    "made and the one it was asked for. The centre and the direction of the longer side are those that the depth "
+    "image showed before the grasp: what seeing them costs is in no column.",
+    "Correction none: as if nothing had moved in the hand; predicted: by the displacement network; truth: by "
+    "what the tracker saw in the hand, which no prediction can beat. Goal: the prediction leaves "
+    f"{GOAL:g} of the median error at most. Intervals: bootstrap over parts, 95 %.",
 )
 
 
@@ -115,8 +115,8 @@ def _examples(out: Path, placements: Sequence[Placement]) -> Section:
         return Section(title="Examples")
     draw_comparison(rows, out / "placed.png")
     caption = (
-        "The first compared placement of each part: the grasp, and where the part came to lie. Green: target, its "
-        "longer arm along the part's longer side, and the part's outline there"
+        "The first compared placement of each part: the grasp, and where the part came to lie. Green: the "
+        "target, its longer arm along the part's longer side, and the part's outline there"
     )
     return Section(title="Examples", pictures=[Picture(path=out / "placed.png", caption=caption)])
 

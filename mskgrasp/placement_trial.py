@@ -165,7 +165,8 @@ class Placer:
         x, y, z, theta = plan.grasp
         return self._operator.may_move(
             picture,
-            f"grasp at x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees, quality {plan.quality:.2f}",
+            f"grasp at x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees, "
+            f"quality {plan.quality:.2f}",
         )
 
     def _target(self, plan: GraspPlan, targets: Sequence[Target]) -> Target:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from rich.console import Console
@@ -13,7 +13,7 @@ from rich.table import Table
 from mskgrasp.metrics import bootstrap_interval
 
 Correction = Literal["none", "predicted", "truth"]
-CORRECTIONS: tuple[Correction, ...] = get_args(Correction)
+CORRECTIONS: tuple[Correction, Correction, Correction] = ("none", "predicted", "truth")
 GOAL = 0.5
 """The correction is meant to leave no more than this share of the median error."""
 _ERRORS = ("translation", "rotation")
@@ -72,7 +72,9 @@ class Placement:
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Placement:
         """The placement that `to_json` wrote."""
-        return cls(**(values | {"target": tuple(values["target"])}))
+        x, y, theta = values["target"]
+        rest: dict[str, Any] = {name: value for name, value in values.items() if name != "target"}
+        return cls(target=(x, y, theta), **rest)
 
 
 def compared(placements: Sequence[Placement]) -> list[dict[Correction, Placement]]:
@@ -88,13 +90,20 @@ def compared(placements: Sequence[Placement]) -> list[dict[Correction, Placement
     return [group for _, group in sorted(groups.items()) if set(group) == tried]
 
 
+def corrections_of(placements: Sequence[Placement]) -> list[Correction]:
+    """The corrections that were tried, in their order."""
+    tried = {one.correction for one in placements}
+    found: list[Correction] = [name for name in CORRECTIONS if name in tried]
+    return found
+
+
 def summarise_placements(placements: Sequence[Placement]) -> dict[str, Any]:
     """Counts and errors of each correction, of all parts and of each, and what correcting gains.
 
-    Medians, with intervals by a bootstrap over parts, are of the placements `compared` finds. Without one they
-    are absent (None), not zero.
+    Medians, with intervals by a bootstrap over parts, are of the placements `compared` finds. Without one
+    they are absent (None), not zero.
     """
-    tried = [name for name in CORRECTIONS if any(one.correction == name for one in placements)]
+    tried = corrections_of(placements)
     groups = compared(placements)
     parts = sorted({one.part for one in placements})
     return dict(

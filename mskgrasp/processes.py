@@ -111,8 +111,8 @@ def _hear(worker: _Worker) -> tuple[str, Any]:
     except (EOFError, OSError):
         worker.process.join(timeout=5)
         return "error", (
-            f"a worker died (exit code {worker.process.exitcode}); what was finished is kept, run the same command "
-            "again, with fewer --workers if memory was short"
+            f"a worker died (exit code {worker.process.exitcode}); what was finished is kept, run the same "
+            "command again, with fewer --workers if memory was short"
         )
 
 

@@ -21,7 +21,7 @@ from mskgrasp.parts import Part
 from mskgrasp.placing import Target, check_place
 
 SEEN_TOLERANCE = 0.003
-"""A depth image tells a part's sides to about a pixel, m; its CAD file tells them exactly, before it moves."""
+"""A depth image tells a part's sides to about a pixel, m."""
 _ANGLES = np.radians([-90.0, -45.0, 0.0, 45.0])
 
 
@@ -43,7 +43,7 @@ class Slot:
     size: tuple[float, float] | None = None
 
     def targets(self, footprint: Footprint, grasp_theta: float) -> tuple[Target, Target]:
-        """Both ways round in which a part that lies so, grasped so, may be put; first that of the lesser hand turn."""
+        """Both ways round for a part that lies so and is grasped so; the lesser turn of the hand first."""
         hand = float(wrap_half_turn(np.asarray(grasp_theta + self.theta - footprint.theta)))
         other = hand - np.copysign(np.pi, hand)
         first, second = (Target(x=self.x, y=self.y, theta=turned - grasp_theta) for turned in (hand, other))
@@ -134,11 +134,9 @@ def parse_target(text: str) -> Slot:
     try:
         x, y, theta = (float(word) for word in text.split(","))
     except ValueError:
-        raise ValueError(
-            f"target must be x,y,theta in metres and degrees, as 0.5,0.06,90, got {text!r}"
-        ) from None
+        raise ValueError("target must be x,y,theta in metres and degrees") from None
     if not all(math.isfinite(value) for value in (x, y, theta)):
-        raise ValueError(f"target must be finite, got {text!r}")
+        raise ValueError("target must be finite")
     return Slot(x=x, y=y, theta=math.radians(theta))
 
 
@@ -210,6 +208,6 @@ def check_room(pairs: Iterable[tuple[Part, Slot]]) -> None:
             room = f"{1e3 * slot.size[0]:g} x {1e3 * slot.size[1]:g} mm"
     if too_large:
         raise UsageError(
-            f"a slot of {room} is smaller than {', '.join(too_large.values())}; give the slots more room, turn "
-            "them (theta_deg), or choose other --parts"
+            f"a slot of {room} is smaller than {', '.join(too_large.values())}; give the slots more room, "
+            "turn them (theta_deg), or choose other --parts"
         )

@@ -78,7 +78,8 @@ def test_a_real_arm_needs_a_terminal_or_a_yes(real, monkeypatch):
 
 def test_it_is_asked_in_a_terminal(real):
     code = (
-        "import sys; from pathlib import Path; from hal import cell_from_yaml; from mskgrasp.operator import Operator\n"
+        "import sys; from pathlib import Path; from hal import cell_from_yaml\n"
+        "from mskgrasp.operator import Operator\n"
         "print(Operator(cell_from_yaml(Path(sys.argv[1]))).may_move(Path('a.png'), 'a grasp'))"
     )
     ours, theirs = pty.openpty()

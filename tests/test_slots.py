@@ -86,7 +86,7 @@ def test_a_slot_smaller_than_a_part_is_named_with_both_sizes():
         ("slots: [{x: 0.5, y: 0, size: [0.1, -0.1]}]", BadConfig, "greater than 0"),
         ("grid: {first: [0.4, 0.2], pitch: [0.1, 0.1], n: [0, 2]}", BadConfig, "greater than or equal to 1"),
         ("grid: {first: [0.4, 0.2], pitch: [0.1, 0.1], n: [3000, 2000]}", BadConfig, "less than or equal to"),
-        ("grid: {first: [0.4, 0.2], pitch: [0.05, 0.05], n: [2, 2], size: [0.06, 0.04]}", BadConfig, "overlap"),
+        ("grid: {first: [0.4, 0.2], pitch: [0.05, 0.05], n: [2, 2], size: [0.06, 0.04]}", BadConfig, "lap"),
         ("- {x: 0.5, y: 0.1}", BadConfig, "expected a mapping"),
     ],
 )  # fmt: skip
