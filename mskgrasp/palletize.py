@@ -145,13 +145,13 @@ def palletize(config: PalletizeConfig) -> dict[str, Any]:
     if config.n_parts and config.n_parts < len(names):
         names = [names[int(i)] for i in np.linspace(0, len(names) - 1, config.n_parts)]
     slots = config.all_slots()
-    corrections = _check(config, slots)
+    corrections, asks = _check(config, slots)
     pallets = _pallets(config, names, slots, corrections)
     check_room((find_part(task.part), task.slot) for pallet in pallets for task in pallet)
     inputs = inputs_of(config.cell, config.models, names)
     if config.slots is not None:
         inputs["slots"] = file_digest(config.slots)
-    may_change = ["out", "trials", "workers", "yes"]
+    may_change = ["out", "trials", "corrections", "workers", "yes"]
     # Which part comes into which slot follows from all of them.
     may_change += ["parts", "n_parts"] if config.slots is None else []
     begin(config, config.out, inputs, may_change=may_change)
@@ -159,15 +159,15 @@ def palletize(config: PalletizeConfig) -> dict[str, Any]:
         if not mine:
             raise UsageError(f"another run is at work in {config.out}; wait for it, or choose another --out")
         make_folder(config.out / "placements")
-        placements = _place_all(config, pallets)
+        placements = _place_all(config, pallets, asks)
     return write_report(config, config.out, placements, slots)
 
 
-def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[Correction, ...]:
+def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[tuple[Correction, ...], bool]:
     """Refuses what cannot be done on this cell; nothing is connected, nothing moves.
 
     Returns:
-        The corrections.
+        The corrections, and whether an operator will be asked.
     """
     cell = cell_from_yaml(config.cell)
     kind = read_yaml(config.cell).get("type")
@@ -175,7 +175,7 @@ def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[Correction, ...]
         raise UsageError(
             f"--workers {config.workers}: {config.cell} is one cell of which there are not several"
         )
-    Operator(cell, yes=config.yes)  # refuses where nobody is there to answer
+    asks = Operator(cell, yes=config.yes).asks
     if kind in ("sapien", "devices"):  # a recording answers only what comes in its order
         check_reach(cell, slots)
     can: tuple[Correction, ...] = CORRECTIONS if cell.tracker is not None else CORRECTIONS[:2]
@@ -184,7 +184,7 @@ def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[Correction, ...]
         raise UsageError(
             f"--corrections {' '.join(wanted)}: nothing in this cell tracks the part; legal: {', '.join(can)}"
         )
-    return wanted
+    return wanted, asks
 
 
 def _pallets(
@@ -215,7 +215,7 @@ def _pallets(
     ]
 
 
-def _place_all(config: PalletizeConfig, pallets: list[list[Task]]) -> list[Placement]:
+def _place_all(config: PalletizeConfig, pallets: list[list[Task]], asks: bool) -> list[Placement]:
     found = {one.key: one for one in read(config.out / TRIALS, Placement.from_json)}
     keys = [task.key for pallet in pallets for task in pallet]
     missing = [
@@ -230,7 +230,7 @@ def _place_all(config: PalletizeConfig, pallets: list[list[Task]]) -> list[Place
     left = sum(key not in found for key in keys)
     if missing:
         results = spread(placing_bench, config, missing, config.workers)
-        bar = tqdm(total=left, unit="placement", file=sys.stderr, disable=not sys.stderr.isatty() or None)
+        bar = tqdm(total=left, unit="placement", file=sys.stderr, disable=asks)
         with contextlib.closing(results), bar:
             for placement in results:
                 if placement.key not in found:

@@ -13,7 +13,8 @@ from pydantic import BaseModel
 
 from mskgrasp.files import write_whole
 from mskgrasp.html_report import Link, Picture, Section, Table, settings_section, write_html
-from mskgrasp.pallet_pictures import draw_comparison, draw_errors, draw_pallets, outcome_text, read_views
+from mskgrasp.pallet_pictures import draw_comparison, draw_errors, draw_pallets, outcome_text
+from mskgrasp.placement_views import read_views
 from mskgrasp.placements import (
     CORRECTIONS,
     GOAL,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,15 +11,16 @@ import numpy as np
 
 from hal import Cell, RgbdFrame, execute_grasp, go_home, put_down
 from hal.errors import MotionAborted, OutOfWorkspace
-from mskgrasp.errors import MarkersNotFound, NoGraspFound, NoPartFound
+from mskgrasp.errors import MarkersNotFound, NoGraspFound, NoPartFound, TapeDoesNotFit
 from mskgrasp.footprint import seen_footprint
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import centre_in_grasp_frame, object_displacement, pose_base_tcp
 from mskgrasp.markers import find_markers, planar_displacement
 from mskgrasp.operator import Operator
-from mskgrasp.pallet_pictures import draw_placement, pallet_image, take_views, write_views
+from mskgrasp.pallet_pictures import draw_placement, pallet_image
 from mskgrasp.parts import find_part
 from mskgrasp.pictures import draw_plan
+from mskgrasp.placement_views import take_views, write_views
 from mskgrasp.placements import Correction, Placement
 from mskgrasp.placing import (
     Target,
@@ -103,7 +105,9 @@ class Placer:
         )  # fmt: skip
         while True:
             self.home()
-            self._operator.lay(self._cell, task.part, task.seed, name=name, keep=task.keep)
+            # It lies there all the same; without tape its error is unmeasured, which is said below.
+            with contextlib.suppress(TapeDoesNotFit):
+                self._operator.lay(self._cell, task.part, task.seed, name=name, keep=task.keep)
             frame = self._cell.camera.capture()
             try:
                 plan = self._plan(frame, task.seed)
@@ -112,7 +116,7 @@ class Placer:
                     self._operator.tell(str(error))
                     continue
                 return replace(failed, reason=type(error).__name__)
-            if self._agreed(frame, plan):
+            if self._agreed(frame, plan, task):
                 break
         known = replace(failed, grasp=plan.grasp.tolist(), predicted=plan.displacement.tolist())
         footprint = seen_footprint(frame, plan.view)
@@ -158,7 +162,7 @@ class Placer:
             self._last = seed, frame.depth, self._planner.plan(frame, np.random.default_rng(seed))
         return self._last[2]
 
-    def _agreed(self, frame: RgbdFrame, plan: GraspPlan) -> bool:
+    def _agreed(self, frame: RgbdFrame, plan: GraspPlan, task: Task) -> bool:
         picture = self._pictures.parent / "next.png"
         if self._operator.asks:
             draw_plan(frame, plan, picture)
@@ -166,7 +170,7 @@ class Placer:
         return self._operator.may_move(
             picture,
             f"grasp at x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees, "
-            f"quality {plan.quality:.2f}",
+            f"quality {plan.quality:.2f}; then to x {task.slot.x:.3f}, y {task.slot.y:.3f} m",
         )
 
     def _target(self, plan: GraspPlan, targets: Sequence[Target]) -> Target:
