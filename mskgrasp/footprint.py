@@ -6,18 +6,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import torch
 import trimesh
 
 from hal.camera import RgbdFrame
 from mskgrasp.geometry import quat_rotate, wrap_half_turn
 from mskgrasp.grasp import PartView
-from mskgrasp.images import crop_patches, height_image
 from mskgrasp.parts import Part
-
-_PIXEL = 0.0005
-_LEVEL = 0.3
-"""Share of the part's height over which a pixel belongs to it: half a pixel of slope counts half."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,25 +42,28 @@ def footprint_of(points: np.ndarray) -> Footprint:
     return Footprint(sides=np.array([long, short]) * 1e-3, theta=float(wrap_half_turn(np.asarray(theta))))
 
 
-def seen_footprint(frame: RgbdFrame, view: PartView) -> Footprint:
+def seen_footprint(frame: RgbdFrame, view: PartView, min_height: float) -> Footprint:
     """The footprint of the part that a frame shows.
 
     Args:
         frame: Of the part on the table.
         view: Where the part was found in it.
+        min_height: What rises less above the table is table, metres.
     """
-    side = 1.3 * float(np.hypot(*view.size[:2])) + 0.02
-    n = int(np.ceil(side / _PIXEL))
-    # In the plane of the part's top there is no parallax.
-    square = torch.tensor([[*view.centre_base[:2], view.table_z + view.size[2], 0.0]])
-    heights = height_image(torch.from_numpy(frame.depth), frame.intrinsics, frame.T_base_camera, view.table_z)
-    patch = crop_patches(heights, square, frame.intrinsics, frame.T_base_camera, n_pixels=n, side=side)
-    high = (patch[0, 0].numpy() > _LEVEL * view.size[2]).astype(np.uint8)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(high, connectivity=8)
+    depth = np.asarray(frame.depth, dtype=np.float64)
+    rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
+    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(frame.intrinsics).T
+    points = frame.T_base_camera.apply((rays * depth[..., None]).reshape(-1, 3))
+    pitch = float(np.nanmedian(depth)) / float(frame.intrinsics[0][0])
+    in_box = np.abs(view.T_base_box.inverse().apply(points)[:, :2]) <= view.size[:2] / 2 + pitch
+    high = in_box.all(axis=1) & (points[:, 2] > view.table_z + min_height)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(
+        high.reshape(depth.shape).astype(np.uint8), connectivity=8
+    )
     largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    rows, columns = np.nonzero(labels == largest)
-    middle, pitch = (n - 1) / 2, side / n
-    return footprint_of(np.column_stack([columns - middle, middle - rows]) * pitch)
+    found = footprint_of(points[(labels == largest).ravel(), :2])
+    # An edge is, on average, half a pixel further out than the last pixel on it.
+    return Footprint(sides=found.sides + pitch, theta=found.theta)
 
 
 def usual_footprint(part: Part) -> Footprint:

@@ -19,6 +19,8 @@ from mskgrasp.files import write_whole
 _KINDS = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 _PACKAGES = ("torch", "sapien", "mani_skill", "numpy", "opencv-python-headless")
 _NUMBER = re.compile(r"[+\-−]?\d.*|[-–]?")
+_LONG = 40
+"""Characters; a column with a longer cell is wrapped."""
 
 # Nothing but what is in the file: a browser refuses the rest, whatever stands in a caption.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
@@ -35,8 +37,8 @@ a { color: #1f6feb; }
 table { border-collapse: collapse; font-size: 0.88rem; font-variant-numeric: tabular-nums; }
 caption { text-align: left; padding: 0 0 0.35rem; color: #5c626b; }
 th, td { padding: 0.3rem 0.75rem 0.3rem 0; text-align: left; vertical-align: top; }
-td { border-top: 1px solid #e3e6ea; min-width: 4rem; }
-td:first-child { white-space: nowrap; }
+td { border-top: 1px solid #e3e6ea; white-space: nowrap; }
+td.t { white-space: normal; min-width: 16rem; }
 th { border-bottom: 1px solid #8b909a; }
 .n { text-align: right; white-space: nowrap; }
 figure { margin: 1rem 0 1.6rem; }
@@ -46,6 +48,7 @@ figcaption { color: #5c626b; font-size: 0.9rem; margin-top: 0.3rem; }
   body { max-width: none; padding: 0; font-size: 10.5pt; }
   nav { display: none; }
   .wide { overflow: visible; }
+  td { white-space: normal; }
   figure, tr { break-inside: avoid; }
   h2 { break-after: avoid; }
   img { max-height: 22cm; }
@@ -192,8 +195,7 @@ def _table(table: Table, names: set[str]) -> str:
     for row in table.rows:
         if len(row) != len(table.header):
             raise ValueError(f"a row of {len(row)} cells under a header of {len(table.header)}: {row}")
-    numeric = [all(_NUMBER.fullmatch(_text(row[k])) for row in table.rows) for k in range(len(table.header))]
-    attributes = [' class="n"' if number else "" for number in numeric]
+    attributes = [_kind([_text(row[k]) for row in table.rows]) for k in range(len(table.header))]
     head = "".join(
         f'<th scope="col"{attribute}>{escape(name)}</th>'
         for name, attribute in zip(table.header, attributes, strict=True)
@@ -207,6 +209,13 @@ def _table(table: Table, names: set[str]) -> str:
     caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
     body = f"<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody>"
     return f'<div class="wide"><table>{caption}{body}</table></div>'
+
+
+def _kind(cells: Sequence[str]) -> str:
+    """The attribute of a column's cells: numbers, long text, or neither."""
+    if any(len(cell) > _LONG for cell in cells):
+        return ' class="t"'
+    return ' class="n"' if all(_NUMBER.fullmatch(cell) for cell in cells) else ""
 
 
 def _text(cell: object) -> str:

@@ -30,6 +30,8 @@ _STYLE: dict[Any, Any] = {
     "axes.spines.top": False, "axes.spines.right": False, "savefig.dpi": 130,
 }  # fmt: skip
 _MM = 1e3
+_CUT = 0.004
+"""Outlines are those of what is higher than half of this, m."""
 
 
 def draw_placement(views: Views, placement: Placement, path: Path) -> None:
@@ -98,10 +100,12 @@ def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> N
     pitch = views.side * _MM / n
     steps = (np.arange(n) - (n - 1) / 2) * pitch
     x, y = np.meshgrid(steps, -steps)
-    # A camera pixel is several of these: without the blur the outline shows its stairs.
-    smooth = cv2.GaussianBlur(np.ascontiguousarray(views.before), (0, 0), 1.5 / pitch)
+    # Cut low, a thin plate counts as much as a high wall. A camera pixel is several of these: without the
+    # blur the outline shows its stairs.
+    low = np.ascontiguousarray(np.minimum(views.before, min(_CUT, views.top)))
+    smooth = cv2.GaussianBlur(low, (0, 0), 1.0 / pitch)
+    level = [0.5 * max(float(smooth.max()), 1e-4)]
     cos, sin = np.cos(turn), np.sin(turn)
-    level = [0.25 * max(float(smooth.max()), 1e-4)]
     axes.contour(
         cos * x - sin * y, sin * x + cos * y, smooth, levels=level, colors=[colour], linewidths=1.3,
         linestyles=line, zorder=5,

@@ -34,10 +34,10 @@ WORST = 10
 _ROWS = 6
 _DEFINITIONS = (
     "Error: distance of the placed part's centre from its target, and the difference between the turn it "
-    "made and the one it was asked for. The centre and the direction of the longer side are those that the depth "
-    "image showed before the grasp: what seeing them costs is in no column.",
+    "made and the one it was asked for. The centre and the direction of the longer side are those that the "
+    "depth image showed before the grasp: what seeing them costs is in no column.",
     "Correction none: as if nothing had moved in the hand; predicted: by the displacement network; truth: by "
-    "what the tracker saw in the hand, which no prediction can beat. Goal: the prediction leaves "
+    "what the tracker saw in the hand, which a prediction beats by luck alone. Goal: the prediction leaves "
     f"{GOAL:g} of the median error at most. Intervals: bootstrap over parts, 95 %.",
 )
 

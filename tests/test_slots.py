@@ -23,9 +23,19 @@ GRID = REPOSITORY / "configs" / "palletize" / "grid.yaml"
 def test_a_depth_image_tells_how_a_part_lies(yaw):
     box = Box(x=0.47, y=0.02, yaw=float(yaw), size=(0.06, 0.03, 0.025))
     seen = frame([box])
-    found = seen_footprint(seen, view(seen.depth))
+    found = seen_footprint(seen, view(seen.depth), 0.002)
     assert abs(wrap_half_turn(np.asarray(found.theta - yaw))) < np.radians(3.0)
     np.testing.assert_allclose(found.sides, [0.06, 0.03], atol=0.003)
+
+
+def test_a_low_part_of_it_counts_too():
+    """A bracket: a plate of 4 mm with a wall of 40 mm."""
+    plate = Box(x=0.47, y=0.0, yaw=0.5, size=(0.08, 0.03, 0.004))
+    wall = Box(x=0.47 + 0.038 * np.cos(0.5), y=0.038 * np.sin(0.5), yaw=0.5, size=(0.004, 0.03, 0.04))
+    seen = frame([plate, wall])
+    found = seen_footprint(seen, view(seen.depth), 0.002)
+    assert abs(found.theta - 0.5) < np.radians(3.0)
+    np.testing.assert_allclose(found.sides, [0.08, 0.03], atol=0.003)
 
 
 def test_the_footprint_of_a_rectangle_is_itself():

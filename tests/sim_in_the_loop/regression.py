@@ -28,18 +28,24 @@ HERE = Path(__file__).parent
 STORED = HERE / "regression.json"
 MODEL = HERE / "model"
 PARTS = (
-    "hex_bolt_m12x60", "hinge_60x30", "parallel_key_b20x12x80", "u_bracket_60x35", "washer_m36", "hex_nut_m30",
-)  # fmt: skip
+    "hex_bolt_m12x60",
+    "hinge_60x30",
+    "parallel_key_b20x12x80",
+    "stepped_shaft_28x95",
+    "t_nut_m16x18",
+    "washer_m36",
+)
+"""Which the model has never seen."""
 LEVEL = 0.99
 """Of confidence: one false alarm in a hundred runs and figure."""
 
 Row = dict[str, Any]
 
-DESCRIPTION = """Plans, grasps, corrects and places a fixed set of parts in the simulated cell, and prints what has
-changed against the run stored in the repository, with intervals over parts.
+DESCRIPTION = """Plans, grasps, corrects and places a fixed set of parts in the simulated cell, and prints
+what has changed against the run stored in the repository, with intervals over parts.
 
-Ends with 1 if anything is worse than chance explains. --store keeps this run as the stored one: commit it with
-the change that explains it."""
+Ends with 1 if anything is worse than chance explains. --store keeps this run as the stored one: commit it
+with the change that explains it."""
 
 
 class RegressionConfig(Config):
