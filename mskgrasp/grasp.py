@@ -157,7 +157,7 @@ class PartView:
     table_z: float
 
 
-def sample_grasps(view: PartView, n: int, rng: np.random.Generator, *, n_angles: int = 0) -> np.ndarray:
+def sample_grasps(view: PartView, n: int, rng: np.random.Generator) -> np.ndarray:
     """Grasps uniform in the part's bounding box, z from the table clearance to the part's top.
 
     A part lower than the lowest grasp is grasped at that height. theta is uniform in [-pi/2, pi/2).
@@ -166,7 +166,6 @@ def sample_grasps(view: PartView, n: int, rng: np.random.Generator, *, n_angles:
         view: Where the part is seen.
         n: Number of grasps.
         rng: Source of all that is random.
-        n_angles: Where over 0, only so many angles occur, evenly spread from a random first one.
 
     Returns:
         (n, 4) float64, base frame, metres and radians.
@@ -179,7 +178,5 @@ def sample_grasps(view: PartView, n: int, rng: np.random.Generator, *, n_angles:
     lowest = lowest_grasp_z(view.table_z)
     highest = max(lowest, view.table_z + float(view.size[2]))
     grasps[:, 2] = lowest + unit[:, 2] * (highest - lowest)
-    if n_angles:
-        unit[:, 3] = (np.floor(unit[:, 3] * n_angles) + rng.random()) / n_angles
     grasps[:, 3] = (unit[:, 3] - 0.5) * np.pi
     return grasps

@@ -186,10 +186,11 @@ def crop_patches(
     *,
     n_pixels: int = 64,
     side: float = 0.128,
+    n_columns: int | None = None,
 ) -> Tensor:
     """Crops the height image around grasps, turned so that the fingers close along the columns.
 
-    A patch is a square of the horizontal plane through the grasp point, centred on it: the grasp frame's
+    A patch is a rectangle of the horizontal plane through the grasp point, centred on it: the grasp frame's
     x points right, its y, the closing direction, up. It is sampled bilinearly. Invalid pixels do not
     spread: they are left out of the interpolation, and where they prevail the table (0) is assumed, as
     outside the image.
@@ -200,20 +201,24 @@ def crop_patches(
         grasps: (n, 4) base frame, metres and radians.
         intrinsics: (3, 3) or (n, 3, 3).
         T_base_camera: One pose or n poses.
-        n_pixels: Pixels along a side.
-        side: Length of a side, metres.
+        n_pixels: Pixels along the closing direction.
+        side: Length along it, metres.
+        n_columns: Pixels across it, as far apart; None: as many.
 
     Returns:
-        (n, 1, n_pixels, n_pixels) float32 on the device of ``heights``, metres above the table.
+        (n, 1, n_pixels, n_columns) float32 on the device of ``heights``, metres above the table.
     """
     height, width = heights.shape[-2:]
     origin, right, up = _patch_axes(grasps.to(heights.device), intrinsics, T_base_camera)
-    steps = torch.arange(n_pixels, device=heights.device, dtype=torch.float32) - (n_pixels - 1) / 2
-    steps = steps * (side / n_pixels)
+    n_columns = n_columns or n_pixels
+    along, across = (
+        (torch.arange(n, device=heights.device, dtype=torch.float32) - (n - 1) / 2) * (side / n_pixels)
+        for n in (n_pixels, n_columns)
+    )
     projected = (
         origin[:, None, None]
-        + steps[None, None, :, None] * right[:, None, None]
-        - steps[None, :, None, None] * up[:, None, None]
+        + across[None, None, :, None] * right[:, None, None]
+        - along[None, :, None, None] * up[:, None, None]
     )
     in_front = projected[..., 2:].clamp(min=1e-6)  # what is behind the camera lands far outside
     to_unit = torch.tensor([2 / (width - 1), 2 / (height - 1)], device=heights.device)
@@ -223,13 +228,13 @@ def crop_patches(
     source = torch.stack([torch.where(valid, heights, 0.0), valid.to(heights.dtype)], dim=-3).float()
     if heights.ndim == 2:
         # All grasps look at the same image: one tall grid over it needs no copy of the image.
-        where = where.reshape(1, -1, n_pixels, 2)
+        where = where.reshape(1, -1, n_columns, 2)
         source = source[None]
     sampled = torch.nn.functional.grid_sample(
         source, where, mode="bilinear", padding_mode="zeros", align_corners=True
     )
     if heights.ndim == 2:
-        sampled = sampled.reshape(2, -1, n_pixels, n_pixels).transpose(0, 1)
+        sampled = sampled.reshape(2, -1, n_pixels, n_columns).transpose(0, 1)
     value, weight = sampled[:, :1], sampled[:, 1:]
     return torch.where(weight >= 0.5, value / weight.clamp(min=0.5), 0.0)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from mskgrasp.config import Config
@@ -16,13 +15,17 @@ class NetworkConfig(Config):
     The paper does not state the padding. Convolutions are "valid", the default of Keras at the time.
     """
 
-    architecture: Literal["patch", "field"] = "patch"
-    """patch: the paper's, every grasp sees a picture of its own; field: grasps share features."""
+    architecture: Literal["patch", "hand"] = "patch"
+    """patch: the paper's, a picture of the heights; hand: a coarse one of what the hand would meet."""
     image: Literal["grasp", "object"] = "grasp"
     """What the displacement network sees: the patch around the grasp (the paper's GCIP), or one around the
     part, not turned, beside the grasp's angle (OCFI). The quality network always sees the grasp's."""
-    patch_pixels: int = Field(default=64, ge=32, le=256)
+    patch_pixels: int = Field(default=64, ge=16, le=256)
+    """Pixels along the closing direction."""
+    patch_columns: int | None = Field(default=None, ge=8, le=256)
+    """Pixels across it; null: as many."""
     patch_side: float = Field(default=0.128, gt=0.0, le=1.0)
+    """Length along the closing direction, metres."""
     channels: int = Field(default=32, ge=1)
     trunk_width: int = Field(default=1024, ge=1)
     action_width: int = Field(default=64, ge=1)
@@ -30,12 +33,8 @@ class NetworkConfig(Config):
     dropout: float = Field(default=0.5, ge=0.0, lt=1.0)
     variance: bool = True
     """False: the displacement network predicts the mean alone (the paper's GCIP-M)."""
-    blocks: int = Field(default=2, ge=0, le=8)
-    """field: residual convolutions after the two that halve the picture."""
-    grid: tuple[int, int] = (7, 9)
-    """field: points across and along the closing direction at which a grasp reads the features."""
-    grid_step: float = Field(default=0.012, gt=0.0, le=0.1)
-    """field: distance of these points, metres."""
+    layers: tuple[int, ...] = Field(default=(16, 32), min_length=1, max_length=6)
+    """hand: channels of its convolutions, each of which halves the picture."""
     least_std: tuple[float, float] = (0.0, 0.0)
     """Deviation, metres and radians, below which no displacement is claimed to be known (paper: none).
 
@@ -45,9 +44,20 @@ class NetworkConfig(Config):
 
     @model_validator(mode="after")
     def _check(self) -> NetworkConfig:
+        if self.architecture == "patch" and self.patch_pixels < 32:
+            raise ValueError("architecture: patch needs patch_pixels of 32 or more")
+        if self.architecture == "patch" and self.patch_shape[0] != self.patch_shape[1]:
+            raise ValueError("architecture: patch needs a square patch; leave patch_columns away")
         if self.image == "object" and self.architecture != "patch":
             raise ValueError("image: object needs architecture: patch")
+        if not all(0 < width <= 512 for width in self.layers):
+            raise ValueError("layers: channels must be between 1 and 512")
         return self
+
+    @property
+    def patch_shape(self) -> tuple[int, int]:
+        """Rows and columns of a patch; the fingers close along the columns."""
+        return self.patch_pixels, self.patch_columns or self.patch_pixels
 
     @field_validator("least_std")
     @classmethod
@@ -55,19 +65,6 @@ class NetworkConfig(Config):
         if not all(0 <= value < float("inf") for value in values):
             raise ValueError("deviations must not be negative")
         return values
-
-
-def patch_plane(network: NetworkConfig, grasps: np.ndarray, centre_base: np.ndarray) -> np.ndarray:
-    """Grasps (n, 4) moved to the height at which their patches are cropped.
-
-    The paper's patches lie at the height of the grasp, as DESIGN says; those that share a map must lie at one
-    height, half that of the part.
-    """
-    if network.architecture == "patch":
-        return grasps
-    moved = np.array(grasps, dtype=np.float64)
-    moved[:, 2] = np.asarray(centre_base)[..., 2]
-    return moved
 
 
 class Normalisation(Config):

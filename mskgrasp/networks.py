@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from mskgrasp.field import FieldFeatures
 from mskgrasp.geometry import wrap_angle
+from mskgrasp.hand_features import HandFeatures
 from mskgrasp.network_config import NetworkConfig, Normalisation
 
 STANDARDISE_EPSILON = 1e-4
@@ -55,21 +55,20 @@ class PatchFeatures(nn.Module):
         scale = (*normalisation.action_scale, torch.pi / 2)
         self.register_buffer("action_scale", torch.tensor(scale[:n_action]), persistent=False)
 
-    def prepare(self, patches: Tensor) -> Tensor:
-        """What the network takes of patches (n, 1, p, p) in metres above the table."""
+    def prepare(self, patches: Tensor, height: Tensor) -> Tensor:  # noqa: ARG002
+        """What the network takes of patches (n, 1, p, p) in metres above the table, whatever the height."""
         return standardise(patches)
 
-    def forward(self, patches: Tensor, centre_grasp: Tensor, offset: Tensor | None = None) -> Tensor:
+    def forward(self, prepared: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:  # noqa: ARG002
         """Features (n, f) of prepared patches (n, 1, p, p) and object centres (n, 3), metres."""
-        assert offset is None, "a patch of its own has the grasp in its middle"
-        image = self.image(self.convolutions(patches))
+        image = self.image(self.convolutions(prepared))
         return torch.cat([image, self.action(centre_grasp / self.action_scale)], dim=-1)
 
 
-def make_features(config: NetworkConfig, normalisation: Normalisation) -> PatchFeatures | FieldFeatures:
+def make_features(config: NetworkConfig, normalisation: Normalisation) -> PatchFeatures | HandFeatures:
     """What both networks share in shape, not in weights."""
-    if config.architecture == "field":
-        return FieldFeatures(config, normalisation)
+    if config.architecture == "hand":
+        return HandFeatures(config, normalisation)
     return PatchFeatures(config, normalisation)
 
 
@@ -91,15 +90,15 @@ class GraspQualityNetwork(nn.Module):
         self.log_prior_odds: Tensor
         self.register_buffer("log_prior_odds", torch.tensor(odds).log(), persistent=False)
 
-    def forward(self, patches: Tensor, centre_grasp: Tensor, offset: Tensor | None = None) -> Tensor:
+    def forward(self, patches: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:
         """Logits (n, 2) of failure and success among balanced data.
 
         Args:
-            patches: (n, 1, p, p), prepared (`PatchFeatures.prepare`).
+            patches: (n, 1, r, c) metres above the table, turned to the grasps.
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
-            offset: (2,) of the grasps from the patches' middle, metres; field architecture alone.
+            height: (n,) of the grasps above the table, metres.
         """
-        return self.head(self.features(patches, centre_grasp, offset))
+        return self.head(self.features(_prepared(self.features, patches, height), centre_grasp, height))
 
     def quality(self, logits: Tensor) -> Tensor:
         """Probabilities (n,) of success, corrected from balanced data to the true share of successes."""
@@ -132,7 +131,7 @@ class GraspDisplacementNetwork(nn.Module):
         self,
         patches: Tensor,
         centre_grasp: Tensor,
-        offset: Tensor | None = None,
+        height: Tensor,
         theta: Tensor | None = None,
     ) -> tuple[Tensor, Tensor | None]:
         """Mean (n, 4) and variance (n, 4) of the grasp displacement, in metres and radians (squared).
@@ -140,17 +139,18 @@ class GraspDisplacementNetwork(nn.Module):
         A network that predicts the mean alone gives None for the variance.
 
         Args:
-            patches: (n, 1, p, p), prepared (`PatchFeatures.prepare`).
+            patches: (n, 1, r, c) metres above the table, turned to the grasps.
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
-            offset: (2,) of the grasps from the patches' middle, metres; field architecture alone.
+            height: (n,) of the grasps above the table, metres.
             theta: (n,) the grasps' angles, for ``image: object``, whose patches are not turned.
         """
+        prepared = _prepared(self.features, patches, height)
         if not self.sees_object:
-            return self.outputs(self.features(patches, centre_grasp, offset))
+            return self.outputs(self.features(prepared, centre_grasp, height))
         assert theta is not None, "a picture that is not turned needs the grasps' angles"
         # Within, all is along the picture's axes.
         centre = torch.cat([_turned(centre_grasp, theta), theta[:, None]], dim=-1)
-        mean, variance = self.outputs(self.features(patches, centre))
+        mean, variance = self.outputs(self.features(prepared, centre, height))
         mean = torch.cat([_turned(mean[:, :3], -theta), mean[:, 3:]], dim=-1)
         if variance is None:
             return mean, None
@@ -172,9 +172,12 @@ class GraspDisplacementNetwork(nn.Module):
         """Copies the convolutions' weights of a trained GQN (paper, figure 3)."""
         if self.sees_object:
             return  # other pictures: the paper starts these at random
-        for name in ("convolutions", "stem", "blocks"):
-            if hasattr(gqn.features, name):
-                getattr(self.features, name).load_state_dict(getattr(gqn.features, name).state_dict())
+        self.features.convolutions.load_state_dict(gqn.features.convolutions.state_dict())
+
+
+def _prepared(features: PatchFeatures | HandFeatures, patches: Tensor, height: Tensor) -> Tensor:
+    # Measured on a CPU: channels last takes about 40 % off the time of the convolutions.
+    return features.prepare(patches, height).contiguous(memory_format=torch.channels_last)
 
 
 def _turned(vectors: Tensor, angle: Tensor) -> Tensor:

@@ -29,10 +29,6 @@ class PlannerConfig(Config):
     """quality: take the best quality, whatever its variance (the paper's experiment 1)."""
     min_quality: float = Field(default=0.0, ge=0.0, le=1.0)
     """A grasp whose predicted quality is lower is not taken."""
-    n_angles: int = Field(default=32, ge=0)
-    """Angles that the candidates are spread over, turned together by a random one, so that every angle is as
-    likely as before; 0: each candidate has its own, as in the paper. What candidates of one angle share is
-    computed once by the networks that can (architecture: field)."""
     chunk_size: int = Field(default=32, ge=1)
     """Grasps a network sees at once: more do not fit a CPU's cache (measured: 32 beats 256 by half)."""
 
@@ -185,7 +181,7 @@ class Planner:
             region=self.region,
             min_height=self.min_height,
         )
-        return view, sample_grasps(view, self.config.n_candidates, rng, n_angles=self.config.n_angles)
+        return view, sample_grasps(view, self.config.n_candidates, rng)
 
 
 def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:

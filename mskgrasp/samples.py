@@ -15,10 +15,9 @@ from torch import Tensor
 
 from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard, u16_to_depth
 from mskgrasp.errors import BadDataset, NoPartFound
-from mskgrasp.field import STRIDE
 from mskgrasp.grasp import centre_in_grasp_frame, to_grasp_displacement
 from mskgrasp.images import crop_patches, height_image, view_part
-from mskgrasp.network_config import NetworkConfig, patch_plane
+from mskgrasp.network_config import NetworkConfig
 from mskgrasp.parts.catalogue import Split, read_index
 
 HEIGHT_STEP = 1e-4
@@ -30,15 +29,14 @@ class Samples:
     """n attempts.
 
     Attributes:
-        patches: (n, 1, q, q) int16, 0.1 mm above the table, each turned to its grasp; ``margin`` pixels wider
-            on every side than what the network takes.
-        object_patches: (n, 1, p, p) int16, around the part and not turned; None where no network sees them.
+        patches: (n, 1, r, c) int16, 0.1 mm above the table, each turned to its grasp.
+        object_patches: (n, 1, r, c) int16, around the part and not turned; None where no network sees them.
         theta: (n,) float32 angle of the grasp.
         centre_grasp: (n, 3) float32 object centre, estimated from the image, in the grasp frame, metres.
+        height: (n,) float32 of the grasp above the table, metres.
         success: (n,) bool.
         displacement: (n, 4) float32 true object displacement, NaN where the grasp failed.
         grasp_displacement: (n, 4) float32, the same as grasp displacement: what is learned.
-        margin: Pixels by which training may move a patch, so that grasps lie anywhere in a cell of features.
         part: (n,) int64, index into ``parts``.
         parts: Names of the parts.
         skipped: Why and how many attempts could not be used: at run time, too, the planner would find
@@ -47,10 +45,10 @@ class Samples:
     """
 
     patches: Tensor
-    margin: int
     object_patches: Tensor | None
     theta: Tensor
     centre_grasp: Tensor
+    height: Tensor
     success: Tensor
     displacement: Tensor
     grasp_displacement: Tensor
@@ -62,19 +60,14 @@ class Samples:
     def __len__(self) -> int:
         return len(self.success)
 
-    def heights(self, rows: Tensor, device: torch.device | str, *, whole: bool = False) -> Tensor:
-        """Patches (n, 1, p, p) in metres on a device; with the margin where ``whole``."""
-        patches = self.patches[rows]
-        if self.margin and not whole:
-            patches = patches[..., self.margin : -self.margin, self.margin : -self.margin]
-        return patches.to(device).float() * HEIGHT_STEP
+    def patches_of(self, rows: Tensor, device: torch.device | str) -> Tensor:
+        """Patches (n, 1, r, c) of some rows in metres on a device."""
+        return self.patches[rows].to(device).float() * HEIGHT_STEP
 
-    def displacement_heights(
-        self, rows: Tensor, device: torch.device | str, *, whole: bool = False
-    ) -> Tensor:
-        """What the displacement network sees of some rows, (n, 1, p, p) metres."""
+    def displacement_patches_of(self, rows: Tensor, device: torch.device | str) -> Tensor:
+        """What the displacement network sees of some rows, (n, 1, r, c) metres."""
         if self.object_patches is None:
-            return self.heights(rows, device, whole=whole)
+            return self.patches_of(rows, device)
         return self.object_patches[rows].to(device).float() * HEIGHT_STEP
 
     def of_parts_between(self, low: float, high: float) -> Samples:
@@ -97,6 +90,7 @@ class Samples:
             object_patches=None if self.object_patches is None else self.object_patches[rows],
             theta=self.theta[rows],
             centre_grasp=self.centre_grasp[rows],
+            height=self.height[rows],
             success=self.success[rows],
             displacement=self.displacement[rows],
             grasp_displacement=self.grasp_displacement[rows],
@@ -117,7 +111,7 @@ def read_samples(
 
     Args:
         folder: The dataset.
-        network: What will learn from them: it decides the patches' size and plane.
+        network: What will learn from them: it decides the patches' size.
         advance: Called with the shards done and their number.
 
     Raises:
@@ -143,15 +137,15 @@ def read_samples(
     if not pieces:
         reason = f": {skipped.most_common(1)[0][0]}" if skipped else ""
         raise BadDataset(f"no usable attempt in {folder}{reason}; collect again")
-    patches, object_patches, theta, centre, success, displacement, grasp_displacement, part = (
+    patches, object_patches, theta, centre, height, success, displacement, grasp_displacement, part = (
         torch.cat(arrays) for arrays in zip(*pieces, strict=True)
     )
     return Samples(
         patches=patches,
-        margin=margin_of(network),
         object_patches=object_patches if network.image == "object" else None,
         theta=theta,
         centre_grasp=centre,
+        height=height,
         success=success,
         displacement=displacement,
         grasp_displacement=grasp_displacement,
@@ -186,33 +180,29 @@ def _shard_samples(
     centre_grasp = centre_in_grasp_frame(np.array(centres), grasp)
     heights = height_image(torch.from_numpy(depth[rows]), info.intrinsics, info.T_base_camera, info.table_z)
 
-    def crop(planes: np.ndarray, n_pixels: int) -> Tensor:
+    def crop(planes: np.ndarray) -> Tensor:
         patches = crop_patches(
             heights,
             torch.from_numpy(planes),
             info.intrinsics,
             info.T_base_camera,
-            n_pixels=n_pixels,
-            side=n_pixels * network.patch_side / network.patch_pixels,
+            n_pixels=network.patch_pixels,
+            side=network.patch_side,
+            n_columns=network.patch_columns,
         )
         return (patches / HEIGHT_STEP).round().clamp(-32768, 32767).to(torch.int16)
 
-    n_pixels = network.patch_pixels
     around = np.column_stack([np.array(centres), np.zeros(len(rows))])
     return (
-        crop(patch_plane(network, grasp, np.array(centres)), n_pixels + 2 * margin_of(network)),
-        crop(around, n_pixels) if network.image == "object" else torch.zeros(len(rows), 0),
+        crop(grasp),
+        crop(around) if network.image == "object" else torch.zeros(len(rows), 0),
         torch.from_numpy(grasp[:, 3]).float(),
         torch.from_numpy(centre_grasp).float(),
+        torch.from_numpy(grasp[:, 2] - info.table_z).float(),
         torch.from_numpy(attempts.success[rows]),
         torch.from_numpy(displacement).float(),
         torch.from_numpy(to_grasp_displacement(displacement, centre_grasp)).float(),
     ), skipped
-
-
-def margin_of(network: NetworkConfig) -> int:
-    """Pixels by which the patches of a network are moved in training."""
-    return STRIDE if network.architecture == "field" else 0
 
 
 def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "catalogue"]) -> dict[str, Split]:

@@ -236,50 +236,37 @@ class Stage:
             rows = kinds[0]
         return rows[torch.randperm(len(rows), generator=generator)]
 
-    def batch(
-        self, rows: Tensor, generator: torch.Generator
-    ) -> tuple[Tensor, Tensor, Tensor | None, Tensor, Tensor]:
-        """Inputs, object centres, the grasps' offset, displacements and successes of some rows.
+    def batch(self, rows: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Patches, object centres, displacements and successes of some rows.
 
-        Turned, mirrored, moved and with noise, all at once on the networks' device.
+        Turned, mirrored and with noise, all at once on the networks' device.
         """
         s, device = self.samples, self.models.device
-        look = s.heights if self.name == "gqn" else s.displacement_heights
-        patches, centre = look(rows, device, whole=True), s.centre_grasp[rows].to(device)
+        look = s.patches_of if self.name == "gqn" else s.displacement_patches_of
+        patches, centre = look(rows, device), s.centre_grasp[rows].to(device)
         target = s.grasp_displacement[rows].to(device)
         if self.config.symmetric:
             patches, centre, target = mirror_and_turn(patches, centre, target, generator)
-        patches, offset = self._moved(patches, generator)
         if self.config.noise_std > 0:
             patches = with_noise(patches, self.config.noise_std, generator)
-        inputs = self.models.gqn.features.prepare(patches).contiguous(memory_format=torch.channels_last)
-        return inputs, centre, offset, target, s.success[rows].to(device)
+        return patches, centre, target, s.success[rows].to(device)
 
     def learn(self, rows: Tensor, generator: torch.Generator) -> float:
         """One step of the optimiser; the loss before it."""
-        inputs, centre, offset, target, success = self.batch(rows, generator)
+        patches, centre, target, success = self.batch(rows, generator)
+        height, theta = (
+            values[rows].to(patches.device) for values in (self.samples.height, self.samples.theta)
+        )
         if self.name == "gqn":
-            loss = nn.functional.cross_entropy(self.models.gqn(inputs, centre, offset), success.long())
+            loss = nn.functional.cross_entropy(self.models.gqn(patches, centre, height), success.long())
         else:
             gdn = self.models.gdn
-            mean, variance = gdn(inputs, centre, offset, self.samples.theta[rows].to(inputs.device))
+            mean, variance = gdn(patches, centre, height, theta)
             loss = displacement_loss(mean, variance, target, gdn.target_std, beta=self.config.beta)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         self.optimiser.step()
         return float(loss.detach())
-
-    def _moved(self, patches: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor | None]:
-        """The patches without their margin, moved by up to it, and where that leaves the grasps."""
-        margin = self.samples.margin
-        if not margin:
-            return patches, None
-        down, right = torch.randint(2 * margin + 1, (2,), generator=generator, device=patches.device).tolist()
-        side = patches.shape[-1] - 2 * margin
-        network = self.config.network
-        pixel = network.patch_side / network.patch_pixels
-        offset = torch.tensor([margin - right, down - margin], device=patches.device) * pixel
-        return patches[..., down : down + side, right : right + side], offset
 
     def _validate(self) -> dict[str, float]:
         if self.name == "gqn":

@@ -23,7 +23,11 @@ _LEAST_TO_SCALE = 50
 def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.ndarray:
     """Predicted probabilities of success (n,)."""
     pieces = [
-        models.quality(samples.heights(r, models.device), samples.centre_grasp[r].to(models.device))
+        models.quality(
+            samples.patches_of(r, models.device),
+            samples.centre_grasp[r].to(models.device),
+            samples.height[r].to(models.device),
+        )
         for r in rows.split(_CHUNK)
     ]
     return torch.cat(pieces).cpu().double().numpy()
@@ -36,8 +40,9 @@ def predict_grasp_displacement(
     means, variances = [], []
     for r in rows.split(_CHUNK):
         mean, variance = models.grasp_displacement(
-            samples.displacement_heights(r, models.device),
+            samples.displacement_patches_of(r, models.device),
             samples.centre_grasp[r].to(models.device),
+            samples.height[r].to(models.device),
             samples.theta[r].to(models.device),
         )
         means.append(mean)

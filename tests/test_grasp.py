@@ -133,20 +133,3 @@ def test_a_flat_part_is_grasped_at_the_lowest_height():
 def test_seed_zero_is_a_seed():
     first, second, other = (sample_grasps(a_view(0.04), 5, np.random.default_rng(s)) for s in (0, 0, 1))
     assert np.array_equal(first, second) and not np.array_equal(first, other)
-
-
-def test_candidates_may_share_angles_and_every_angle_is_as_likely():
-    view = PartView(
-        centre_base=np.array([0.5, 0.0, 0.015]),
-        T_base_box=Pose(position=np.array([0.5, 0.0, 0.0]), quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0])),
-        size=np.array([0.06, 0.04, 0.03]),
-        gyration_radius=0.02,
-        table_z=0.0,
-    )
-    drawn = [sample_grasps(view, 400, np.random.default_rng(seed), n_angles=8)[:, 3] for seed in range(300)]
-    assert all(len(np.unique(angles)) == 8 for angles in drawn)
-    assert all(np.allclose(np.diff(np.unique(angles)), np.pi / 8) for angles in drawn)
-    whole = np.concatenate(drawn)
-    assert whole.min() >= -np.pi / 2 and whole.max() < np.pi / 2
-    counts = np.histogram(whole, bins=20, range=(-np.pi / 2, np.pi / 2))[0]
-    assert counts.min() > 0.85 * len(whole) / 20

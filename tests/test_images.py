@@ -193,6 +193,14 @@ def test_one_image_for_all_grasps_and_one_image_each_agree():
     assert torch.allclose(one, each, atol=1e-6) and torch.allclose(one, own, atol=1e-6)
 
 
+def test_a_narrow_patch_is_the_middle_of_a_square_one():
+    heights = heights_of([Box(x=0.455, y=0.0, yaw=0.5, size=(0.06, 0.03, 0.03))])
+    grasps = torch.tensor([[0.46, 0.01, 0.02, 0.7]])
+    square = crop_patches(heights, grasps, INTRINSICS, OVERHEAD, n_pixels=33, side=0.132)
+    narrow = crop_patches(heights, grasps, INTRINSICS, OVERHEAD, n_pixels=33, side=0.132, n_columns=17)
+    assert narrow.shape == (1, 1, 33, 17) and torch.allclose(narrow, square[..., 8:25], atol=1e-6)
+
+
 def test_invalid_pixels_become_table_and_do_not_spread():
     heights = torch.full((160, 160), 0.02)
     heights[70:75, 70:75] = torch.nan

@@ -6,6 +6,7 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from mskgrasp.errors import BadModel
+from mskgrasp.hand_features import HandFeatures
 from mskgrasp.models import ModelMeta, build_models, load_models, save_model
 from mskgrasp.networks import (
     GraspDisplacementNetwork,
@@ -56,12 +57,12 @@ def test_the_papers_networks_have_the_sizes_worked_out_by_hand():
 
 def test_outputs_have_their_shapes_and_variances_are_positive():
     models = small_models()
-    patches, centres = torch.rand(5, 1, 32, 32), torch.rand(5, 3) * 0.02
-    quality = models.quality(patches, centres)
-    mean, variance = models.grasp_displacement(patches, centres)
+    patches, centres, height = torch.rand(5, 1, 32, 32), torch.rand(5, 3) * 0.02, torch.rand(5) * 0.03
+    quality = models.quality(patches, centres, height)
+    mean, variance = models.grasp_displacement(patches, centres, height)
     assert quality.shape == (5,) and mean.shape == variance.shape == (5, 4)
     assert bool(((quality > 0) & (quality < 1)).all()) and bool((variance > 0).all())
-    assert small_models(variance=False).grasp_displacement(patches, centres)[1] is None
+    assert small_models(variance=False).grasp_displacement(patches, centres, height)[1] is None
 
 
 def test_an_undecided_network_says_the_base_rate():
@@ -76,7 +77,7 @@ def test_an_untrained_network_predicts_in_the_units_of_its_targets():
         models.gdn.mean_head[-1].bias.zero_()
         models.gdn.variance_head[-1].weight.zero_()
         models.gdn.variance_head[-1].bias.zero_()
-    mean, variance = models.grasp_displacement(torch.rand(2, 1, 32, 32), torch.zeros(2, 3))
+    mean, variance = models.grasp_displacement(torch.rand(2, 1, 32, 32), torch.zeros(2, 3), torch.zeros(2))
     assert torch.allclose(mean, torch.tensor(NORMAL.target_mean))
     assert torch.allclose(variance, torch.tensor(NORMAL.target_std).square())
 
@@ -85,7 +86,7 @@ def test_no_displacement_is_claimed_to_be_known_below_the_floor():
     models = small_models(least_std=(0.0005, 0.01))
     with torch.no_grad():
         models.gdn.variance_head[-1].bias.fill_(-100.0)
-    _, variance = models.grasp_displacement(torch.rand(2, 1, 32, 32), torch.zeros(2, 3))
+    _, variance = models.grasp_displacement(torch.rand(2, 1, 32, 32), torch.zeros(2, 3), torch.zeros(2))
     floor = torch.tensor([0.0005, 0.0005, 0.0005, 0.01])
     assert bool((variance.sqrt() >= floor * 0.999).all()) and torch.allclose(
         variance.sqrt(), floor, rtol=0.01
@@ -100,6 +101,28 @@ def test_preprocessing_standardises_and_ignores_the_height():
     assert torch.allclose(standardise(patches + 0.3), done, atol=1e-3)
     flat = standardise(torch.full((1, 1, 32, 32), 0.01))
     assert float(flat.abs().max()) < 1e-4
+
+
+def test_our_network_sees_what_the_hand_would_meet():
+    config = NetworkConfig(architecture="hand", patch_pixels=16, patch_columns=8, layers=(4, 8))
+    features = HandFeatures(config, NORMAL)
+    # A step from the table to 30 mm, a finger tip at 10.5 mm (TCP at 20 mm), the palm far above.
+    patch = torch.zeros(1, 1, 16, 8)
+    patch[..., :8, :] = 0.03
+    tips, beside, palm, table = features.prepare(patch, torch.tensor([0.02]))[0]
+    assert torch.equal(tips[:8], torch.ones(8, 8)) and torch.equal(tips[8:], -torch.ones(8, 8))
+    assert torch.allclose(beside[:8], torch.tensor(1 / 3)) and torch.allclose(
+        beside[8:], torch.tensor(-2 / 3)
+    )
+    assert torch.equal(palm, -torch.ones(16, 8)) and torch.allclose(table[:8], torch.tensor(0.6))
+    # 56 mm below the top of a part the palm meets it.
+    assert float(features.prepare(patch + 0.05, torch.tensor([0.02]))[0, 2, 0, 0]) == 1.0
+    models = build_models(ModelMeta(network=config, normalisation=NORMAL))
+    inputs = torch.rand(3, 1, 16, 8), torch.zeros(3, 3), torch.full((3,), 0.02)
+    assert models.quality(*inputs).shape == (3,) and models.grasp_displacement(*inputs)[0].shape == (3, 4)
+    for wrong in ({"patch_pixels": 16}, {"patch_columns": 8}, {"architecture": "hand", "layers": (0,)}):
+        with pytest.raises(ValueError, match="needs|channels"):
+            NetworkConfig(**wrong)
 
 
 def test_noise_has_its_deviation_and_comes_from_the_generator_alone():
@@ -161,11 +184,9 @@ def test_the_loss_is_least_at_the_true_mean_and_variance():
 
 def test_a_saved_model_predicts_the_same_when_loaded(folder):
     models, again = small_models(), load_models(folder)
-    patches, centres = torch.rand(3, 1, 32, 32), torch.rand(3, 3) * 0.01
-    assert torch.equal(models.quality(patches, centres), again.quality(patches, centres))
-    for one, other in zip(
-        models.grasp_displacement(patches, centres), again.grasp_displacement(patches, centres), strict=True
-    ):
+    inputs = torch.rand(3, 1, 32, 32), torch.rand(3, 3) * 0.01, torch.full((3,), 0.02)
+    assert torch.equal(models.quality(*inputs), again.quality(*inputs))
+    for one, other in zip(models.grasp_displacement(*inputs), again.grasp_displacement(*inputs), strict=True):
         assert torch.equal(one, other)
     assert again.meta == models.meta
     assert sorted(path.name for path in folder.iterdir()) == ["model.json", "model.safetensors"]
@@ -233,4 +254,4 @@ def test_other_schema_versions_and_missing_weights_are_told(folder):
 
 def test_patches_of_another_size_are_refused():
     with pytest.raises(BadModel, match=r"takes \(n, 1, 32, 32\)"):
-        small_models().quality(torch.zeros(1, 1, 64, 64), torch.zeros(1, 3))
+        small_models().quality(torch.zeros(1, 1, 64, 64), torch.zeros(1, 3), torch.zeros(1))

@@ -9,6 +9,7 @@ from hypothesis import given
 from mskgrasp.errors import BadModel, NoGraspFound, NoPartFound
 from mskgrasp.geometry import wrap_angle
 from mskgrasp.grasp import centre_in_grasp_frame, to_object_displacement
+from mskgrasp.images import view_part
 from mskgrasp.models import ModelMeta, build_models
 from mskgrasp.networks import NetworkConfig, Normalisation
 from mskgrasp.pictures import draw_plan
@@ -20,6 +21,7 @@ from mskgrasp.planner import (
     shortlist,
     variance_score,
 )
+from mskgrasp.scoring import Scene, displacements
 from tests import synthetic
 from tests.synthetic import REGION, Box
 from tests.test_grasp import centres, shifts
@@ -166,3 +168,28 @@ def test_the_covariance_is_that_of_the_derivative(displacement, centre):
         change[3] = wrap_angle(change[3])
         jacobian[:, k] = change / 2e-6
     assert np.allclose(covariance, jacobian @ np.diag(variance) @ jacobian.T, atol=1e-10)
+
+
+def test_a_network_that_sees_the_part_is_told_the_angle():
+    torch.manual_seed(5)
+    network = NetworkConfig(
+        image="object", patch_pixels=32, channels=4, trunk_width=8, action_width=8, head_width=8, dropout=0.0
+    )
+    scale = Normalisation(action_scale=(0.05, 0.05, 0.02))
+    models = build_models(ModelMeta(network=network, normalisation=scale))
+    view = view_part(FRAME.depth, FRAME.intrinsics, FRAME.T_base_camera, table_z=0.0, region=REGION)
+    scene = Scene.of(FRAME, view, 0.0, models.device)
+    grasps = np.tile(np.append(view.centre_base + [0.01, 0.0, 0.0], 0.0), (3, 1))
+    grasps[:, 3] = [0.0, 0.5, 0.5]
+    mean, variance = displacements(models, scene, grasps, 2)
+    assert np.allclose(mean[1], mean[2]) and not np.allclose(mean[0], mean[1])
+    assert mean.shape == variance.shape == (3, 4) and (variance > 0).all()
+    # What the network says along the picture's axes, worked out by hand for the second grasp.
+    action = torch.tensor([[-0.01, 0.0, 0.0, 0.5]])
+    patch = scene.crop(np.append(view.centre_base, 0.0)[None], network)
+    height = torch.tensor([view.centre_base[2]], dtype=torch.float32)
+    with torch.inference_mode():
+        prepared = models.gdn.features.prepare(patch, height)
+        x, y = models.gdn.outputs(models.gdn.features(prepared, action, height))[0][0, :2].tolist()
+    cos, sin = np.cos(0.5), np.sin(0.5)
+    np.testing.assert_allclose(mean[1, :2], [cos * x + sin * y, cos * y - sin * x], atol=1e-6)

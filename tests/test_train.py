@@ -277,7 +277,7 @@ def test_the_configurations_that_are_shipped_can_be_read(name):
         argv=["--config", str(train.DEFAULT_CONFIG.with_name(f"{name}.yaml")), "--seed", "3"],
     )
     assert config.seed == 3 and config.calibrate == (name == "default")
-    assert config.network.architecture == ("field" if name == "default" else "patch")
+    assert config.network.architecture == ("hand" if name == "default" else "patch")
     if name == "paper":
         assert config.network == NetworkConfig()
         assert config.gqn == StageConfig(
@@ -306,14 +306,15 @@ def test_parts_outside_the_success_range_are_left_out(dataset):
         samples.of_parts_between(0.999, 0.9991)
 
 
-FIELD = CONFIG.model_copy(
+HAND = CONFIG.model_copy(
     update={
         "network": NetworkConfig(
-            architecture="field",
-            patch_pixels=64,
-            patch_side=0.128,
-            channels=8,
+            architecture="hand",
+            patch_pixels=32,
+            patch_columns=16,
+            layers=(8, 8),
             trunk_width=32,
+            action_width=32,
             head_width=32,
             dropout=0.0,
         ),
@@ -323,29 +324,20 @@ FIELD = CONFIG.model_copy(
 )
 
 
-def test_the_field_network_learns_and_its_intervals_hold_what_they_say(tmp_path):
+def test_our_network_learns_and_its_intervals_hold_what_they_say(tmp_path):
     dataset = synthetic.write_dataset(tmp_path, n_parts=8, n_attempts=250, seed=1)
-    samples = read_samples(dataset, FIELD.network)
-    assert samples.patches.shape == (2000, 1, 72, 72) and samples.patches.dtype == torch.int16
-    models, _ = learn(samples, FIELD, checkpoint_path=tmp_path / "checkpoint")
+    samples = read_samples(dataset, HAND.network)
+    assert samples.patches.shape == (2000, 1, 32, 16) and samples.patches.dtype == torch.int16
+    models, _ = learn(samples, HAND, checkpoint_path=tmp_path / "checkpoint")
     report, found = models.meta.metrics, models.meta.calibration
     assert report["gqn"]["auroc"] > 0.85
-    assert report["gdn"]["translation_rmse"] < 0.8 * report["gdn"]["zero_displacement"]["translation_rmse"]
+    assert report["gdn"]["translation_rmse"] < 0.6 * report["gdn"]["zero_displacement"]["translation_rmse"]
     # Scaled on these very rows, 90 % of them lie inside.
     assert report["gdn"]["n"] >= 50 and max(found.variance_scale) != 1.0
     assert all(0.87 <= share <= 0.93 for share in report["gdn"]["coverage_90"].values())
     assert found.quality_slope > 0 and min(found.variance_scale) > 0
     save_model(tmp_path / "model", models)
     assert load_models(tmp_path / "model").meta.calibration == found
-
-
-def test_the_patch_in_the_middle_is_the_paper_s_patch(dataset):
-    wide = NetworkConfig(architecture="field", patch_pixels=64, patch_side=0.128)
-    one, other = read_samples(dataset, wide), read_samples(dataset, NetworkConfig())
-    rows = torch.arange(20)
-    # Both look at the same place; the field's plane is half way up the part instead of at the grasp.
-    difference = (one.heights(rows, "cpu") - other.heights(rows, "cpu")).abs()
-    assert one.heights(rows, "cpu").shape == (20, 1, 64, 64) and float(difference.median()) == 0
 
 
 def test_the_catalogue_decides_the_sides_where_it_is_asked_to(monkeypatch, tmp_path):

@@ -21,7 +21,7 @@ from tqdm import tqdm
 
 from mskgrasp.config import read_config
 from mskgrasp.models import build_models
-from mskgrasp.samples import Samples, margin_of
+from mskgrasp.samples import Samples
 from mskgrasp.training import LearningConfig, Stage, describe, split
 
 REPOSITORY = Path(__file__).parents[2]
@@ -87,17 +87,17 @@ def rate(stage: Stage, work: Callable[[torch.Tensor, torch.Generator], object], 
 
 def random_samples(config: LearningConfig, n: int) -> Samples:
     """Noise in the shape of a dataset: what it shows makes no step slower."""
-    network, margin = config.network, margin_of(config.network)
     generator = torch.Generator().manual_seed(0)
-    side = network.patch_pixels + 2 * margin
     success = torch.rand(n, generator=generator) < 0.5
     shift = 0.003 * torch.randn((n, 4), generator=generator)
     return Samples(
-        patches=torch.randint(0, 400, (n, 1, side, side), generator=generator, dtype=torch.int16),
-        margin=margin,
+        patches=torch.randint(
+            0, 400, (n, 1, *config.network.patch_shape), generator=generator, dtype=torch.int16
+        ),
         object_patches=None,
         theta=torch.zeros(n),
         centre_grasp=0.02 * torch.randn((n, 3), generator=generator),
+        height=0.02 + 0.02 * torch.rand(n, generator=generator),
         success=success,
         displacement=shift,
         grasp_displacement=shift,

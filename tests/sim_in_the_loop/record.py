@@ -27,7 +27,7 @@ def run_scenario() -> list[Trial]:
     with open_cell(CELL) as cell:
         planner = Planner(
             models,
-            PlannerConfig(n_candidates=N_CANDIDATES, n_angles=0),
+            PlannerConfig(n_candidates=N_CANDIDATES),
             table_z=cell.workspace.table_z,
             region=cell.workspace.region,
         )
