@@ -21,6 +21,7 @@ for number, end in zip((3, 4), ends):
     os.dup2(end, number)
 os.execv(sys.argv[3], sys.argv[3:])
 """
+_PATIENCE_S = 120
 _NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 
 
@@ -50,7 +51,6 @@ class Page:
         self.complaints: list[str] = []
         self._url = path.resolve().as_uri()
         self._number = 0
-        self._loaded = False
         self._rest = b""
         self._width = width
 
@@ -69,7 +69,7 @@ class Page:
         os.close(hear)
         os.close(writes)
         self._says, self._reads = says, reads
-        self._session = None
+        self._session: str | None = None
         try:
             targets = self._ask("Target.getTargets")["targetInfos"]
             page = next(target for target in targets if target["type"] == "page")
@@ -78,11 +78,8 @@ class Page:
             ]
             for domain in ("Page", "Runtime", "Log", "Network"):
                 self._ask(f"{domain}.enable")
-            self._loaded = False
             self._ask("Page.navigate", url=self._url)
-            deadline = time.monotonic() + 60
-            while not self._loaded:
-                self._take(deadline)
+            self._wait_for_load()
         except BaseException:
             self.__exit__()
             raise
@@ -110,13 +107,30 @@ class Page:
         """The page on paper."""
         path.write_bytes(base64.b64decode(self._ask("Page.printToPDF", printBackground=True)["data"]))
 
+    def _wait_for_load(self) -> None:
+        # Events of the empty page before may still come: only the page itself says that it is there.
+        deadline = time.monotonic() + _PATIENCE_S
+        while not self._is_there():
+            if time.monotonic() > deadline:
+                raise RuntimeError(f"{self._url} was not loaded within {_PATIENCE_S} s")
+            time.sleep(0.05)
+
+    def _is_there(self) -> bool:
+        try:
+            state = self.evaluate("document.readyState + ' ' + location.href")
+        except RuntimeError:
+            if self._process.poll() is not None:
+                raise
+            return False  # between two pages there is none to ask
+        return state == f"complete {self._url}"
+
     def _ask(self, method: str, **parameters: Any) -> dict[str, Any]:
         self._number += 1
         message: dict[str, Any] = {"id": self._number, "method": method, "params": parameters}
         if self._session is not None:
             message["sessionId"] = self._session
         os.write(self._says, json.dumps(message).encode() + b"\0")
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + _PATIENCE_S
         while True:
             answer = self._take(deadline)
             if answer.get("id") == self._number:
@@ -129,7 +143,7 @@ class Page:
             ready, _, _ = select.select([self._reads], [], [], max(0.0, deadline - time.monotonic()))
             piece = os.read(self._reads, 1 << 20) if ready else b""
             if not piece:
-                raise RuntimeError("the browser ended, or did not answer within a minute")
+                raise RuntimeError(f"the browser ended, or did not answer within {_PATIENCE_S} s")
             self._rest += piece
         line, self._rest = self._rest.split(b"\0", 1)
         message = json.loads(line)
@@ -138,8 +152,6 @@ class Page:
 
     def _note(self, method: str, values: dict[str, Any]) -> None:
         match method:
-            case "Page.loadEventFired":
-                self._loaded = True
             case "Log.entryAdded":
                 self.complaints.append(values["entry"]["text"])
             case "Runtime.consoleAPICalled":
