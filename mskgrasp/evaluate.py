@@ -22,9 +22,10 @@ from mskgrasp.comparison import compare
 from mskgrasp.config import Config
 from mskgrasp.errors import BadModel, UsageError
 from mskgrasp.evaluate_pictures import draw_comparison, draw_errors, draw_success
-from mskgrasp.evaluate_report import print_report
+from mskgrasp.evaluate_report import page, print_report
 from mskgrasp.experiments import Compared, Experiment, load_compared, open_model, scenes, with_predictions
 from mskgrasp.files import only_here, write_whole
+from mskgrasp.html_report import write_html
 from mskgrasp.outcomes import farthest_off, summarise, worst_trials
 from mskgrasp.parts import find_part
 from mskgrasp.plan import SIMULATED_CELL
@@ -45,7 +46,8 @@ dataset from which LOWESS predicts known parts. One grasp of the best quality se
 
 Every trial is stored at once, with what was seen: a stopped run goes on where it was, with more parts, trials
 or models if need be, and --replay OUT TRIAL draws one again. Simulated cells work in parallel; the number of
-them changes nothing. Another cell is another YAML file."""
+them changes nothing. Another cell is another YAML file; a real one asks its operator to lay every part, and
+before the arm moves (--yes: it asks nothing)."""
 
 PARTS: dict[Experiment, tuple[str, ...]] = {
     "success": ("validation",),
@@ -84,6 +86,8 @@ class EvaluateConfig(Config):
     """A collected dataset: LOWESS predicts the parts of which it holds grasps."""
     workers: int = Field(default=0, ge=0)
     """Simulated cells at work at once; 0: one a core."""
+    yes: bool = False
+    """Ask no operator: on a real cell, too, the arm moves as soon as a grasp is planned."""
     seed: int = Field(default=0, ge=0)
     """Places, turns and candidates follow from it."""
     planner: PlannerConfig = PlannerConfig(policy="quality")
@@ -97,7 +101,7 @@ class EvaluateConfig(Config):
         return [f"{label}={folder}" for label, folder in value.items()] if isinstance(value, dict) else value
 
 
-MAY_CHANGE = ("out", "trials", "parts", "n_parts", "compare", "lowess_data", "workers", "replay")
+MAY_CHANGE = ("out", "trials", "parts", "n_parts", "compare", "lowess_data", "workers", "yes", "replay")
 
 
 def main() -> int:
@@ -111,7 +115,7 @@ def main() -> int:
     report = evaluate(config)
     print_report(report, config.out, Console(width=None if sys.stdout.isatty() else 150))
     pictures = "success.png, errors.png" if config.experiment == "success" else "displacement.png"
-    print(f"wrote {config.out}/report.json, {pictures}, and every trial: see --replay {config.out} TRIAL")
+    print(f"wrote {config.out}/report.html, report.json, {pictures}, and every trial: see --replay")
     return 0
 
 
@@ -203,6 +207,7 @@ def _make_trials(
         lowess=compared.lowess.fits if compared is not None and compared.lowess is not None else {},
         tape=cell.tape,
         must_measure=compared is not None,
+        yes=config.yes,
     )
     n = sum(map(len, missing))
     done = sum(map(len, tasks)) - n
@@ -291,6 +296,8 @@ def _report(
         draw_comparison(report, config.out / "displacement.png")
     text = json.dumps(report, indent=1, allow_nan=False)
     write_whole(config.out / "report.json", (text + "\n").encode())
+    title = {"success": "Success of planned grasps", "displacement": "Displacement in the hand"}
+    write_html(config.out / "report.html", title=title[config.experiment], sections=page(report, config.out))
     return report
 
 

@@ -10,9 +10,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from mskgrasp import html_report
 from mskgrasp.comparison import POLICIES, POLICY_NAMES, SIDES
 
 Rows = tuple[tuple[str, ...], ...]
+WORST = "Worst trials"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +50,7 @@ def sections(report: dict[str, Any], folder: Path) -> list[Section]:
     return [
         *body,
         *_tape(report),
-        *([Section(title="Worst trials", figures=worst, on_page_only=True)] if worst else []),
+        *([Section(title=WORST, figures=worst, on_page_only=True)] if worst else []),
         Section(
             title="Settings",
             columns=("setting", "value"),
@@ -62,6 +64,22 @@ def sections(report: dict[str, Any], folder: Path) -> list[Section]:
             on_page_only=True,
         ),
     ]
+
+
+def page(report: dict[str, Any], folder: Path) -> list[html_report.Section]:
+    """The pieces as `mskgrasp.html_report.write_html` takes them, the worst trials behind links."""
+    found = []
+    for one in sections(report, folder):
+        tables = [html_report.Table(header=one.columns, rows=one.rows)] if one.columns else []
+        if one.title == WORST:
+            rows = [(html_report.Link(text=path.stem, to=path.stem), text) for path, text in one.figures]
+            tables = [html_report.Table(header=("trial", "outcome"), rows=rows)]
+        pictures = [
+            html_report.Picture(path=path, caption=text, name=path.stem) for path, text in one.figures
+        ]
+        text = one.text.splitlines()
+        found.append(html_report.Section(title=one.title, text=text, tables=tables, pictures=pictures))
+    return found
 
 
 def print_report(report: dict[str, Any], folder: Path, console: Console) -> None:

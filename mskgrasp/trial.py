@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, Protocol
 
@@ -25,6 +26,8 @@ from mskgrasp.planner import GraspPlan
 from mskgrasp.settings import Tape
 
 Policy = Literal["quality", "low_variance"]
+Recover = Callable[[str], None]
+"""Lets an arm move again that stopped for the reason given."""
 _MOST_DEPTH = np.iinfo(np.uint16).max * DEPTH_UNIT
 _LEGAL_KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 
@@ -153,8 +156,16 @@ class TrialRecord:
 
 
 def run_trial(
-    cell: Cell, planner: PlansGrasps, *, part: str, number: int, seed: int, tape: Tape | None = None
-) -> TrialRecord:
+    cell: Cell,
+    planner: PlansGrasps,
+    *,
+    part: str,
+    number: int,
+    seed: int,
+    tape: Tape | None = None,
+    may_move: Callable[[RgbdFrame, GraspPlan], bool] | None = None,
+    recover: Recover | None = None,
+) -> TrialRecord | None:
     """Looks, plans, grasps and measures; the part lies on the table already, the arm is at home.
 
     Args:
@@ -165,6 +176,11 @@ def run_trial(
         seed: The candidates follow from it.
         tape: Measure by squares of tape of these sizes: the part is put down where it was grasped, and the
             arm goes home. None: by the cell's tracker.
+        may_move: Is asked once the grasp is planned; None: the arm moves.
+        recover: Lets the arm move again after a contact; by default at once.
+
+    Returns:
+        None where the arm may not move.
 
     Raises:
         HalError: The cell was lost.
@@ -175,6 +191,8 @@ def run_trial(
         plan = planner.plan(frame, np.random.default_rng(seed))
     except (NoPartFound, NoGraspFound) as error:
         return TrialRecord(trial=replace(trial, reason=type(error).__name__), frame=frame, plan=None)
+    if may_move is not None and not may_move(frame, plan):
+        return None
     before = cell.tracker.part_pose() if cell.tracker is not None else None
     trial = replace(
         trial,
@@ -204,7 +222,7 @@ def run_trial(
     if trial.measured is not None and before is not None:
         true = _of_seen_centre(np.array(trial.measured), before, plan)
         trial = replace(trial, true=true.tolist(), measured=None)
-    return _measure_by_tape(cell, tape, trial, frame, plan)
+    return _measure_by_tape(cell, tape, trial, frame, plan, recover)
 
 
 def _of_seen_centre(displacement: np.ndarray, before: Pose, plan: GraspPlan) -> np.ndarray:
@@ -216,7 +234,9 @@ def _of_seen_centre(displacement: np.ndarray, before: Pose, plan: GraspPlan) -> 
     return displacement + np.array([cos * x - sin * y - x, sin * x + cos * y - y, 0.0, 0.0])
 
 
-def _measure_by_tape(cell: Cell, tape: Tape, trial: Trial, frame: RgbdFrame, plan: GraspPlan) -> TrialRecord:
+def _measure_by_tape(
+    cell: Cell, tape: Tape, trial: Trial, frame: RgbdFrame, plan: GraspPlan, recover: Recover | None
+) -> TrialRecord:
     """Puts the part down where it was grasped and looks how it lies; whatever is in doubt is no number."""
 
     def look(at: RgbdFrame) -> Markers:
@@ -229,9 +249,9 @@ def _measure_by_tape(cell: Cell, tape: Tape, trial: Trial, frame: RgbdFrame, pla
             # To the very place: where it falls, it shifts.
             put_down(cell, plan.grasp, height=0.0)
         except MotionAborted as error:
-            cell.arm.recover()
+            _recover(cell, error, recover)
             raise MarkersNotFound("not put down: the part hangs lower in the hand than it lay") from error
-        clear(cell)
+        clear(cell, recover)
         after = _as_stored(cell.camera.capture())
         dx, dy, dtheta = planar_displacement(before, look(after), plan.grasp, plan.view.centre_base)
     except MarkersNotFound as error:
@@ -264,18 +284,25 @@ def _failure(result: GraspResult, before: Pose | None, after: Pose | None, lift:
     return "slipped" if result.lifted else "missed"
 
 
-def finish(cell: Cell, record: TrialRecord) -> None:
+def finish(cell: Cell, record: TrialRecord, recover: Recover | None = None) -> None:
     """Puts a lifted part down again; after a contact the arm may move on, the trial is over."""
-    try:
-        if record.trial.reason == "collided":
-            cell.arm.recover()
-        elif record.in_hand and record.plan is not None:
+    if record.trial.reason == "collided":
+        _recover(cell, MotionAborted("it met something on its way to the grasp, or with the part"), recover)
+    elif record.in_hand and record.plan is not None:
+        try:
             put_down(cell, record.plan.grasp)
-    except MotionAborted:
+        except MotionAborted as error:
+            _recover(cell, error, recover)
+
+
+def _recover(cell: Cell, error: MotionAborted, recover: Recover | None) -> None:
+    if recover is None:
         cell.arm.recover()
+    else:
+        recover(str(error))
 
 
-def clear(cell: Cell) -> None:
+def clear(cell: Cell, recover: Recover | None = None) -> None:
     """Brings the arm home, out of the camera's sight; after a contact on the way it tries once more.
 
     Raises:
@@ -283,8 +310,8 @@ def clear(cell: Cell) -> None:
     """
     try:
         go_home(cell)
-    except MotionAborted:
-        cell.arm.recover()
+    except MotionAborted as error:
+        _recover(cell, error, recover)
         go_home(cell)
 
 

@@ -10,14 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from hal import Cell, open_cell
+from hal import Cell, RgbdFrame, open_cell
 from mskgrasp.choosing import Candidates, Chooser
 from mskgrasp.errors import TapeDoesNotFit, UsageError
 from mskgrasp.lowess import Lowess
 from mskgrasp.models import load_models
+from mskgrasp.operator import Operator
 from mskgrasp.parts import find_part
-from mskgrasp.plan import make_planner, present
-from mskgrasp.planner import PlannerConfig
+from mskgrasp.pictures import draw_plan
+from mskgrasp.plan import make_planner
+from mskgrasp.planner import GraspPlan, PlannerConfig
 from mskgrasp.predictors import LOWESS, LowessPredictor, NetworkPredictor, Predictor
 from mskgrasp.settings import Tape
 from mskgrasp.trial import Policy, Trial, clear, finish, run_trial, trial_key
@@ -62,6 +64,7 @@ class Setup:
         lowess: LOWESS of the known parts.
         tape: Sizes of the squares of tape to measure by; None: the cell's tracker measures.
         must_measure: Trials that nothing measures are worth nothing.
+        yes: Ask no operator.
         out: Folder of the run.
     """
 
@@ -73,6 +76,7 @@ class Setup:
     lowess: dict[str, Lowess] = field(default_factory=dict)
     tape: Tape | None = None
     must_measure: bool = False
+    yes: bool = False
 
 
 def scene_seed(seed: int, part: str, number: int) -> int:
@@ -85,7 +89,8 @@ class TrialRunner:
     """Makes trials on a connected cell.
 
     Raises:
-        UsageError: The cell does not tell what the trials need to know.
+        UsageError: The cell does not tell what the trials need to know, or somebody must be asked and is not
+            there.
     """
 
     def __init__(self, cell: Cell, setup: Setup):
@@ -97,6 +102,7 @@ class TrialRunner:
             )
         self._cell = cell
         self._setup = setup
+        self._operator = Operator(cell, yes=setup.yes)
         planner = make_planner(setup.models, setup.planner, cell)
         chunk, device = setup.planner.chunk_size, planner.models.device
         self._candidates = Candidates(planner)
@@ -107,36 +113,69 @@ class TrialRunner:
             self._predictors[LOWESS] = LowessPredictor(setup.lowess)
 
     def run(self, task: TrialTask) -> Iterator[Trial]:
-        """Makes a trial, writes its file and yields it; only then the arm moves again, to put the part down.
+        """Makes a trial, writes its file and yields it; only then the arm puts the part down.
 
         Raises:
             HalError: The cell was lost.
+            StoppedByOperator: The operator said so.
         """
         seed = scene_seed(task.seed, task.part, task.number)
-        clear(self._cell)
-        no_tape = ""
-        try:
-            present(self._cell, task.source, seed)
-        except TapeDoesNotFit as error:
-            no_tape = f"no room for tape: {error}"  # it lies there all the same, and may be grasped
-        chooser = Chooser(
-            self._candidates, self._predictors[task.chosen_by], task.policy, task.part, self._cell.tracker
-        )
-        record = run_trial(
-            self._cell, chooser, part=task.part, number=task.number, seed=seed, tape=self._setup.tape
-        )
+        record, no_tape = None, ""
+        while record is None:
+            clear(self._cell, self._recover)
+            try:
+                self._operator.lay(self._cell, task.source, seed, name=task.key)
+            except TapeDoesNotFit as error:
+                no_tape = f"no room for tape: {error}"  # it lies there all the same, and may be grasped
+            chooser = Chooser(
+                self._candidates,
+                self._predictors[task.chosen_by],
+                task.policy,
+                task.part,
+                self._cell.tracker,
+            )
+            record = run_trial(
+                self._cell,
+                chooser,
+                part=task.part,
+                number=task.number,
+                seed=seed,
+                tape=self._setup.tape,
+                may_move=self._may_move,
+                recover=self._recover,
+            )
+            if record is not None and record.plan is None and self._operator.asks:
+                self._operator.tell(f"{record.trial.reason}: no grasp was planned; lay the part down anew")
+                record = None
         trial = replace(
-            record.trial, family=find_part(task.source).family, policy=task.policy, chosen_by=task.chosen_by
+            record.trial,
+            family=find_part(task.source).family,
+            policy=task.policy,
+            chosen_by=task.chosen_by,
         )
         if trial.unmeasured and no_tape:
             trial = replace(trial, unmeasured=no_tape)
         write_trial(trial_file(self._setup.out, trial.key), record.frame, record.plan, record.after)
         yield trial
-        finish(self._cell, record)
+        finish(self._cell, record, self._recover)
+
+    def _may_move(self, frame: RgbdFrame, plan: GraspPlan) -> bool:
+        picture = self._setup.out / "next.png"
+        if self._operator.asks:
+            draw_plan(frame, plan, picture)
+        x, y, z, theta = plan.grasp
+        return self._operator.may_move(
+            picture,
+            f"grasp at x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees, "
+            f"quality {plan.quality:.2f}",
+        )
+
+    def _recover(self, reason: str) -> None:
+        self._operator.recover(self._cell, reason)
 
     def close(self) -> None:
         """Brings the arm home."""
-        clear(self._cell)
+        clear(self._cell, self._recover)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shutil
 import subprocess
@@ -12,12 +13,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hal.sim import SapienArm
 from mskgrasp.errors import BadConfig, UsageError
 from mskgrasp.evaluate import EvaluateConfig, evaluate
+from mskgrasp.operator import StoppedByOperator
 from mskgrasp.planner import PlannerConfig
 from mskgrasp.runs import TRIALS, read
 from mskgrasp.trial import Trial
 from mskgrasp.trial_files import read_trial, trial_file
+from tests.browser import Page
 
 REPOSITORY = Path(__file__).parents[1]
 MODEL = REPOSITORY / "tests" / "sim_in_the_loop" / "model"
@@ -70,6 +74,11 @@ def test_several_processes_go_on_with_a_run_and_make_the_very_same_trials(alone:
     assert report == json.loads((out / "report.json").read_text())
     assert report["overall"]["trials"] == 3 and report["settings"]["noise"] == "kinect2"
     assert (out / "success.png").exists() and len(list((out / "worst").glob("*.png"))) == 3
+    with Page(out / "report.html") as page:
+        widths = page.evaluate("[...document.images].map(i => i.complete ? i.naturalWidth : 0)")
+        assert len(widths) == 5 and min(widths) > 500  # both figures, and the worst three
+        assert page.evaluate("[...document.links].every(a => document.querySelector(a.hash) !== null)")
+        assert page.complaints == []
 
 
 def test_a_run_with_other_settings_or_another_model_is_refused(alone: Path, tmp_path: Path):
@@ -144,6 +153,32 @@ def test_a_run_without_a_success_and_a_trial_drawn_again(tmp_path: Path):
     assert again.returncode == 0, again.stderr
     assert "not lifted (NoGraspFound)" in again.stdout
     assert (out / "replay" / "hex_nut_m30-000.png").exists()
+
+
+class Person(io.StringIO):
+    """Answers that a person types."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    """The simulated cell, taken for a real one: n, and the part is laid anew; then y; q before the second."""
+    monkeypatch.setattr(SapienArm, "simulated", False)
+    monkeypatch.setattr(sys, "stdin", Person("n\ny\nq\n"))
+    out = tmp_path / "out"
+    with pytest.raises(StoppedByOperator):
+        evaluate(config(out, trials=2))
+    assert list(trials(out)) == ["hex_nut_m30-000"] and (out / "next.png").exists()
+    asked = capfd.readouterr().err
+    assert asked.count("May the arm move?") == 3 and "quality 0." in asked
+    monkeypatch.setattr(sys, "stdin", io.StringIO("y\n"))
+    with pytest.raises(UsageError, match="give --yes"):
+        evaluate(config(out, trials=2))
+    report = evaluate(config(out, trials=2, yes=True))
+    assert report["overall"]["trials"] == 2
 
 
 @pytest.mark.parametrize(
