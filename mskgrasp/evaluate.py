@@ -115,7 +115,7 @@ def main() -> int:
     report = evaluate(config)
     print_report(report, config.out, Console(width=None if sys.stdout.isatty() else 150))
     pictures = "success.png, errors.png" if config.experiment == "success" else "displacement.png"
-    print(f"wrote {config.out}/report.html, report.json, {pictures}, and every trial: see --replay")
+    print(f"wrote {config.out}/report.html, report.json, {pictures}; any trial: --replay {config.out} TRIAL")
     return 0
 
 

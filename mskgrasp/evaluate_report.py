@@ -72,7 +72,10 @@ def page(report: dict[str, Any], folder: Path) -> list[html_report.Section]:
     for one in sections(report, folder):
         tables = [html_report.Table(header=one.columns, rows=one.rows)] if one.columns else []
         if one.title == WORST:
-            rows = [(html_report.Link(text=path.stem, to=path.stem), text) for path, text in one.figures]
+            rows = [
+                (html_report.Link(text=path.stem, to=path.stem), text.removeprefix(f"{path.stem}: "))
+                for path, text in one.figures
+            ]
             tables = [html_report.Table(header=("trial", "outcome"), rows=rows)]
         pictures = [
             html_report.Picture(path=path, caption=text, name=path.stem) for path, text in one.figures
