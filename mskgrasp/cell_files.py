@@ -15,6 +15,7 @@ from mskgrasp.errors import UsageError
 from mskgrasp.files import write_whole
 from mskgrasp.settings import Tape
 
+# As in hal.sim.noise, which brings the simulator along.
 Noise = Literal["off", "iid", "kinect2"]
 SIMULATED = "sapien"
 FINE = 3
@@ -89,7 +90,8 @@ def read_cell(
             raise UsageError(
                 f"--noise is for a simulated cell; {path} is of type {values.get('type')!r}: leave it away"
             )
-        values["noise"] = noise
+        kept = values.get("noise")
+        values["noise"] = (kept if isinstance(kept, dict) else {}) | {"model": noise}
     squares = None
     if measure == "markers":
         squares = dict(zip(("large", "small"), tape, strict=True)) if tape else {}

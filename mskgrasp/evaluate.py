@@ -32,7 +32,7 @@ from mskgrasp.plan import SIMULATED_CELL
 from mskgrasp.planner import PlannerConfig
 from mskgrasp.runs import TRIALS, append, begin, model_digests, part_digests, part_names, read, rewrite
 from mskgrasp.stored_trials import describe_trial, draw_trial, find_trial, outcome_text
-from mskgrasp.trial import Trial, clear
+from mskgrasp.trial import Trial
 from mskgrasp.trial_files import FOLDER
 from mskgrasp.trial_runner import Setup, TrialTask, trial_runner
 from mskgrasp.trial_workers import run_trials
@@ -53,7 +53,6 @@ PARTS: dict[Experiment, tuple[str, ...]] = {
     "success": ("validation",),
     "displacement": ("train", "validation"),
 }
-__all__ = ["EvaluateConfig", "clear", "evaluate"]
 
 
 class EvaluateConfig(Config):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import multiprocessing
 import shutil
 import subprocess
 import sys
@@ -16,11 +17,15 @@ import pytest
 from hal.sim import SapienArm
 from mskgrasp.errors import BadConfig, UsageError
 from mskgrasp.evaluate import EvaluateConfig, evaluate
+from mskgrasp.experiments import scenes
 from mskgrasp.operator import StoppedByOperator
+from mskgrasp.plan import SIMULATED_CELL
 from mskgrasp.planner import PlannerConfig
 from mskgrasp.runs import TRIALS, read
 from mskgrasp.trial import Trial
 from mskgrasp.trial_files import read_trial, trial_file
+from mskgrasp.trial_runner import Setup
+from mskgrasp.trial_workers import run_trials
 from tests.browser import Page
 
 REPOSITORY = Path(__file__).parents[1]
@@ -79,6 +84,21 @@ def test_several_processes_go_on_with_a_run_and_make_the_very_same_trials(alone:
         assert len(widths) == 5 and min(widths) > 500  # both figures, and the worst three
         assert page.evaluate("[...document.links].every(a => document.querySelector(a.hash) !== null)")
         assert page.complaints == []
+
+
+def test_a_process_that_dies_costs_no_trial(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    planner = PlannerConfig(policy="quality", n_candidates=20)
+    (tmp_path / "trials").mkdir()
+    setup = Setup(cell=SIMULATED_CELL, models=MODEL, planner=planner, out=tmp_path)
+    tasks = scenes({"hex_nut_m30": "hex_nut_m30"}, 2, 0, planner, None)
+    made = run_trials(setup, tasks, 1)
+    first = next(made)
+    (worker,) = multiprocessing.active_children()
+    worker.kill()
+    (second,) = made
+    assert (first.number, second.number) == (0, 1)
+    assert "trial hex_nut_m30-001 is made again" in capfd.readouterr().err
+    assert not multiprocessing.active_children()
 
 
 def test_a_run_with_other_settings_or_another_model_is_refused(alone: Path, tmp_path: Path):
