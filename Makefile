@@ -5,7 +5,7 @@ READY := $(VENV)/.ready
 TESTABLE := $(VENV)/.testable
 RUN := $(VENV)/bin/python -m
 
-.PHONY: help setup collect train plan evaluate test bench-parts bench-collect bench-train bench-plan check format clean
+.PHONY: help setup collect train plan evaluate palletize test regression bench-parts bench-collect bench-train bench-plan check format clean
 .DEFAULT_GOAL := help
 
 help: ## Explain the targets
@@ -17,9 +17,9 @@ $(READY): pyproject.toml .ci/constraints.txt .ci/setup
 	PYTHON=$(PYTHON) .ci/setup
 	@touch $@
 
-# Tests need the extras, which collecting and planning do without: [cad] (700 MB), Ray and the drivers.
+# Tests need what collecting and planning do without: [cad] (700 MB), Ray, the drivers, and a browser (100 MB).
 $(TESTABLE): pyproject.toml .ci/constraints.txt .ci/setup
-	PYTHON=$(PYTHON) EXTRAS=dev,cad,cluster,franka .ci/setup
+	PYTHON=$(PYTHON) EXTRAS=dev,cad,cluster,franka BROWSER=yes .ci/setup
 	@touch $@ $(READY)
 
 collect: $(READY) ## Collect the demo dataset into data/demo (the main job; resumes)
@@ -32,10 +32,18 @@ plan: $(READY) ## Plan a grasp in the simulated cell with models/demo
 	$(RUN) mskgrasp.plan --cell configs/cells/sapien.yaml --models models/demo --out out/plan
 
 evaluate: $(READY) ## Plan and execute grasps in the simulated cell with models/demo
-	$(RUN) mskgrasp.evaluate --cell configs/cells/sapien.yaml --models models/demo --trials 2 --out out/eval
+	$(RUN) mskgrasp.evaluate --models models/demo --planner.policy low_variance --trials 2 --out out/eval
+
+palletize: $(READY) ## Grasp parts, correct by the predicted displacement and place them, with models/demo
+	$(RUN) mskgrasp.palletize --models models/demo --parts validation --trials 2 --out out/palletize
 
 test: $(TESTABLE) ## Run the tests
 	$(RUN) pytest -n 3 --dist loadfile --no-loadscope-reorder --durations 15
+
+# Anew each time: what an earlier state of the code left must not count.
+regression: $(READY) ## Run the loop over a fixed set and print what has changed (ARGS=--store keeps it)
+	rm -rf out/regression
+	$(RUN) tests.sim_in_the_loop.regression --workers 2 $(ARGS)
 
 bench-parts: $(TESTABLE) ## Seconds to make a part, by family and stage
 	$(RUN) tests.benchmarks.build_parts

@@ -70,7 +70,12 @@ class Arm(Device):
     base class checks limits before a motion and arrival after it; a backend only moves. A command that is
     refused (`OutOfWorkspace`) changes nothing. After any other error nothing moves until `recover` is
     called. Construction neither connects nor moves.
+
+    Attributes:
+        simulated: Nothing moves in the real world, so that nobody need be asked.
     """
+
+    simulated: bool = False
 
     def __init__(self, limits: ArmLimits):
         self.limits = limits

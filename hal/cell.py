@@ -38,8 +38,14 @@ class Workspace:
 class PartFeeder(Protocol):
     """Lays parts on the table: a simulator by itself, on a real cell an operator."""
 
-    def present(self, part: str, seed: int) -> None:
-        """Lays the part, by name or folder, at a place and turn that follow from the seed."""
+    def present(self, part: str, seed: int, *, keep: bool = False) -> None:
+        """Lays the part, by name or folder, at a place and turn that follow from the seed.
+
+        Args:
+            part: Name or folder.
+            seed: Its place and turn follow from it.
+            keep: What was put outside the region, as on a pallet, stays there; else the table is cleared.
+        """
         ...
 
 

@@ -138,17 +138,27 @@ def _ellipse(axes: Axes, centre: np.ndarray, covariance: np.ndarray, n_sigma: fl
     )
 
 
-def draw_plan(frame: RgbdFrame, plan: GraspPlan, path: Path) -> None:
+def draw_plan(
+    frame: RgbdFrame, plan: GraspPlan, path: Path, *, measured: np.ndarray | None = None, note: str = ""
+) -> None:
     """Draws a plan: candidates by quality over the part, and the chosen grasp with the expected shift.
 
     Left, the base frame from above, right, the grasp frame; both in millimetres and to scale.
+
+    Args:
+        frame: What was seen.
+        plan: What was planned in it.
+        path: Of the picture.
+        measured: (4,) object displacement that came of it, drawn beside the expected one.
+        note: A line under that of the plan.
     """
     with matplotlib.rc_context(STYLE):
-        figure = make_figure(11.5, 5.7)
+        figure = make_figure(11.5, 5.7 + 0.25 * bool(note))
         left, right = figure.subplots(1, 2)
         _draw_candidates(figure, left, frame, plan)
-        _draw_chosen(right, frame, plan)
-        figure.suptitle(_plan_text(plan), fontsize=11, x=0.01, ha="left")
+        _draw_chosen(right, frame, plan, measured)
+        text = _plan_text(plan) + (f"\n{note}" if note else "")
+        figure.suptitle(text, fontsize=11, x=0.01, ha="left")
         figure.savefig(path)
 
 
@@ -196,7 +206,7 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     axes.set(xlabel="base x, mm", ylabel="base y, mm", title=f"{len(plan.candidates)} candidates")
 
 
-def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
+def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.ndarray | None) -> None:
     side = 0.128
     heights = _from_above(
         frame.depth, frame.intrinsics, frame.T_base_camera, plan.view.table_z, plan.grasp, side
@@ -209,6 +219,9 @@ def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
     _outlines(axes, heights, np.zeros(2), side, centre, shift, turn)
     axes.plot([], [], color=INK, lw=0.9, label="part before")
     axes.plot([], [], color=_SHIFT, lw=1.3, ls="--", label="part expected in the hand")
+    if measured is not None:
+        _outlines(axes, heights, np.zeros(2), side, centre, measured[:2] * _MM, float(measured[3]), _GOOD)
+        axes.plot([], [], color=_GOOD, lw=1.3, ls="--", label="part measured in the hand")
     axes.legend(loc="upper left", frameon=False, fontsize=8)
     axes.plot(*centre, "+", color=_SHIFT, ms=8, mew=1.5, zorder=9)
     known = bool(np.isfinite(plan.displacement_cov).all())
@@ -220,8 +233,12 @@ def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
     )
     _draw_shift(axes, centre, shift, covariance)
     reach = float(np.hypot(*shift)) + 2 * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])) * _MM
+    came = None if measured is None else measured[:2] * _MM
+    if came is not None:
+        axes.plot(*(centre + came), "x", color=_GOOD, ms=7, mew=1.8, zorder=10)
+        reach = max(reach, float(np.hypot(*came)))
     if reach < 20.0:
-        _inset(axes, shift, covariance, max(1.4 * reach, 1.0), right=bool(centre[0] < 0))
+        _inset(axes, shift, covariance, max(1.4 * reach, 1.0), right=bool(centre[0] < 0), measured=came)
 
 
 def _draw_shift(axes: Axes, start: np.ndarray, shift: np.ndarray, covariance: np.ndarray) -> None:
@@ -237,6 +254,7 @@ def _outlines(
     centre: np.ndarray,
     shift: np.ndarray,
     turn: float,
+    colour: str = _SHIFT,
 ) -> None:
     """The part's outline, and dashed where it ends up, turned about its centre and shifted (mm)."""
     n = heights.shape[0]
@@ -251,11 +269,19 @@ def _outlines(
     moved_y = centre[1] + shift[1] + sin * dx + cos * dy
     axes.contour(x, y, smooth, levels=level, colors=[INK], linewidths=0.9, zorder=5)
     axes.contour(
-        moved_x, moved_y, smooth, levels=level, colors=[_SHIFT], linewidths=1.3, linestyles="--", zorder=6
+        moved_x, moved_y, smooth, levels=level, colors=[colour], linewidths=1.3, linestyles="--", zorder=6
     )
 
 
-def _inset(axes: Axes, shift: np.ndarray, covariance: np.ndarray, half: float, *, right: bool) -> None:
+def _inset(
+    axes: Axes,
+    shift: np.ndarray,
+    covariance: np.ndarray,
+    half: float,
+    *,
+    right: bool,
+    measured: np.ndarray | None,
+) -> None:
     inset = axes.inset_axes((0.70 if right else 0.02, 0.02, 0.28, 0.28))
     inset.set(xlim=(-half, half), ylim=(-half, half), xticks=[], yticks=[], aspect="equal")
     inset.set_facecolor("white")
@@ -264,6 +290,8 @@ def _inset(axes: Axes, shift: np.ndarray, covariance: np.ndarray, half: float, *
     inset.axhline(0, color=FAINT, lw=0.5)
     inset.axvline(0, color=FAINT, lw=0.5)
     _draw_shift(inset, np.zeros(2), shift, covariance)
+    if measured is not None:
+        inset.plot(*measured, "x", color=_GOOD, ms=7, mew=1.8, zorder=10)
     bar = next(step for step in (10, 5, 2, 1, 0.5) if step <= 0.8 * half or step == 0.5)
     inset.plot([-0.9 * half, -0.9 * half + bar], [-0.85 * half] * 2, color=INK, lw=2)
     inset.text(-0.9 * half, -0.8 * half, f"{bar:g} mm", fontsize=7, va="bottom")

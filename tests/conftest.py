@@ -29,6 +29,7 @@ LONGEST = (
     "collect/test_crashes.py",
     "collect/test_cluster.py",
     "test_evaluate.py",
+    "test_palletize.py",
     "sim_in_the_loop/test_precise_grasps.py",
 )
 """Files that take a minute or more: begun first, so that no process is left alone with one at the end."""

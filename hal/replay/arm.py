@@ -31,6 +31,8 @@ class ReplayArm(Arm):
         BadRecording: The file cannot be used.
     """
 
+    simulated = True
+
     def __init__(self, config: ReplayArmConfig, playback: Playback | None = None):
         calls = [call for call in COMMANDS if call not in ("capture", "present")]
         self._playback = playback or Playback(read_recording(config.recording), calls, config.tolerances)

@@ -58,13 +58,14 @@ class ReplayFeeder:
     def __init__(self, playback: Playback):
         self._playback = playback
 
-    def present(self, part: str, seed: int) -> None:
+    def present(self, part: str, seed: int, *, keep: bool = False) -> None:
         """Checks that it is the recorded part and seed.
 
         Raises:
             NotRecorded: It is not.
         """
-        self._playback.command("present", {"part": part, "seed": seed})
+        settings = {"keep": True} if keep else {}
+        self._playback.command("present", {"part": part, "seed": seed} | settings)
 
 
 class ReplayTracker:

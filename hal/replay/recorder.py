@@ -65,6 +65,7 @@ class RecordingArm(Arm):
 
     def __init__(self, arm: Arm, writer: RecordingWriter):
         super().__init__(arm.limits)
+        self.simulated = arm.simulated
         self._arm, self._writer = arm, writer
         self._open = False
 
@@ -151,9 +152,14 @@ class RecordingFeeder:
     def __init__(self, feeder: PartFeeder, writer: RecordingWriter):
         self._feeder, self._writer = feeder, writer
 
-    def present(self, part: str, seed: int) -> None:
+    def present(self, part: str, seed: int, *, keep: bool = False) -> None:
         """See `PartFeeder.present`."""
-        self._writer.call("present", dict(part=part, seed=seed), lambda: self._feeder.present(part, seed))
+        settings = {"keep": True} if keep else {}
+        self._writer.call(
+            "present",
+            dict(part=part, seed=seed) | settings,
+            lambda: self._feeder.present(part, seed, **settings),
+        )
 
 
 class RecordingTracker:

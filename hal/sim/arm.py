@@ -33,6 +33,8 @@ _WAYPOINT_M = 0.01
 class SapienArm(Arm):
     """Moves the Panda of a `SapienWorld`; a contact force over the reflex's ends a motion."""
 
+    simulated = True
+
     def __init__(self, world: SapienWorld, limits: ArmLimits):
         super().__init__(limits)
         self._world = world

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 
 import gymnasium
@@ -11,7 +12,9 @@ import torch
 from hal.errors import NotConnected
 from hal.sim.board import show_board
 from hal.sim.colour import FineColour
+from hal.sim.pallet import Lying, lay_again, outside
 from hal.sim.tape import stick_tape
+from mskgrasp.errors import TapeDoesNotFit
 from mskgrasp.geometry import Pose
 from mskgrasp.parts import find_part
 from mskgrasp.settings import Overhead, Physics, Region, Tape
@@ -53,8 +56,13 @@ class SapienWorld:
         self._tape = tape
         self._colour_scale = colour_scale
         self._fine_colour: FineColour | None = None
+        self._beside: list[Lying] = []
         self._users = 0
         self._gym: gymnasium.Env | None = None
+        self.presented = 0
+        """How many parts have been laid down so far."""
+        self.presented_seed = seed
+        """The place and turn of the last one follow from it."""
 
     @property
     def env(self) -> GraspDisplacementEnv:
@@ -89,7 +97,9 @@ class SapienWorld:
             render_backend=render_backend(),
         )
         try:
-            self.present(part, seed)
+            # Programs lay down parts of their own: that this one has no room for tape must not stop them.
+            with contextlib.suppress(TapeDoesNotFit):
+                self.present(part, seed)
         except BaseException:
             self._free()
             raise
@@ -102,20 +112,34 @@ class SapienWorld:
 
     def _free(self) -> None:
         self._fine_colour = None
+        self._beside = []
         if self._gym is not None:
             self._gym.close()
             self._gym = None
 
-    def present(self, part: str, seed: int) -> None:
+    def present(self, part: str, seed: int, *, keep: bool = False) -> None:
         """Lays a part on the table, arm at home, everything at rest.
+
+        Args:
+            part: Name or folder.
+            seed: Its place and turn follow from it.
+            keep: What lies outside the region, where parts are put, stays; else the table is cleared.
 
         Raises:
             BadPart: There is no such part, or no room for the tape on it.
         """
         folder = str(find_part(part).folder)
+        staying = (
+            outside(self.region, [*self._beside, Lying(self.env.parts[0], self.env.part)]) if keep else []
+        )
         self._fine_colour = None
+        self.presented, self.presented_seed = self.presented + 1, seed
         # A fresh scene each time, so that a trial does not depend on those before it.
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
+        self._beside = [
+            lay_again(self.env.scene, lying, pose, number, self.physics.friction_pad_part)
+            for number, (lying, pose) in enumerate(staying)
+        ]
         self.env.motion.place(self._home)
         self.env.motion.step(self.env.motion.n_steps(self.physics.settle_s))
         if self._tape is not None:

@@ -1,0 +1,51 @@
+"""Parts that were put down and stay where they are while the next one is grasped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import sapien
+from mani_skill.envs.scene import ManiSkillScene
+from mani_skill.utils.structs.actor import Actor
+
+from mskgrasp.parts import Part
+from mskgrasp.settings import TABLE_Z, Region
+from tasks.frames import base_pose
+from tasks.part_actor import build_part
+
+_FALLEN = 0.05
+"""A part this far below the table has fallen off it, m."""
+
+
+@dataclass(frozen=True)
+class Lying:
+    """A part in the scene, and its body."""
+
+    part: Part
+    body: Actor
+
+
+def outside(region: Region, bodies: list[Lying]) -> list[tuple[Lying, sapien.Pose]]:
+    """Those whose origin lies on the table but not in a region, with their poses in ManiSkill's world."""
+    x_min, x_max, y_min, y_max = region
+    found = []
+    for lying in bodies:
+        x, y, z = base_pose(lying.body).position[0].tolist()
+        if z > TABLE_Z - _FALLEN and not (x_min <= x <= x_max and y_min <= y <= y_max):
+            found.append((lying, lying.body.pose.sp))
+    return found
+
+
+def lay_again(scene: ManiSkillScene, lying: Lying, pose: sapien.Pose, number: int, friction: float) -> Lying:
+    """Puts a part into a new scene where it lay in the last one; it can be pushed, as any other.
+
+    Args:
+        scene: The new one.
+        lying: The part.
+        pose: ManiSkill's world.
+        number: Tells it from others of its name.
+        friction: Its coefficient.
+    """
+    body = build_part(scene, replace(lying.part, name=f"{lying.part.name}-beside-{number}"), 0, friction)
+    body.set_pose(pose)
+    return Lying(lying.part, body)

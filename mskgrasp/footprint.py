@@ -1,0 +1,74 @@
+"""The rectangle that a part fills on the table: seen in a depth image, or known from its CAD file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import trimesh
+
+from hal.camera import RgbdFrame
+from mskgrasp.geometry import quat_rotate, wrap_half_turn
+from mskgrasp.grasp import PartView
+from mskgrasp.parts import Part
+
+
+@dataclass(frozen=True, kw_only=True)
+class Footprint:
+    """The smallest rectangle around a part seen from above.
+
+    Attributes:
+        sides: (2,) the longer and the shorter one, metres.
+        theta: Direction of the longer side from base x, radians in [-pi/2, pi/2).
+    """
+
+    sides: np.ndarray
+    theta: float
+
+    def extent(self, theta: float) -> np.ndarray:
+        """(2,) how far it reaches along base x and y with the longer side at ``theta``, metres."""
+        cos, sin = abs(np.cos(theta)), abs(np.sin(theta))
+        long, short = self.sides
+        return np.array([cos * long + sin * short, sin * long + cos * short])
+
+
+def footprint_of(points: np.ndarray) -> Footprint:
+    """The footprint of points (n, 2), base frame, metres."""
+    # OpenCV's rectangle is exact for points of some size, not for metres in single precision.
+    _, (width, height), angle = cv2.minAreaRect((np.asarray(points) * 1e3).astype(np.float32))
+    long, short = max(width, height), min(width, height)
+    theta = np.radians(angle + (0.0 if width >= height else 90.0))
+    return Footprint(sides=np.array([long, short]) * 1e-3, theta=float(wrap_half_turn(np.asarray(theta))))
+
+
+def seen_footprint(frame: RgbdFrame, view: PartView, min_height: float) -> Footprint:
+    """The footprint of the part that a frame shows.
+
+    Args:
+        frame: Of the part on the table.
+        view: Where the part was found in it.
+        min_height: What rises less above the table is table, metres.
+    """
+    depth = np.asarray(frame.depth, dtype=np.float64)
+    rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
+    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(frame.intrinsics).T
+    points = frame.T_base_camera.apply((rays * depth[..., None]).reshape(-1, 3))
+    pitch = float(np.nanmedian(depth)) / float(frame.intrinsics[0][0])
+    in_box = np.abs(view.T_base_box.inverse().apply(points)[:, :2]) <= view.size[:2] / 2 + pitch
+    high = in_box.all(axis=1) & (points[:, 2] > view.table_z + min_height)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(
+        high.reshape(depth.shape).astype(np.uint8), connectivity=8
+    )
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    found = footprint_of(points[(labels == largest).ravel(), :2])
+    # An edge is, on average, half a pixel further out than the last pixel on it.
+    return Footprint(sides=found.sides + pitch, theta=found.theta)
+
+
+def usual_footprint(part: Part) -> Footprint:
+    """The footprint of a part on the side on which it comes to lie most often; theta is 0."""
+    mesh = trimesh.load_mesh(part.mesh_path)
+    quat_wxyz = part.resting.quat_wxyz[int(np.argmax(part.resting_probability))]
+    found = footprint_of(quat_rotate(quat_wxyz, np.asarray(mesh.vertices))[:, :2])
+    return Footprint(sides=found.sides, theta=0.0)

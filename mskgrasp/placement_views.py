@@ -1,0 +1,99 @@
+"""A placement seen from above, before and after, as it is stored and drawn."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from hal.camera import RgbdFrame
+from mskgrasp.errors import BadDataset
+from mskgrasp.files import write_whole
+from mskgrasp.images import crop_patches, height_image
+from mskgrasp.placing import Target
+from mskgrasp.planner import GraspPlan
+
+_N = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class Views:
+    """A placement seen from above, before and after; squares with the base's axes, metres.
+
+    Attributes:
+        before: (n, n) heights over the table around the part as it lay, its centre in the middle.
+        after: (n, n) the same around the target; empty where the part was not placed.
+        side: Length of a side of both.
+        top: Height of the part.
+        grasp: (3,) x, y from the part's centre, and theta.
+        turn: By how much the part shall be turned, radians.
+        theta: Direction of its longer side at the target, radians.
+    """
+
+    before: np.ndarray
+    after: np.ndarray
+    side: float
+    top: float
+    grasp: np.ndarray
+    turn: float
+    theta: float
+
+
+def take_views(
+    before: RgbdFrame, after: RgbdFrame | None, plan: GraspPlan, target: Target, theta: float
+) -> Views:
+    """The views of a placement from its frames."""
+    view = plan.view
+    side = max(0.1, 1.6 * float(np.hypot(*view.size[:2])))
+    height = view.table_z + view.size[2]
+    return Views(
+        before=_heights(before, view.centre_base[:2], height, side, view.table_z),
+        after=np.empty((0, 0))
+        if after is None
+        else _heights(after, np.array([target.x, target.y]), height, side, view.table_z),
+        side=side,
+        top=float(view.size[2]),
+        grasp=np.array([*(plan.grasp[:2] - view.centre_base[:2]), plan.grasp[3]]),
+        turn=target.theta,
+        theta=theta,
+    )
+
+
+def write_views(views: Views, path: Path) -> None:
+    """Writes views as a compressed file, whole or not at all."""
+    values: dict[str, Any] = {name: np.asarray(value) for name, value in asdict(views).items()}
+    for name in ("before", "after"):
+        values[name] = values[name].astype(np.float32)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **values)
+    write_whole(path, buffer.getvalue())
+
+
+def read_views(path: Path) -> Views:
+    """What `write_views` wrote.
+
+    Raises:
+        BadDataset: It is not there, or damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            values = {name: file[name] for name in file.files}
+        numbers = {name: float(values[name]) for name in ("side", "top", "turn", "theta")}
+        return Views(
+            before=values["before"], after=values["after"], grasp=values["grasp"].reshape(3), **numbers
+        )
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise BadDataset(f"{path} is missing or damaged; start again in another --out") from error
+
+
+def _heights(frame: RgbdFrame, centre: np.ndarray, height: float, side: float, table_z: float) -> np.ndarray:
+    heights = height_image(torch.from_numpy(frame.depth), frame.intrinsics, frame.T_base_camera, table_z)
+    # In the plane of the part's top there is no parallax.
+    square = torch.tensor([[*centre, height, 0.0]])
+    patch = crop_patches(heights, square, frame.intrinsics, frame.T_base_camera, n_pixels=_N, side=side)
+    return patch[0, 0].numpy()

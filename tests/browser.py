@@ -1,0 +1,164 @@
+"""A page in a headless browser, asked over the DevTools protocol's pipe: no port, no package."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import select
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+# The browser reads commands from 3 and answers on 4, where nothing else may lie: a shell cannot promise it.
+_CONNECT = """
+import fcntl, os, sys
+ends = [fcntl.fcntl(int(end), fcntl.F_DUPFD, 10) for end in sys.argv[1:3]]
+for number, end in zip((3, 4), ends):
+    os.dup2(end, number)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
+_PATIENCE_S = 120
+_NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+
+
+def browser() -> str:
+    """The browser that `.ci/setup` installs, or another Chromium; its absence is no reason to skip a test."""
+    found = next((path for name in _NAMES if (path := shutil.which(name))), None)
+    if found is None:
+        raise RuntimeError(
+            "no Chromium: run make test as root on Debian or Ubuntu, which installs one, or yourself: "
+            "sudo apt-get install --no-install-recommends chromium-headless-shell"
+        )
+    return found
+
+
+class Page:
+    """A page that has been loaded; a context manager.
+
+    Args:
+        path: The HTML file.
+        width: Of the window, pixels.
+
+    Attributes:
+        complaints: What the browser's console and log said, and every request it made but for the file.
+    """
+
+    def __init__(self, path: Path, *, width: int = 1000):
+        self.complaints: list[str] = []
+        self._url = path.resolve().as_uri()
+        self._number = 0
+        self._rest = b""
+        self._width = width
+
+    def __enter__(self) -> Page:
+        hear, says = os.pipe()
+        reads, writes = os.pipe()
+        options = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+        options += ["--remote-debugging-pipe", f"--window-size={self._width},900", "about:blank"]
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _CONNECT, str(hear), str(writes), browser(), *options],
+            pass_fds=(hear, writes),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(hear)
+        os.close(writes)
+        self._says, self._reads = says, reads
+        self._session: str | None = None
+        try:
+            targets = self._ask("Target.getTargets")["targetInfos"]
+            page = next(target for target in targets if target["type"] == "page")
+            self._session = self._ask("Target.attachToTarget", targetId=page["targetId"], flatten=True)[
+                "sessionId"
+            ]
+            for domain in ("Page", "Runtime", "Log", "Network"):
+                self._ask(f"{domain}.enable")
+            self._ask("Page.navigate", url=self._url)
+            self._wait_for_load()
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.terminate()
+        self._process.wait()
+        os.close(self._says)
+        os.close(self._reads)
+
+    def evaluate(self, expression: str) -> Any:
+        """The value of an expression of JavaScript on the page, from JSON; promises are awaited."""
+        found = self._ask("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in found:
+            raise RuntimeError(str(found["exceptionDetails"]))
+        return found["result"].get("value")
+
+    def screenshot(self, path: Path) -> None:
+        """The whole page as PNG."""
+        taken = self._ask("Page.captureScreenshot", format="png", captureBeyondViewport=True)
+        path.write_bytes(base64.b64decode(taken["data"]))
+
+    def pdf(self, path: Path) -> None:
+        """The page on paper."""
+        path.write_bytes(base64.b64decode(self._ask("Page.printToPDF", printBackground=True)["data"]))
+
+    def _wait_for_load(self) -> None:
+        # Events of the empty page before may still come: only the page itself says that it is there.
+        deadline = time.monotonic() + _PATIENCE_S
+        while not self._is_there():
+            if time.monotonic() > deadline:
+                raise RuntimeError(f"{self._url} was not loaded within {_PATIENCE_S} s")
+            time.sleep(0.05)
+
+    def _is_there(self) -> bool:
+        try:
+            state = self.evaluate("document.readyState + ' ' + location.href")
+        except RuntimeError:
+            if self._process.poll() is not None:
+                raise
+            return False  # between two pages there is none to ask
+        return state == f"complete {self._url}"
+
+    def _ask(self, method: str, **parameters: Any) -> dict[str, Any]:
+        self._number += 1
+        message: dict[str, Any] = {"id": self._number, "method": method, "params": parameters}
+        if self._session is not None:
+            message["sessionId"] = self._session
+        os.write(self._says, json.dumps(message).encode() + b"\0")
+        deadline = time.monotonic() + _PATIENCE_S
+        while True:
+            answer = self._take(deadline)
+            if answer.get("id") == self._number:
+                if "error" in answer:
+                    raise RuntimeError(f"{method}: {answer['error']}")
+                return answer["result"]
+
+    def _take(self, deadline: float) -> dict[str, Any]:
+        while b"\0" not in self._rest:
+            ready, _, _ = select.select([self._reads], [], [], max(0.0, deadline - time.monotonic()))
+            piece = os.read(self._reads, 1 << 20) if ready else b""
+            if not piece:
+                raise RuntimeError(f"the browser ended, or did not answer within {_PATIENCE_S} s")
+            self._rest += piece
+        line, self._rest = self._rest.split(b"\0", 1)
+        message = json.loads(line)
+        self._note(message.get("method", ""), message.get("params", {}))
+        return message
+
+    def _note(self, method: str, values: dict[str, Any]) -> None:
+        match method:
+            case "Log.entryAdded":
+                self.complaints.append(values["entry"]["text"])
+            case "Runtime.consoleAPICalled":
+                self.complaints.append(str(values["args"]))
+            case "Runtime.exceptionThrown":
+                self.complaints.append(str(values["exceptionDetails"]))
+            case "Network.requestWillBeSent" if not values["request"]["url"].startswith(("data:", self._url)):
+                self.complaints.append(f"asked for {values['request']['url']}")
+            case _:
+                pass
