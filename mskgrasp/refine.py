@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import torch
 
 from mskgrasp.geometry import wrap_half_turn
 from mskgrasp.grasp import MAX_OPENING, PAD_REACH, PartView, lowest_grasp_z
@@ -27,7 +28,7 @@ def fingers_free(scene: Scene, grasps: np.ndarray) -> np.ndarray:
     rows, columns = 2 * int(np.ceil(reach / _STEP)) + 1, 2 * int(np.ceil(FINGER_HALF_WIDTH / _STEP)) + 1
     along = np.abs((np.arange(rows) - (rows - 1) / 2) * _STEP)
     fingers = (along >= MAX_OPENING / 2) & (along <= reach)
-    heights = scene.crop_of(grasps, (rows, columns), _STEP)[:, 0, fingers]
+    heights = scene.crop_of(grasps, (rows, columns), _STEP)[:, 0, torch.from_numpy(fingers)]
     tips = grasps[:, 2] - scene.table_z - PAD_REACH
     return heights.amax(dim=(1, 2)).cpu().double().numpy() <= tips
 
