@@ -13,6 +13,8 @@ import pytest
 import torch
 import yaml
 
+from hal import Cell, GraspResult, execute_grasp
+from hal.errors import CommunicationLost
 from hal.sim import SapienCellConfig, sapien_cell
 from mskgrasp.errors import BadModel, UsageError
 from mskgrasp.operator import Operator, StoppedByOperator
@@ -44,13 +46,28 @@ def config(out: Path, **changes: object) -> PalletizeConfig:
     return PalletizeConfig(**(values | changes))  # type: ignore[arg-type]
 
 
-def test_a_run_goes_on_and_its_report_shows_everything(tmp_path, monkeypatch, capsys):
+def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_path, monkeypatch, capsys):
     out = tmp_path / "run"
+    grasped: list[np.ndarray] = []
+
+    def pulled_cable(cell: Cell, grasp: np.ndarray) -> GraspResult:
+        if grasped:
+            raise CommunicationLost("no answer from the arm")
+        grasped.append(grasp)
+        return execute_grasp(cell, grasp)
+
+    with monkeypatch.context() as patch, pytest.raises(CommunicationLost):
+        patch.setattr("mskgrasp.placement_trial.execute_grasp", pulled_cable)
+        palletize(config(out))
+    kept = (out / "trials.jsonl").read_text()
+    assert len(kept.splitlines()) == 1
+
     command = ["palletize", "--models", str(MODEL), "--out", str(out), "--parts", PART, "--trials", "1"]
     monkeypatch.setattr("sys.argv", [*command, "--planner.n-candidates", "100"])
     assert main() == 0
     assert "Corrected by the truth" in capsys.readouterr().out
     first = (out / "trials.jsonl").read_text()
+    assert first.startswith(kept)
     lines = [json.loads(line) for line in first.splitlines()]
     assert [line["correction"] for line in lines] == ["none", "predicted", "truth"]
     assert all(line["placed"] for line in lines)
