@@ -32,7 +32,7 @@ plan: $(READY) ## Plan a grasp in the simulated cell with models/demo
 	$(RUN) mskgrasp.plan --cell configs/cells/sapien.yaml --models models/demo --out out/plan
 
 evaluate: $(READY) ## Plan and execute grasps in the simulated cell with models/demo
-	$(RUN) mskgrasp.evaluate --cell configs/cells/sapien.yaml --models models/demo --trials 2 --out out/eval
+	$(RUN) mskgrasp.evaluate --models models/demo --planner.policy low_variance --trials 2 --out out/eval
 
 palletize: $(READY) ## Grasp parts, correct by the predicted displacement and place them, with models/demo
 	$(RUN) mskgrasp.palletize --models models/demo --parts validation --trials 2 --out out/palletize

@@ -87,13 +87,18 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
     )
 
 
-def put_down(cell: Cell, grasp: np.ndarray) -> None:
+def put_down(cell: Cell, grasp: np.ndarray, *, height: float = PUT_DOWN) -> None:
     """Lowers what was lifted to where it was grasped, and opens the fingers.
+
+    Args:
+        cell: The hand holds the part over the table.
+        grasp: (4,) at which it was grasped.
+        height: How much above that it is let go, metres; falling 2 mm, a part may shift by half of one.
 
     Raises:
         MotionAborted: The part met the table early, because it hangs lower in the hand than it lay.
     """
-    above = np.asarray(grasp, dtype=np.float64) + np.array([0.0, 0.0, PUT_DOWN, 0.0])
+    above = np.asarray(grasp, dtype=np.float64) + np.array([0.0, 0.0, height, 0.0])
     cell.arm.move_to_pose(pose_base_tcp(above), speed=0.15)
     cell.arm.move_gripper(MAX_OPENING)
 

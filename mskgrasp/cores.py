@@ -1,8 +1,11 @@
-"""Processes that keep to one core each."""
+"""Processes that keep to one core each, and do not outlive the one that started them."""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -19,3 +22,17 @@ def one_thread_a_process() -> Iterator[None]:
             del os.environ["OMP_NUM_THREADS"]
         else:
             os.environ["OMP_NUM_THREADS"] = before
+
+
+def leave_with_parent() -> None:
+    """Ends this process when its parent is gone, however that ended."""
+    # Asked now, the system may already name another: the parent can have died while this process started.
+    born_of = multiprocessing.parent_process()
+    parent = os.getppid() if born_of is None else born_of.pid
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

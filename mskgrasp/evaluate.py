@@ -1,63 +1,130 @@
-"""Program: plan and execute grasps on a cell and compare. Run ``python -m mskgrasp.evaluate --help``."""
+"""Program: the paper's experiments on any cell. Run ``python -m mskgrasp.evaluate --help``."""
 
 from __future__ import annotations
 
 import json
+import os
 import sys
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-import numpy as np
-from pydantic import Field
+import torch
+from pydantic import Field, field_validator
 from rich.console import Console
 from tqdm import tqdm
 
-from hal import Cell, go_home, open_cell, put_down
-from hal.errors import MotionAborted, OutOfWorkspace
+from mskgrasp.cell_files import CellFile, Noise, read_cell
 from mskgrasp.cli import make_folder, parse, run
+from mskgrasp.collect.work import versions
+from mskgrasp.comparison import compare
 from mskgrasp.config import Config
-from mskgrasp.errors import NoGraspFound, NoPartFound
-from mskgrasp.models import load_models
-from mskgrasp.outcomes import draw_errors, print_report, summarise
+from mskgrasp.errors import BadModel, UsageError
+from mskgrasp.evaluate_pictures import draw_comparison, draw_errors, draw_success
+from mskgrasp.evaluate_report import page, print_report
+from mskgrasp.experiments import Compared, Experiment, load_compared, open_model, scenes, with_predictions
+from mskgrasp.files import only_here, write_whole
+from mskgrasp.html_report import write_html
+from mskgrasp.outcomes import farthest_off, summarise, worst_trials
 from mskgrasp.parts import find_part
-from mskgrasp.pictures import draw_plan
-from mskgrasp.plan import make_planner, present
-from mskgrasp.planner import Planner, PlannerConfig
-from mskgrasp.runs import TRIALS, append, begin, inputs_of, part_names, read
-from mskgrasp.trial import Trial, run_trial
+from mskgrasp.plan import SIMULATED_CELL
+from mskgrasp.planner import PlannerConfig
+from mskgrasp.runs import TRIALS, append, begin, model_digests, part_digests, part_names, read, rewrite
+from mskgrasp.stored_trials import describe_trial, draw_trial, find_trial, outcome_text
+from mskgrasp.trial import Trial
+from mskgrasp.trial_files import FOLDER
+from mskgrasp.trial_runner import Setup, TrialTask, trial_runner
+from mskgrasp.trial_workers import run_trials
 
-DESCRIPTION = """Plans and executes grasps on a cell and reports how often the part was lifted and how well
-its displacement in the hand was predicted.
+DESCRIPTION = """Plans and executes grasps on a cell and reports what came of them.
 
-Runs through the hardware abstraction alone, so that another cell is another YAML file.
-Every finished trial is stored at once; a stopped run goes on where it was."""
+--experiment success: how often the grasp of the best predicted quality lifts the part.
+--experiment displacement: how well models predict how the part moves in the hand, for grasps of the best
+quality and for those of low predicted variance among the best; --compare names the models, --lowess-data a
+dataset from which LOWESS predicts known parts. One grasp of the best quality serves all models.
+
+Every trial is stored at once, with what was seen: a stopped run goes on where it was, with more parts, trials
+or models if need be, and --replay OUT TRIAL draws one again. Simulated cells work in parallel; the number of
+them changes nothing. Another cell is another YAML file; a real one asks its operator to lay every part, and
+before the arm moves (--yes: it asks nothing)."""
+
+PARTS: dict[Experiment, tuple[str, ...]] = {
+    "success": ("validation",),
+    "displacement": ("train", "validation"),
+}
 
 
 class EvaluateConfig(Config):
     """Settings of an evaluation."""
 
-    cell: Path
-    """YAML file of the cell, for example configs/cells/sapien.yaml."""
     models: Path
-    """Folder with model.safetensors and model.json, as mskgrasp.train writes it."""
+    """Folder with model.safetensors and model.json, as mskgrasp.train writes it: its qualities count."""
+    experiment: Experiment = "success"
+    """success: the policy of --planner.policy. displacement: both policies, known and novel parts apart."""
+    cell: Path = SIMULATED_CELL
+    """YAML file of the cell; by default the simulated one."""
+    noise: Noise | None = None
+    """How a simulated camera errs (iid: 3 mm a pixel), instead of what its cell's file says."""
+    measure: Literal["truth", "markers"] = "truth"
+    """truth: the cell's tracker tells the displacement. markers: two squares of tape do (docs/markers.md)."""
+    tape: tuple[float, float] | None = None
+    """Sides of both squares, m, the larger first; by default 0.012 0.008, or those of a simulated cell."""
     out: Path = Path("out/eval")
     """Folder for trials.jsonl, report.json and the pictures."""
-    parts: tuple[str, ...] = ("validation",)
-    """Names or folders of parts; "validation": those the model never saw; "all": every built-in part."""
+    parts: tuple[str, ...] = ()
+    """Names or folders of parts, or sets: train (those the model knows), validation and test (that it never
+    saw), starter, catalogue. By default validation, for displacement train and validation."""
+    n_parts: int = Field(default=0, ge=0)
+    """At most so many parts, evenly chosen, an equal share of every set; 0: all."""
     trials: int = Field(default=5, ge=1)
     """Trials a part."""
+    compare: tuple[str, ...] = ()
+    """Models of the displacement experiment, label=folder each; by default the one of --models."""
+    lowess_data: Path | None = None
+    """A collected dataset: LOWESS predicts the parts of which it holds grasps."""
+    workers: int = Field(default=0, ge=0)
+    """Simulated cells at work at once; 0: one a core."""
+    yes: bool = False
+    """Ask no operator: on a real cell, too, the arm moves as soon as a grasp is planned."""
     seed: int = Field(default=0, ge=0)
     """Places, turns and candidates follow from it."""
-    planner: PlannerConfig = PlannerConfig()
+    planner: PlannerConfig = PlannerConfig(policy="quality")
     """How grasps are chosen."""
+    replay: tuple[Path, str] | None = None
+    """Draw a stored trial again and do nothing else: the folder of a run, and the trial's name."""
+
+    @field_validator("compare", mode="before")
+    @classmethod
+    def _from_mapping(cls, value: Any) -> Any:
+        return [f"{label}={folder}" for label, folder in value.items()] if isinstance(value, dict) else value
+
+
+MAY_CHANGE = ("out", "trials", "parts", "n_parts", "compare", "lowess_data", "workers", "yes", "replay")
 
 
 def main() -> int:
     """Runs the trials and reports."""
-    config = parse(EvaluateConfig, prog="python -m mskgrasp.evaluate", description=DESCRIPTION)
+    argv = sys.argv[1:]
+    if "--replay" in argv and "--models" not in argv:
+        argv += ["--models", "."]  # a stored trial needs none
+    config = parse(EvaluateConfig, prog="python -m mskgrasp.evaluate", description=DESCRIPTION, argv=argv)
+    if config.replay is not None:
+        return replay(*config.replay)
     report = evaluate(config)
-    print_report(report, Console(width=None if sys.stdout.isatty() else 130))
-    print(f"wrote {config.out}/report.json, trials.jsonl, errors.png and a picture of every plan")
+    print_report(report, config.out, Console(width=None if sys.stdout.isatty() else 150))
+    pictures = "success.png, errors.png" if config.experiment == "success" else "displacement.png"
+    print(f"wrote {config.out}/report.html, report.json, {pictures}; any trial: --replay {config.out} TRIAL")
+    return 0
+
+
+def replay(out: Path, key: str) -> int:
+    """Draws a stored trial of a run and says what came of it."""
+    trial = find_trial(out, key)
+    picture = out / "replay" / f"{trial.key}.png"
+    draw_trial(out, trial, picture)
+    print(describe_trial(trial))
+    print(f"wrote {picture}")
     return 0
 
 
@@ -66,75 +133,171 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
 
     Raises:
         UsageError: The folder holds a run with other settings, another model or another cell.
+        MskgraspError: A model, a part or the cell cannot be used.
     """
-    models = load_models(config.models)
-    names = part_names(config.parts, models.meta.training)
-    inputs = inputs_of(config.cell, config.models, names)
-    begin(config, config.out, inputs, may_change=("out", "trials", "parts"))
-    make_folder(config.out / "plans")
-    finished = {(trial.part, trial.number): trial for trial in read(config.out / TRIALS, Trial.from_json)}
-    missing = [
-        (name, number)
-        for name in names
-        for number in range(config.trials)
-        if (find_part(name).name, number) not in finished
-    ]
-    if missing:
-        with open_cell(config.cell) as cell:
-            planner = make_planner(config.models, config.planner, cell)
-            for name, number in tqdm(missing, unit="trial", file=sys.stderr):
-                clear(cell)
-                trial = _one(cell, planner, config, name, number)
-                finished[trial.part, trial.number] = trial
-                # Stored before the arm moves again: what comes now must not cost what is known.
-                append(config.out / TRIALS, trial.to_json())
-                finish(cell, trial)
-            clear(cell)
-    trials = [finished[key] for key in sorted(finished)]
-    report = summarise(trials)
+    _check(config)
+    models = open_model(config.models)
+    words = config.parts or PARTS[config.experiment]
+    parts = _parts(part_names(words, models.meta.training, config.n_parts))
+    if config.planner.policy == "low_variance" and not models.meta.network.variance:
+        raise BadModel(
+            f"{config.models} predicts no variance; use --planner.policy quality, or another model"
+        )
+    cell = read_cell(config.cell, noise=config.noise, measure=config.measure, tape=config.tape)
+    if config.workers > 1 and not cell.simulated:
+        raise UsageError(f"--workers {config.workers}: there is one cell of {config.cell}; leave it away")
+    compared = None
+    if config.experiment == "displacement":
+        chunk = config.planner.chunk_size
+        compared = load_compared(config.compare, config.models, config.lowess_data, list(parts), chunk)
+    inputs = {"cell": cell.digest} | model_digests(config.models) | part_digests(parts.values())
+    inputs |= compared.inputs if compared is not None else {}
+    begin(config, config.out, inputs, may_change=MAY_CHANGE)
+    with only_here(config.out) as alone:
+        if not alone:
+            raise UsageError(
+                f"another evaluation writes into {config.out}; wait for it, or choose another --out"
+            )
+        tasks = scenes(parts, config.trials, config.seed, config.planner, compared)
+        trials = _make_trials(config, cell, compared, tasks)
+        if compared is not None:
+            trials = _with_predictions(config, trials, compared)
+        return _report(config, cell, compared, [trials[task.key] for scene in tasks for task in scene])
+
+
+def _check(config: EvaluateConfig) -> None:
+    if config.experiment == "success" and (config.compare or config.lowess_data):
+        raise UsageError("--compare and --lowess-data are for --experiment displacement: add that")
+    if config.experiment == "displacement" and config.planner.policy != "quality":
+        raise UsageError("--experiment displacement runs both policies: leave --planner.policy away")
+
+
+def _parts(words: Sequence[str]) -> dict[str, str]:
+    """What the user called each part, by its name."""
+    parts: dict[str, str] = {}
+    for word in words:
+        name = find_part(word).name
+        if name in parts:
+            raise UsageError(f"--parts: {parts[name]} and {word} are both called {name!r}; leave one away")
+        parts[name] = word
+    if not parts:
+        raise UsageError("--parts names no part that the model was not trained on; name another set or parts")
+    return parts
+
+
+def _make_trials(
+    config: EvaluateConfig, cell: CellFile, compared: Compared | None, tasks: Sequence[tuple[TrialTask, ...]]
+) -> dict[str, Trial]:
+    """All trials of the folder by key, those that were missing made now."""
+    make_folder(config.out / FOLDER)
+    for leftover in (config.out / FOLDER).glob("*.tmp"):
+        leftover.unlink()
+    trials = {trial.key: trial for trial in read(config.out / TRIALS, Trial.from_json)}
+    missing = [tuple(task for task in scene if task.key not in trials) for scene in tasks]
+    missing = [scene for scene in missing if scene]
+    if not missing:
+        return trials
+    setup = Setup(
+        cell=cell.write(config.out),
+        models=config.models,
+        planner=config.planner,
+        out=config.out,
+        choosers=compared.choosers if compared is not None else {},
+        lowess=compared.lowess.fits if compared is not None and compared.lowess is not None else {},
+        tape=cell.tape,
+        must_measure=compared is not None,
+        yes=config.yes,
+    )
+    n = sum(map(len, missing))
+    done = sum(map(len, tasks)) - n
+    bar = tqdm(
+        total=n + done, initial=done, unit="trial", file=sys.stderr, smoothing=0.05, dynamic_ncols=True,
+        mininterval=0.5 if sys.stderr.isatty() else 15.0,
+    )  # fmt: skip
+    n_lifted = 0
+    with _made(config, cell, setup, missing) as made, bar:
+        for k, trial in enumerate(made, 1):
+            append(config.out / TRIALS, trial.to_json())
+            trials[trial.key] = trial
+            n_lifted += trial.success
+            bar.set_postfix_str(f"lifted {n_lifted / k:.0%}", refresh=False)
+            bar.update()
+    # In the order of their names, whoever was first.
+    rewrite(config.out / TRIALS, (trials[key].to_json() for key in sorted(trials)))
+    return trials
+
+
+@contextmanager
+def _made(
+    config: EvaluateConfig, cell: CellFile, setup: Setup, missing: Sequence[tuple[TrialTask, ...]]
+) -> Iterator[Iterator[Trial]]:
+    """The missing trials, in this process or, of simulated cells, in several."""
+    n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
+    n_threads = torch.get_num_threads()
+    if n_workers > 1:
+        made = run_trials(setup, missing, n_workers)
+    else:
+        made = _one_by_one(setup, missing)
+        if cell.simulated:
+            torch.set_num_threads(1)  # as in a process of its own: the same sums
+    try:
+        yield made
+    finally:
+        made.close()
+        torch.set_num_threads(n_threads)
+
+
+def _one_by_one(setup: Setup, missing: Sequence[tuple[TrialTask, ...]]) -> Generator[Trial, None, None]:
+    with trial_runner(setup) as runner:
+        for scene in missing:
+            for task in scene:
+                yield from runner.run(task)
+
+
+def _with_predictions(
+    config: EvaluateConfig, trials: dict[str, Trial], compared: Compared
+) -> dict[str, Trial]:
+    """Adds what each model expects of the grasps of best quality, where that is not known yet."""
+    bar = tqdm(trials.items(), desc="predictions", leave=False, delay=5, file=sys.stderr)
+    more = {key: with_predictions(trial, config.out, compared.predictors) for key, trial in bar}
+    if more != trials:
+        rewrite(config.out / TRIALS, (more[key].to_json() for key in sorted(more)))
+    return more
+
+
+def _report(
+    config: EvaluateConfig, cell: CellFile, compared: Compared | None, trials: Sequence[Trial]
+) -> dict[str, Any]:
+    """Writes the report and its pictures."""
+    body = summarise(trials) if compared is None else compare(trials, compared.predictors)
+    worst = worst_trials(trials) if compared is None else farthest_off(trials)
+    pictures = {trial.key: f"worst/{trial.key}.png" for trial in worst}
+    settings = config.model_dump(mode="json", exclude={"replay"}) | dict(
+        parts=sorted({trial.part for trial in trials}),
+        noise=cell.noise or None,
+    )
+    report = dict(
+        experiment=config.experiment,
+        **body,
+        trials=[dict(trial=trial.key, outcome=outcome_text(trial)) for trial in trials],
+        worst=[[pictures[trial.key], f"{trial.key}: {outcome_text(trial)}"] for trial in worst],
+        settings=settings,
+        versions=versions(),
+    )
+    for earlier in (config.out / "worst").glob("*.png"):
+        earlier.unlink()
+    for trial in worst:
+        draw_trial(config.out, trial, config.out / pictures[trial.key])
+    if compared is None:
+        draw_success(report, config.out / "success.png")
+        draw_errors(trials, config.out / "errors.png")
+    else:
+        draw_comparison(report, config.out / "displacement.png")
     text = json.dumps(report, indent=1, allow_nan=False)
-    (config.out / "report.json").write_text(text + "\n", encoding="utf-8")
-    draw_errors(trials, config.out / "errors.png")
+    write_whole(config.out / "report.json", (text + "\n").encode())
+    title = {"success": "Success of planned grasps", "displacement": "Displacement in the hand"}
+    write_html(config.out / "report.html", title=title[config.experiment], sections=page(report, config.out))
     return report
-
-
-def finish(cell: Cell, trial: Trial) -> None:
-    """Puts a lifted part down again; after a contact the arm may move on, the trial is over."""
-    try:
-        if trial.reason == "collided":
-            cell.arm.recover()
-        elif trial.success and trial.grasp is not None:
-            put_down(cell, np.array(trial.grasp))
-    except MotionAborted:
-        cell.arm.recover()
-
-
-def clear(cell: Cell) -> None:
-    """Brings the arm home, out of the camera's sight; after a contact on the way it tries once more.
-
-    Raises:
-        MotionAborted: Something still holds it.
-    """
-    try:
-        go_home(cell)
-    except MotionAborted:
-        cell.arm.recover()
-        go_home(cell)
-
-
-def _one(cell: Cell, planner: Planner, config: EvaluateConfig, name: str, number: int) -> Trial:
-    part = find_part(name).name
-    seed = int(np.random.SeedSequence([config.seed, number]).generate_state(1)[0] >> 1)
-    present(cell, name, seed)
-    try:
-        trial, frame, plan = run_trial(cell, planner, part=part, number=number, seed=seed)
-    except (NoPartFound, NoGraspFound, OutOfWorkspace) as error:
-        return Trial(
-            part=part, number=number, seed=seed, success=False, reason=type(error).__name__, grasp=None,
-            quality=None, predicted=None, predicted_std=None, measured=None, tilt=None, planning_s=None,
-        )  # fmt: skip
-    draw_plan(frame, plan, config.out / "plans" / f"{part}-{number:03d}.png")
-    return trial
 
 
 if __name__ == "__main__":

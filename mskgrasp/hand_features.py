@@ -28,17 +28,24 @@ _HIGH = 0.05
 class HandFeatures(nn.Module):
     """What is around a grasp, and where the part's centre lies from it, as one vector."""
 
-    def __init__(self, config: NetworkConfig, normalisation: Normalisation):
+    def __init__(
+        self,
+        config: NetworkConfig,
+        normalisation: Normalisation,
+        widths: tuple[int, ...],
+        shape: tuple[int, int],
+    ):
+        """Takes the channels of its convolutions, and the rows and columns of its patches."""
         super().__init__()
         layers: list[nn.Module] = []
         before = self.n_channels = 4
-        for number, width in enumerate(config.layers):
+        for number, width in enumerate(widths):
             kernel = 5 if number == 0 else 3
             layers += [nn.Conv2d(before, width, kernel, stride=2, padding=kernel // 2), nn.ReLU()]
             before = width
         self.convolutions = nn.Sequential(*layers, nn.Flatten())
         with torch.no_grad():
-            n_read = self.convolutions(torch.zeros(1, self.n_channels, *config.patch_shape)).shape[1]
+            n_read = self.convolutions(torch.zeros(1, self.n_channels, *shape)).shape[1]
         self.image = nn.Sequential(nn.Linear(n_read, config.trunk_width), nn.ReLU())
         self.action = nn.Sequential(nn.Linear(4, config.action_width), nn.ReLU())
         self.n_features = config.trunk_width + config.action_width

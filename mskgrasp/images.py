@@ -13,6 +13,10 @@ from mskgrasp.grasp import PartView
 
 REGION_MARGIN = 0.05
 """How far a part that lies in the region may reach beyond it, metres."""
+MOST_RAISED = 0.4
+"""Share of the region's pixels that a part may cover: 15 cm of 34 cm, squared, are 20 %."""
+ALONE = 0.2
+"""Share of the part's pixels from which on something else in the region is another part."""
 MIN_PIXELS = 5
 """Smaller groups of pixels are specks: an M3 nut covers 6 pixels of 2.2 mm."""
 _PLAUSIBLE_DEPTH = 20.0
@@ -64,6 +68,7 @@ def view_part(
     table_z: float,
     region: tuple[float, float, float, float],
     min_height: float = 0.002,
+    alone: bool = False,
 ) -> PartView:
     """Finds the part that lies on the table, by its height alone.
 
@@ -79,6 +84,7 @@ def view_part(
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
         min_height: What rises less above the table is table, metres.
+        alone: Refuse a second part.
 
     Raises:
         NoPartFound: Nothing rises above the table there, or the image is no depth in metres.
@@ -90,7 +96,14 @@ def view_part(
     x_min, x_max, y_min, y_max = region
     near = (x > x_min - REGION_MARGIN) & (x < x_max + REGION_MARGIN)
     near &= (y > y_min - REGION_MARGIN) & (y < y_max + REGION_MARGIN)
-    mask = _largest_component(near & (heights > min_height))
+    raised = near & (heights > min_height)
+    if raised.sum() > MOST_RAISED * max(near.sum(), 1):
+        raise NoPartFound(
+            f"{raised.sum() / near.sum():.0%} of the region rise more than {min_height * 1e3:g} mm above the "
+            f"table (median {np.median(heights[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
+            f"{table_z:g} or the camera's pose is wrong; calibrate the camera anew"
+        )
+    mask, n_other = _largest_component(raised)
     if mask is None:
         highest = heights[near].max() if near.any() else np.nan
         raise NoPartFound(
@@ -112,6 +125,10 @@ def view_part(
         raise NoPartFound(
             f"the part lies outside the region (centre at {centre_base[0]:.3f}, {centre_base[1]:.3f}, region "
             f"x {x_min:g}..{x_max:g}, y {y_min:g}..{y_max:g}); move it, or clear away what else is there"
+        )
+    if alone and n_other > ALONE * mask.sum():
+        raise NoPartFound(
+            f"two things lie in the region, of {mask.sum()} and {n_other} pixels; take one away"
         )
     spread = np.stack([x[mask] - centre_base[0], y[mask] - centre_base[1]], axis=-1)
     return PartView(
@@ -144,12 +161,13 @@ def _check_depth(depth: np.ndarray) -> None:
         )
 
 
-def _largest_component(mask: np.ndarray) -> np.ndarray | None:
+def _largest_component(mask: np.ndarray) -> tuple[np.ndarray | None, int]:
+    """The largest group of neighbouring pixels, and how many pixels the second largest has."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    if len(stats) < 2:
-        return None
-    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))  # 0 is the background
-    return labels == largest if stats[largest, cv2.CC_STAT_AREA] >= MIN_PIXELS else None
+    areas = stats[1:, cv2.CC_STAT_AREA]  # 0 is the background
+    if not len(areas) or areas.max() < MIN_PIXELS:
+        return None, 0
+    return labels == 1 + int(np.argmax(areas)), int(np.sort(areas)[-2]) if len(areas) > 1 else 0
 
 
 def _box_axes(T_base_camera: Pose) -> Pose:

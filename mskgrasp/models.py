@@ -23,6 +23,9 @@ from mskgrasp.networks import (
     Normalisation,
 )
 
+PRETRAINED = Path(__file__).parent / "pretrained"
+"""The model that ships."""
+
 SCHEMA_VERSION = 1
 WEIGHTS = "model.safetensors"
 DESCRIPTION = "model.json"
@@ -67,11 +70,12 @@ class Models:
         """Probability of success (n,) of grasps.
 
         Args:
-            patches: (n, 1, r, c) metres above the table, around the grasps and turned with them.
+            patches: (n, 1, r, c) metres above the table, around the grasps and turned with them, of the
+                network's ``quality_shape``.
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
             height: (n,) of the grasps above the table, metres.
         """
-        self._check(patches)
+        self._check(patches, self.meta.network.quality_shape)
         return self._probability(self.gqn(patches, centre_grasp.to(patches.dtype), height.to(patches.dtype)))
 
     @torch.inference_mode()
@@ -87,7 +91,7 @@ class Models:
             height: (n,) of the grasps above the table, metres.
             theta: (n,) the grasps' angles, for ``image: object``.
         """
-        self._check(patches)
+        self._check(patches, self.meta.network.patch_shape)
         centre_grasp, height = (values.to(patches.dtype) for values in (centre_grasp, height))
         return self._calibrated(*self.gdn(patches, centre_grasp, height, theta))
 
@@ -100,8 +104,8 @@ class Models:
         scale = mean.new_tensor(self.meta.calibration.variance_scale)
         return mean, None if variance is None else variance * scale
 
-    def _check(self, patches: Tensor) -> None:
-        rows, columns = self.meta.network.patch_shape
+    def _check(self, patches: Tensor, shape: tuple[int, int]) -> None:
+        rows, columns = shape
         if tuple(patches.shape[1:]) != (1, rows, columns):
             raise BadModel(
                 f"patches have shape {tuple(patches.shape)}, this model takes (n, 1, {rows}, {columns})"

@@ -33,8 +33,12 @@ class NetworkConfig(Config):
     dropout: float = Field(default=0.5, ge=0.0, lt=1.0)
     variance: bool = True
     """False: the displacement network predicts the mean alone (the paper's GCIP-M)."""
+    quality_stride: int = Field(default=1, ge=1, le=8)
+    """hand: the quality network sees every so many-th pixel: it has thousands of grasps to look at."""
     layers: tuple[int, ...] = Field(default=(16, 32), min_length=1, max_length=6)
-    """hand: channels of its convolutions, each of which halves the picture."""
+    """hand: channels of the quality network's convolutions, each of which halves the picture."""
+    displacement_layers: tuple[int, ...] = Field(default=(16, 32, 32), min_length=1, max_length=6)
+    """hand: the same of the displacement network."""
     least_std: tuple[float, float] = (0.0, 0.0)
     """Deviation, metres and radians, below which no displacement is claimed to be known (paper: none).
 
@@ -50,7 +54,11 @@ class NetworkConfig(Config):
             raise ValueError("architecture: patch needs a square patch; leave patch_columns away")
         if self.image == "object" and self.architecture != "patch":
             raise ValueError("image: object needs architecture: patch")
-        if not all(0 < width <= 512 for width in self.layers):
+        if self.architecture == "patch" and self.quality_stride != 1:
+            raise ValueError("architecture: patch shows all pixels to both networks; quality_stride is 1")
+        if any((pixels - 1) % self.quality_stride for pixels in self.patch_shape):
+            raise ValueError("the patch's middle must be a pixel that quality_stride leaves")
+        if not all(0 < width <= 512 for width in (*self.layers, *self.displacement_layers)):
             raise ValueError("layers: channels must be between 1 and 512")
         return self
 
@@ -58,6 +66,17 @@ class NetworkConfig(Config):
     def patch_shape(self) -> tuple[int, int]:
         """Rows and columns of a patch; the fingers close along the columns."""
         return self.patch_pixels, self.patch_columns or self.patch_pixels
+
+    @property
+    def quality_shape(self) -> tuple[int, int]:
+        """The same of what the quality network sees."""
+        rows, columns = self.patch_shape
+        return -(-rows // self.quality_stride), -(-columns // self.quality_stride)
+
+    @property
+    def pixel(self) -> float:
+        """Distance of a patch's pixels, metres."""
+        return self.patch_side / self.patch_pixels
 
     @field_validator("least_std")
     @classmethod

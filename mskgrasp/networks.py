@@ -65,11 +65,16 @@ class PatchFeatures(nn.Module):
         return torch.cat([image, self.action(centre_grasp / self.action_scale)], dim=-1)
 
 
-def make_features(config: NetworkConfig, normalisation: Normalisation) -> PatchFeatures | HandFeatures:
-    """What both networks share in shape, not in weights."""
-    if config.architecture == "hand":
-        return HandFeatures(config, normalisation)
-    return PatchFeatures(config, normalisation)
+def make_features(
+    config: NetworkConfig, normalisation: Normalisation, *, quality: bool
+) -> PatchFeatures | HandFeatures:
+    """The first part of the quality network, or of the displacement network."""
+    if config.architecture == "patch":
+        n_action = 4 if config.image == "object" and not quality else 3
+        return PatchFeatures(config, normalisation, n_action)
+    if quality:
+        return HandFeatures(config, normalisation, config.layers, config.quality_shape)
+    return HandFeatures(config, normalisation, config.displacement_layers, config.patch_shape)
 
 
 def _head(n_features: int, config: NetworkConfig, n_outputs: int) -> nn.Sequential:
@@ -84,7 +89,7 @@ class GraspQualityNetwork(nn.Module):
 
     def __init__(self, config: NetworkConfig, normalisation: Normalisation):
         super().__init__()
-        self.features = make_features(config, normalisation)
+        self.features = make_features(config, normalisation, quality=True)
         self.head = _head(self.features.n_features, config, 2)
         odds = normalisation.base_rate / (1 - normalisation.base_rate)
         self.log_prior_odds: Tensor
@@ -111,11 +116,7 @@ class GraspDisplacementNetwork(nn.Module):
     def __init__(self, config: NetworkConfig, normalisation: Normalisation):
         super().__init__()
         self.sees_object = config.image == "object"
-        self.features = (
-            PatchFeatures(config, normalisation, n_action=4)
-            if self.sees_object
-            else make_features(config, normalisation)
-        )
+        self.features = make_features(config, normalisation, quality=False)
         self.mean_head = _head(self.features.n_features, config, 4)
         self.variance_head = _head(self.features.n_features, config, 4) if config.variance else None
         self.target_mean: Tensor
@@ -172,6 +173,8 @@ class GraspDisplacementNetwork(nn.Module):
         """Copies the convolutions' weights of a trained GQN (paper, figure 3)."""
         if self.sees_object:
             return  # other pictures: the paper starts these at random
+        if isinstance(self.features, HandFeatures):
+            return  # layers of its own; and what tells a slip from a hold starts them no better
         self.features.convolutions.load_state_dict(gqn.features.convolutions.state_dict())
 
 

@@ -1,120 +1,178 @@
-"""What a set of trials amounts to: numbers, a table, a picture of predicted against measured."""
+"""What trials amount to, in numbers: how many were lifted, how well displacements were predicted."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from rich.console import Console
-from rich.table import Table
 
-from mskgrasp.metrics import rotation_rmse, translation_rmse, wilson_interval
-from mskgrasp.trial import Trial
+from mskgrasp.geometry import wrap_angle
+from mskgrasp.lowess import TURN_LENGTH
+from mskgrasp.metrics import bootstrap_interval, coverage, wilson_interval
+from mskgrasp.trial import Prediction, Trial
 
-_COLOURS = {"dx": "#1f6feb", "dy": "#e8590c", "dz": "#8b909a", "turn": "#2b8a3e"}
+SCHEMA_VERSION = 2
+COVERED = 0.9
+"""The central interval whose coverage is told."""
+
+TILTED = float(np.radians(1.0))
+"""A part that hangs more askew than this is put down otherwise than it was held, radians."""
+
+PAPER_SUCCESS = {"simulated": 0.949, "real": 0.863}
+"""Share of novel parts' grasps that lifted (Zhao et al. 2019, evaluation in simulation and on the robot)."""
 
 
-def summarise(trials: list[Trial]) -> dict[str, Any]:
-    """Success and displacement errors, of all trials and of each part.
+def own_prediction(trial: Trial) -> Prediction | None:
+    """What the model that planned the trial expected."""
+    if trial.predicted is None or trial.predicted_std is None:
+        return None
+    return Prediction(mean=trial.predicted, std=trial.predicted_std)
+
+
+def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
+    """Success and displacement errors, of all trials, of each family and of each part.
 
     Without a single measured success the errors are absent (None), not zero.
     """
-    parts = sorted({trial.part for trial in trials})
     return dict(
-        schema_version=1,
-        overall=_numbers(trials),
-        parts={part: _numbers([trial for trial in trials if trial.part == part]) for part in parts},
+        schema_version=SCHEMA_VERSION,
+        overall=numbers(trials),
+        families=_each(trials, lambda trial: trial.family),
+        parts=_each(trials, lambda trial: trial.part),
+        tape_against_truth=tape_against_truth(trials),
+        paper=PAPER_SUCCESS,
     )
 
 
-def _numbers(trials: list[Trial]) -> dict[str, Any]:
-    measured = [trial for trial in trials if trial.measured is not None]
-    predicted = np.array([trial.predicted for trial in measured])
-    true = np.array([trial.measured for trial in measured])
-    planning = [trial.planning_s for trial in trials if trial.planning_s is not None]
+def _each(trials: Sequence[Trial], of: Callable[[Trial], str]) -> dict[str, Any]:
+    groups: dict[str, list[Trial]] = {}
+    for trial in trials:
+        groups.setdefault(of(trial), []).append(trial)
+    return {name: numbers(groups[name]) for name in sorted(groups)}
+
+
+def numbers(
+    trials: Sequence[Trial], prediction: Callable[[Trial], Prediction | None] = own_prediction
+) -> dict[str, Any]:
+    """Of some trials; metres and radians, intervals of 95 %.
+
+    Args:
+        trials: In any order.
+        prediction: Which of the predictions counts; a trial without it is not among the errors.
+    """
     n_success = sum(trial.success for trial in trials)
-    reasons = sorted({trial.reason for trial in trials if trial.reason})
+    planning = [trial.planning_s for trial in trials if trial.planning_s is not None]
     return dict(
         trials=len(trials),
         successes=n_success,
         success_rate=n_success / len(trials) if trials else None,
         success_interval=list(wilson_interval(n_success, len(trials))) if trials else None,
-        measured=len(measured),
-        translation_rmse=translation_rmse(predicted, true) if measured else None,
-        rotation_rmse=rotation_rmse(predicted, true) if measured else None,
-        translation_rmse_of_zero=translation_rmse(0 * true, true) if measured else None,
-        rotation_rmse_of_zero=rotation_rmse(0 * true, true) if measured else None,
+        reasons=_counted(trial.reason for trial in trials if trial.reason),
+        unmeasured=_counted(trial.unmeasured.split(":")[0] for trial in trials if trial.unmeasured),
         median_planning_s=float(np.median(planning)) if planning else None,
-        reasons={reason: sum(trial.reason == reason for trial in trials) for reason in reasons},
+        **_errors(trials, prediction),
     )
 
 
-def print_report(report: dict[str, Any], console: Console) -> None:
-    """A row a part and one for all; "of zero" is the error of predicting no displacement at all."""
-    table = Table(title="Planned grasps")
-    for name in ("part", "lifted", "95 % interval", "RMSE", "of zero", "turn RMSE", "of zero", "failures"):
-        table.add_column(name, justify="left" if name in ("part", "failures") else "right")
-    for name, row in [*report["parts"].items(), ("all", report["overall"])]:
-        if name == "all":
-            table.add_section()
-        low, high = row["success_interval"]
-        table.add_row(
-            name,
-            f"{row['successes']} of {row['trials']}",
-            f"{low:.0%} - {high:.0%}",
-            _unit(row["translation_rmse"], 1e3, "mm"),
-            _unit(row["translation_rmse_of_zero"], 1e3, "mm"),
-            _unit(row["rotation_rmse"], 180 / np.pi, "deg"),
-            _unit(row["rotation_rmse_of_zero"], 180 / np.pi, "deg"),
-            ", ".join(f"{reason} {n}" for reason, n in row["reasons"].items()),
-        )
-    console.print(table)
-    if report["overall"]["median_planning_s"] is not None:
-        console.print(f"median planning time {report['overall']['median_planning_s']:.2f} s")
+def _counted(words: Iterable[str]) -> dict[str, int]:
+    return dict(sorted(Counter(words).items()))
 
 
-def _unit(value: float | None, scale: float, unit: str) -> str:
-    return "-" if value is None else f"{value * scale:.1f} {unit}"
+def _errors(trials: Sequence[Trial], prediction: Callable[[Trial], Prediction | None]) -> dict[str, Any]:
+    rows = [(t.part, t.measured, prediction(t)) for t in trials if t.measured is not None]
+    rows = [(part, measured, one) for part, measured, one in rows if one is not None]
+    parts = np.array([part for part, _, _ in rows])
+    true = np.array([measured for _, measured, _ in rows]).reshape(-1, 4)
+    expected = np.array([one.mean for _, _, one in rows]).reshape(-1, 4)
+    found: dict[str, Any] = dict(measured=len(rows), measured_parts=len(set(parts.tolist())))
+    for suffix, predicted in (("", expected), ("_of_zero", 0 * expected)):
+        for kind, errors in zip(
+            ("translation", "rotation"), displacement_errors(predicted, true), strict=True
+        ):
+            found[f"{kind}_rmse{suffix}"] = _rms(errors) if rows else None
+            if not suffix:
+                found[f"{kind}_interval"] = _interval(errors, parts)
+    tilts = np.array([trial.tilt for trial in trials if trial.tilt is not None])
+    found["tilt_rms"] = _rms(tilts) if len(tilts) else None
+    std = np.array([one.std for _, _, one in rows]).reshape(-1, 4)
+    told = np.isfinite(std).all() and np.isfinite(true).all() and len(rows) > 0
+    found["coverage_90"] = coverage(expected, std**2, true, COVERED).tolist() if told else None
+    return found
 
 
-def draw_errors(trials: list[Trial], path: Path) -> None:
-    """Draws the measured displacement of every success over the predicted one, with its deviation."""
-    measured = [trial for trial in trials if trial.measured is not None]
-    predicted = np.array([trial.predicted for trial in measured]).reshape(-1, 4)
-    deviation = np.array([trial.predicted_std for trial in measured]).reshape(-1, 4)
-    true = np.array([trial.measured for trial in measured]).reshape(-1, 4)
-    with matplotlib.rc_context({"axes.spines.top": False, "axes.spines.right": False}):
-        figure = Figure(figsize=(10, 4.8), layout="constrained")
-        shift, turn = figure.subplots(1, 2)
-        for k, name in enumerate(("dx", "dy", "dz")):
-            _points(shift, predicted[:, k] * 1e3, true[:, k] * 1e3, deviation[:, k] * 1e3, name)
-        degrees = [np.degrees(values[:, 3]) for values in (predicted, true, deviation)]
-        _points(turn, degrees[0], degrees[1], degrees[2], "turn")
-        for axes, unit in ((shift, "mm"), (turn, "deg")):
-            axes.axline((0, 0), slope=1, color="#c5c9d0", lw=1, zorder=0)
-            low, high = (f(*axes.get_xlim(), *axes.get_ylim()) for f in (min, max))
-            axes.set(xlabel=f"predicted, {unit}", ylabel=f"measured, {unit}", aspect="equal")
-            axes.set(xlim=(low, high), ylim=(low, high))
-        rmse = ("no success was measured", "")
-        if measured:
-            rmse = (
-                f"RMSE {translation_rmse(predicted, true) * 1e3:.1f} mm",
-                f"RMSE {np.degrees(rotation_rmse(predicted, true)):.1f} deg",
-            )
-        shift.set_title(f"Displacement in the hand: {rmse[0]}", loc="left", fontsize=11)
-        turn.set_title(f"Turn in the hand: {rmse[1]}", loc="left", fontsize=11)
-        shift.legend(frameon=False, loc="lower right")
-        figure.savefig(path, dpi=150)
+def displacement_errors(predicted: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distances (n,), metres, and angles (n,), radians, not negative, between displacements (n, 4).
+
+    Where dz was not measured (NaN) the distance is that in the plane.
+    """
+    off = np.asarray(predicted, dtype=np.float64) - np.asarray(measured, dtype=np.float64)
+    off[:, 2] = np.where(np.isnan(off[:, 2]), 0.0, off[:, 2])
+    return np.linalg.norm(off[:, :3], axis=1), np.abs(wrap_angle(off[:, 3]))
 
 
-def _points(
-    axes: Axes, predicted: np.ndarray, measured: np.ndarray, deviation: np.ndarray, name: str
-) -> None:
-    known = np.where(np.isfinite(deviation), deviation, 0.0)
-    axes.errorbar(
-        predicted, measured, xerr=known, fmt="o", ms=4, lw=0.8, alpha=0.8, color=_COLOURS[name], label=name
+def _rms(errors: np.ndarray) -> float:
+    return float(np.sqrt((errors**2).mean()))
+
+
+def _interval(errors: np.ndarray, parts: np.ndarray) -> list[float] | None:
+    """Of the RMSE, over parts; of a single part nothing can be said."""
+    groups = [errors[parts == part] for part in np.unique(parts)]
+    return list(bootstrap_interval(groups, _rms)) if len(groups) > 1 else None
+
+
+def tape_against_truth(trials: Sequence[Trial]) -> dict[str, Any] | None:
+    """How far tape measures from what a tracker says; None where not both are known.
+
+    A part that hung tilted in the hand lies flat when it is put down, and has moved otherwise by then: those
+    are told apart, for tape cannot know.
+    """
+    both = [t for t in trials if t.measured is not None and t.true is not None]
+    if not both:
+        return None
+    tilted = [t for t in both if (t.tilt or 0.0) > TILTED]
+    return dict(
+        flat=_tape_errors([t for t in both if t not in tilted]), tilted=_tape_errors(tilted), tilt=TILTED
     )
+
+
+def _tape_errors(trials: Sequence[Trial]) -> dict[str, Any]:
+    if not trials:
+        return dict(trials=0)
+    distance, angle = displacement_errors(
+        np.array([t.true for t in trials]), np.array([t.measured for t in trials])
+    )
+    return dict(
+        trials=len(trials),
+        translation_rmse=_rms(distance),
+        translation_worst=float(distance.max()),
+        rotation_rmse=_rms(angle),
+        rotation_worst=float(angle.max()),
+    )
+
+
+def worst_trials(trials: Sequence[Trial], n: int = 10) -> list[Trial]:
+    """Failures of which most was expected, or predictions that were farthest off, the worst first.
+
+    A turn counts as the way of a point 3 cm away.
+    """
+    failed = sorted((t for t in trials if not t.success), key=lambda t: (-(t.quality or 0.0), t.key))
+    return [*failed, *sorted((t for t in trials if miss(t) is not None), key=_by_miss)][:n]
+
+
+def farthest_off(trials: Sequence[Trial], n: int = 10) -> list[Trial]:
+    """Measured trials whose displacement was least expected, the worst first."""
+    return sorted((t for t in trials if miss(t) is not None), key=_by_miss)[:n]
+
+
+def _by_miss(trial: Trial) -> tuple[float, str]:
+    return -(miss(trial) or 0.0), trial.key
+
+
+def miss(trial: Trial) -> float | None:
+    """How far the prediction was off, metres, a radian counted as 3 cm; None where nothing was measured."""
+    if trial.measured is None or trial.predicted is None:
+        return None
+    distance, angle = displacement_errors(np.array([trial.predicted]), np.array([trial.measured]))
+    return float(np.hypot(distance[0], TURN_LENGTH * angle[0]))

@@ -25,26 +25,27 @@ from mskgrasp.grasp import FAILURES, MAX_OPENING, centre_in_grasp_frame
 from mskgrasp.images import crop_patches, height_image
 from mskgrasp.planner import GraspPlan
 
-_INK, _FAINT = "#22252b", "#8b909a"
+INK, FAINT = "#22252b", "#8b909a"
 _JAW, _SHIFT, _GOOD, _BAD = "#1f6feb", "#e8590c", "#2b8a3e", "#c92a2a"
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "font.size": 10,
     "font.family": "DejaVu Sans",
-    "text.color": _INK,
-    "axes.edgecolor": _FAINT,
-    "axes.labelcolor": _INK,
+    "text.color": INK,
+    "axes.edgecolor": FAINT,
+    "axes.labelcolor": INK,
     "axes.titlesize": 11,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
-    "xtick.color": _FAINT,
-    "ytick.color": _FAINT,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
     "savefig.dpi": 150,
 }
 _PAD_WIDTH, _PAD_THICKNESS = 0.020, 0.008  # drawn size of a finger pad seen from above, metres
 _MM = 1e3
 
 
-def _figure(width: float, height: float) -> Figure:
+def make_figure(width: float, height: float) -> Figure:
+    """A figure of inches, its panels set so that nothing overlaps."""
     return Figure(figsize=(width, height), layout="constrained")  # no pyplot: nothing global, no window
 
 
@@ -137,17 +138,27 @@ def _ellipse(axes: Axes, centre: np.ndarray, covariance: np.ndarray, n_sigma: fl
     )
 
 
-def draw_plan(frame: RgbdFrame, plan: GraspPlan, path: Path) -> None:
+def draw_plan(
+    frame: RgbdFrame, plan: GraspPlan, path: Path, *, measured: np.ndarray | None = None, note: str = ""
+) -> None:
     """Draws a plan: candidates by quality over the part, and the chosen grasp with the expected shift.
 
     Left, the base frame from above, right, the grasp frame; both in millimetres and to scale.
+
+    Args:
+        frame: What was seen.
+        plan: What was planned in it.
+        path: Of the picture.
+        measured: (4,) object displacement that came of it, drawn beside the expected one.
+        note: A line under that of the plan.
     """
-    with matplotlib.rc_context(_STYLE):
-        figure = _figure(11.5, 5.7)
+    with matplotlib.rc_context(STYLE):
+        figure = make_figure(11.5, 5.7 + 0.25 * bool(note))
         left, right = figure.subplots(1, 2)
         _draw_candidates(figure, left, frame, plan)
-        _draw_chosen(right, frame, plan)
-        figure.suptitle(_plan_text(plan), fontsize=11, x=0.01, ha="left")
+        _draw_chosen(right, frame, plan, measured)
+        text = _plan_text(plan) + (f"\n{note}" if note else "")
+        figure.suptitle(text, fontsize=11, x=0.01, ha="left")
         figure.savefig(path)
 
 
@@ -189,13 +200,13 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     bar.set_label("predicted quality")
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     best = plan.candidates[plan.shortlist]
-    axes.plot(*(best[:, :2] * _MM).T, "o", ms=3.2, mfc="none", mec=_INK, mew=0.6, zorder=5, label="shortlist")
+    axes.plot(*(best[:, :2] * _MM).T, "o", ms=3.2, mfc="none", mec=INK, mew=0.6, zorder=5, label="shortlist")
     _jaw(axes, plan.grasp, float(plan.grasp[3]))
     axes.legend(loc="lower left", frameon=False, fontsize=8)
     axes.set(xlabel="base x, mm", ylabel="base y, mm", title=f"{len(plan.candidates)} candidates")
 
 
-def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
+def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.ndarray | None) -> None:
     side = 0.128
     heights = _from_above(
         frame.depth, frame.intrinsics, frame.T_base_camera, plan.view.table_z, plan.grasp, side
@@ -206,8 +217,11 @@ def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
     centre = centre_in_grasp_frame(plan.view.centre_base, plan.grasp)[:2] * _MM
     shift, turn = plan.displacement[:2] * _MM, float(plan.displacement[3])
     _outlines(axes, heights, np.zeros(2), side, centre, shift, turn)
-    axes.plot([], [], color=_INK, lw=0.9, label="part before")
+    axes.plot([], [], color=INK, lw=0.9, label="part before")
     axes.plot([], [], color=_SHIFT, lw=1.3, ls="--", label="part expected in the hand")
+    if measured is not None:
+        _outlines(axes, heights, np.zeros(2), side, centre, measured[:2] * _MM, float(measured[3]), _GOOD)
+        axes.plot([], [], color=_GOOD, lw=1.3, ls="--", label="part measured in the hand")
     axes.legend(loc="upper left", frameon=False, fontsize=8)
     axes.plot(*centre, "+", color=_SHIFT, ms=8, mew=1.5, zorder=9)
     known = bool(np.isfinite(plan.displacement_cov).all())
@@ -219,8 +233,12 @@ def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
     )
     _draw_shift(axes, centre, shift, covariance)
     reach = float(np.hypot(*shift)) + 2 * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])) * _MM
+    came = None if measured is None else measured[:2] * _MM
+    if came is not None:
+        axes.plot(*(centre + came), "x", color=_GOOD, ms=7, mew=1.8, zorder=10)
+        reach = max(reach, float(np.hypot(*came)))
     if reach < 20.0:
-        _inset(axes, shift, covariance, max(1.4 * reach, 1.0), right=bool(centre[0] < 0))
+        _inset(axes, shift, covariance, max(1.4 * reach, 1.0), right=bool(centre[0] < 0), measured=came)
 
 
 def _draw_shift(axes: Axes, start: np.ndarray, shift: np.ndarray, covariance: np.ndarray) -> None:
@@ -236,6 +254,7 @@ def _outlines(
     centre: np.ndarray,
     shift: np.ndarray,
     turn: float,
+    colour: str = _SHIFT,
 ) -> None:
     """The part's outline, and dashed where it ends up, turned about its centre and shifted (mm)."""
     n = heights.shape[0]
@@ -248,23 +267,33 @@ def _outlines(
     dx, dy = x - centre[0], y - centre[1]
     moved_x = centre[0] + shift[0] + cos * dx - sin * dy
     moved_y = centre[1] + shift[1] + sin * dx + cos * dy
-    axes.contour(x, y, smooth, levels=level, colors=[_INK], linewidths=0.9, zorder=5)
+    axes.contour(x, y, smooth, levels=level, colors=[INK], linewidths=0.9, zorder=5)
     axes.contour(
-        moved_x, moved_y, smooth, levels=level, colors=[_SHIFT], linewidths=1.3, linestyles="--", zorder=6
+        moved_x, moved_y, smooth, levels=level, colors=[colour], linewidths=1.3, linestyles="--", zorder=6
     )
 
 
-def _inset(axes: Axes, shift: np.ndarray, covariance: np.ndarray, half: float, *, right: bool) -> None:
+def _inset(
+    axes: Axes,
+    shift: np.ndarray,
+    covariance: np.ndarray,
+    half: float,
+    *,
+    right: bool,
+    measured: np.ndarray | None,
+) -> None:
     inset = axes.inset_axes((0.70 if right else 0.02, 0.02, 0.28, 0.28))
     inset.set(xlim=(-half, half), ylim=(-half, half), xticks=[], yticks=[], aspect="equal")
     inset.set_facecolor("white")
     for spine in inset.spines.values():
-        spine.set_color(_FAINT)
-    inset.axhline(0, color=_FAINT, lw=0.5)
-    inset.axvline(0, color=_FAINT, lw=0.5)
+        spine.set_color(FAINT)
+    inset.axhline(0, color=FAINT, lw=0.5)
+    inset.axvline(0, color=FAINT, lw=0.5)
     _draw_shift(inset, np.zeros(2), shift, covariance)
+    if measured is not None:
+        inset.plot(*measured, "x", color=_GOOD, ms=7, mew=1.8, zorder=10)
     bar = next(step for step in (10, 5, 2, 1, 0.5) if step <= 0.8 * half or step == 0.5)
-    inset.plot([-0.9 * half, -0.9 * half + bar], [-0.85 * half] * 2, color=_INK, lw=2)
+    inset.plot([-0.9 * half, -0.9 * half + bar], [-0.85 * half] * 2, color=INK, lw=2)
     inset.text(-0.9 * half, -0.8 * half, f"{bar:g} mm", fontsize=7, va="bottom")
     inset.set_title("shift and 2σ", fontsize=8, fontweight="normal", loc="center", pad=3)
 
@@ -281,8 +310,8 @@ def draw_contact_sheet(
     """
     columns = min(6, max(1, len(rows)))
     lines = max(1, -(-len(rows) // columns))
-    with matplotlib.rc_context(_STYLE):
-        figure = _figure(2.1 * columns, 2.45 * lines + 0.5)
+    with matplotlib.rc_context(STYLE):
+        figure = make_figure(2.1 * columns, 2.45 * lines + 0.5)
         grid = np.atleast_1d(figure.subplots(lines, columns, squeeze=False)).ravel()
         for axes in grid[len(rows) :]:
             axes.axis("off")
@@ -330,24 +359,24 @@ def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Pat
         report: The final metrics, with the trivial predictors' errors.
         path: Where the picture goes.
     """
-    with matplotlib.rc_context({**_STYLE, "axes.spines.top": False, "axes.spines.right": False}):
-        figure = _figure(11.5, 6.0)
+    with matplotlib.rc_context({**STYLE, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = make_figure(11.5, 6.0)
         panels = figure.subplots(2, 3)
         for line, name in zip(panels, ("gqn", "gdn"), strict=True):
             rows = [row for row in history if row["stage"] == name]
-            _curve(line[0], rows, "train_loss", "training (with noise and dropout)", _FAINT)
+            _curve(line[0], rows, "train_loss", "training (with noise and dropout)", FAINT)
             _curve(line[0], rows, "validation_loss", "parts never seen", _JAW)
             line[0].set(title=f"{name.upper()} loss", xlabel="epoch")
             line[0].legend(frameon=False, fontsize=8)
         gqn, gdn = report["gqn"], report["gdn"]
         rows = [row for row in history if row["stage"] == "gqn"]
         _curve(panels[0, 1], rows, "auroc", "parts never seen", _JAW)
-        panels[0, 1].axhline(0.5, color=_FAINT, lw=1, ls="--", label="guessing")
+        panels[0, 1].axhline(0.5, color=FAINT, lw=1, ls="--", label="guessing")
         panels[0, 1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.3, 1.02))
         panels[0, 1].legend(frameon=False, fontsize=8, loc="lower right")
         bars = {
             "network": (gqn["brier"], _JAW),
-            "base rate": (gqn["brier_of_base_rate"], _FAINT),
+            "base rate": (gqn["brier_of_base_rate"], FAINT),
         }
         panels[0, 2].bar(
             list(bars), [v for v, _ in bars.values()], color=[c for _, c in bars.values()], width=0.5
@@ -363,7 +392,7 @@ def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Pat
             _curve(axes, rows, key, "parts never seen", _JAW, factor)
             for style, other in (("--", "zero_displacement"), (":", "training_mean")):
                 axes.axhline(
-                    gdn[other][key] * factor, color=_FAINT, lw=1.2, ls=style, label=other.replace("_", " ")
+                    gdn[other][key] * factor, color=FAINT, lw=1.2, ls=style, label=other.replace("_", " ")
                 )
             axes.set(title=f"Displacement: {key.split('_')[0]} RMSE, {unit}", xlabel="epoch")
             axes.set_ylim(bottom=0)

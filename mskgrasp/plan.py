@@ -14,7 +14,7 @@ from hal.cell import Cell
 from hal.errors import HalError
 from mskgrasp.cli import make_folder, parse, run
 from mskgrasp.config import Config
-from mskgrasp.models import load_models
+from mskgrasp.models import PRETRAINED, load_models
 from mskgrasp.parts.mesh_files import Unit
 from mskgrasp.pictures import draw_plan
 from mskgrasp.planner import GraspPlan, Planner, PlannerConfig
@@ -24,7 +24,7 @@ DESCRIPTION = """Takes a depth image of the cell and plans a precise grasp of th
 Samples grasps over the part, keeps those of the best predicted quality, and chooses the one whose
 displacement in the hand is best known. Nothing moves. Writes plan.png and plan.json.
 
-A part of your own: python -m mskgrasp.plan --models models/demo --part my_bracket.stl"""
+A part of your own: python -m mskgrasp.plan --part my_bracket.stl"""
 
 SIMULATED_CELL = Path(__file__).resolve().parents[1] / "configs" / "cells" / "sapien.yaml"
 
@@ -32,8 +32,8 @@ SIMULATED_CELL = Path(__file__).resolve().parents[1] / "configs" / "cells" / "sa
 class PlanConfig(Config):
     """Settings of one planning."""
 
-    models: Path
-    """Folder with model.safetensors and model.json, as mskgrasp.train writes it."""
+    models: Path = PRETRAINED
+    """Folder with model.safetensors and model.json; by default the shipped one."""
     cell: Path = SIMULATED_CELL
     """YAML file of the cell; by default the simulated one."""
     out: Path = Path("out/plan")

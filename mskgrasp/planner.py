@@ -16,6 +16,7 @@ from mskgrasp.geometry import wrap_angle
 from mskgrasp.grasp import PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
 from mskgrasp.images import view_part
 from mskgrasp.models import Models
+from mskgrasp.refine import fingers_free, grasps_near
 from mskgrasp.scoring import Scene, displacements, qualities
 
 
@@ -29,6 +30,10 @@ class PlannerConfig(Config):
     """quality: take the best quality, whatever its variance (the paper's experiment 1)."""
     min_quality: float = Field(default=0.0, ge=0.0, le=1.0)
     """A grasp whose predicted quality is lower is not taken."""
+    check_fingers: bool = False
+    """Leave out grasps whose open fingers the depth image shows something in the way of."""
+    refinements: int = Field(default=0, ge=0, le=20)
+    """Rounds of the cross-entropy method: grasps are drawn near the best ones and judged in turn."""
     chunk_size: int = Field(default=32, ge=1)
     """Grasps a network sees at once: more do not fit a CPU's cache (measured: 32 beats 256 by half)."""
 
@@ -100,6 +105,23 @@ def _plain(values: np.ndarray) -> Any:
     return float(values) if np.isfinite(values) else None
 
 
+@dataclass(frozen=True)
+class _Shortlist:
+    """Candidates by row (k,), best quality first, with their mean and variance (k, 4) and scores (k,)."""
+
+    rows: np.ndarray
+    mean: np.ndarray
+    variance: np.ndarray
+    scores: np.ndarray
+
+    def joined(self, other: _Shortlist, found: np.ndarray) -> _Shortlist:
+        """Both, by the qualities of all candidates."""
+        names = ("rows", "mean", "variance", "scores")
+        arrays = [np.append(getattr(self, name), getattr(other, name), axis=0) for name in names]
+        order = np.argsort(-found[arrays[0]], kind="stable")
+        return _Shortlist(*(array[order] for array in arrays))
+
+
 class Planner:
     """Samples grasps over the part, scores them with the networks, and selects one."""
 
@@ -142,13 +164,14 @@ class Planner:
         sampled = time.perf_counter()
         found = qualities(self.models, scene, candidates, self.config.chunk_size)
         scored = time.perf_counter()
-        best = shortlist(found, self.config.top_fraction)
-        mean, variance = displacements(self.models, scene, candidates[best], self.config.chunk_size)
-        scores = variance_score(variance, view.gyration_radius)
-        chosen = select(found[best], scores, self.config)
+        best = self._judged(scene, candidates, self._shortlist(scene, candidates, found))
+        if self.config.refinements:
+            candidates, found, best = self._refined(scene, candidates, found, best, rng)
+        rows, mean, variance, scores = best.rows, best.mean, best.variance, best.scores
+        chosen = select(found[rows], scores, self.config)
         selected = time.perf_counter()
 
-        grasp, quality = candidates[best[chosen]], float(found[best[chosen]])
+        grasp, quality = candidates[rows[chosen]], float(found[rows[chosen]])
         centre_grasp = centre_in_grasp_frame(view.centre_base, grasp)
         return GraspPlan(
             grasp=grasp,
@@ -161,7 +184,7 @@ class Planner:
             view=view,
             candidates=candidates,
             qualities=found,
-            shortlist=best,
+            shortlist=rows,
             shortlist_scores=scores,
             seconds={
                 "sample": sampled - started,
@@ -170,6 +193,59 @@ class Planner:
                 "total": selected - started,
             },
         )
+
+    def _shortlist(self, scene: Scene, candidates: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """Indices of the best candidates; of those whose fingers are free where that is asked for.
+
+        Raises:
+            NoGraspFound: Something is in the way of all fingers.
+        """
+        if not self.config.check_fingers:
+            return shortlist(found, self.config.top_fraction)
+        n = len(shortlist(found, self.config.top_fraction))
+        order, free = shortlist(found, 1.0), np.zeros(0, dtype=np.int64)
+        for rows in np.array_split(order, max(1, len(order) // (4 * n))):
+            free = np.append(free, rows[fingers_free(scene, candidates[rows])])
+            if len(free) >= n:
+                break
+        if not len(free):
+            raise NoGraspFound(
+                "something is in the way of the open fingers of every candidate; clear the table around the "
+                "part, or switch check_fingers off"
+            )
+        return free[:n]
+
+    def _judged(self, scene: Scene, candidates: np.ndarray, rows: np.ndarray) -> _Shortlist:
+        mean, variance = displacements(self.models, scene, candidates[rows], self.config.chunk_size)
+        return _Shortlist(rows, mean, variance, variance_score(variance, scene.view.gyration_radius))
+
+    def _refined(
+        self,
+        scene: Scene,
+        candidates: np.ndarray,
+        found: np.ndarray,
+        best: _Shortlist,
+        rng: np.random.Generator,
+    ) -> tuple[np.ndarray, np.ndarray, _Shortlist]:
+        """Candidates, qualities and shortlist after some rounds near the best grasps.
+
+        What is sought is what is chosen by: the least variance score at a quality that the first shortlist
+        had, or the best quality.
+        """
+        n_best, least = len(best.rows), float(found[best.rows].min())
+        for number in range(self.config.refinements):
+            loss = -found[best.rows] if self.config.policy == "quality" else best.scores
+            elite = candidates[best.rows[np.argsort(loss, kind="stable")[: max(1, n_best // 4)]]]
+            drawn = grasps_near(elite, 4 * n_best, scene.view, rng, width=0.5 ** (number + 1))
+            if self.config.check_fingers:
+                drawn = drawn[fingers_free(scene, drawn)]
+            quality = qualities(self.models, scene, drawn, self.config.chunk_size)
+            kept = np.argsort(-quality, kind="stable")[:n_best]
+            kept = kept[quality[kept] >= least]
+            rows = len(candidates) + np.arange(len(kept))
+            candidates, found = np.append(candidates, drawn[kept], axis=0), np.append(found, quality[kept])
+            best = best.joined(self._judged(scene, candidates, rows), found)
+        return candidates, found, best
 
     def sample(self, frame: RgbdFrame, rng: np.random.Generator) -> tuple[PartView, np.ndarray]:
         """Finds the part and draws candidates (n, 4) over it."""
@@ -180,6 +256,7 @@ class Planner:
             table_z=self.table_z,
             region=self.region,
             min_height=self.min_height,
+            alone=True,
         )
         return view, sample_grasps(view, self.config.n_candidates, rng)
 

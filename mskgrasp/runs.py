@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from mskgrasp.cli import make_folder
 from mskgrasp.config import Config, read_config, write_config
 from mskgrasp.errors import BadDataset, UsageError
+from mskgrasp.files import write_whole
 from mskgrasp.parts import chosen_names, find_part, starter_names
 
 Record = TypeVar("Record")
@@ -55,11 +57,19 @@ def begin(config: Config, out: Path, inputs: Mapping[str, str], *, may_change: C
 
 def inputs_of(cell: Path, models: Path, parts: Iterable[str]) -> dict[str, str]:
     """Digests of a cell's file, a model and parts."""
+    return {"cell": file_digest(cell)} | model_digests(models) | part_digests(parts)
+
+
+def model_digests(models: Path, label: str = "") -> dict[str, str]:
+    """Digests of a model's files; the label tells models apart."""
     return {
-        "cell": file_digest(cell),
-        "model.json": file_digest(models / "model.json"),
-        "model.safetensors": file_digest(models / "model.safetensors"),
-    } | {f"part {name}": find_part(name).content_hash for name in parts}
+        f"{label} {name}".strip(): file_digest(models / name) for name in ("model.json", "model.safetensors")
+    }
+
+
+def part_digests(parts: Iterable[str]) -> dict[str, str]:
+    """Digests of parts, by name or folder."""
+    return {f"part {name}": find_part(name).content_hash for name in parts}
 
 
 def file_digest(path: Path) -> str:
@@ -78,6 +88,11 @@ def append(path: Path, values: Mapping[str, Any]) -> None:
     """Adds a line to a file of trials; NaN is no JSON and refused."""
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(values, allow_nan=False) + "\n")
+
+
+def rewrite(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
+    """Writes a file of trials anew, whole or not at all."""
+    write_whole(path, "".join(json.dumps(one, allow_nan=False) + "\n" for one in lines).encode())
 
 
 def read(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
@@ -102,22 +117,55 @@ def read(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
     return found
 
 
-def part_names(words: Iterable[str], training: Mapping[str, Any]) -> list[str]:
+def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int = 0) -> list[str]:
     """Names or folders of parts from a user's words.
 
-    ``validation`` and ``test``: what the model never saw, or the catalogue's where the model knows of none;
-    ``all``: every part of the starter set; else as `mskgrasp.parts.chosen_names`.
+    ``train``, ``validation`` and ``test``: the model's, where it was trained with any such; else the
+    catalogue's, for the last two without what the model was trained on. ``all``: every part of the starter
+    set. Other words as `mskgrasp.parts.chosen_names`.
+
+    Args:
+        words: Of the user.
+        training: What a model says of its training.
+        n_parts: Over 0, at most so many, an equal share of each word's, evenly chosen from their names in
+            order; more of them include the fewer.
 
     Raises:
         BadPart: A part is unknown.
     """
-    names: list[str] = []
+    sets = []
     for word in words:
-        unseen = training.get(f"{word}_parts") if word in ("validation", "test") else None
-        if unseen:
-            names += unseen
+        known = training.get("training_parts") or ()
+        if word == "train" and known:
+            sets.append(list(known))
+        elif word in ("validation", "test"):
+            unseen = training.get(f"{word}_parts")
+            sets.append(unseen or [name for name in chosen_names((word,)) if name not in known])
         else:
-            names += starter_names() if word == "all" else chosen_names((word,))
+            sets.append(starter_names() if word == "all" else chosen_names((word,)))
+    if n_parts:
+        sets = [evenly(list(one), share) for one, share in zip(sets, _shares(sets, n_parts), strict=True)]
+    names = list(dict.fromkeys(name for one in sets for name in one))
     for name in names:
         find_part(name)
-    return list(dict.fromkeys(names))
+    return names
+
+
+def evenly(names: Sequence[str], n: int) -> list[str]:
+    """At most n of some names, spread evenly over their sorted order; a larger n adds to a smaller one's."""
+    in_order = sorted(names)
+    # The golden ratio's multiples fill an interval evenly, however many there are.
+    places = (k * 0.6180339887498949 % 1.0 for k in itertools.count())
+    chosen: dict[int, None] = {}
+    while len(chosen) < min(n, len(in_order)):
+        chosen[int(next(places) * len(in_order))] = None
+    return [in_order[i] for i in sorted(chosen)]
+
+
+def _shares(sets: Sequence[Sequence[str]], n: int) -> list[int]:
+    """How many of each set, n in all where there are so many; what a small one lacks the others give."""
+    shares = [0] * len(sets)
+    while sum(shares) < min(n, sum(map(len, sets))):
+        open_ = [i for i, one in enumerate(sets) if shares[i] < len(one)]
+        shares[min(open_, key=lambda i: shares[i])] += 1
+    return shares

@@ -48,25 +48,33 @@ class Scene:
         )
 
     def crop(self, grasps: np.ndarray, network: NetworkConfig) -> Tensor:
-        """Patches (n, 1, r, c) around grasps (n, 4)."""
+        """Patches (n, 1, r, c) around grasps (n, 4), as the displacement network takes them."""
+        return self.crop_of(grasps, network.patch_shape, network.pixel)
+
+    def crop_for_quality(self, grasps: np.ndarray, network: NetworkConfig) -> Tensor:
+        """The same for the quality network: what is not looked at is not cropped."""
+        return self.crop_of(grasps, network.quality_shape, network.pixel * network.quality_stride)
+
+    def crop_of(self, grasps: np.ndarray, shape: tuple[int, int], pixel: float) -> Tensor:
+        """Patches of any rows and columns, their pixels some metres apart: `images.crop_patches`."""
         return crop_patches(
             self.heights,
             torch.as_tensor(grasps),
             self.intrinsics,
             self.T_base_camera,
-            n_pixels=network.patch_pixels,
-            side=network.patch_side,
-            n_columns=network.patch_columns,
+            n_pixels=shape[0],
+            side=shape[0] * pixel,
+            n_columns=shape[1],
         )
 
 
 def qualities(models: Models, scene: Scene, grasps: np.ndarray, chunk: int) -> np.ndarray:
     """Predicted probabilities of success (n,) of grasps (n, 4)."""
     found = [
-        models.quality(scene.crop(grasps[rows], models.meta.network), centre, height)
+        models.quality(scene.crop_for_quality(grasps[rows], models.meta.network), centre, height)
         for rows, centre, height, _ in _chunks(models, scene, grasps, chunk)
     ]
-    return torch.cat(found).cpu().double().numpy()
+    return torch.cat(found).cpu().double().numpy() if found else np.zeros(0)
 
 
 def displacements(
@@ -83,6 +91,8 @@ def displacements(
         mean, variance = models.grasp_displacement(patches, centre, height, theta)
         means.append(mean)
         variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
+    if not means:
+        return np.zeros((0, 4)), np.zeros((0, 4))
     return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
 
 

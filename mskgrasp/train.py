@@ -17,6 +17,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from mskgrasp import cli
 from mskgrasp.config import read_config, write_config
 from mskgrasp.errors import UsageError
+from mskgrasp.metric_pictures import draw_uncertainty
+from mskgrasp.model_card import model_card
 from mskgrasp.models import DESCRIPTION, WEIGHTS, save_model
 from mskgrasp.pictures import draw_curves
 from mskgrasp.samples import Samples, read_samples
@@ -105,8 +107,13 @@ def run(config: TrainConfig) -> int:
             reporter=_Bar(progress, out / "log.csv"),
         )
     draw_curves(history, models.meta.metrics, out / "curves.png")
+    if config.network.variance:
+        draw_uncertainty(
+            models, samples, sides.test if len(sides.test) else sides.validation, out / "uncertainty.png"
+        )
     _write(out / "metrics.json", json.dumps(_finite(models.meta.metrics), indent=2, allow_nan=False) + "\n")
     save_model(out, models)
+    _write(out / "card.md", model_card(models.meta))
     (out / CHECKPOINT).unlink(missing_ok=True)
     _summarise(console, models.meta.metrics, out)
     return 0
@@ -173,7 +180,7 @@ def _finite(value: Any) -> Any:
 
 
 def _summarise(console: Console, report: dict[str, Any], out: Path) -> None:
-    gqn, gdn = report["gqn"], report["gdn"]
+    gqn, gdn = (report.get("test", report)[name] for name in ("gqn", "gdn"))
     console.print(
         f"quality on parts never seen: AUROC {gqn['auroc']:.3f}, "
         f"balanced accuracy {gqn['balanced_accuracy']:.1%}, "

@@ -153,7 +153,8 @@ def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) ->
             "test_parts": [name for name in samples.parts if sides[name] == "test"],
             "skipped": samples.skipped,
             "data_fingerprint": samples.fingerprint,
-            "settings": config.model_dump(mode="json"),
+            # Where the data lay and the model went is nobody's business.
+            "settings": config.model_dump(mode="json", include=set(LearningConfig.model_fields)),
         },
     )
 
@@ -242,8 +243,11 @@ class Stage:
         Turned, mirrored and with noise, all at once on the networks' device.
         """
         s, device = self.samples, self.models.device
-        look = s.patches_of if self.name == "gqn" else s.displacement_patches_of
-        patches, centre = look(rows, device), s.centre_grasp[rows].to(device)
+        if self.name == "gqn":
+            patches = s.patches_of(rows, device, self.config.network.quality_stride)
+        else:
+            patches = s.displacement_patches_of(rows, device)
+        centre = s.centre_grasp[rows].to(device)
         target = s.grasp_displacement[rows].to(device)
         if self.config.symmetric:
             patches, centre, target = mirror_and_turn(patches, centre, target, generator)
@@ -280,15 +284,15 @@ class Stage:
                 "validation_loss": float(balanced),
                 "auroc": metrics.auroc(quality.numpy(), success.numpy() > 0),
             }
-        report = validation.displacement_metrics(self.models, self.samples, self.training_rows, self.rows)
         rows = self.rows[self.samples.success[self.rows]]
         mean, variance = validation.predict_grasp_displacement(self.models, self.samples, rows)
         known = torch.from_numpy(variance) if self.config.network.variance else None
         std = self.models.gdn.target_std.cpu().double()
         target = self.samples.grasp_displacement[rows].double()
         loss = displacement_loss(torch.from_numpy(mean), known, target, std)
+        errors = validation.displacement_errors(self.samples, rows, mean, variance)
         return {"validation_loss": float(loss)} | {
-            name: report[name] for name in ("translation_rmse", "rotation_rmse")
+            name: errors[name] for name in ("translation_rmse", "rotation_rmse")
         }
 
 
@@ -299,6 +303,7 @@ def train(
     checkpoint_path: Path,
     device: torch.device | str = "cpu",
     reporter: Reporter | None = None,
+    sides: Sides | None = None,
 ) -> tuple[Models, list[dict[str, Any]]]:
     """Trains both networks, from a checkpoint where there is one.
 
@@ -308,6 +313,7 @@ def train(
         checkpoint_path: Replaced after every epoch.
         device: Where the networks run.
         reporter: Is told how it goes.
+        sides: Of the samples; None: as the settings say.
 
     Returns:
         The networks with their metrics on the parts never seen, and one row an epoch.
@@ -318,7 +324,7 @@ def train(
         TrainingDiverged: The loss is no number any more.
     """
     reporter = reporter or Reporter()
-    sides = split(samples, config)
+    sides = sides or split(samples, config)
     meta = describe(samples, sides.training, config)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)

@@ -11,11 +11,17 @@ from scipy.special import logit
 from scipy.stats import norm
 
 from mskgrasp import metrics
+from mskgrasp.geometry import wrap_angle
 from mskgrasp.grasp import to_object_displacement
 from mskgrasp.models import Calibration, Models
 from mskgrasp.samples import Samples
 
 _CHUNK = 64
+AXES = ("x", "y", "z", "theta")
+_REPEATS = 200
+"""Draws of parts for an interval of scores that take a sort each."""
+_RADIUS = 0.03
+"""Radius of gyration of a typical part, metres, where a variance score is taken without a picture."""
 _LEAST_TO_SCALE = 50
 """Successes under which a 90 % quantile is chance."""
 
@@ -24,7 +30,7 @@ def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.
     """Predicted probabilities of success (n,)."""
     pieces = [
         models.quality(
-            samples.patches_of(r, models.device),
+            samples.patches_of(r, models.device, models.meta.network.quality_stride),
             samples.centre_grasp[r].to(models.device),
             samples.height[r].to(models.device),
         )
@@ -95,12 +101,23 @@ def quality_metrics(models: Models, samples: Samples, rows: torch.Tensor) -> dic
     """Balanced accuracy, AUROC and Brier score of the GQN, and the Brier score of saying the base rate.
 
     A grasp counts as told to succeed where its probability exceeds the training data's base rate: with
-    balanced data, that is one half.
+    balanced data, that is one half. Intervals are of 95 %, over parts.
     """
     success = samples.success[rows].numpy()
     probability = predict_quality(models, samples, rows)
     base_rate = models.meta.normalisation.base_rate
+    each = _by_part(samples, rows, np.column_stack([probability, success]))
+    intervals = {
+        "balanced_accuracy": lambda v: metrics.balanced_accuracy(v[:, 0], v[:, 1], base_rate),
+        "auroc": lambda v: metrics.auroc(v[:, 0], v[:, 1]),
+        "brier": lambda v: metrics.brier(v[:, 0], v[:, 1]),
+    }
     return {
+        "intervals": {
+            name: metrics.bootstrap_interval(each, statistic, repeats=_REPEATS)
+            for name, statistic in intervals.items()
+        },
+        "reliability": metrics.reliability(probability, success).tolist(),
         "n": len(success),
         "base_rate": float(success.mean()),
         "balanced_accuracy": metrics.balanced_accuracy(probability, success, base_rate),
@@ -126,14 +143,70 @@ def displacement_metrics(
         "zero_displacement": (np.zeros(4), np.maximum((seen**2).mean(axis=0), floor)),
         "training_mean": (seen.mean(axis=0), np.maximum(seen.var(axis=0), floor)),
     }
-    report: dict[str, Any] = {"n": len(rows)} | _errors(samples, rows, mean, variance)
+    report: dict[str, Any] = {"n": len(rows)} | displacement_errors(samples, rows, mean, variance)
+    report |= _spread(samples, rows, mean, variance)
     for name, (constant, spread) in constants.items():
         repeated = np.tile(constant, (len(rows), 1))
-        report[name] = _errors(samples, rows, repeated, np.tile(spread, (len(rows), 1)))
+        report[name] = displacement_errors(samples, rows, repeated, np.tile(spread, (len(rows), 1)))
     return report
 
 
-def _errors(samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray) -> dict[str, Any]:
+def _spread(samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray) -> dict[str, Any]:
+    """Intervals of the errors over parts, and whether the predicted deviations can be believed."""
+    centre_grasp = samples.centre_grasp[rows].double().numpy()
+    displacement = samples.displacement[rows].double().numpy()
+    predicted = to_object_displacement(mean, centre_grasp)
+    shift = np.linalg.norm(predicted[:, :3] - displacement[:, :3], axis=1)
+    turn = np.abs(wrap_angle(predicted[:, 3] - displacement[:, 3]))
+    report: dict[str, Any] = {
+        "intervals": {
+            f"{name}_rmse": metrics.bootstrap_interval(_by_part(samples, rows, error**2), _root_mean)
+            for name, error in (("translation", shift), ("rotation", turn))
+        }
+    }
+    if not np.isfinite(variance).all() or not len(rows):
+        return report
+    target = samples.grasp_displacement[rows].double().numpy()
+    axes = {
+        "crps": metrics.crps(mean, variance, target),
+        "calibration_error": metrics.calibration_error(mean, variance, target),
+        "sharpness": np.sqrt(variance).mean(axis=0),
+        "rmse": np.sqrt((metrics.standardised_error(mean, variance, target) ** 2 * variance).mean(axis=0)),
+    } | {
+        f"coverage_{level}": metrics.coverage(mean, variance, target, level / 100)
+        for level in (50, 80, 90, 95)
+    }
+    return report | {
+        "axes": {name: dict(zip(AXES, map(float, values), strict=True)) for name, values in axes.items()},
+        "ause_translation": metrics.ause(shift, variance[:, :3].sum(axis=1)),
+        "ause_rotation": metrics.ause(turn, variance[:, 3]),
+        "least_uncertain": {
+            f"{share:.0%}": _errors_of_least(shift, turn, variance, share) for share in (0.03, 0.1, 0.3)
+        },
+    }
+
+
+def _errors_of_least(shift: np.ndarray, turn: np.ndarray, variance: np.ndarray, share: float) -> list[float]:
+    """RMSE of translation and rotation over the share of samples that the network is surest of."""
+    score = variance[:, :3].sum(axis=1) + _RADIUS**2 * variance[:, 3]
+    kept = np.argsort(score, kind="stable")[: max(1, round(share * len(score)))]
+    return [_root_mean(values[kept] ** 2) for values in (shift, turn)]
+
+
+def _root_mean(squared: np.ndarray) -> float:
+    return float(np.sqrt(squared.mean()))
+
+
+def _by_part(samples: Samples, rows: torch.Tensor, values: np.ndarray) -> list[np.ndarray]:
+    """The values of each part's rows."""
+    part = samples.part[rows].numpy()
+    return [values[part == number] for number in np.unique(part)]
+
+
+def displacement_errors(
+    samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
+) -> dict[str, Any]:
+    """RMSE over the object displacement; likelihood and coverage over the grasp displacement."""
     centre_grasp = samples.centre_grasp[rows].double().numpy()
     predicted = to_object_displacement(mean, centre_grasp)
     displacement = samples.displacement[rows].double().numpy()
@@ -144,5 +217,5 @@ def _errors(samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np
         "translation_rmse": metrics.translation_rmse(predicted, displacement),
         "rotation_rmse": metrics.rotation_rmse(predicted, displacement),
         "nll": metrics.gaussian_nll(mean, variance, target) if known else None,
-        "coverage_90": dict(zip("x y z theta".split(), covered.tolist(), strict=True)) if known else None,
+        "coverage_90": dict(zip(AXES, covered.tolist(), strict=True)) if known else None,
     }

@@ -11,8 +11,13 @@ os.environ.setdefault("LP_NUM_THREADS", "1")
 
 import pytest
 import torch
+from hypothesis import settings
 
 from tests.collecting import collect
+
+# How long an example takes says more of the machine than of the code.
+settings.register_profile("mskgrasp", deadline=None)
+settings.load_profile("mskgrasp")
 
 LONGEST = (
     "parts/test_catalogue_parts.py",

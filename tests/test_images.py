@@ -111,6 +111,7 @@ def test_what_stands_outside_the_region_is_not_the_part():
         (np.full((160, 160), np.nan, np.float32), "no valid pixel"),
         (render([]) * 1000, "millimetres"),
         ((render([]) * 1000).astype(np.uint16), "millimetres"),
+        (render([]) + np.linspace(-0.015, 0.015, 160, dtype=np.float32), "the table is tilted"),
         (render([Box(x=0.6, y=0.0, yaw=0.0, size=(0.04, 0.04, 0.03))]), "outside the region"),
     ],
 )

@@ -7,6 +7,7 @@ from safetensors.torch import load_file, save_file
 
 from mskgrasp.errors import BadModel
 from mskgrasp.hand_features import HandFeatures
+from mskgrasp.images import view_part
 from mskgrasp.models import ModelMeta, build_models, load_models, save_model
 from mskgrasp.networks import (
     GraspDisplacementNetwork,
@@ -17,6 +18,8 @@ from mskgrasp.networks import (
     standardise,
     with_noise,
 )
+from mskgrasp.scoring import Scene
+from tests import synthetic
 
 SMALL = NetworkConfig(patch_pixels=32, channels=4, trunk_width=16, action_width=8, head_width=8, dropout=0.5)
 NORMAL = Normalisation(
@@ -105,7 +108,7 @@ def test_preprocessing_standardises_and_ignores_the_height():
 
 def test_our_network_sees_what_the_hand_would_meet():
     config = NetworkConfig(architecture="hand", patch_pixels=16, patch_columns=8, layers=(4, 8))
-    features = HandFeatures(config, NORMAL)
+    features = HandFeatures(config, NORMAL, config.layers, config.quality_shape)
     # A step from the table to 30 mm, a finger tip at 10.5 mm (TCP at 20 mm), the palm far above.
     patch = torch.zeros(1, 1, 16, 8)
     patch[..., :8, :] = 0.03
@@ -120,9 +123,28 @@ def test_our_network_sees_what_the_hand_would_meet():
     models = build_models(ModelMeta(network=config, normalisation=NORMAL))
     inputs = torch.rand(3, 1, 16, 8), torch.zeros(3, 3), torch.full((3,), 0.02)
     assert models.quality(*inputs).shape == (3,) and models.grasp_displacement(*inputs)[0].shape == (3, 4)
-    for wrong in ({"patch_pixels": 16}, {"patch_columns": 8}, {"architecture": "hand", "layers": (0,)}):
-        with pytest.raises(ValueError, match="needs|channels"):
+    for wrong in (
+        {"patch_pixels": 16},
+        {"patch_columns": 8},
+        {"architecture": "hand", "layers": (0,)},
+        {"quality_stride": 3},
+    ):
+        with pytest.raises(ValueError, match="needs|channels|all pixels"):
             NetworkConfig(**wrong)
+
+
+def test_the_quality_network_sees_every_second_pixel_of_the_same_place():
+    network = NetworkConfig(
+        architecture="hand", patch_pixels=33, patch_columns=17, patch_side=0.066, quality_stride=2
+    )
+    assert network.quality_shape == (17, 9)
+    box = synthetic.Box(x=0.45, y=0.02, yaw=0.4, size=(0.07, 0.02, 0.03))
+    frame = synthetic.frame([box])
+    view = view_part(frame.depth, frame.intrinsics, frame.T_base_camera, table_z=0.0, region=synthetic.REGION)
+    scene = Scene.of(frame, view, 0.0, torch.device("cpu"))
+    grasps = np.array([[0.46, 0.01, 0.02, 0.3]])
+    whole, coarse = scene.crop(grasps, network), scene.crop_for_quality(grasps, network)
+    assert torch.allclose(whole[..., ::2, ::2], coarse, atol=1e-6)
 
 
 def test_noise_has_its_deviation_and_comes_from_the_generator_alone():

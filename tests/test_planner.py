@@ -21,6 +21,7 @@ from mskgrasp.planner import (
     shortlist,
     variance_score,
 )
+from mskgrasp.refine import fingers_free
 from mskgrasp.scoring import Scene, displacements
 from tests import synthetic
 from tests.synthetic import REGION, Box
@@ -193,3 +194,54 @@ def test_a_network_that_sees_the_part_is_told_the_angle():
         x, y = models.gdn.outputs(models.gdn.features(prepared, action, height))[0][0, :2].tolist()
     cos, sin = np.cos(0.5), np.sin(0.5)
     np.testing.assert_allclose(mean[1, :2], [cos * x + sin * y, cos * y - sin * x], atol=1e-6)
+
+
+def test_a_grasp_beside_which_something_stands_is_left_out():
+    other = Box(
+        x=BOX.x - 0.055 * np.sin(0.4), y=BOX.y + 0.055 * np.cos(0.4), yaw=0.4, size=(0.02, 0.01, 0.03)
+    )
+    frame = synthetic.frame([BOX, other])
+    grasps = np.array(
+        [
+            [BOX.x, BOX.y, 0.015, 0.4],  # its second finger would stand on the other box
+            [BOX.x, BOX.y, 0.045, 0.4],  # the same above it
+            [BOX.x, BOX.y, 0.015, 0.4 - np.pi / 2],  # along the box: 70 mm fit between the fingers
+            [BOX.x + 0.02 * np.cos(0.4), BOX.y + 0.02 * np.sin(0.4), 0.015, 0.4 - np.pi / 2],
+        ]
+    )
+    view = view_part(frame.depth, frame.intrinsics, frame.T_base_camera, table_z=0.0, region=REGION)
+    scene = Scene.of(frame, view, 0.0, torch.device("cpu"))
+    assert fingers_free(scene, grasps).tolist() == [False, True, True, False]
+    checked = planner(PlannerConfig(n_candidates=400, check_fingers=True))
+    plan = checked.plan(frame, np.random.default_rng(0))
+    assert fingers_free(scene, plan.candidates[plan.shortlist]).all() and len(plan.shortlist) == 12
+    free = planner(PlannerConfig(n_candidates=400)).plan(frame, np.random.default_rng(0))
+    assert not fingers_free(scene, free.candidates[free.shortlist]).all()
+
+
+@pytest.mark.parametrize("policy", ["low_variance", "quality"])
+def test_refinement_finds_better_grasps_within_the_parts_box(policy):
+    plans = [
+        planner(PlannerConfig(n_candidates=200, refinements=rounds, policy=policy)).plan(
+            FRAME, np.random.default_rng(1)
+        )
+        for rounds in (0, 4)
+    ]
+    first, refined = plans
+    assert refined.quality >= first.qualities[first.shortlist].min()
+    if policy == "quality":
+        assert refined.quality > first.quality
+    else:
+        assert refined.score < first.score
+    assert np.array_equal(refined.candidates[:200], first.candidates) and len(refined.candidates) > 200
+    local = refined.view.T_base_box.inverse().apply(refined.candidates[:, :3])
+    assert (np.abs(local[:, :2]) <= refined.view.size[:2] / 2 + 1e-9).all()
+    assert (refined.candidates[:, 2] >= 0.0105 - 1e-9).all()
+    assert (np.abs(refined.candidates[:, 3]) <= np.pi / 2).all()
+    assert (np.diff(refined.qualities[refined.shortlist]) <= 0).all()
+
+
+def test_two_parts_are_refused():
+    other = Box(x=0.45, y=-0.06, yaw=0.0, size=(0.04, 0.02, 0.02))
+    with pytest.raises(NoPartFound, match="two things lie in the region.*take one away"):
+        planner().plan(synthetic.frame([BOX, other]), np.random.default_rng(0))

@@ -155,11 +155,19 @@ def test_a_small_dataset_is_learned_and_beats_the_trivial_predictors(dataset, tm
     with open(out / "log.csv") as file:
         rows = list(csv.DictReader(file))
     assert [row["stage"] for row in rows] == ["gqn"] * 12 + ["gdn"] * 30
+    card = (out / "card.md").read_text()
+    assert f"{gqn['auroc']:.3f}" in card and f"{1e3 * gdn['translation_rmse']:.2f}" in card
+    assert str(dataset) not in card + (out / "model.json").read_text()
+    assert (
+        0 < gdn["ause_translation"] < 1 and gdn["intervals"]["translation_rmse"][0] < gdn["translation_rmse"]
+    )
     files = {path.name for path in out.iterdir()}
     assert files == {
         "model.safetensors",
         "model.json",
         "metrics.json",
+        "card.md",
+        "uncertainty.png",
         "log.csv",
         "curves.png",
         "config.yaml",
@@ -310,16 +318,19 @@ HAND = CONFIG.model_copy(
     update={
         "network": NetworkConfig(
             architecture="hand",
-            patch_pixels=32,
-            patch_columns=16,
+            patch_pixels=33,
+            patch_columns=17,
+            patch_side=0.132,
+            quality_stride=2,
             layers=(8, 8),
+            displacement_layers=(8, 16),
             trunk_width=32,
             action_width=32,
             head_width=32,
             dropout=0.0,
         ),
-        "gqn": StageConfig(learning_rate=2e-3, epochs=8, batch_size=32),
-        "gdn": StageConfig(learning_rate=2e-3, epochs=8, batch_size=16),
+        "gqn": StageConfig(learning_rate=4e-3, epochs=14, batch_size=32),
+        "gdn": StageConfig(learning_rate=4e-3, epochs=10, batch_size=16),
     }
 )
 
@@ -327,7 +338,7 @@ HAND = CONFIG.model_copy(
 def test_our_network_learns_and_its_intervals_hold_what_they_say(tmp_path):
     dataset = synthetic.write_dataset(tmp_path, n_parts=8, n_attempts=250, seed=1)
     samples = read_samples(dataset, HAND.network)
-    assert samples.patches.shape == (2000, 1, 32, 16) and samples.patches.dtype == torch.int16
+    assert samples.patches.shape == (2000, 1, 33, 17) and samples.patches.dtype == torch.int16
     models, _ = learn(samples, HAND, checkpoint_path=tmp_path / "checkpoint")
     report, found = models.meta.metrics, models.meta.calibration
     assert report["gqn"]["auroc"] > 0.85

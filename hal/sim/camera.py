@@ -25,13 +25,14 @@ class SapienCamera(Camera):
         self._world = world
         self._noise = noise or SensorNoise()
         self._rng = np.random.default_rng(self._noise.seed)
+        self._presented = 0
         self._open = False
 
     def connect(self) -> None:
         """Builds the world, if the arm has not; the sensor's errors begin anew."""
         if not self._open:
             self._world.open()
-            self._rng = np.random.default_rng(self._noise.seed)
+            self._presented = 0
             self._open = True
 
     def close(self) -> None:
@@ -49,6 +50,10 @@ class SapienCamera(Camera):
         if not self._open:
             raise NotConnected("SapienCamera is not connected; use it inside its context (with ...)")
         env = self._world.env
+        if self._presented != self._world.presented:
+            # With every part anew: what it looks like must not depend on how many came before.
+            self._presented = self._world.presented
+            self._rng = np.random.default_rng([self._noise.seed, self._world.presented_seed])
         taken = time.monotonic()
         colour, depth = env.capture_rgbd(with_robot=True)
         metres = depth[0].cpu().numpy().astype(np.float32)

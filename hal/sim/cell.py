@@ -34,8 +34,8 @@ class SapienCellConfig(Config):
     """x_min, x_max, y_min, y_max where parts lie, base frame, m."""
     home: tuple[float, float, float, float, float, float, float] = READY
     """Joints at which the arm is out of the camera's sight, rad."""
-    min_height: float = Field(default=0.002, gt=0)
-    """What rises less over the table is taken for table, m."""
+    min_height: float | None = Field(default=None, gt=0)
+    """What rises less over the table is taken for table, m; null: 2 mm, or 6 mm where the camera errs."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
     """How far a grasped part is lifted, m."""
     grasp_force: float = Field(default=20.0, gt=0, le=70)
@@ -91,7 +91,7 @@ def sapien_cell(config: SapienCellConfig) -> Cell:
             table_z=TABLE_Z,
             region=config.region,
             home=home,
-            min_height=config.min_height,
+            min_height=config.noise.least_height if config.min_height is None else config.min_height,
             lift_height=config.lift_height,
             grasp_force=config.grasp_force,
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 
 import gymnasium
@@ -13,6 +14,7 @@ from hal.sim.board import show_board
 from hal.sim.colour import FineColour
 from hal.sim.pallet import Lying, lay_again, outside
 from hal.sim.tape import stick_tape
+from mskgrasp.errors import TapeDoesNotFit
 from mskgrasp.geometry import Pose
 from mskgrasp.parts import find_part
 from mskgrasp.settings import Overhead, Physics, Region, Tape
@@ -57,6 +59,10 @@ class SapienWorld:
         self._beside: list[Lying] = []
         self._users = 0
         self._gym: gymnasium.Env | None = None
+        self.presented = 0
+        """How many parts have been laid down so far."""
+        self.presented_seed = seed
+        """The place and turn of the last one follow from it."""
 
     @property
     def env(self) -> GraspDisplacementEnv:
@@ -91,7 +97,9 @@ class SapienWorld:
             render_backend=render_backend(),
         )
         try:
-            self.present(part, seed)
+            # Programs lay down parts of their own: that this one has no room for tape must not stop them.
+            with contextlib.suppress(TapeDoesNotFit):
+                self.present(part, seed)
         except BaseException:
             self._free()
             raise
@@ -125,6 +133,7 @@ class SapienWorld:
             outside(self.region, [*self._beside, Lying(self.env.parts[0], self.env.part)]) if keep else []
         )
         self._fine_colour = None
+        self.presented, self.presented_seed = self.presented + 1, seed
         # A fresh scene each time, so that a trial does not depend on those before it.
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
         self._beside = [

@@ -46,6 +46,7 @@ def build_parts(names: Sequence[str], before: Index, workers: int) -> Generator[
 
     Raises:
         BadPart: A worker died.
+        KeyboardInterrupt: The user stopped; a single part's decomposition is finished first, some seconds.
     """
     missing = []
     for name in names:
@@ -58,7 +59,9 @@ def build_parts(names: Sequence[str], before: Index, workers: int) -> Generator[
             yield Built(name=name, entry=None, reason=old.reason)
         else:
             missing.append(name)
-    if missing:
+    if len(missing) == 1:
+        yield _build_one(missing[0])  # starting a process takes longer than most parts
+    elif missing:
         # A process for each core serves better than the threads of CoACD (1.45 times with two).
         with one_thread_a_process():
             yield from _build(missing, max(1, min(workers, len(missing))))

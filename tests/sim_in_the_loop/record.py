@@ -35,7 +35,9 @@ def run_scenario() -> list[Trial]:
         for part in models.meta.training["validation_parts"]:
             for number, seed in enumerate(SEEDS):
                 cell.feeder.present(part, seed)
-                trial, _, _ = run_trial(cell, planner, part=part, number=number, seed=seed)
+                record = run_trial(cell, planner, part=part, number=number, seed=seed)
+                assert record is not None
+                trial = record.trial
                 trials.append(trial)
                 if trial.reason == "collided":
                     cell.arm.recover()

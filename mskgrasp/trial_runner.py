@@ -1,0 +1,187 @@
+"""The trials of an experiment on one cell, one after another: what a process does, alone or beside others."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from hal import Cell, RgbdFrame, open_cell
+from mskgrasp.choosing import Candidates, Chooser
+from mskgrasp.errors import TapeDoesNotFit, UsageError
+from mskgrasp.lowess import Lowess
+from mskgrasp.models import load_models
+from mskgrasp.operator import Operator
+from mskgrasp.parts import find_part
+from mskgrasp.pictures import draw_plan
+from mskgrasp.plan import make_planner
+from mskgrasp.planner import GraspPlan, PlannerConfig
+from mskgrasp.predictors import LOWESS, LowessPredictor, NetworkPredictor, Predictor
+from mskgrasp.settings import Tape
+from mskgrasp.trial import Policy, Trial, clear, finish, run_trial, trial_key
+from mskgrasp.trial_files import trial_file, write_trial
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialTask:
+    """A trial to be made.
+
+    Attributes:
+        part: Name of the part.
+        source: Its name or its folder.
+        number: Which trial of it; trials of one part and number see the same scene.
+        seed: Of the run.
+        policy: How the grasp is chosen.
+        chosen_by: Label of the model whose variances choose it; empty: the run's own.
+    """
+
+    part: str
+    source: str
+    number: int
+    seed: int
+    policy: Policy
+    chosen_by: str = ""
+
+    @property
+    def key(self) -> str:
+        """As `Trial.key`."""
+        return trial_key(self.part, self.number, self.chosen_by)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """What the trials of a run share.
+
+    Attributes:
+        cell: YAML file of the cell.
+        models: Folder of the model whose qualities count, and that predicts where no other does.
+        planner: How grasps are chosen.
+        choosers: Folders of the models that choose by their variances, by label.
+        lowess: LOWESS of the known parts.
+        tape: Sizes of the squares of tape to measure by; None: the cell's tracker measures.
+        must_measure: Trials that nothing measures are worth nothing.
+        yes: Ask no operator.
+        out: Folder of the run.
+    """
+
+    cell: Path
+    models: Path
+    planner: PlannerConfig
+    out: Path
+    choosers: dict[str, Path] = field(default_factory=dict)
+    lowess: dict[str, Lowess] = field(default_factory=dict)
+    tape: Tape | None = None
+    must_measure: bool = False
+    yes: bool = False
+
+
+def scene_seed(seed: int, part: str, number: int) -> int:
+    """The seed of a trial, which the part's place, the camera's errors and the candidates follow from."""
+    words = [seed, zlib.crc32(part.encode()), number]
+    return int(np.random.SeedSequence(words).generate_state(1)[0] >> 1)
+
+
+class TrialRunner:
+    """Makes trials on a connected cell.
+
+    Raises:
+        UsageError: The cell does not tell what the trials need to know, or somebody must be asked and is not
+            there.
+    """
+
+    def __init__(self, cell: Cell, setup: Setup):
+        if cell.tracker is None and setup.must_measure and setup.tape is None:
+            raise UsageError("nothing in this cell tracks the part: measure by tape, --measure markers")
+        if cell.tracker is None and setup.lowess:
+            raise UsageError(
+                "LOWESS needs the part's pose and nothing here tells it: leave --lowess-data away"
+            )
+        self._cell = cell
+        self._setup = setup
+        self._operator = Operator(cell, yes=setup.yes)
+        planner = make_planner(setup.models, setup.planner, cell)
+        chunk, device = setup.planner.chunk_size, planner.models.device
+        self._candidates = Candidates(planner)
+        self._predictors: dict[str, Predictor] = {"": NetworkPredictor(planner.models, chunk)}
+        for label, folder in setup.choosers.items():
+            self._predictors[label] = NetworkPredictor(load_models(folder, device), chunk)
+        if setup.lowess:
+            self._predictors[LOWESS] = LowessPredictor(setup.lowess)
+
+    def run(self, task: TrialTask) -> Iterator[Trial]:
+        """Makes a trial, writes its file and yields it; only then the arm puts the part down.
+
+        Raises:
+            HalError: The cell was lost.
+            StoppedByOperator: The operator said so.
+        """
+        seed = scene_seed(task.seed, task.part, task.number)
+        record, no_tape = None, ""
+        while record is None:
+            clear(self._cell, self._recover)
+            try:
+                self._operator.lay(self._cell, task.source, seed, name=task.key)
+            except TapeDoesNotFit as error:
+                no_tape = f"no room for tape: {error}"  # it lies there all the same, and may be grasped
+            chooser = Chooser(
+                self._candidates,
+                self._predictors[task.chosen_by],
+                task.policy,
+                task.part,
+                self._cell.tracker,
+            )
+            record = run_trial(
+                self._cell,
+                chooser,
+                part=task.part,
+                number=task.number,
+                seed=seed,
+                tape=self._setup.tape,
+                may_move=self._may_move,
+                recover=self._recover,
+            )
+            if record is not None and record.plan is None and self._operator.asks:
+                self._operator.tell(f"{record.trial.reason}: no grasp was planned; lay the part down anew")
+                record = None
+        trial = replace(
+            record.trial,
+            family=find_part(task.source).family,
+            policy=task.policy,
+            chosen_by=task.chosen_by,
+        )
+        if trial.unmeasured and no_tape:
+            trial = replace(trial, unmeasured=no_tape)
+        write_trial(trial_file(self._setup.out, trial.key), record.frame, record.plan, record.after)
+        yield trial
+        finish(self._cell, record, self._recover)
+
+    def _may_move(self, frame: RgbdFrame, plan: GraspPlan) -> bool:
+        picture = self._setup.out / "next.png"
+        if self._operator.asks:
+            draw_plan(frame, plan, picture)
+        x, y, z, theta = plan.grasp
+        return self._operator.may_move(
+            picture,
+            f"grasp at x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees, "
+            f"quality {plan.quality:.2f}",
+        )
+
+    def _recover(self, reason: str) -> None:
+        self._operator.recover(self._cell, reason)
+
+    def close(self) -> None:
+        """Brings the arm home."""
+        clear(self._cell, self._recover)
+
+
+@contextmanager
+def trial_runner(setup: Setup) -> Iterator[TrialRunner]:
+    """A runner on the cell of a setup, connected until the end of the block."""
+    with open_cell(setup.cell) as cell:
+        runner = TrialRunner(cell, setup)
+        yield runner
+        runner.close()

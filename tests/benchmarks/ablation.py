@@ -1,0 +1,127 @@
+"""What each choice of our network is worth. Run: python -m tests.benchmarks.ablation --help.
+
+Every line trains both networks anew on the same attempts, with one choice of configs/train/default.yaml
+undone, and scores them on the validation parts, which training never saw; test parts are not looked at.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from rich.console import Console
+from rich.table import Table
+from tqdm import tqdm
+
+from mskgrasp.config import read_config
+from mskgrasp.networks import NetworkConfig
+from mskgrasp.samples import Samples, read_samples
+from mskgrasp.training import LearningConfig, Sides, split, train
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
+    """Our configuration, and the same with one choice undone."""
+    paper = read_config(LearningConfig, REPOSITORY / "configs" / "train" / "paper.yaml").network
+
+    def with_(**changes: Any) -> LearningConfig:
+        network = changes.pop("network", {})
+        return ours.model_copy(update=changes | {"network": ours.network.model_copy(update=network)})
+
+    assert isinstance(paper, NetworkConfig)
+    return {
+        "ours": ours,
+        "the paper's network, trained as ours": ours.model_copy(update={"network": paper}),
+        "quality sees all pixels": with_(network={"quality_stride": 1, "layers": (16, 32, 32)}),
+        "displacement sees every second pixel": with_(
+            network={
+                "patch_pixels": 33,
+                "patch_columns": 17,
+                "patch_side": 0.132,
+                "quality_stride": 1,
+                "displacement_layers": (16, 32),
+            }
+        ),
+        "half the channels": with_(network={"layers": (8, 16), "displacement_layers": (8, 16, 16)}),
+        "twice the channels": with_(network={"layers": (32, 64), "displacement_layers": (32, 64, 64)}),
+        "no half turns and mirror images": with_(symmetric=False),
+        "plain likelihood (beta 0)": with_(beta=0.0),
+        "beta 1": with_(beta=1.0),
+        "no noise": with_(noise_std=0.0),
+        "no floor of the deviations": with_(network={"least_std": (0.0, 0.0)}),
+        "no dropout": with_(network={"dropout": 0.0}),
+        "not calibrated": with_(calibrate=False),
+    }
+
+
+def main() -> None:
+    """Prints a row a choice and, last, one JSON object."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--data", type=Path, required=True, help="dataset folder")
+    parser.add_argument("--gqn-epochs", type=int, default=8)
+    parser.add_argument("--gdn-epochs", type=int, default=16)
+    parser.add_argument("--only", nargs="*", help="words that a choice's name must hold one of")
+    options = parser.parse_args()
+    torch.set_num_threads(min(2, os.cpu_count() or 1))
+    ours = read_config(LearningConfig, REPOSITORY / "configs" / "train" / "default.yaml")
+    ours = ours.model_copy(
+        update={
+            "gqn": ours.gqn.model_copy(update={"epochs": options.gqn_epochs}),
+            "gdn": ours.gdn.model_copy(update={"epochs": options.gdn_epochs}),
+        }
+    )
+    chosen = {
+        name: config
+        for name, config in variants(ours).items()
+        if not options.only or any(word in name for word in options.only)
+    }
+    known: dict[tuple[int, int, float], Samples] = {}
+    found = {}
+    for name, config in tqdm(chosen.items(), unit="network", file=sys.stderr, disable=None):
+        look = (*config.network.patch_shape, config.network.patch_side)
+        if look not in known:
+            known[look] = read_samples(options.data, config.network).of_parts_between(*config.success_range)
+        found[name] = score(known[look], config)
+        Console(width=150, stderr=True).print(name, found[name])
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("choice")
+    for column in next(iter(found.values())):
+        table.add_column(column, justify="right")
+    for name, values in found.items():
+        table.add_row(name, *(f"{value:.3g}" if np.isfinite(value) else "-" for value in values.values()))
+    Console(width=150).print(table)
+    print(json.dumps(found))
+
+
+def score(samples: Samples, config: LearningConfig) -> dict[str, float]:
+    """Metrics of freshly trained networks on the validation parts."""
+    sides = split(samples, config)
+    sides = Sides(training=sides.training, validation=sides.validation, test=sides.test[:0])
+    with tempfile.TemporaryDirectory() as folder:
+        models, _ = train(samples, config, checkpoint_path=Path(folder) / "checkpoint", sides=sides)
+    gqn, gdn = models.meta.metrics["gqn"], models.meta.metrics["gdn"]
+    surest = gdn["least_uncertain"]["10%"]
+    return {
+        "accuracy %": 100 * gqn["balanced_accuracy"],
+        "AUROC": gqn["auroc"],
+        "Brier": gqn["brier"],
+        "mm": 1e3 * gdn["translation_rmse"],
+        "deg": float(np.degrees(gdn["rotation_rmse"])),
+        "NLL": gdn["nll"],
+        "90 % holds": 100 * float(np.mean(list(gdn["coverage_90"].values()))),
+        "AUSE": gdn["ause_translation"],
+        "surest 10 %, mm": 1e3 * surest[0],
+        "surest 10 %, deg": float(np.degrees(surest[1])),
+    }
+
+
+if __name__ == "__main__":
+    main()
