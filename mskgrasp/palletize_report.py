@@ -31,7 +31,7 @@ from mskgrasp.placements import (
 from mskgrasp.slots import Slot
 
 WORST = 10
-_ROWS = 6
+_ROWS = 4
 _DEFINITIONS = (
     "Error: distance of the placed part's centre from its target, and the difference between the turn it "
     "made and the one it was asked for. The centre and the direction of the longer side are those that the "

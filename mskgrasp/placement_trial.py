@@ -122,11 +122,8 @@ class Placer:
         footprint = seen_footprint(frame, plan.view, self._cell.workspace.min_height)
         if not task.slot.fits(footprint, SEEN_TOLERANCE):
             return replace(known, reason="slot too small")
-        try:
-            target = self._target(plan, task.slot.targets(footprint, float(plan.grasp[3])))
-        except OutOfWorkspace:
-            return replace(known, reason="OutOfWorkspace")
-        done, after = self._carry(frame, plan, target, known)
+        targets = task.slot.targets(footprint)
+        done, target, after = self._carry(frame, plan, targets, known)
         if not task.keep:
             self._tops = {}
         if done.placed:
@@ -173,47 +170,51 @@ class Placer:
             f"quality {plan.quality:.2f}; then to x {task.slot.x:.3f}, y {task.slot.y:.3f} m",
         )
 
-    def _target(self, plan: GraspPlan, targets: Sequence[Target]) -> Target:
-        """The target that the arm reaches, before anything moves."""
-        table_z = self._cell.workspace.table_z
-        poses = [
-            place_pose(plan.grasp, np.zeros(4), plan.view.centre_base, target, table_z) for target in targets
-        ]
-        return targets[first_reachable(self._cell, poses)]
-
     def _carry(
-        self, frame: RgbdFrame, plan: GraspPlan, target: Target, known: Placement
-    ) -> tuple[Placement, RgbdFrame | None]:
-        """Grasps, places and measures; the frame afterwards is None where nothing was placed."""
-        cell, tracker = self._cell, self._cell.tracker
+        self, frame: RgbdFrame, plan: GraspPlan, targets: Sequence[Target], known: Placement
+    ) -> tuple[Placement, Target, RgbdFrame | None]:
+        """Grasps, places at the first target that the arm reaches, and measures.
+
+        Returns:
+            What came of it, the target, and the frame afterwards; None where nothing was placed.
+        """
+        cell, tracker, target = self._cell, self._cell.tracker, targets[0]
         before = None if tracker is None else tracker.part_pose()
-        table_z, centre = cell.workspace.table_z, plan.view.centre_base
         try:
+            # Before anything moves, and not only when the part hangs in the hand.
+            first_reachable(cell, [self._pose(plan, np.zeros(4), target) for target in targets])
             result = execute_grasp(cell, plan.grasp)
         except OutOfWorkspace:
-            return replace(known, reason="OutOfWorkspace"), None
+            return replace(known, reason="OutOfWorkspace"), target, None
         if result.aborted is not None:
             self._operator.recover(cell, result.aborted)
-            return replace(known, reason="collided"), None
+            return replace(known, reason="collided"), target, None
         if not result.holding:
-            return replace(known, reason="slipped" if result.lifted else "missed"), None
+            return replace(known, reason="slipped" if result.lifted else "missed"), target, None
         measured = None
         if tracker is not None and before is not None:
             measured = _displacement(plan, before, result.T_base_tcp, tracker.part_pose())
             known = replace(known, measured=measured.tolist())
         by = {"none": np.zeros(4), "predicted": plan.displacement, "truth": measured}[known.correction]
         assert by is not None  # truth is refused where nothing tracks the part
-        try:
-            place(cell, place_pose(plan.grasp, by, centre, target, table_z))
-        except OutOfWorkspace:
-            self._put_back(plan)
-            return replace(known, reason="OutOfWorkspace"), None
-        except MotionAborted as error:
-            self._operator.recover(cell, str(error))
-            return replace(known, reason="collided"), None
-        self.home()
-        after = cell.camera.capture()
-        return self._measured(frame, after, plan, before, target, replace(known, placed=True)), after
+        for target in targets:
+            try:
+                place(cell, self._pose(plan, by, target))
+            except OutOfWorkspace:
+                continue  # the other way round, perhaps
+            except MotionAborted as error:
+                self._operator.recover(cell, str(error))
+                return replace(known, reason="collided"), target, None
+            self.home()
+            after = cell.camera.capture()
+            done = self._measured(frame, after, plan, before, target, replace(known, placed=True))
+            return done, target, after
+        self._put_back(plan)
+        return replace(known, reason="OutOfWorkspace"), target, None
+
+    def _pose(self, plan: GraspPlan, displacement: np.ndarray, target: Target) -> np.ndarray:
+        table_z = self._cell.workspace.table_z
+        return place_pose(plan.grasp, displacement, plan.view.centre_base, target, table_z)
 
     def _put_back(self, plan: GraspPlan) -> None:
         try:

@@ -42,12 +42,11 @@ class Slot:
     theta: float
     size: tuple[float, float] | None = None
 
-    def targets(self, footprint: Footprint, grasp_theta: float) -> tuple[Target, Target]:
-        """Both ways round for a part that lies so and is grasped so; the lesser turn of the hand first."""
-        hand = float(wrap_half_turn(np.asarray(grasp_theta + self.theta - footprint.theta)))
-        other = hand - np.copysign(np.pi, hand)
-        first, second = (Target(x=self.x, y=self.y, theta=turned - grasp_theta) for turned in (hand, other))
-        return first, second
+    def targets(self, footprint: Footprint) -> tuple[Target, Target]:
+        """Both ways round for a part that lies so; first the lesser turn, in which less moves in the hand."""
+        turn = float(wrap_half_turn(np.asarray(self.theta - footprint.theta)))
+        other = turn - float(np.copysign(np.pi, turn))
+        return Target(x=self.x, y=self.y, theta=turn), Target(x=self.x, y=self.y, theta=other)
 
     def fits(self, footprint: Footprint, tolerance: float = 0.0) -> bool:
         """Whether a part has room in it, turned as it shall lie."""

@@ -13,6 +13,8 @@ import pytest
 import torch
 import yaml
 
+from hal import Cell, GraspResult, execute_grasp
+from hal.errors import CommunicationLost
 from hal.sim import SapienCellConfig, sapien_cell
 from mskgrasp.errors import BadModel, UsageError
 from mskgrasp.operator import Operator, StoppedByOperator
@@ -39,30 +41,47 @@ def threads() -> Iterator[None]:
 
 def config(out: Path, **changes: object) -> PalletizeConfig:
     values: dict[str, object] = dict(
-        models=MODEL, out=out, parts=(PART,), trials=1, planner=PlannerConfig(n_candidates=100)
-    )
+        models=MODEL, out=out, parts=(PART,), trials=1, corrections=("none", "truth"),
+        planner=PlannerConfig(n_candidates=100),
+    )  # fmt: skip
     return PalletizeConfig(**(values | changes))  # type: ignore[arg-type]
 
 
-def test_a_run_goes_on_and_its_report_shows_everything(tmp_path, monkeypatch, capsys):
+def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_path, monkeypatch, capsys):
     out = tmp_path / "run"
+    grasped: list[np.ndarray] = []
+
+    def pulled_cable(cell: Cell, grasp: np.ndarray) -> GraspResult:
+        if grasped:
+            raise CommunicationLost("no answer from the arm")
+        grasped.append(grasp)
+        return execute_grasp(cell, grasp)
+
+    with monkeypatch.context() as patch, pytest.raises(CommunicationLost):
+        patch.setattr("mskgrasp.placement_trial.execute_grasp", pulled_cable)
+        palletize(config(out))
+    kept = (out / "trials.jsonl").read_text()
+    assert len(kept.splitlines()) == 1
+
     command = ["palletize", "--models", str(MODEL), "--out", str(out), "--parts", PART, "--trials", "1"]
-    monkeypatch.setattr("sys.argv", [*command, "--planner.n-candidates", "100"])
+    command += ["--corrections", "none", "truth", "--planner.n-candidates", "100"]
+    monkeypatch.setattr("sys.argv", command)
     assert main() == 0
     assert "Corrected by the truth" in capsys.readouterr().out
     first = (out / "trials.jsonl").read_text()
+    assert first.startswith(kept)
     lines = [json.loads(line) for line in first.splitlines()]
-    assert [line["correction"] for line in lines] == ["none", "predicted", "truth"]
+    assert [line["correction"] for line in lines] == ["none", "truth"]
     assert all(line["placed"] for line in lines)
-    assert lines[0]["grasp"] == lines[1]["grasp"] == lines[2]["grasp"]
+    assert lines[0]["grasp"] == lines[1]["grasp"]
     # The same grasp moves the part the same way: what differs is where the hand went.
-    np.testing.assert_allclose(lines[0]["measured"], lines[2]["measured"], atol=1e-6)
-    none, _, truth = (line["translation_error"] for line in lines)
+    np.testing.assert_allclose(lines[0]["measured"], lines[1]["measured"], atol=1e-6)
+    none, truth = (line["translation_error"] for line in lines)
     shift = float(np.hypot(*lines[0]["measured"][:2]))
     assert none == pytest.approx(shift, abs=1.5e-3) and truth < 1.5e-3
 
     # A line lost, as by a kill, is made again to the same values.
-    (out / "trials.jsonl").write_text("\n".join(first.splitlines()[:2]) + '\n{"part": "u_br')
+    (out / "trials.jsonl").write_text("\n".join(first.splitlines()[:1]) + '\n{"part": "u_br')
     report = palletize(config(out))
     assert [json.loads(line) for line in (out / "trials.jsonl").read_text().splitlines()] == lines
     assert report["corrections"]["truth"]["placed"] == 1
@@ -72,7 +91,7 @@ def test_a_run_goes_on_and_its_report_shows_everything(tmp_path, monkeypatch, ca
 
     with Page(out / "report.html") as page:
         widths = page.evaluate("[...document.images].map(i => i.complete ? i.naturalWidth : 0)")
-        assert len(widths) == 3 and min(widths) > 400
+        assert len(widths) == 4 and min(widths) > 400
         assert page.complaints == []
         assert PART in page.evaluate("document.body.textContent")
 

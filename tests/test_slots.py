@@ -46,14 +46,13 @@ def test_the_footprint_of_a_rectangle_is_itself():
     assert abs(wrap_half_turn(np.asarray(found.theta - (0.4 + np.pi / 2)))) < 1e-5
 
 
-def test_both_ways_round_differ_by_half_a_turn_and_the_first_turns_the_hand_less():
+def test_both_ways_round_differ_by_half_a_turn_and_the_first_turns_less():
     slot = Slot(x=0.5, y=0.1, theta=0.2)
-    for grasp_theta in (-1.5, 0.0, 1.2):
-        for lies in (-1.4, 0.3, 1.1):
-            first, second = slot.targets(Footprint(sides=np.array([0.06, 0.03]), theta=lies), grasp_theta)
-            assert abs(wrap_half_turn(np.asarray(lies + first.theta - slot.theta))) < 1e-9
-            assert abs(abs(first.theta - second.theta) - np.pi) < 1e-9
-            assert abs(grasp_theta + first.theta) <= np.pi / 2 + 1e-9
+    for lies in (-1.4, 0.2, 0.3, 1.1):
+        first, second = slot.targets(Footprint(sides=np.array([0.06, 0.03]), theta=lies))
+        assert abs(wrap_half_turn(np.asarray(lies + first.theta - slot.theta))) < 1e-9
+        assert abs(abs(first.theta - second.theta) - np.pi) < 1e-9
+        assert abs(first.theta) <= np.pi / 2 + 1e-9
 
 
 def test_a_turned_part_needs_other_room():
