@@ -26,6 +26,7 @@ from mskgrasp.evaluate_report import page, print_report
 from mskgrasp.experiments import Compared, Experiment, load_compared, open_model, scenes, with_predictions
 from mskgrasp.files import only_here, write_whole
 from mskgrasp.html_report import write_html
+from mskgrasp.models import PRETRAINED
 from mskgrasp.outcomes import farthest_off, summarise, worst_trials
 from mskgrasp.parts import find_part
 from mskgrasp.plan import SIMULATED_CELL
@@ -58,8 +59,8 @@ PARTS: dict[Experiment, tuple[str, ...]] = {
 class EvaluateConfig(Config):
     """Settings of an evaluation."""
 
-    models: Path
-    """Folder with model.safetensors and model.json, as mskgrasp.train writes it: its qualities count."""
+    models: Path = PRETRAINED
+    """Folder with model.safetensors and model.json; by default the shipped one. Its qualities count."""
     experiment: Experiment = "success"
     """success: the policy of --planner.policy. displacement: both policies, known and novel parts apart."""
     cell: Path = SIMULATED_CELL
@@ -106,8 +107,6 @@ MAY_CHANGE = ("out", "trials", "parts", "n_parts", "compare", "lowess_data", "wo
 def main() -> int:
     """Runs the trials and reports."""
     argv = sys.argv[1:]
-    if "--replay" in argv and "--models" not in argv:
-        argv += ["--models", "."]  # a stored trial needs none
     config = parse(EvaluateConfig, prog="python -m mskgrasp.evaluate", description=DESCRIPTION, argv=argv)
     if config.replay is not None:
         return replay(*config.replay)

@@ -227,38 +227,49 @@ def crop_patches(
         (n, 1, n_pixels, n_columns) float32 on the device of ``heights``, metres above the table.
     """
     height, width = heights.shape[-2:]
-    origin, right, up = _patch_axes(grasps.to(heights.device), intrinsics, T_base_camera)
     n_columns = n_columns or n_pixels
+    axes = _patch_axes(grasps.to(heights.device), intrinsics, T_base_camera)
+    # Pixels to grid_sample's units, before the division by the distance: (2 / (width - 1)) u - 1.
+    to_unit = torch.tensor([2 / (width - 1), 2 / (height - 1)], device=heights.device)
+    axes = torch.cat([axes[..., :2] * to_unit - axes[..., 2:], axes[..., 2:]], dim=-1)  # (n, 3, 3)
     along, across = (
         (torch.arange(n, device=heights.device, dtype=torch.float32) - (n - 1) / 2) * (side / n_pixels)
         for n in (n_pixels, n_columns)
     )
-    projected = (
-        origin[:, None, None]
-        + across[None, None, :, None] * right[:, None, None]
-        - along[None, :, None, None] * up[:, None, None]
-    )
+    up, right = (values.flatten() for values in torch.meshgrid(-along, across, indexing="ij"))
+    points = torch.stack([torch.ones_like(up), right, up], dim=-1)
+    projected = (points @ axes.permute(1, 0, 2).reshape(3, -1)).reshape(len(points), -1, 3)
     in_front = projected[..., 2:].clamp(min=1e-6)  # what is behind the camera lands far outside
-    to_unit = torch.tensor([2 / (width - 1), 2 / (height - 1)], device=heights.device)
-    where = (projected[..., :2] / in_front) * to_unit - 1
+    where = projected[..., :2] / in_front  # (pixels, n, 2)
+    sampled = _sampled(heights, where if heights.ndim == 2 else where.transpose(0, 1))
+    patches = sampled.T if heights.ndim == 2 else sampled
+    return patches.reshape(-1, 1, n_pixels, n_columns).contiguous()
 
-    valid = ~torch.isnan(heights)
-    source = torch.stack([torch.where(valid, heights, 0.0), valid.to(heights.dtype)], dim=-3).float()
-    if heights.ndim == 2:
-        # All grasps look at the same image: one tall grid over it needs no copy of the image.
-        where = where.reshape(1, -1, n_columns, 2)
-        source = source[None]
+
+def _sampled(heights: Tensor, where: Tensor) -> Tensor:
+    """Heights (a, b) between the pixels of one image (h, w), or of a images (a, h, w), at (a, b, 2)."""
+    one = heights.ndim == 2
+    images = heights[None, None] if one else heights[:, None]
+    grid = where[None] if one else where[:, None]
+    valid = ~torch.isnan(images)
+    if bool(valid.all()):
+        value = torch.nn.functional.grid_sample(
+            images.float(), grid, mode="bilinear", padding_mode="border", align_corners=True
+        )
+        # The share of the four pixels around a point that lies within the image, as below.
+        size = torch.tensor([heights.shape[-1] - 1, heights.shape[-2] - 1], device=heights.device) / 2
+        inside = (1 - (where.abs() - 1).clamp(min=0) * size).clamp(min=0).prod(dim=-1) >= 0.5
+        return torch.where(inside, value.reshape(inside.shape), 0.0)
+    source = torch.cat([torch.where(valid, images, 0.0), valid.to(images.dtype)], dim=1).float()
     sampled = torch.nn.functional.grid_sample(
-        source, where, mode="bilinear", padding_mode="zeros", align_corners=True
+        source, grid, mode="bilinear", padding_mode="zeros", align_corners=True
     )
-    if heights.ndim == 2:
-        sampled = sampled.reshape(2, -1, n_pixels, n_columns).transpose(0, 1)
-    value, weight = sampled[:, :1], sampled[:, 1:]
+    value, weight = (sampled[:, k].reshape(where.shape[:-1]) for k in (0, 1))
     return torch.where(weight >= 0.5, value / weight.clamp(min=0.5), 0.0)
 
 
-def _patch_axes(grasps: Tensor, intrinsics: Array, T_base_camera: Pose) -> tuple[Tensor, Tensor, Tensor]:
-    """Homogeneous pixels (n, 3) of the grasp points and of a metre along the grasp frames' x and y."""
+def _patch_axes(grasps: Tensor, intrinsics: Array, T_base_camera: Pose) -> Tensor:
+    """Homogeneous pixels (n, 3, 3) of the grasp points and of a metre along the grasp frames' x and y."""
     device = grasps.device
     grasps = grasps.double()
     matrix = torch.as_tensor(intrinsics, dtype=torch.float64, device=device)
@@ -270,7 +281,7 @@ def _patch_axes(grasps: Tensor, intrinsics: Array, T_base_camera: Pose) -> tuple
         torch.stack([cos, sin, zero], dim=-1),
         torch.stack([-sin, cos, zero], dim=-1),
     )
-    origin, right, up = (
-        (matrix @ quat_rotate(to_camera, vector)[..., None])[..., 0].float() for vector in vectors_base
+    return torch.stack(
+        [(matrix @ quat_rotate(to_camera, vector)[..., None])[..., 0].float() for vector in vectors_base],
+        dim=-2,
     )
-    return origin, right, up

@@ -22,7 +22,7 @@ from mskgrasp.cli import make_folder, parse, run
 from mskgrasp.config import Config, read_yaml
 from mskgrasp.errors import UsageError
 from mskgrasp.files import only_here
-from mskgrasp.models import load_models
+from mskgrasp.models import PRETRAINED, load_models
 from mskgrasp.operator import Operator
 from mskgrasp.palletize_report import write_report
 from mskgrasp.parts import find_part
@@ -52,8 +52,8 @@ A real cell asks its operator to lay every part, and before the arm moves (--yes
 class PalletizeConfig(Config):
     """Settings of a palletizing run."""
 
-    models: Path
-    """Folder with model.safetensors and model.json, as mskgrasp.train writes it."""
+    models: Path = PRETRAINED
+    """Folder with model.safetensors and model.json; by default the shipped one."""
     cell: Path = SIMULATED_CELL
     """YAML file of the cell; by default the simulated one."""
     out: Path = Path("out/palletize")
@@ -137,13 +137,11 @@ def palletize(config: PalletizeConfig) -> dict[str, Any]:
         HalError: The cell was lost; what is finished is stored.
     """
     models = load_models(config.models)
-    names = part_names(config.parts, models.meta.training)
+    names = part_names(config.parts, models.meta.training, config.n_parts)
     if not names:
         raise UsageError(
             f"--parts {' '.join(config.parts)} names no part; `python -m mskgrasp.parts list` does"
         )
-    if config.n_parts and config.n_parts < len(names):
-        names = [names[int(i)] for i in np.linspace(0, len(names) - 1, config.n_parts)]
     slots = config.all_slots()
     corrections, asks = _check(config, slots)
     pallets = _pallets(config, names, slots, corrections)

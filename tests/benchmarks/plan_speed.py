@@ -49,7 +49,9 @@ def main() -> None:
     ours = load_models(options.models, device) if options.models else fresh("default", device)
     planners = {
         "ours": planner(ours, PlannerConfig(n_candidates=options.candidates)),
-        "paper": planner(fresh("paper", device), PlannerConfig(n_candidates=options.candidates)),
+        "paper": planner(
+            fresh("paper", device), PlannerConfig(n_candidates=options.candidates, chunk_size=32)
+        ),
     }
     seconds: dict[str, list[float]] = {name: [] for name in planners}
     stages: dict[str, list[dict[str, float]]] = {name: [] for name in planners}
