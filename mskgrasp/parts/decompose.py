@@ -87,7 +87,7 @@ def fewest_hulls(mesh_mm: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> tuple
     most_largest = np.inf  # more than PhysX should take have to be joined, whatever stands out
     if len(hulls) <= MOST_HULLS:
         # Holes that are filled on purpose stand out already.
-        most_largest = max(CLOSE_LARGEST_MM, surface.fit(hulls).outward_largest + 0.01)
+        most_largest = max(CLOSE_LARGEST_MM, surface.outward_largest(hulls) + 0.01)
     return tuple(_join(surface, hulls, CLOSE_P95_MM, CLOSE_VOLUME_RATIO, most_largest))
 
 
@@ -170,10 +170,7 @@ def _join(
             continue
         joined = finish(joined)
         close = max(oblongness(points) for points in joined) <= most_oblong
-        if close:
-            fit = surface.fit(joined)
-            close = _within(fit, most_p95, most_ratio) and fit.outward_largest <= most_largest
-        if close:
+        if close and surface.fit_within(joined, most_p95, most_ratio, most_largest) is not None:
             best, low = joined, middle + 1
         else:
             high = middle
