@@ -28,17 +28,21 @@ collect: $(READY) ## Collect the demo dataset into data/demo (the main job; resu
 train: $(READY) ## Train both networks on data/demo into models/demo
 	$(RUN) mskgrasp.train --data data/demo --out models/demo
 
-plan: $(READY) ## Plan a grasp in the simulated cell with models/demo
-	$(RUN) mskgrasp.plan --cell configs/cells/sapien.yaml --models models/demo --out out/plan
+plan: $(READY) ## Plan a grasp in the simulated cell
+	$(RUN) mskgrasp.plan --out out/plan
 
-evaluate: $(READY) ## Plan and execute grasps in the simulated cell with models/demo
-	$(RUN) mskgrasp.evaluate --models models/demo --planner.policy low_variance --trials 2 --out out/eval
+evaluate: $(READY) ## Plan and execute grasps in the simulated cell
+	$(RUN) mskgrasp.evaluate --parts test --n-parts 10 --trials 2 --out out/evaluate
 
-palletize: $(READY) ## Grasp parts, correct by the predicted displacement and place them, with models/demo
-	$(RUN) mskgrasp.palletize --models models/demo --parts validation --trials 2 --out out/palletize
+palletize: $(READY) ## Grasp parts, correct by the predicted displacement and place them
+	$(RUN) mskgrasp.palletize --parts test --n-parts 6 --trials 2 --out out/palletize
 
 test: $(TESTABLE) ## Run the tests
 	$(RUN) pytest -n 3 --dist loadfile --no-loadscope-reorder --durations 15
+
+test-all: $(TESTABLE) ## The same and the slow ones: every family, both drivers' faults, 20 kills (an hour)
+	MSKGRASP_FAMILIES=99 MSKGRASP_KILLS=10 $(RUN) pytest -n 3 --dist loadfile --no-loadscope-reorder \
+		--durations 15 -m "slow or not slow"
 
 # Anew each time: what an earlier state of the code left must not count.
 regression: $(READY) ## Run the loop over a fixed set and print what has changed (ARGS=--store keeps it)

@@ -9,15 +9,8 @@ import numpy as np
 
 from hal.camera import RgbdFrame
 from hal.cell import PartTracker
-from mskgrasp.grasp import PartView, centre_in_grasp_frame, to_object_displacement
-from mskgrasp.planner import (
-    GraspPlan,
-    Planner,
-    object_displacement_covariance,
-    select,
-    shortlist,
-    variance_score,
-)
+from mskgrasp.grasp import PartView
+from mskgrasp.planner import GraspPlan, Planner, Shortlist, select, shortlist, variance_score
 from mskgrasp.predictors import Predictor, Seen
 from mskgrasp.scoring import Scene, qualities
 
@@ -79,27 +72,12 @@ class Chooser:
         config = self.candidates.planner.config.model_copy(update={"policy": self.policy})
         view, candidates, found, scoring_s = self.candidates.of(frame, rng)
         scored = time.perf_counter()
-        best = shortlist(found, config.top_fraction)
+        rows = shortlist(found, config.top_fraction)
         pose = None if self.tracker is None else self.tracker.part_pose()
         seen = Seen(part=self.part, frame=frame, view=view, pose_base_obj=pose)
-        mean, variance, centre = self.predictor.predict(seen, candidates[best])
-        scores = variance_score(variance, view.gyration_radius)
-        chosen = select(found[best], scores, config)
-        grasp = candidates[best[chosen]]
-        centre_grasp = centre_in_grasp_frame(centre, grasp)
+        mean, variance, centre = self.predictor.predict(seen, candidates[rows])
+        best = Shortlist(rows, mean, variance, variance_score(variance, view.gyration_radius))
+        chosen = select(found[rows], best.scores, config)
         selecting_s = time.perf_counter() - scored
-        return GraspPlan(
-            grasp=grasp,
-            quality=float(found[best[chosen]]),
-            displacement=to_object_displacement(mean[chosen], centre_grasp),
-            displacement_cov=object_displacement_covariance(mean[chosen], variance[chosen], centre_grasp),
-            grasp_displacement=mean[chosen],
-            grasp_displacement_var=variance[chosen],
-            score=float(scores[chosen]),
-            view=view,
-            candidates=candidates,
-            qualities=found,
-            shortlist=best,
-            shortlist_scores=scores,
-            seconds={"score": scoring_s, "select": selecting_s, "total": scoring_s + selecting_s},
-        )
+        seconds = {"score": scoring_s, "select": selecting_s, "total": scoring_s + selecting_s}
+        return GraspPlan.of(view, candidates, found, best, chosen, centre=centre, seconds=seconds)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -36,3 +38,12 @@ def leave_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def use_one_core() -> None:
+    """Keeps this process to one core: neither torch nor the software renderer may spread over the others."""
+    os.environ.setdefault("LP_NUM_THREADS", "1")
+    os.environ["OMP_NUM_THREADS"] = "1"  # torch reads it when it is loaded
+    if "torch" in sys.modules:
+        sys.modules["torch"].set_num_threads(1)
+    logging.getLogger("mani_skill").setLevel(logging.ERROR)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
@@ -35,8 +35,7 @@ from mskgrasp.runs import TRIALS, append, begin, model_digests, part_digests, pa
 from mskgrasp.stored_trials import describe_trial, draw_trial, find_trial, outcome_text
 from mskgrasp.trial import Trial
 from mskgrasp.trial_files import FOLDER
-from mskgrasp.trial_runner import Setup, TrialTask, trial_runner
-from mskgrasp.trial_workers import run_trials
+from mskgrasp.trial_runner import Setup, TrialTask, run_trials
 
 DESCRIPTION = """Plans and executes grasps on a cell and reports what came of them.
 
@@ -233,24 +232,14 @@ def _made(
     """The missing trials, in this process or, of simulated cells, in several."""
     n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
     n_threads = torch.get_num_threads()
-    if n_workers > 1:
-        made = run_trials(setup, missing, n_workers)
-    else:
-        made = _one_by_one(setup, missing)
-        if cell.simulated:
-            torch.set_num_threads(1)  # as in a process of its own: the same sums
+    if cell.simulated:
+        torch.set_num_threads(1)  # as in a process of its own: the same sums
+    made = run_trials(setup, missing, n_workers)
     try:
         yield made
     finally:
         made.close()
         torch.set_num_threads(n_threads)
-
-
-def _one_by_one(setup: Setup, missing: Sequence[tuple[TrialTask, ...]]) -> Generator[Trial, None, None]:
-    with trial_runner(setup) as runner:
-        for scene in missing:
-            for task in scene:
-                yield from runner.run(task)
 
 
 def _with_predictions(

@@ -42,6 +42,19 @@ def footprint_of(points: np.ndarray) -> Footprint:
     return Footprint(sides=np.array([long, short]) * 1e-3, theta=float(wrap_half_turn(np.asarray(theta))))
 
 
+def seen_points(frame: RgbdFrame) -> np.ndarray:
+    """(h * w, 3) what a frame's pixels show, base frame, metres; NaN where they show nothing."""
+    depth = np.asarray(frame.depth, dtype=np.float64)
+    rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
+    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(frame.intrinsics).T
+    return frame.T_base_camera.apply((rays * depth[..., None]).reshape(-1, 3))
+
+
+def pixel_pitch(frame: RgbdFrame) -> float:
+    """How far apart neighbouring pixels look, at the median of the frame's depth, metres."""
+    return float(np.nanmedian(frame.depth)) / float(frame.intrinsics[0][0])
+
+
 def seen_footprint(frame: RgbdFrame, view: PartView, min_height: float) -> Footprint:
     """The footprint of the part that a frame shows.
 
@@ -50,15 +63,11 @@ def seen_footprint(frame: RgbdFrame, view: PartView, min_height: float) -> Footp
         view: Where the part was found in it.
         min_height: What rises less above the table is table, metres.
     """
-    depth = np.asarray(frame.depth, dtype=np.float64)
-    rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
-    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(frame.intrinsics).T
-    points = frame.T_base_camera.apply((rays * depth[..., None]).reshape(-1, 3))
-    pitch = float(np.nanmedian(depth)) / float(frame.intrinsics[0][0])
+    points, pitch = seen_points(frame), pixel_pitch(frame)
     in_box = np.abs(view.T_base_box.inverse().apply(points)[:, :2]) <= view.size[:2] / 2 + pitch
     high = in_box.all(axis=1) & (points[:, 2] > view.table_z + min_height)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(
-        high.reshape(depth.shape).astype(np.uint8), connectivity=8
+        high.reshape(frame.depth.shape).astype(np.uint8), connectivity=8
     )
     largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
     found = footprint_of(points[(labels == largest).ravel(), :2])

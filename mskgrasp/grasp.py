@@ -33,6 +33,12 @@ TABLE_CLEARANCE = 0.001
 """Least distance between the pads and the table at the grasp, metres."""
 MAX_OPENING = 0.08
 """Distance between the pads of the open hand, metres (Franka Hand datasheet)."""
+FINGER_HALF_WIDTH = 0.011
+"""Of the widest of a finger's collision boxes, along the pads, metres (Panda hand)."""
+FINGER_THICKNESS = 0.026
+"""From a pad's face to the back of the finger, metres."""
+PALM_HEIGHT = 0.0374
+"""Of the hand's collision hull over the TCP, metres."""
 MIN_GAP = 0.5e-3
 """Pads closer than this hold nothing, metres."""
 MIN_RISE = 0.8

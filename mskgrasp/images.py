@@ -229,21 +229,21 @@ def crop_patches(
     height, width = heights.shape[-2:]
     n_columns = n_columns or n_pixels
     axes = _patch_axes(grasps.to(heights.device), intrinsics, T_base_camera)
-    # Pixels to grid_sample's units, before the division by the distance: (2 / (width - 1)) u - 1.
-    to_unit = torch.tensor([2 / (width - 1), 2 / (height - 1)], device=heights.device)
-    axes = torch.cat([axes[..., :2] * to_unit - axes[..., 2:], axes[..., 2:]], dim=-1)  # (n, 3, 3)
     along, across = (
         (torch.arange(n, device=heights.device, dtype=torch.float32) - (n - 1) / 2) * (side / n_pixels)
         for n in (n_pixels, n_columns)
     )
     up, right = (values.flatten() for values in torch.meshgrid(-along, across, indexing="ij"))
-    points = torch.stack([torch.ones_like(up), right, up], dim=-1)
-    projected = (points @ axes.permute(1, 0, 2).reshape(3, -1)).reshape(len(points), -1, 3)
-    in_front = projected[..., 2:].clamp(min=1e-6)  # what is behind the camera lands far outside
-    where = projected[..., :2] / in_front  # (pixels, n, 2)
-    sampled = _sampled(heights, where if heights.ndim == 2 else where.transpose(0, 1))
-    patches = sampled.T if heights.ndim == 2 else sampled
-    return patches.reshape(-1, 1, n_pixels, n_columns).contiguous()
+    points = torch.stack([torch.ones_like(up), right, up])
+    distance = axes[..., 2] @ points
+    if distance.numel() and float(distance.min()) < 1e-6:
+        distance.clamp_(min=1e-6)  # what is behind the camera lands far outside
+    where = torch.empty(*distance.shape, 2, device=heights.device)  # (n, pixels, 2)
+    for k, size in enumerate((width, height)):
+        # To grid_sample's units before the division by the distance: (2 / (width - 1)) u - 1.
+        unit = axes[..., k] * (2 / (size - 1)) - axes[..., 2]
+        torch.div(unit @ points, distance, out=where[..., k])
+    return _sampled(heights, where).reshape(-1, 1, n_pixels, n_columns)
 
 
 def _sampled(heights: Tensor, where: Tensor) -> Tensor:
@@ -256,10 +256,13 @@ def _sampled(heights: Tensor, where: Tensor) -> Tensor:
         value = torch.nn.functional.grid_sample(
             images.float(), grid, mode="bilinear", padding_mode="border", align_corners=True
         )
+        value = value.reshape(where.shape[:-1])
+        if not where.numel() or max(float(where.max()), -float(where.min())) <= 1.0:
+            return value  # all within the image
         # The share of the four pixels around a point that lies within the image, as below.
         size = torch.tensor([heights.shape[-1] - 1, heights.shape[-2] - 1], device=heights.device) / 2
         inside = (1 - (where.abs() - 1).clamp(min=0) * size).clamp(min=0).prod(dim=-1) >= 0.5
-        return torch.where(inside, value.reshape(inside.shape), 0.0)
+        return torch.where(inside, value, 0.0)
     source = torch.cat([torch.where(valid, images, 0.0), valid.to(images.dtype)], dim=1).float()
     sampled = torch.nn.functional.grid_sample(
         source, grid, mode="bilinear", padding_mode="zeros", align_corners=True

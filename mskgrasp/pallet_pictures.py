@@ -103,7 +103,7 @@ def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> N
     # Cut low, a thin plate counts as much as a high wall. A camera pixel is several of these: without the
     # blur the outline shows its stairs.
     low = np.ascontiguousarray(np.minimum(views.before, min(_CUT, views.top)))
-    smooth = cv2.GaussianBlur(low, (0, 0), 1.0 / pitch)
+    smooth = cv2.GaussianBlur(low, (0, 0), 1.5 / pitch)
     level = [0.5 * max(float(smooth.max()), 1e-4)]
     cos, sin = np.cos(turn), np.sin(turn)
     axes.contour(

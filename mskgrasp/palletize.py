@@ -6,7 +6,7 @@ import contextlib
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from mskgrasp.placement_trial import Placer, Task
 from mskgrasp.placements import CORRECTIONS, Correction, Placement, print_placements
 from mskgrasp.plan import SIMULATED_CELL, make_planner
 from mskgrasp.planner import PlannerConfig
-from mskgrasp.processes import spread
+from mskgrasp.processes import results
 from mskgrasp.runs import TRIALS, append, begin, file_digest, inputs_of, part_names, read
 from mskgrasp.settings import Tape
 from mskgrasp.slots import Slot, check_reach, check_room, parse_target, read_slots
@@ -117,6 +117,16 @@ class Pallet:
     name: str
     tasks: tuple[Task, ...]
     done: frozenset[tuple[str, int, int, Correction]]
+
+    @property
+    def title(self) -> str:
+        """For messages."""
+        return self.name or f"{self.tasks[0].part}, trial {self.tasks[0].number + 1},"
+
+    def after(self, n_told: int) -> Pallet:
+        """What is left when its process died; a simulated pallet stands empty again."""
+        told = [task.key for task in self.tasks if task.key not in self.done][:n_told]
+        return self if self.name else replace(self, done=self.done.union(told))
 
 
 def main() -> int:
@@ -227,10 +237,12 @@ def _place_all(config: PalletizeConfig, pallets: list[list[Task]], asks: bool) -
     ]
     left = sum(key not in found for key in keys)
     if missing:
-        results = spread(placing_bench, config, missing, config.workers)
+        placed = results(
+            placing_bench, config, missing, config.workers, name=lambda one: one.title, rest=Pallet.after
+        )
         bar = tqdm(total=left, unit="placement", file=sys.stderr, disable=asks)
-        with contextlib.closing(results), bar:
-            for placement in results:
+        with contextlib.closing(placed), bar:
+            for placement in placed:
                 if placement.key not in found:
                     append(config.out / TRIALS, placement.to_json())
                     found[placement.key] = placement

@@ -163,12 +163,8 @@ class Placer:
         picture = self._pictures.parent / "next.png"
         if self._operator.asks:
             draw_plan(frame, plan, picture)
-        x, y, z, theta = plan.grasp
-        return self._operator.may_move(
-            picture,
-            f"grasp at x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees, "
-            f"quality {plan.quality:.2f}; then to x {task.slot.x:.3f}, y {task.slot.y:.3f} m",
-        )
+        where = f"x {task.slot.x:.3f}, y {task.slot.y:.3f} m"
+        return self._operator.may_move(picture, f"{plan.summary}; then to {where}")
 
     def _carry(
         self, frame: RgbdFrame, plan: GraspPlan, targets: Sequence[Target], known: Placement

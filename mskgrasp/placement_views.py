@@ -8,13 +8,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
-import torch
 
 from hal.camera import RgbdFrame
 from mskgrasp.errors import BadDataset
 from mskgrasp.files import write_whole
-from mskgrasp.images import crop_patches, height_image
+from mskgrasp.footprint import pixel_pitch, seen_points
 from mskgrasp.placing import Target
 from mskgrasp.planner import GraspPlan
 
@@ -50,12 +50,11 @@ def take_views(
     """The views of a placement from its frames."""
     view = plan.view
     side = max(0.1, 1.6 * float(np.hypot(*view.size[:2])))
-    height = view.table_z + view.size[2]
     return Views(
-        before=_heights(before, view.centre_base[:2], height, side, view.table_z),
+        before=_heights(before, view.centre_base[:2], side, view.table_z),
         after=np.empty((0, 0))
         if after is None
-        else _heights(after, np.array([target.x, target.y]), height, side, view.table_z),
+        else _heights(after, np.array([target.x, target.y]), side, view.table_z),
         side=side,
         top=float(view.size[2]),
         grasp=np.array([*(plan.grasp[:2] - view.centre_base[:2]), plan.grasp[3]]),
@@ -91,9 +90,15 @@ def read_views(path: Path) -> Views:
         raise BadDataset(f"{path} is missing or damaged; start again in another --out") from error
 
 
-def _heights(frame: RgbdFrame, centre: np.ndarray, height: float, side: float, table_z: float) -> np.ndarray:
-    heights = height_image(torch.from_numpy(frame.depth), frame.intrinsics, frame.T_base_camera, table_z)
-    # In the plane of the part's top there is no parallax.
-    square = torch.tensor([[*centre, height, 0.0]])
-    patch = crop_patches(heights, square, frame.intrinsics, frame.T_base_camera, n_pixels=_N, side=side)
-    return patch[0, 0].numpy()
+def _heights(frame: RgbdFrame, centre: np.ndarray, side: float, table_z: float) -> np.ndarray:
+    """(n, n) heights as seen from straight above, whatever the place in the frame: no parallax."""
+    points = seen_points(frame)
+    cell = side / _N
+    from_corner = (points[:, :2] - centre) * [1, -1] + side / 2
+    inside = ((from_corner >= 0) & (from_corner < side)).all(axis=1)
+    columns, rows = np.floor(from_corner[inside] / cell).astype(int).T
+    heights = np.zeros((_N, _N), dtype=np.float32)
+    np.maximum.at(heights, (rows, columns), (points[inside, 2] - table_z).astype(np.float32))
+    # A pixel of the camera covers several cells, and the point is in the middle of it.
+    width = 2 * round(pixel_pitch(frame) / cell / 2) + 1
+    return cv2.dilate(heights, cv2.getStructuringElement(cv2.MORPH_RECT, (width, width)))

@@ -36,7 +36,24 @@ class PlannerConfig(Config):
     """Rounds of the cross-entropy method: grasps are drawn near the best ones and judged in turn."""
     chunk_size: int = Field(default=640, ge=1)
     """Grasps a network sees at once: many more do not fit a CPU's cache, few take long to prepare. (The
-    paper's network, its patches forty times larger, is fastest with 32.)"""
+    paper's network, with patches seven times larger, is fastest with 32.)"""
+
+
+@dataclass(frozen=True)
+class Shortlist:
+    """Candidates by row (k,), best quality first, with their mean and variance (k, 4) and scores (k,)."""
+
+    rows: np.ndarray
+    mean: np.ndarray
+    variance: np.ndarray
+    scores: np.ndarray
+
+    def joined(self, other: Shortlist, found: np.ndarray) -> Shortlist:
+        """Both, by the qualities of all candidates."""
+        names = ("rows", "mean", "variance", "scores")
+        arrays = [np.append(getattr(self, name), getattr(other, name), axis=0) for name in names]
+        order = np.argsort(-found[arrays[0]], kind="stable")
+        return Shortlist(*(array[order] for array in arrays))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +90,44 @@ class GraspPlan:
     shortlist_scores: np.ndarray
     seconds: dict[str, float]
 
+    @classmethod
+    def of(
+        cls,
+        view: PartView,
+        candidates: np.ndarray,
+        qualities: np.ndarray,
+        best: Shortlist,
+        chosen: int,
+        *,
+        centre: np.ndarray,
+        seconds: dict[str, float],
+    ) -> GraspPlan:
+        """The plan of the shortlist's grasp ``chosen``, for a part whose centre is at (3,), base frame."""
+        row, mean, variance = best.rows[chosen], best.mean[chosen], best.variance[chosen]
+        centre_grasp = centre_in_grasp_frame(centre, candidates[row])
+        return cls(
+            grasp=candidates[row],
+            quality=float(qualities[row]),
+            displacement=to_object_displacement(mean, centre_grasp),
+            displacement_cov=object_displacement_covariance(mean, variance, centre_grasp),
+            grasp_displacement=mean,
+            grasp_displacement_var=variance,
+            score=float(best.scores[chosen]),
+            view=view,
+            candidates=candidates,
+            qualities=qualities,
+            shortlist=best.rows,
+            shortlist_scores=best.scores,
+            seconds=seconds,
+        )
+
+    @property
+    def summary(self) -> str:
+        """The grasp in a line, for whoever is asked about it."""
+        x, y, z, theta = self.grasp
+        place = f"x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees"
+        return f"grasp at {place}, quality {self.quality:.2f}"
+
     @property
     def displacement_std(self) -> np.ndarray:
         """(4,) standard deviations of the object displacement, metres and radians."""
@@ -104,23 +159,6 @@ def _plain(values: np.ndarray) -> Any:
     if values.ndim:
         return [_plain(np.asarray(value)) for value in values]
     return float(values) if np.isfinite(values) else None
-
-
-@dataclass(frozen=True)
-class _Shortlist:
-    """Candidates by row (k,), best quality first, with their mean and variance (k, 4) and scores (k,)."""
-
-    rows: np.ndarray
-    mean: np.ndarray
-    variance: np.ndarray
-    scores: np.ndarray
-
-    def joined(self, other: _Shortlist, found: np.ndarray) -> _Shortlist:
-        """Both, by the qualities of all candidates."""
-        names = ("rows", "mean", "variance", "scores")
-        arrays = [np.append(getattr(self, name), getattr(other, name), axis=0) for name in names]
-        order = np.argsort(-found[arrays[0]], kind="stable")
-        return _Shortlist(*(array[order] for array in arrays))
 
 
 class Planner:
@@ -168,32 +206,15 @@ class Planner:
         best = self._judged(scene, candidates, self._shortlist(scene, candidates, found))
         if self.config.refinements:
             candidates, found, best = self._refined(scene, candidates, found, best, rng)
-        rows, mean, variance, scores = best.rows, best.mean, best.variance, best.scores
-        chosen = select(found[rows], scores, self.config)
+        chosen = select(found[best.rows], best.scores, self.config)
         selected = time.perf_counter()
-
-        grasp, quality = candidates[rows[chosen]], float(found[rows[chosen]])
-        centre_grasp = centre_in_grasp_frame(view.centre_base, grasp)
-        return GraspPlan(
-            grasp=grasp,
-            quality=quality,
-            displacement=to_object_displacement(mean[chosen], centre_grasp),
-            displacement_cov=object_displacement_covariance(mean[chosen], variance[chosen], centre_grasp),
-            grasp_displacement=mean[chosen],
-            grasp_displacement_var=variance[chosen],
-            score=float(scores[chosen]),
-            view=view,
-            candidates=candidates,
-            qualities=found,
-            shortlist=rows,
-            shortlist_scores=scores,
-            seconds={
-                "sample": sampled - started,
-                "score": scored - sampled,
-                "select": selected - scored,
-                "total": selected - started,
-            },
-        )
+        seconds = {
+            "sample": sampled - started,
+            "score": scored - sampled,
+            "select": selected - scored,
+            "total": selected - started,
+        }
+        return GraspPlan.of(view, candidates, found, best, chosen, centre=view.centre_base, seconds=seconds)
 
     def _shortlist(self, scene: Scene, candidates: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Indices of the best candidates; of those whose fingers are free where that is asked for.
@@ -216,18 +237,18 @@ class Planner:
             )
         return free[:n]
 
-    def _judged(self, scene: Scene, candidates: np.ndarray, rows: np.ndarray) -> _Shortlist:
+    def _judged(self, scene: Scene, candidates: np.ndarray, rows: np.ndarray) -> Shortlist:
         mean, variance = displacements(self.models, scene, candidates[rows], self.config.chunk_size)
-        return _Shortlist(rows, mean, variance, variance_score(variance, scene.view.gyration_radius))
+        return Shortlist(rows, mean, variance, variance_score(variance, scene.view.gyration_radius))
 
     def _refined(
         self,
         scene: Scene,
         candidates: np.ndarray,
         found: np.ndarray,
-        best: _Shortlist,
+        best: Shortlist,
         rng: np.random.Generator,
-    ) -> tuple[np.ndarray, np.ndarray, _Shortlist]:
+    ) -> tuple[np.ndarray, np.ndarray, Shortlist]:
         """Candidates, qualities and shortlist after some rounds near the best grasps.
 
         What is sought is what is chosen by: the least variance score at a quality that the first shortlist

@@ -1,23 +1,30 @@
-"""Jobs spread over processes, each with a simulator of its own; results come as they are ready."""
+"""Jobs spread over processes, each with a simulator of its own; results come as soon as they are there.
+
+A process that dies takes nothing with it: what it had not told yet is done again by a fresh one.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
-import os
 import signal
-import threading
-import time
+import sys
 import traceback
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
+
+from tqdm import tqdm
 
 from mskgrasp.cli import explain_os_error
-from mskgrasp.cores import one_thread_a_process
+from mskgrasp.cores import leave_with_parent, one_thread_a_process, use_one_core
 from mskgrasp.errors import MskgraspError
+
+MAX_TRIES = 3
+REMEDY = "run the same command again, with fewer --workers if memory was short"
 
 Settings = TypeVar("Settings")
 Job = TypeVar("Job")
@@ -27,82 +34,170 @@ Bench = Callable[[Settings], AbstractContextManager[Callable[[Job], Iterator[Res
 
 
 class WorkerFailed(MskgraspError):
-    """A process could not do its job."""
+    """A job could not be done; what was told before is sound."""
+
+
+@dataclass(frozen=True)
+class Told(Generic[Job, Result]):
+    """One result of a job that goes on."""
+
+    job: Job
+    result: Result
+
+
+@dataclass(frozen=True)
+class Done(Generic[Job]):
+    """All of a job is done; `process` names who did it."""
+
+    job: Job
+    process: str
+
+
+@dataclass(frozen=True)
+class Lost(Generic[Job]):
+    """A process died after `n_told` results of its job; `again` will be done in its place."""
+
+    job: Job
+    n_told: int
+    again: Job
+    reason: str
+
+
+@dataclass
+class _Ticket:
+    """A job on its way through the processes."""
+
+    job: Any
+    deaths: int = 0
 
 
 @dataclass
 class _Worker:
     process: Any
     connection: Connection
-    busy: bool = False
+    ticket: _Ticket | None = None
+    n_told: int = 0
 
 
 def spread(
-    bench: Bench[Settings, Job, Result], settings: Settings, jobs: Sequence[Job], n_workers: int
-) -> Generator[Result, None, None]:
-    """Does jobs in this process, or in several, and gives every result as soon as it is there.
+    bench: Bench[Settings, Job, Result],
+    settings: Settings,
+    jobs: Sequence[Job],
+    n_workers: int,
+    *,
+    name: Callable[[Job], str] = str,
+    rest: Callable[[Job, int], Job | None] = lambda job, n_told: job,
+    remedy: str = REMEDY,
+    lost_by: tuple[type[Exception], ...] = (),
+) -> Generator[Told[Job, Result] | Done[Job] | Lost[Job], None, None]:
+    """Does jobs in several processes and tells of every step; closing the iterator ends all processes.
 
-    Which process does which job is left to chance: a job's results must depend on the job alone. Closing the
-    iterator, as Ctrl-C does, ends all processes.
+    Which process does which job is left to chance: a job's results must depend on the job alone.
 
     Args:
         bench: A function of a module; in a spawned process it is imported again.
         settings: What it takes; pickled.
         jobs: In the order in which they are begun; pickled, as are their results.
-        n_workers: 1: no other process is started.
+        n_workers: At most so many processes at once.
+        name: How a message calls a job.
+        rest: What is left of a job of which so many results were told, when its process died; None: nothing.
+        remedy: What to do about a job that `MAX_TRIES` processes died of.
+        lost_by: Errors that a fresh process may be free of: with one of them, too, a process counts as dead.
 
     Raises:
-        WorkerFailed: A process died or failed; in this process, whatever the job raises.
+        WorkerFailed: A job failed for a reason that trying again will not mend.
     """
+    context = multiprocessing.get_context("spawn")  # a forked simulator shares the parent's driver state
+    waiting = deque(_Ticket(job) for job in jobs)
+    workers: list[_Worker] = []
+    try:
+        while waiting or any(worker.ticket for worker in workers):
+            with one_thread_a_process():
+                while waiting and len(workers) < min(n_workers, len(jobs)):
+                    workers.append(_start(context, bench, settings, lost_by))
+            for worker in workers:
+                if worker.ticket is None and waiting:
+                    _give(worker, waiting.popleft())
+            ready = wait([worker.connection for worker in workers], timeout=1.0)
+            for worker in [one for one in workers if one.connection in ready]:
+                kind, value = _hear(worker)
+                ticket = worker.ticket
+                if kind == "error":
+                    raise WorkerFailed(value)
+                if kind == "lost":
+                    _end([worker])
+                    workers.remove(worker)
+                if ticket is None:
+                    continue
+                if kind == "result":
+                    worker.n_told += 1
+                    yield Told(ticket.job, value)
+                elif kind == "done":
+                    worker.ticket = None
+                    yield Done(ticket.job, str(worker.process.pid))
+                elif (left := rest(ticket.job, worker.n_told)) is None:
+                    yield Done(ticket.job, str(worker.process.pid))
+                else:
+                    again = _Ticket(left, ticket.deaths + 1)
+                    if again.deaths >= MAX_TRIES:
+                        raise WorkerFailed(
+                            f"{name(again.job)} could not be done in {MAX_TRIES} fresh processes ({value}); "
+                            f"what was finished is kept: {remedy}"
+                        )
+                    waiting.appendleft(again)
+                    yield Lost(ticket.job, worker.n_told, again.job, value)
+    finally:
+        _end(workers)
+
+
+def results(
+    bench: Bench[Settings, Job, Result],
+    settings: Settings,
+    jobs: Sequence[Job],
+    n_workers: int,
+    *,
+    name: Callable[[Job], str] = str,
+    rest: Callable[[Job, int], Job | None] = lambda job, n_told: job,
+    remedy: str = REMEDY,
+    lost_by: tuple[type[Exception], ...] = (),
+) -> Generator[Result, None, None]:
+    """What `spread` is told, and a line on stderr where a process was lost.
+
+    With one worker, or one job, the jobs are done in this process; then whatever they raise is raised here.
+    """
+    if not jobs:
+        return
     if n_workers == 1 or len(jobs) < 2:
         with bench(settings) as work:
             for job in jobs:
                 yield from work(job)
         return
-    context = multiprocessing.get_context("spawn")  # a forked simulator shares the parent's driver state
-    waiting = deque(jobs)
-    workers: list[_Worker] = []
-    try:
-        with one_thread_a_process():
-            for _ in range(min(n_workers, len(jobs))):
-                workers.append(_start(context, bench, settings))
-        for worker in workers:
-            _give(worker, waiting)
-        while any(worker.busy for worker in workers):
-            ready = wait([worker.connection for worker in workers if worker.busy])
-            for worker in [one for one in workers if one.connection in ready]:
-                kind, value = _hear(worker)
-                if kind == "result":
-                    yield value
-                elif kind == "done":
-                    _give(worker, waiting)
-                else:
-                    raise WorkerFailed(value)
-    finally:
-        for worker in workers:
-            worker.process.terminate()
-        for worker in workers:
-            worker.process.join(timeout=5)
-            if worker.process.is_alive():
-                worker.process.kill()
-            worker.connection.close()
+    events = spread(bench, settings, jobs, n_workers, name=name, rest=rest, remedy=remedy, lost_by=lost_by)
+    with contextlib.closing(events):
+        for event in events:
+            if isinstance(event, Told):
+                yield event.result
+            elif isinstance(event, Lost):
+                again = f"{name(event.again)} is made again"
+                tqdm.write(f"a process was lost ({event.reason}); {again}", file=sys.stderr)
 
 
-def _start(context: Any, bench: Bench[Any, Any, Any], settings: Any) -> _Worker:
+def _start(
+    context: Any, bench: Bench[Any, Any, Any], settings: Any, lost_by: tuple[type[Exception], ...]
+) -> _Worker:
     ours, theirs = context.Pipe()
-    process = context.Process(target=_work, args=(theirs, bench, settings), daemon=True)
+    process = context.Process(target=_work, args=(theirs, bench, settings, lost_by), daemon=True)
     process.start()
     theirs.close()
     return _Worker(process=process, connection=ours)
 
 
-def _give(worker: _Worker, waiting: deque[Any]) -> None:
-    worker.busy = bool(waiting)
-    if waiting:
-        try:
-            worker.connection.send(waiting.popleft())
-        except OSError:
-            pass  # it has just died; reading from it says so
+def _give(worker: _Worker, ticket: _Ticket) -> None:
+    worker.ticket, worker.n_told = ticket, 0
+    try:
+        worker.connection.send(ticket.job)
+    except OSError:
+        pass  # it has just died; reading from it says so
 
 
 def _hear(worker: _Worker) -> tuple[str, Any]:
@@ -110,18 +205,30 @@ def _hear(worker: _Worker) -> tuple[str, Any]:
         return worker.connection.recv()
     except (EOFError, OSError):
         worker.process.join(timeout=5)
-        return "error", (
-            f"a worker died (exit code {worker.process.exitcode}); what was finished is kept, run the same "
-            "command again, with fewer --workers if memory was short"
-        )
+        return "lost", f"exit code {worker.process.exitcode}"
 
 
-def _work(connection: Connection, bench: Bench[Any, Any, Any], settings: Any) -> None:
-    """A worker's life: receive a job, do it, say so."""
+def _end(workers: Sequence[_Worker]) -> None:
+    for worker in workers:
+        worker.process.terminate()
+    for worker in workers:
+        worker.process.join(timeout=5)
+        if worker.process.is_alive():
+            worker.process.kill()
+        worker.connection.close()
+
+
+def _work(
+    connection: Connection,
+    bench: Bench[Any, Any, Any],
+    settings: Any,
+    lost_by: tuple[type[Exception], ...],
+) -> None:
+    """A process's life: receive a job, do it, say so."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
-    threading.Thread(target=_leave_with_parent, daemon=True).start()
+    leave_with_parent()
     try:
-        os.environ.setdefault("LP_NUM_THREADS", "1")
+        use_one_core()
         with bench(settings) as work:
             while True:
                 for result in work(connection.recv()):
@@ -129,19 +236,12 @@ def _work(connection: Connection, bench: Bench[Any, Any, Any], settings: Any) ->
                 connection.send(("done", None))
     except (EOFError, BrokenPipeError):
         pass
+    except lost_by as error:
+        connection.send(("lost", str(error)))
     except MskgraspError as error:
         connection.send(("error", str(error)))
     except OSError as error:
         connection.send(("error", explain_os_error(error)))
     except Exception as error:
         traceback.print_exc()  # a defect: its place is wanted, once
-        connection.send(("error", f"a worker failed: {type(error).__name__}: {error}"))
-
-
-def _leave_with_parent() -> None:
-    """Ends this process when its parent is gone, however that ended."""
-    born_of = multiprocessing.parent_process()
-    parent = os.getppid() if born_of is None else born_of.pid
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)
+        connection.send(("error", f"a process failed: {type(error).__name__}: {error}"))

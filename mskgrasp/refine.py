@@ -6,13 +6,16 @@ import numpy as np
 import torch
 
 from mskgrasp.geometry import wrap_half_turn
-from mskgrasp.grasp import MAX_OPENING, PAD_REACH, PartView, lowest_grasp_z
+from mskgrasp.grasp import (
+    FINGER_HALF_WIDTH,
+    FINGER_THICKNESS,
+    MAX_OPENING,
+    PAD_REACH,
+    PartView,
+    lowest_grasp_z,
+)
 from mskgrasp.scoring import Scene
 
-FINGER_HALF_WIDTH = 0.011
-"""Of the widest of a finger's collision boxes, along the pads, metres (Panda hand)."""
-FINGER_THICKNESS = 0.026
-"""From a pad's face to the back of the finger, metres."""
 _STEP = 0.002
 _LEAST_SPREAD = np.array([0.0005, 0.0005, 0.0005, 0.01])
 """Metres and radians: the elite may be one grasp."""

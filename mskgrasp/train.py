@@ -17,12 +17,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from mskgrasp import cli
 from mskgrasp.config import read_config, write_config
 from mskgrasp.errors import UsageError
-from mskgrasp.metric_pictures import draw_uncertainty
 from mskgrasp.model_card import model_card
 from mskgrasp.models import DESCRIPTION, WEIGHTS, save_model
-from mskgrasp.pictures import draw_curves
 from mskgrasp.samples import Samples, read_samples
 from mskgrasp.training import LearningConfig, Reporter, split, train
+from mskgrasp.training_pictures import draw_curves, draw_uncertainty
 
 DEFAULT_CONFIG = Path(__file__).resolve().parents[1] / "configs" / "train" / "default.yaml"
 CHECKPOINT = "checkpoint.safetensors"

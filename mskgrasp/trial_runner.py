@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from hal import Cell, RgbdFrame, open_cell
+from hal.errors import HalError
 from mskgrasp.choosing import Candidates, Chooser
 from mskgrasp.errors import TapeDoesNotFit, UsageError
 from mskgrasp.lowess import Lowess
@@ -21,6 +23,7 @@ from mskgrasp.pictures import draw_plan
 from mskgrasp.plan import make_planner
 from mskgrasp.planner import GraspPlan, PlannerConfig
 from mskgrasp.predictors import LOWESS, LowessPredictor, NetworkPredictor, Predictor
+from mskgrasp.processes import results
 from mskgrasp.settings import Tape
 from mskgrasp.trial import Policy, Trial, clear, finish, run_trial, trial_key
 from mskgrasp.trial_files import trial_file, write_trial
@@ -163,12 +166,7 @@ class TrialRunner:
         picture = self._setup.out / "next.png"
         if self._operator.asks:
             draw_plan(frame, plan, picture)
-        x, y, z, theta = plan.grasp
-        return self._operator.may_move(
-            picture,
-            f"grasp at x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees, "
-            f"quality {plan.quality:.2f}",
-        )
+        return self._operator.may_move(picture, plan.summary)
 
     def _recover(self, reason: str) -> None:
         self._operator.recover(self._cell, reason)
@@ -176,6 +174,38 @@ class TrialRunner:
     def close(self) -> None:
         """Brings the arm home."""
         clear(self._cell, self._recover)
+
+
+Scene = tuple[TrialTask, ...]
+"""Trials that see the same: one process makes them, and looks at the scene once."""
+
+
+def run_trials(setup: Setup, scenes: Sequence[Scene], n_workers: int) -> Generator[Trial, None, None]:
+    """Makes the trials of scenes, each told of once its file lies there; closing it stops all.
+
+    What comes of a trial depends neither on the number of processes nor on which of them makes it. A trial
+    whose process dies, or whose simulated cell is lost, is made again by another.
+
+    Raises:
+        HalError: The one cell was lost; a real one may not be built again behind its operator's back.
+        WorkerFailed: A trial failed for a reason that trying again will not mend.
+    """
+    return results(
+        _trial_bench,
+        setup,
+        scenes,
+        n_workers,
+        name=lambda scene: f"trial {scene[0].key}",
+        rest=lambda scene, n_told: scene[n_told:] or None,
+        remedy="leave its part out with --parts",
+        lost_by=(HalError,),
+    )
+
+
+@contextmanager
+def _trial_bench(setup: Setup) -> Iterator[Callable[[Scene], Iterator[Trial]]]:
+    with trial_runner(setup) as runner:
+        yield lambda scene: chain.from_iterable(map(runner.run, scene))
 
 
 @contextmanager

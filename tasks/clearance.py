@@ -11,14 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mskgrasp.grasp import MAX_OPENING, PAD_REACH
+from mskgrasp.grasp import FINGER_HALF_WIDTH, FINGER_THICKNESS, MAX_OPENING, PAD_REACH, PALM_HEIGHT
 
-FINGER_HALF_WIDTH = 0.011
-"""Of the widest of a finger's collision boxes, along the pads, m."""
-FINGER_THICKNESS = 0.026
-"""From a pad's face to the back of the finger, m."""
-PALM_HEIGHT = 0.0374
-"""Of the hand's collision hull over the TCP, m."""
 MARGIN = 0.002
 """Between hand and part, m; the arm is placed at a pose to a hundredth of that."""
 

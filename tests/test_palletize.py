@@ -17,6 +17,7 @@ from hal import Cell, GraspResult, execute_grasp
 from hal.errors import CommunicationLost
 from hal.sim import SapienCellConfig, sapien_cell
 from mskgrasp.errors import BadModel, UsageError
+from mskgrasp.models import PRETRAINED
 from mskgrasp.operator import Operator, StoppedByOperator
 from mskgrasp.palletize import PalletizeConfig, main, palletize
 from mskgrasp.placement_trial import Placer, Task
@@ -28,8 +29,9 @@ from tests.browser import Page
 from tests.test_operator import REAL
 
 REPOSITORY = Path(__file__).parents[1]
-MODEL = REPOSITORY / "tests" / "sim_in_the_loop" / "model"
-PART = "u_bracket_60x35"
+PART = "t_nut_m16x18"
+TAPED = "u_bracket_60x35"
+"""Has room for two squares of tape."""
 
 
 @pytest.fixture(autouse=True)
@@ -41,7 +43,7 @@ def threads() -> Iterator[None]:
 
 def config(out: Path, **changes: object) -> PalletizeConfig:
     values: dict[str, object] = dict(
-        models=MODEL, out=out, parts=(PART,), trials=1, corrections=("none", "truth"),
+        models=PRETRAINED, out=out, parts=(PART,), trials=1, corrections=("none", "truth"),
         planner=PlannerConfig(n_candidates=100),
     )  # fmt: skip
     return PalletizeConfig(**(values | changes))  # type: ignore[arg-type]
@@ -63,7 +65,7 @@ def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_pa
     kept = (out / "trials.jsonl").read_text()
     assert len(kept.splitlines()) == 1
 
-    command = ["palletize", "--models", str(MODEL), "--out", str(out), "--parts", PART, "--trials", "1"]
+    command = ["palletize", "--models", str(PRETRAINED), "--out", str(out), "--parts", PART, "--trials", "1"]
     command += ["--corrections", "none", "truth", "--planner.n-candidates", "100"]
     monkeypatch.setattr("sys.argv", command)
     assert main() == 0
@@ -81,7 +83,7 @@ def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_pa
     assert none == pytest.approx(shift, abs=1.5e-3) and truth < 1.5e-3
 
     # A line lost, as by a kill, is made again to the same values.
-    (out / "trials.jsonl").write_text("\n".join(first.splitlines()[:1]) + '\n{"part": "u_br')
+    (out / "trials.jsonl").write_text("\n".join(first.splitlines()[:1]) + '\n{"part": "t_nu')
     report = palletize(config(out))
     assert [json.loads(line) for line in (out / "trials.jsonl").read_text().splitlines()] == lines
     assert report["corrections"]["truth"]["placed"] == 1
@@ -102,7 +104,7 @@ def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_pa
         (dict(target="0.9,0,0"), UsageError, r"the target at \(0.9, 0\) m .*outside the workspace"),
         (dict(parts=("no_such_part",)), UsageError, "no_such_part"),
         (dict(models=Path("no/model")), BadModel, "no/model"),
-        (dict(slots="small.yaml"), UsageError, rf"slot of 30 x 30 mm is smaller than {PART} \(60 x 45 mm\)"),
+        (dict(slots="small.yaml"), UsageError, rf"slot of 20 x 30 mm is smaller than {PART} \(28 x 28 mm\)"),
         (dict(slots="none.yaml"), UsageError, "cannot read configuration .*none.yaml"),
         (dict(cell="real.yaml"), UsageError, "standard input is no terminal"),
         (dict(cell="real.yaml", yes=True, workers=2), UsageError, "--workers 2: .* is one cell"),
@@ -110,7 +112,7 @@ def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_pa
     ],
 )  # fmt: skip
 def test_what_cannot_be_done_is_refused_before_anything_moves(tmp_path, monkeypatch, changes, error, message):
-    (tmp_path / "small.yaml").write_text("slots: [{x: 0.5, y: 0.2, size: [0.03, 0.03]}]")
+    (tmp_path / "small.yaml").write_text("slots: [{x: 0.5, y: 0.2, size: [0.02, 0.03]}]")
     (tmp_path / "real.yaml").write_text(yaml.safe_dump(REAL))
     monkeypatch.setattr("sys.stdin", io.StringIO())
     files = {name: tmp_path / value for name, value in changes.items() if name in ("slots", "cell")}
@@ -143,20 +145,20 @@ def test_a_cell_without_feeder_and_tracker_is_served_by_its_operator_and_measure
 ):
     """As on a real cell: asked before every motion, the error told by two squares of tape."""
     tape = Tape(large=0.012, small=0.008)
-    whole = sapien_cell(SapienCellConfig(type="sapien", part=PART, tape=tape, colour_scale=3))
+    whole = sapien_cell(SapienCellConfig(type="sapien", part=TAPED, tape=tape, colour_scale=3))
     monkeypatch.setattr(type(whole.arm), "simulated", False)
     cell = dataclasses.replace(whole, feeder=None, tracker=None)
     assert whole.feeder is not None and whole.tracker is not None
     feeder, tracker, prompts = whole.feeder, whole.tracker, io.StringIO()
-    hands = Hands(lambda: feeder.present(PART, 5), "\nn\ny\nyq")
+    hands = Hands(lambda: feeder.present(TAPED, 5), "\nn\ny\nyq")
     operator = Operator(cell, answers=hands, prompts=prompts)  # type: ignore[arg-type]
     task = Task(
-        part=PART, number=0, index=0, slot=Slot(x=0.52, y=0.05, theta=1.0), correction="predicted", seed=5,
+        part=TAPED, number=0, index=0, slot=Slot(x=0.52, y=0.05, theta=1.0), correction="predicted", seed=5,
         keep=False,
     )  # fmt: skip
     (tmp_path / "placements").mkdir()
     with cell.connected():
-        planner = make_planner(MODEL, PlannerConfig(n_candidates=100), cell)
+        planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=100), cell)
         placer = Placer(cell, planner, operator, tmp_path / "placements", tape=tape)
         placed = placer.run(task)
         true = tracker.part_pose()

@@ -1,7 +1,8 @@
 import cv2
 import numpy as np
 
-from mskgrasp.pictures import draw_contact_sheet, draw_curves
+from mskgrasp.pictures import draw_contact_sheet
+from mskgrasp.training_pictures import draw_curves
 from tests import synthetic
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from pathlib import Path
 
 import pytest
 
 from mskgrasp.errors import UsageError
-from mskgrasp.processes import WorkerFailed, spread
+from mskgrasp.processes import MAX_TRIES, Done, Lost, Told, WorkerFailed, results, spread
 
 
 @contextmanager
@@ -19,34 +20,73 @@ def bench(factor: int) -> Iterator[Callable[[int], Iterator[int]]]:
             os._exit(9)
         if job == -2:
             raise UsageError("no such thing")
+        if job == -3:
+            raise TimeoutError("the cell does not answer")
         yield factor * job
         yield os.getpid()
 
     yield work
 
 
+@contextmanager
+def counting(folder: Path) -> Iterator[Callable[[tuple[int, ...]], Iterator[int]]]:
+    """Dies after its first result, once."""
+
+    def work(job: tuple[int, ...]) -> Iterator[int]:
+        for number in job:
+            yield number
+            if not (folder / "died").exists():
+                (folder / "died").touch()
+                os._exit(9)
+
+    yield work
+
+
 def test_all_jobs_are_done_once_wherever():
-    alone = list(spread(bench, 3, range(1, 5), 1))
+    alone = list(results(bench, 3, range(1, 5), 1))
     assert alone == [3, os.getpid(), 6, os.getpid(), 9, os.getpid(), 12, os.getpid()]
-    several = list(spread(bench, 3, range(1, 5), 2))
+    several = list(results(bench, 3, range(1, 5), 2))
     pids = {value for value in several if value > 12}
     assert sorted(value for value in several if value <= 12) == [3, 6, 9, 12]
     assert len(several) == 8 and os.getpid() not in pids
+    assert list(results(bench, 3, [], 2)) == []
 
 
-def test_a_worker_that_dies_ends_the_run_in_one_line():
-    with pytest.raises(WorkerFailed, match=r"exit code 9.*kept.*--workers"):
-        list(spread(bench, 3, [1, -1], 2))
+def test_what_a_dead_process_has_not_told_is_done_again(tmp_path: Path):
+    jobs: list[tuple[int, ...]] = [(1, 2, 3)]
+    (job,), again = jobs, (2, 3)
+    events = list(spread(counting, tmp_path, jobs, 1, rest=lambda job, n: job[n:]))
+    assert events[:2] == [Told(job, 1), Lost(job, 1, again, "exit code 9")]
+    assert events[2:4] == [Told(again, 2), Told(again, 3)]
+    (last,) = events[4:]
+    assert isinstance(last, Done) and last.job == again
+
+
+def test_a_process_that_died_after_all_was_told_has_done_its_job(tmp_path: Path):
+    events = list(spread(counting, tmp_path, [(1,)], 1, rest=lambda job, n: job[n:] or None))
+    assert events[0] == Told((1,), 1) and isinstance(events[1], Done) and len(events) == 2
+
+
+def test_a_job_that_every_process_dies_of_ends_the_run_in_one_line(capfd: pytest.CaptureFixture[str]):
+    with pytest.raises(WorkerFailed, match=rf"job -1 could not .*{MAX_TRIES} fresh.*exit code 9.*--workers"):
+        list(results(bench, 3, [1, -1], 2, name=lambda job: f"job {job}"))
+    assert capfd.readouterr().err.count("job -1 is made again") == MAX_TRIES - 1
 
 
 def test_a_worker_that_fails_says_why():
     with pytest.raises(WorkerFailed, match="no such thing"):
-        list(spread(bench, 3, [1, -2], 2))
+        list(results(bench, 3, [1, -2], 2))
+
+
+def test_what_a_fresh_process_may_mend_is_tried_again(capfd: pytest.CaptureFixture[str]):
+    with pytest.raises(WorkerFailed, match="the cell does not answer"):
+        list(results(bench, 3, [1, -3], 2, lost_by=(TimeoutError,)))
+    assert capfd.readouterr().err.count("-3 is made again") == MAX_TRIES - 1
 
 
 def test_whoever_closes_the_iterator_ends_the_workers():
-    with closing(spread(bench, 3, list(range(1, 20)), 2)) as results:
-        seen = [next(results), next(results)]
+    with closing(results(bench, 3, list(range(1, 20)), 2)) as found:
+        seen = [next(found), next(found)]
     pid = max(seen)
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)

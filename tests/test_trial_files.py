@@ -11,7 +11,7 @@ import pytest
 
 from hal.camera import RgbdFrame
 from mskgrasp.errors import BadDataset, UsageError
-from mskgrasp.models import load_models
+from mskgrasp.models import PRETRAINED, load_models
 from mskgrasp.planner import Planner, PlannerConfig
 from mskgrasp.runs import TRIALS, append, read
 from mskgrasp.stored_trials import draw_trial, find_trial
@@ -19,8 +19,6 @@ from mskgrasp.trial import Prediction, Trial
 from mskgrasp.trial_files import read_trial, trial_file, write_trial
 from tests import synthetic
 from tests.test_outcomes import trial
-
-MODEL = Path(__file__).parent / "sim_in_the_loop" / "model"
 
 
 def seen() -> RgbdFrame:
@@ -35,7 +33,10 @@ def seen() -> RgbdFrame:
 
 def stored(run: Path, one: Trial) -> tuple[RgbdFrame, object]:
     planner = Planner(
-        load_models(MODEL), PlannerConfig(n_candidates=50), table_z=synthetic.TABLE_Z, region=synthetic.REGION
+        load_models(PRETRAINED),
+        PlannerConfig(n_candidates=50),
+        table_z=synthetic.TABLE_Z,
+        region=synthetic.REGION,
     )
     frame = seen()
     plan = planner.plan(frame, np.random.default_rng(0))

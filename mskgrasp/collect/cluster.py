@@ -20,11 +20,13 @@ from typing import TYPE_CHECKING, Any
 from mskgrasp.cli import explain_os_error
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.work import ShardTask, versions
-from mskgrasp.collect.workers import MAX_TRIES, Finished, Lost, Progress, WorkerFailed, use_one_core
-from mskgrasp.dataset import shard_path, write_shard
+from mskgrasp.collect.workers import Finished, Lost, Progress
+from mskgrasp.cores import use_one_core
+from mskgrasp.dataset import shard_path
 from mskgrasp.errors import MskgraspError, UsageError
 from mskgrasp.parts import Part
 from mskgrasp.parts.store import pack_part, receive_part
+from mskgrasp.processes import MAX_TRIES, WorkerFailed
 
 if TYPE_CHECKING:
     from mskgrasp.collect.shard import Simulator
@@ -252,10 +254,8 @@ def _make_shard(part: PackedPart, job: Job, task: ShardTask) -> Made:
     try:
         simulator = _ready(job)
         folder = receive_part(part.name, part.content_hash, part.files).folder
-        outcomes: list[int] = []
-        attempts, info = simulator.run(replace(task, folder=str(folder)), outcomes.append)
-        write_shard(shard_path(job.config.out, task.part, task.index), attempts, info)
-        return Made(worker=worker, outcomes=tuple(outcomes))
+        outcomes = tuple(simulator.write(replace(task, folder=str(folder)), job.config.out))
+        return Made(worker=worker, outcomes=outcomes)
     except MskgraspError as error:
         return Made(worker=worker, error=str(error))
     except OSError as error:

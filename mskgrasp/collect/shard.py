@@ -5,7 +5,8 @@ from __future__ import annotations
 import gc
 import zlib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Generator, Iterator
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -13,7 +14,7 @@ import numpy as np
 import torch
 
 from mskgrasp.collect.work import ShardTask, versions
-from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, u16_to_depth
+from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, u16_to_depth, write_shard
 from mskgrasp.errors import NoPartFound
 from mskgrasp.grasp import MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.images import view_part
@@ -58,12 +59,16 @@ class Simulator:
         assert isinstance(env, GraspDisplacementEnv)
         return env
 
-    def run(self, task: ShardTask, report: Callable[[int], None]) -> tuple[Attempts, ShardInfo]:
-        """Makes the attempts of a shard.
+    def write(self, task: ShardTask, dataset: Path) -> Iterator[int]:
+        """Makes a shard and writes it into a dataset's folder; yields as `run`."""
+        attempts, info = yield from self.run(task)
+        write_shard(shard_path(dataset, task.part, task.index), attempts, info)
 
-        Args:
-            task: Which ones.
-            report: Called after each with 1 for a success, 0 for a failure and -1 for a discarded one.
+    def run(self, task: ShardTask) -> Generator[int, None, tuple[Attempts, ShardInfo]]:
+        """Makes the attempts of a shard and returns them.
+
+        Yields:
+            After each 1 for a success, 0 for a failure and -1 for a discarded one.
         """
         env = self._load(task.folder)
         part = env.parts[0]
@@ -75,17 +80,17 @@ class Simulator:
             depth, grasp = draw_attempt(env, task.part, task.seed, attempt)
             if grasp is None:
                 discarded["part_not_seen"] += 1
-                report(-1)
+                yield -1
                 continue
             outcome = env.try_grasp(torch.as_tensor(grasp, device=env.device))
             row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
             reason = impossible(outcome, row)
             if reason:
                 discarded[reason] += 1
-                report(-1)
+                yield -1
                 continue
             rows.append(dict(row, depth=depth, grasp=grasp[0]))
-            report(int(row["success"]))
+            yield int(row["success"])
         attempts = _stack(rows, (self._camera.n_pixels, self._camera.n_pixels))
         info = ShardInfo(
             part=part.name,

@@ -50,6 +50,7 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
                 "displacement_layers": (16, 32),
             }
         ),
+        "quality with half the channels at first": with_(network={"layers": (8, 32)}),
         "half the channels": with_(network={"layers": (8, 16), "displacement_layers": (8, 16, 16)}),
         "twice the channels": with_(network={"layers": (32, 64), "displacement_layers": (32, 64, 64)}),
         "no half turns and mirror images": with_(symmetric=False),
@@ -68,6 +69,9 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True, help="dataset folder")
     parser.add_argument("--gqn-epochs", type=int, default=8)
     parser.add_argument("--gdn-epochs", type=int, default=16)
+    parser.add_argument(
+        "--share", type=float, default=1.0, help="of the attempts to learn from; the paper's network is slow"
+    )
     parser.add_argument("--only", nargs="*", help="words that a choice's name must hold one of")
     options = parser.parse_args()
     torch.set_num_threads(min(2, os.cpu_count() or 1))
@@ -89,7 +93,7 @@ def main() -> None:
         look = (*config.network.patch_shape, config.network.patch_side)
         if look not in known:
             known[look] = read_samples(options.data, config.network).of_parts_between(*config.success_range)
-        found[name] = score(known[look], config)
+        found[name] = score(known[look], config, options.share)
         Console(width=150, stderr=True).print(name, found[name])
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("choice")
@@ -101,10 +105,12 @@ def main() -> None:
     print(json.dumps(found))
 
 
-def score(samples: Samples, config: LearningConfig) -> dict[str, float]:
-    """Metrics of freshly trained networks on the validation parts."""
+def score(samples: Samples, config: LearningConfig, share: float) -> dict[str, float]:
+    """Metrics on the validation parts of networks freshly trained on a share of the others."""
     sides = split(samples, config)
-    sides = Sides(training=sides.training, validation=sides.validation, test=sides.test[:0])
+    drawn = torch.randperm(len(sides.training), generator=torch.Generator().manual_seed(0))
+    training = sides.training[drawn[: round(share * len(drawn))].sort().values]
+    sides = Sides(training=training, validation=sides.validation, test=sides.test[:0])
     with tempfile.TemporaryDirectory() as folder:
         models, _ = train(samples, config, checkpoint_path=Path(folder) / "checkpoint", sides=sides)
     gqn, gdn = models.meta.metrics["gqn"], models.meta.metrics["gdn"]

@@ -35,7 +35,6 @@ from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.shard import Simulator, draw_attempt
 from mskgrasp.collect.work import ShardTask
 from mskgrasp.collect.workers import Progress, make_shards
-from mskgrasp.dataset import write_shard
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import PAD_REACH
 from mskgrasp.parts import Part, find_part, starter_names
@@ -206,9 +205,7 @@ class Ours:
         """A shard of n attempts, written; how many of them lifted the part."""
         task = ShardTask(part=part.name, folder=str(part.folder), index=0, first=0, n=n, seed=0)
         with tempfile.TemporaryDirectory() as folder:
-            attempts, info = self.simulator.run(task, lambda _: None)
-            write_shard(Path(folder) / "shard.h5", attempts, info)
-        return int(attempts.success.sum())
+            return sum(outcome == 1 for outcome in self.simulator.write(task, Path(folder)))
 
 
 def throughput(parts: list[Part], shards: int, workers: int) -> dict[str, float]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from mskgrasp.dataset import read_shard
 from mskgrasp.dataset.check import check_dataset
@@ -107,6 +108,7 @@ def has_worker(pid: int) -> bool:
     return False
 
 
+@pytest.mark.slow
 def test_kills_lose_no_shard_and_change_no_byte(collected, tmp_path):
     lives = [Life(out=tmp_path / name / "data", seed=seed) for seed, name in enumerate("ab")]
     with ThreadPoolExecutor(2) as pool:

@@ -83,7 +83,7 @@ def nudge(arm: Arm) -> None:
     arm.move_to_joints(here + np.array([-0.05 if here[0] > 0 else 0.05, *np.zeros(6)]), speed=1.0)
 
 
-@pytest.fixture(scope="module", params=["franky", "panda_py"])
+@pytest.fixture(scope="module", params=["franky", pytest.param("panda_py", marks=pytest.mark.slow)])
 def driver(request: pytest.FixtureRequest) -> DriverName:
     return request.param
 

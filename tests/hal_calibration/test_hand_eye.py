@@ -82,6 +82,7 @@ def test_wherever_the_camera_hangs_it_is_found(x, y, z, lean):
     assert errors(found, camera) == pytest.approx((0, 0), abs=1e-2)
 
 
+@pytest.mark.slow
 def test_a_tenth_of_a_pixel_of_noise_leaves_less_than_a_millimetre_and_a_tenth_of_a_degree():
     millimetres, degrees = zip(
         *(errors(solve_hand_eye(BOARD, views_of(hand_poses(24, 30, s), 0.1, s))) for s in range(4)),

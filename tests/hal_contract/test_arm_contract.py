@@ -55,7 +55,10 @@ def backend(name: str, folder: Path) -> AbstractContextManager[Path]:
     return serve()
 
 
-@pytest.fixture(params=["sapien", "franky", "panda_py", "replay"], scope="module")
+PANDA_PY = pytest.param("panda_py", marks=pytest.mark.slow)
+
+
+@pytest.fixture(params=["sapien", "franky", PANDA_PY, "replay"], scope="module")
 def name(request: pytest.FixtureRequest) -> str:
     return request.param
 
@@ -162,7 +165,7 @@ def test_a_straight_motion_arrives(cell: Cell, theta: float):
     assert distance < POSITION_TOLERANCE and angle < ROTATION_TOLERANCE
 
 
-@pytest.mark.parametrize("name", ["franky", "panda_py"], indirect=True, scope="module")
+@pytest.mark.parametrize("name", ["franky", PANDA_PY], indirect=True, scope="module")
 def test_a_straight_motion_is_straight(cell: Cell):
     """Measured on the way, from another thread, while the arm moves; SAPIEN's has its own test."""
     begin, target = cell.arm.state().T_base_tcp.position, over_the_table()

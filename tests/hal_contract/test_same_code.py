@@ -17,12 +17,11 @@ from hal import Cell, cell_from_yaml, execute_grasp, go_home
 from hal.arm import POSITION_TOLERANCE, ROTATION_TOLERANCE, Arm
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import MAX_OPENING, pose_base_tcp
-from mskgrasp.models import load_models
+from mskgrasp.models import PRETRAINED, load_models
 from mskgrasp.planner import Planner, PlannerConfig
 from tests.franka.robots import franky_sim, write_cell
 from tests.hal_contract.conftest import CELLS
 
-MODEL = Path(__file__).parents[1] / "sim_in_the_loop" / "model"
 PART, SEED = "hex_nut_m30", 5
 PLACE = np.array([0.45, -0.1])
 """Where the part is put down, base frame, m."""
@@ -66,7 +65,7 @@ def pick_and_place(cell: Cell, planner: Planner) -> np.ndarray:
 
 def test_the_same_program_sends_the_same_commands_to_both_arms(tmp_path: Path, monkeypatch):
     torch.manual_seed(0)
-    models = load_models(MODEL)
+    models = load_models(PRETRAINED)
     told, grasps = [], []
     planner = None
     with franky_sim() as robot:

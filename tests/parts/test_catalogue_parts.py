@@ -22,7 +22,7 @@ from mskgrasp.parts.measure import oblongness
 ONCE_A_FAMILY = {recipe_of(name).family: name for name in reversed(builtin_names())}
 
 
-FAMILIES = int(os.environ.get("MSKGRASP_FAMILIES", "2"))
+FAMILIES = int(os.environ.get("MSKGRASP_FAMILIES", "1"))
 """Of every module that draws parts, how many families are built; 99 for all."""
 
 

@@ -142,3 +142,21 @@ def test_a_sliver_is_taken_up_by_its_neighbour_instead_of_being_cut_to_pieces():
     mesh = trimesh.creation.box(bounds=[[0, 0, 0], [60, 30, 20]])
     assert len(decompose._stout(pieces)) > 3
     assert len(decompose._join(MeshSurface(mesh), pieces, 0.7, 1.1, finish=decompose._stout)) == 1
+
+
+def test_a_fit_that_stops_early_decides_as_the_whole_fit_does():
+    mesh = mesh_of(angle_body())
+    surface = MeshSurface(mesh)
+    for pieces in (convex_pieces(mesh), [np.asarray(mesh.vertices)], [s.box(0, 50, 0, 8.5, 0, 30)]):
+        whole = surface.fit(pieces)
+        assert surface.outward_largest(pieces) == whole.outward_largest
+        for most_p95 in (whole.p95 - 1e-6, whole.p95 + 1e-6):
+            for most_ratio in (1.05, 4.0):
+                for most_outward in (whole.outward_largest - 1e-6, whole.outward_largest + 1e-6):
+                    found = surface.fit_within(pieces, most_p95, most_ratio, most_outward)
+                    kept = (
+                        whole.p95 <= most_p95
+                        and 1 / most_ratio <= whole.volume_ratio <= most_ratio
+                        and whole.outward_largest <= most_outward
+                    )
+                    assert found == (whole if kept else None)

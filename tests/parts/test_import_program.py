@@ -179,6 +179,7 @@ def fine_pin(file: Path, radius: float = 8.0, length: float = 60.0, sides: int =
     file.write_bytes(bytes(80) + struct.pack("<I", len(faces)) + record.tobytes())
 
 
+@pytest.mark.slow
 def test_two_million_triangles_become_a_part_in_bounded_time_and_memory(program, tmp_path, own_cache):
     fine_pin(tmp_path / "pin.stl")
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime

@@ -20,22 +20,14 @@ from mskgrasp.errors import BadDataset, UsageError
 from mskgrasp.files import write_whole
 from mskgrasp.geometry import wrap_angle
 from mskgrasp.metrics import bootstrap_interval
+from mskgrasp.models import PRETRAINED
 from mskgrasp.palletize import PalletizeConfig, palletize
 from mskgrasp.placements import Placement
 from mskgrasp.runs import TRIALS, file_digest, read
+from tests.sim_in_the_loop.record import PARTS
 
 HERE = Path(__file__).parent
 STORED = HERE / "regression.json"
-MODEL = HERE / "model"
-PARTS = (
-    "hex_bolt_m12x60",
-    "hinge_60x30",
-    "parallel_key_b20x12x80",
-    "stepped_shaft_28x95",
-    "t_nut_m16x18",
-    "washer_m36",
-)
-"""Which the model has never seen."""
 LEVEL = 0.99
 """Of confidence: one false alarm in a hundred runs and figure."""
 
@@ -67,7 +59,7 @@ def main() -> int:
         RegressionConfig, prog="python -m tests.sim_in_the_loop.regression", description=DESCRIPTION
     )
     rows = run_set(config)
-    weights = file_digest(MODEL / "model.safetensors")[:16]
+    weights = file_digest(PRETRAINED / "model.safetensors")[:16]
     worse = False
     if STORED.exists():
         stored = json.loads(STORED.read_text(encoding="utf-8"))
@@ -89,7 +81,7 @@ def main() -> int:
 def run_set(config: RegressionConfig) -> list[Row]:
     """Makes the trials, and what is compared of each."""
     settings = PalletizeConfig(
-        models=MODEL, out=config.out, parts=PARTS, trials=config.trials, corrections=("none", "predicted"),
+        out=config.out, parts=PARTS, trials=config.trials, corrections=("none", "predicted"),
         workers=config.workers,
     )  # fmt: skip
     palletize(settings)

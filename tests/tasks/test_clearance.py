@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from mskgrasp.grasp import PAD_REACH
-from tasks.clearance import FINGER_HALF_WIDTH, FINGER_THICKNESS, MARGIN, PALM_HEIGHT, hand_clearance
+from mskgrasp.grasp import FINGER_HALF_WIDTH, FINGER_THICKNESS, PAD_REACH, PALM_HEIGHT
+from tasks.clearance import MARGIN, hand_clearance
 from tasks.kinematics import top_down
 
 FIELDS = ("success", "failure", "displacement", "tilt")

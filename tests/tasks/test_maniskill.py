@@ -84,6 +84,7 @@ def test_record_episode_writes_a_trajectory(boxes, tmp_path):
         assert file["traj_0/env_states/actors/part"].shape == (2, 13)
 
 
+@pytest.mark.slow
 def test_maniskills_demo_finds_and_runs_the_task():
     command = [sys.executable, "-m", "mani_skill.examples.demo_random_action"]
     command += ["-e", "tasks:GraspDisplacement-v1", "--quiet", "-o", "state", "--render-mode", "none"]

@@ -36,6 +36,7 @@ def outcomes(n: int = 200, **changes: np.ndarray) -> Outcomes:
     return dataclasses.replace(plain, **changes)
 
 
+@pytest.mark.slow
 def test_a_coarse_simulation_fails():
     told: list[Check] = []
     coarse = Physics(rate_hz=100, position_iterations=4)

@@ -1,13 +1,15 @@
-"""Whether a model knows what it does not know, to look at."""
+"""How a training went, and whether the model knows what it does not know, to look at."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 import torch
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from mskgrasp import metrics
 from mskgrasp.geometry import wrap_angle
@@ -19,6 +21,7 @@ from mskgrasp.validation import AXES, predict_grasp_displacement, predict_qualit
 
 _COLOURS = ("#1f6feb", "#e8590c", "#8b909a", "#2b8a3e")
 _BINS = 12
+_MM = 1e3
 
 
 def draw_uncertainty(models: Models, samples: Samples, rows: torch.Tensor, path: Path) -> None:
@@ -99,3 +102,60 @@ def _error_over_deviation(
     axes.legend(frameon=False)
     for axis in (axes.xaxis, axes.yaxis):
         axis.label.set_color(INK)
+
+
+def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Path) -> None:
+    """Draws losses and validation metrics by epoch, beside predictors that learned nothing.
+
+    Args:
+        history: One row an epoch, as `mskgrasp.training.train` returns them.
+        report: The final metrics, with the trivial predictors' errors.
+        path: Where the picture goes.
+    """
+    with matplotlib.rc_context({**STYLE, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = make_figure(11.5, 6.0)
+        panels = figure.subplots(2, 3)
+        for line, name in zip(panels, ("gqn", "gdn"), strict=True):
+            rows = [row for row in history if row["stage"] == name]
+            _curve(line[0], rows, "train_loss", "training (with noise and dropout)", FAINT)
+            _curve(line[0], rows, "validation_loss", "parts never seen", _COLOURS[0])
+            line[0].set(title=f"{name.upper()} loss", xlabel="epoch")
+            line[0].legend(frameon=False, fontsize=8)
+        gqn, gdn = report["gqn"], report["gdn"]
+        rows = [row for row in history if row["stage"] == "gqn"]
+        _curve(panels[0, 1], rows, "auroc", "parts never seen", _COLOURS[0])
+        panels[0, 1].axhline(0.5, color=FAINT, lw=1, ls="--", label="guessing")
+        panels[0, 1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.3, 1.02))
+        panels[0, 1].legend(frameon=False, fontsize=8, loc="lower right")
+        bars = {
+            "network": (gqn["brier"], _COLOURS[0]),
+            "base rate": (gqn["brier_of_base_rate"], FAINT),
+        }
+        panels[0, 2].bar(
+            list(bars), [v for v, _ in bars.values()], color=[c for _, c in bars.values()], width=0.5
+        )
+        panels[0, 2].set(title="Success: Brier score, less is better")
+        for place, (value, _) in enumerate(bars.values()):
+            panels[0, 2].text(place, value, f"{value:.3f}", ha="center", va="bottom")
+        rows = [row for row in history if row["stage"] == "gdn"]
+        for axes, key, unit, factor in (
+            (panels[1, 1], "translation_rmse", "mm", _MM),
+            (panels[1, 2], "rotation_rmse", "degrees", float(np.degrees(1.0))),
+        ):
+            _curve(axes, rows, key, "parts never seen", _COLOURS[0], factor)
+            for style, other in (("--", "zero_displacement"), (":", "training_mean")):
+                axes.axhline(
+                    gdn[other][key] * factor, color=FAINT, lw=1.2, ls=style, label=other.replace("_", " ")
+                )
+            axes.set(title=f"Displacement: {key.split('_')[0]} RMSE, {unit}", xlabel="epoch")
+            axes.set_ylim(bottom=0)
+            axes.legend(frameon=False, fontsize=8)
+        figure.savefig(path)
+
+
+def _curve(
+    axes: Axes, rows: list[dict[str, Any]], key: str, label: str, colour: str, factor: float = 1.0
+) -> None:
+    values = [row[key] * factor for row in rows]
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.plot([row["epoch"] for row in rows], values, color=colour, lw=1.8, label=label, marker="o", ms=3)
