@@ -40,7 +40,7 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
     return {
         "ours": ours,
         "the paper's network, trained as ours": ours.model_copy(update={"network": paper}),
-        "quality sees all pixels": with_(network={"quality_stride": 1, "layers": (16, 32, 32)}),
+        "quality sees all pixels": with_(network={"quality_stride": 1, "layers": (8, 32, 32)}),
         "displacement sees every second pixel": with_(
             network={
                 "patch_pixels": 33,
@@ -50,9 +50,9 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
                 "displacement_layers": (16, 32),
             }
         ),
-        "quality with half the channels at first": with_(network={"layers": (8, 32)}),
-        "half the channels": with_(network={"layers": (8, 16), "displacement_layers": (8, 16, 16)}),
-        "twice the channels": with_(network={"layers": (32, 64), "displacement_layers": (32, 64, 64)}),
+        "quality with twice the channels at first": with_(network={"layers": (16, 32)}),
+        "half the channels": with_(network={"layers": (4, 16), "displacement_layers": (8, 16, 16)}),
+        "twice the channels": with_(network={"layers": (16, 64), "displacement_layers": (32, 64, 64)}),
         "no half turns and mirror images": with_(symmetric=False),
         "plain likelihood (beta 0)": with_(beta=0.0),
         "beta 1": with_(beta=1.0),
@@ -72,7 +72,7 @@ def main() -> None:
     parser.add_argument(
         "--share", type=float, default=1.0, help="of the attempts to learn from; the paper's network is slow"
     )
-    parser.add_argument("--only", nargs="*", help="words that a choice's name must hold one of")
+    parser.add_argument("--only", nargs="*", help="how the names of the wanted choices begin")
     options = parser.parse_args()
     torch.set_num_threads(min(2, os.cpu_count() or 1))
     ours = read_config(LearningConfig, REPOSITORY / "configs" / "train" / "default.yaml")
@@ -85,7 +85,7 @@ def main() -> None:
     chosen = {
         name: config
         for name, config in variants(ours).items()
-        if not options.only or any(word in name for word in options.only)
+        if not options.only or name.startswith(tuple(options.only))
     }
     known: dict[tuple[int, int, float], Samples] = {}
     found = {}
