@@ -35,6 +35,8 @@ class NetworkConfig(Config):
     """False: the displacement network predicts the mean alone (the paper's GCIP-M)."""
     quality_stride: int = Field(default=1, ge=1, le=8)
     """hand: the quality network sees every so many-th pixel: it has thousands of grasps to look at."""
+    quality_columns: int | None = Field(default=None, ge=4, le=256)
+    """hand: so many of these across the closing direction; null: all that the patch has."""
     layers: tuple[int, ...] = Field(default=(16, 32), min_length=1, max_length=6)
     """hand: channels of the quality network's convolutions, each of which halves the picture."""
     displacement_layers: tuple[int, ...] = Field(default=(16, 32, 32), min_length=1, max_length=6)
@@ -56,8 +58,13 @@ class NetworkConfig(Config):
             raise ValueError("image: object needs architecture: patch")
         if self.architecture == "patch" and self.quality_stride != 1:
             raise ValueError("architecture: patch shows all pixels to both networks; quality_stride is 1")
+        if self.architecture == "patch" and self.quality_columns is not None:
+            raise ValueError("architecture: patch shows both networks all; leave quality_columns away")
         if any((pixels - 1) % self.quality_stride for pixels in self.patch_shape):
             raise ValueError("the patch's middle must be a pixel that quality_stride leaves")
+        spare = -(-self.patch_shape[1] // self.quality_stride) - self.quality_shape[1]
+        if spare < 0 or spare % 2:
+            raise ValueError("quality_columns must leave as many columns of the patch on either side")
         if not all(0 < width <= 512 for width in (*self.layers, *self.displacement_layers)):
             raise ValueError("layers: channels must be between 1 and 512")
         return self
@@ -70,8 +77,8 @@ class NetworkConfig(Config):
     @property
     def quality_shape(self) -> tuple[int, int]:
         """The same of what the quality network sees."""
-        rows, columns = self.patch_shape
-        return -(-rows // self.quality_stride), -(-columns // self.quality_stride)
+        rows, columns = (-(-pixels // self.quality_stride) for pixels in self.patch_shape)
+        return rows, self.quality_columns or columns
 
     @property
     def pixel(self) -> float:

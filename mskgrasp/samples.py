@@ -60,9 +60,16 @@ class Samples:
     def __len__(self) -> int:
         return len(self.success)
 
-    def patches_of(self, rows: Tensor, device: torch.device | str, stride: int = 1) -> Tensor:
-        """Patches (n, 1, r, c) of some rows in metres on a device, every ``stride``-th pixel of them."""
-        return self.patches[rows, :, ::stride, ::stride].to(device).float() * HEIGHT_STEP
+    def patches_of(self, rows: Tensor, device: torch.device | str) -> Tensor:
+        """Patches (n, 1, r, c) of some rows in metres on a device."""
+        return self.patches[rows].to(device).float() * HEIGHT_STEP
+
+    def quality_patches_of(self, rows: Tensor, device: torch.device | str, network: NetworkConfig) -> Tensor:
+        """What the quality network sees of some rows, (n, 1, r, c) metres."""
+        stride, columns = network.quality_stride, network.quality_shape[1]
+        spare = (-(-self.patches.shape[-1] // stride) - columns) // 2
+        coarse = self.patches[rows, :, ::stride, spare * stride :: stride][..., :columns]
+        return coarse.to(device).float() * HEIGHT_STEP
 
     def displacement_patches_of(self, rows: Tensor, device: torch.device | str) -> Tensor:
         """What the displacement network sees of some rows, (n, 1, r, c) metres."""

@@ -244,7 +244,7 @@ class Stage:
         """
         s, device = self.samples, self.models.device
         if self.name == "gqn":
-            patches = s.patches_of(rows, device, self.config.network.quality_stride)
+            patches = s.quality_patches_of(rows, device, self.config.network)
         else:
             patches = s.displacement_patches_of(rows, device)
         centre = s.centre_grasp[rows].to(device)

@@ -30,7 +30,7 @@ def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.
     """Predicted probabilities of success (n,)."""
     pieces = [
         models.quality(
-            samples.patches_of(r, models.device, models.meta.network.quality_stride),
+            samples.quality_patches_of(r, models.device, models.meta.network),
             samples.centre_grasp[r].to(models.device),
             samples.height[r].to(models.device),
         )

@@ -128,14 +128,17 @@ def test_our_network_sees_what_the_hand_would_meet():
         {"patch_columns": 8},
         {"architecture": "hand", "layers": (0,)},
         {"quality_stride": 3},
+        {"quality_columns": 17},
+        {"architecture": "hand", "patch_pixels": 33, "quality_columns": 16},
+        {"architecture": "hand", "patch_pixels": 33, "quality_columns": 35},
     ):
-        with pytest.raises(ValueError, match="needs|channels|all pixels"):
+        with pytest.raises(ValueError, match="needs|channels|all pixels|quality_columns"):
             NetworkConfig(**wrong)
 
 
-def test_the_quality_network_sees_every_second_pixel_of_the_same_place():
+def test_the_quality_network_sees_every_second_pixel_of_the_middle_of_the_same_place():
     network = NetworkConfig(
-        architecture="hand", patch_pixels=33, patch_columns=17, patch_side=0.066, quality_stride=2
+        architecture="hand", patch_pixels=33, patch_side=0.066, quality_stride=2, quality_columns=9
     )
     assert network.quality_shape == (17, 9)
     box = synthetic.Box(x=0.45, y=0.02, yaw=0.4, size=(0.07, 0.02, 0.03))
@@ -144,7 +147,8 @@ def test_the_quality_network_sees_every_second_pixel_of_the_same_place():
     scene = Scene.of(frame, view, 0.0, torch.device("cpu"))
     grasps = np.array([[0.46, 0.01, 0.02, 0.3]])
     whole, coarse = scene.crop(grasps, network), scene.crop_for_quality(grasps, network)
-    assert torch.allclose(whole[..., ::2, ::2], coarse, atol=1e-6)
+    assert whole.shape == (1, 1, 33, 33) and coarse.shape == (1, 1, 17, 9)
+    assert torch.allclose(whole[..., ::2, 8:25:2], coarse, atol=1e-6)
 
 
 def test_noise_has_its_deviation_and_comes_from_the_generator_alone():

@@ -319,9 +319,9 @@ HAND = CONFIG.model_copy(
         "network": NetworkConfig(
             architecture="hand",
             patch_pixels=33,
-            patch_columns=17,
             patch_side=0.132,
             quality_stride=2,
+            quality_columns=9,
             layers=(8, 8),
             displacement_layers=(8, 16),
             trunk_width=32,
@@ -338,7 +338,10 @@ HAND = CONFIG.model_copy(
 def test_our_network_learns_and_its_intervals_hold_what_they_say(tmp_path):
     dataset = synthetic.write_dataset(tmp_path, n_parts=8, n_attempts=250, seed=1)
     samples = read_samples(dataset, HAND.network)
-    assert samples.patches.shape == (2000, 1, 33, 17) and samples.patches.dtype == torch.int16
+    assert samples.patches.shape == (2000, 1, 33, 33) and samples.patches.dtype == torch.int16
+    rows = torch.tensor([3, 5])
+    seen = samples.quality_patches_of(rows, "cpu", HAND.network)
+    assert torch.equal(seen, samples.patches_of(rows, "cpu")[..., ::2, 8:25:2])
     models, _ = learn(samples, HAND, checkpoint_path=tmp_path / "checkpoint")
     report, found = models.meta.metrics, models.meta.calibration
     assert report["gqn"]["auroc"] > 0.85

@@ -41,6 +41,9 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         "ours": ours,
         "the paper's network, trained as ours": ours.model_copy(update={"network": paper}),
         "quality sees all pixels": with_(network={"quality_stride": 1, "layers": (8, 32, 32)}),
+        "displacement sees as far across as along": with_(
+            network={"patch_columns": None, "quality_columns": 17}
+        ),
         "displacement sees every second pixel": with_(
             network={
                 "patch_pixels": 33,
