@@ -32,27 +32,16 @@ class HandContacts:
 
     def hand_force(self) -> Tensor:
         """(n,) largest net contact force on the hand or a finger, N."""
-        return self._link_forces().norm(dim=-1).amax(dim=-1)
-
-    def arm_force(self) -> Tensor:
-        """(n,) what all contacts of hand and fingers together exert on the arm, N.
-
-        The grip on a part is none of it: one finger's force is the other's. PhysX tells no friction, so that
-        neither is the weight of what is held.
-        """
-        return self._link_forces().sum(dim=1).norm(dim=-1)
-
-    def _link_forces(self) -> Tensor:
-        """(n, links, 3) net contact force on the hand and each finger, N."""
         if self._gpu:
-            return self._agent.robot.get_net_contact_forces(HAND_LINKS)
-        total = np.zeros((len(self._hand), 3))
+            return self._agent.robot.get_net_contact_forces(HAND_LINKS).norm(dim=-1).amax(dim=-1)
+        total: dict[int, np.ndarray] = {}
         for contact in self._scene.px.get_contacts():
             for sign, body in zip((1.0, -1.0), contact.bodies, strict=True):
                 for i, entity in enumerate(self._hand):
                     if body.entity == entity:
-                        total[i] += sign * _impulse(contact)
-        return torch.tensor(total[None] / self._scene.px.timestep, dtype=torch.float32)
+                        total[i] = total.get(i, 0.0) + sign * _impulse(contact)
+        largest = max((float(np.linalg.norm(v)) for v in total.values()), default=0.0)
+        return torch.tensor([largest / self._scene.px.timestep])
 
     def pads_on_part(self) -> tuple[Tensor, Tensor]:
         """Grip on the part.

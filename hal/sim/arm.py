@@ -39,7 +39,7 @@ class SapienArm(Arm):
         super().__init__(limits)
         self._world = world
         self._open = False
-        self._holding = False
+        self._force = 0.0
 
     def connect(self) -> None:
         """Builds the world, if the camera has not."""
@@ -96,20 +96,23 @@ class SapienArm(Arm):
 
     def _follow(self, path: Tensor) -> None:
         motion, contacts = self._world.env.motion, self._world.env.contacts
-        limit = self._world.physics.reflex_force
         reason = ""
 
         def check(_: int) -> bool:
             nonlocal reason
             if self._stop.is_set():
                 reason = "stop() was called"
-            elif float((contacts.arm_force() if self._holding else contacts.hand_force())[0]) > limit:
-                reason = f"contact force over {limit:.0f} N"
+            elif float(contacts.hand_force()[0]) > self._reflex_force():
+                reason = f"contact force over {self._reflex_force():.0f} N"
             return bool(reason)
 
         if not motion.follow(path[:, None], check=check):
             raise MotionAborted(f"{reason}: the arm stopped; call recover() when it is safe")
         motion.step(motion.n_steps(SETTLE_S))
+
+    def _reflex_force(self) -> float:
+        """The reflex watches for surprises: the gripper's own force on what it holds is none."""
+        return self._world.physics.reflex_force + 1.5 * self._force
 
     def _target(self) -> Tensor:
         """(7,) where the drives point: a motion starts there, so that nothing jumps."""
@@ -119,13 +122,13 @@ class SapienArm(Arm):
         )
 
     def _move_gripper(self, width: float) -> None:
-        self._holding = False
+        self._force = 0.0
         self._world.env.motion.move_fingers(width / 2, check=self._stop.is_set)
 
     def _grasp(self, force: float) -> GraspOutcome:
         env = self._world.env
         env.agent.set_finger_force(force)
-        self._holding = True
+        self._force = force
         env.motion.move_fingers(-MAX_OPENING / 2, force=force, check=self._stop.is_set)
         width = self._state().gripper_width
         return GraspOutcome(width=width, holding=width > MIN_GAP)

@@ -78,14 +78,3 @@ def test_a_part_is_lifted_whatever_the_grip_force(cell: Cell, force: float):
     assert result.aborted is None and result.holding
     go_home(firm)
     assert cell.arm.state().joints == pytest.approx(cell.workspace.home, abs=5e-3)
-
-
-def test_the_grip_on_a_part_is_no_force_on_the_arm(cell: Cell):
-    assert cell.feeder is not None and cell.tracker is not None
-    cell.feeder.present("hex_nut_m30", 0)
-    x, y, _ = cell.tracker.part_pose().position
-    assert execute_grasp(cell, np.array([x, y, 0.0115, 0.3])).holding
-    contacts = cell.feeder.env.contacts  # type: ignore[attr-defined]  # the feeder is the simulated world
-    assert float(contacts.hand_force()) == pytest.approx(cell.workspace.grasp_force, rel=0.3)
-    assert float(contacts.arm_force()) < 0.03 * cell.workspace.grasp_force
-    go_home(cell)
