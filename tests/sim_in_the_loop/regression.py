@@ -65,9 +65,10 @@ def main() -> int:
         stored = json.loads(STORED.read_text(encoding="utf-8"))
         if stored["weights"] != weights:
             print(f"the stored run was made with other weights ({stored['weights']}, now {weights})")
-        figures = compare(stored["rows"], rows)
-        print_figures(figures, Console(width=110))
-        worse = any(figure["verdict"] == "worse" for figure in figures)
+        if not config.store or _pairs(stored["rows"], rows):
+            figures = compare(stored["rows"], rows)
+            print_figures(figures, Console(width=110))
+            worse = any(figure["verdict"] == "worse" for figure in figures)
     elif not config.store:
         raise UsageError(f"no {STORED}: make one with --store")
     if config.store:
@@ -119,10 +120,14 @@ def rows_of(placements: Sequence[Placement]) -> list[Row]:
     return rows
 
 
+def _pairs(stored: Sequence[Row], now: Sequence[Row]) -> list[tuple[Row, Row]]:
+    before = {(row["part"], row["number"]): row for row in stored}
+    return [(before[key], row) for row in now if (key := (row["part"], row["number"])) in before]
+
+
 def compare(stored: Sequence[Row], now: Sequence[Row]) -> list[dict[str, Any]]:
     """Figures of trials that both runs have, their difference and what to make of it."""
-    before = {(row["part"], row["number"]): row for row in stored}
-    pairs = [(before[key], row) for row in now if (key := (row["part"], row["number"])) in before]
+    pairs = _pairs(stored, now)
     if not pairs:
         raise UsageError("the stored run has none of these trials: store another with --store")
     found = [_held(pairs)]
