@@ -215,6 +215,7 @@ def _end(workers: Sequence[_Worker]) -> None:
         worker.process.join(timeout=5)
         if worker.process.is_alive():
             worker.process.kill()
+            worker.process.join()
         worker.connection.close()
 
 
