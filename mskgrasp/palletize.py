@@ -30,7 +30,7 @@ from mskgrasp.placement_trial import Placer, Task
 from mskgrasp.placements import CORRECTIONS, Correction, Placement, print_placements
 from mskgrasp.plan import SIMULATED_CELL, make_planner
 from mskgrasp.planner import PlannerConfig
-from mskgrasp.processes import results
+from mskgrasp.processes import Work, results
 from mskgrasp.runs import TRIALS, append, begin, file_digest, inputs_of, part_names, read
 from mskgrasp.settings import Tape
 from mskgrasp.slots import Slot, check_reach, check_room, parse_target, read_slots
@@ -237,9 +237,8 @@ def _place_all(config: PalletizeConfig, pallets: list[list[Task]], asks: bool) -
     ]
     left = sum(key not in found for key in keys)
     if missing:
-        placed = results(
-            placing_bench, config, missing, config.workers, name=lambda one: one.title, rest=Pallet.after
-        )
+        work = Work(placing_bench, config, name=lambda one: one.title, rest=Pallet.after)
+        placed = results(work, missing, config.workers)
         bar = tqdm(total=left, unit="placement", file=sys.stderr, disable=asks)
         with contextlib.closing(placed), bar:
             for placement in placed:

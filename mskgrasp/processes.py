@@ -79,30 +79,38 @@ class _Worker:
     n_told: int = 0
 
 
+@dataclass(frozen=True)
+class Work(Generic[Settings, Job, Result]):
+    """What every process does, and what becomes of a job whose process dies.
+
+    `name` and `rest` are called in the process that spreads the jobs.
+    """
+
+    bench: Bench[Settings, Job, Result]
+    """A function of a module; in a spawned process it is imported again."""
+    settings: Settings
+    """What it takes; pickled."""
+    name: Callable[[Job], str] = str
+    """How a message calls a job."""
+    rest: Callable[[Job, int], Job | None] = lambda job, n_told: job
+    """What is left of a job of which so many results were told, when its process died; None: nothing."""
+    remedy: str = REMEDY
+    """What to do about a job that `MAX_TRIES` processes died of."""
+    lost_by: tuple[type[Exception], ...] = ()
+    """Errors that a fresh process may be free of: with one of them, too, a process counts as dead."""
+
+
 def spread(
-    bench: Bench[Settings, Job, Result],
-    settings: Settings,
-    jobs: Sequence[Job],
-    n_workers: int,
-    *,
-    name: Callable[[Job], str] = str,
-    rest: Callable[[Job, int], Job | None] = lambda job, n_told: job,
-    remedy: str = REMEDY,
-    lost_by: tuple[type[Exception], ...] = (),
+    work: Work[Settings, Job, Result], jobs: Sequence[Job], n_workers: int
 ) -> Generator[Told[Job, Result] | Done[Job] | Lost[Job], None, None]:
     """Does jobs in several processes and tells of every step; closing the iterator ends all processes.
 
     Which process does which job is left to chance: a job's results must depend on the job alone.
 
     Args:
-        bench: A function of a module; in a spawned process it is imported again.
-        settings: What it takes; pickled.
+        work: What is done.
         jobs: In the order in which they are begun; pickled, as are their results.
         n_workers: At most so many processes at once.
-        name: How a message calls a job.
-        rest: What is left of a job of which so many results were told, when its process died; None: nothing.
-        remedy: What to do about a job that `MAX_TRIES` processes died of.
-        lost_by: Errors that a fresh process may be free of: with one of them, too, a process counts as dead.
 
     Raises:
         WorkerFailed: A job failed for a reason that trying again will not mend.
@@ -114,7 +122,7 @@ def spread(
         while waiting or any(worker.ticket for worker in workers):
             with one_thread_a_process():
                 while waiting and len(workers) < min(n_workers, len(jobs)):
-                    workers.append(_start(context, bench, settings, lost_by))
+                    workers.append(_start(context, work))
             for worker in workers:
                 if worker.ticket is None and waiting:
                     _give(worker, waiting.popleft())
@@ -135,14 +143,14 @@ def spread(
                 elif kind == "done":
                     worker.ticket = None
                     yield Done(ticket.job, str(worker.process.pid))
-                elif (left := rest(ticket.job, worker.n_told)) is None:
+                elif (left := work.rest(ticket.job, worker.n_told)) is None:
                     yield Done(ticket.job, str(worker.process.pid))
                 else:
                     again = _Ticket(left, ticket.deaths + 1)
                     if again.deaths >= MAX_TRIES:
                         raise WorkerFailed(
-                            f"{name(again.job)} could not be done in {MAX_TRIES} fresh processes ({value}); "
-                            f"what was finished is kept: {remedy}"
+                            f"{work.name(again.job)} could not be done in {MAX_TRIES} fresh processes "
+                            f"({value}); what was finished is kept: {work.remedy}"
                         )
                     waiting.appendleft(again)
                     yield Lost(ticket.job, worker.n_told, again.job, value)
@@ -151,15 +159,7 @@ def spread(
 
 
 def results(
-    bench: Bench[Settings, Job, Result],
-    settings: Settings,
-    jobs: Sequence[Job],
-    n_workers: int,
-    *,
-    name: Callable[[Job], str] = str,
-    rest: Callable[[Job, int], Job | None] = lambda job, n_told: job,
-    remedy: str = REMEDY,
-    lost_by: tuple[type[Exception], ...] = (),
+    work: Work[Settings, Job, Result], jobs: Sequence[Job], n_workers: int
 ) -> Generator[Result, None, None]:
     """What `spread` is told, and a line on stderr where a process was lost.
 
@@ -168,25 +168,24 @@ def results(
     if not jobs:
         return
     if n_workers == 1 or len(jobs) < 2:
-        with bench(settings) as work:
+        with work.bench(work.settings) as do:
             for job in jobs:
-                yield from work(job)
+                yield from do(job)
         return
-    events = spread(bench, settings, jobs, n_workers, name=name, rest=rest, remedy=remedy, lost_by=lost_by)
-    with contextlib.closing(events):
+    with contextlib.closing(spread(work, jobs, n_workers)) as events:
         for event in events:
             if isinstance(event, Told):
                 yield event.result
             elif isinstance(event, Lost):
-                again = f"{name(event.again)} is made again"
+                again = f"{work.name(event.again)} is made again"
                 tqdm.write(f"a process was lost ({event.reason}); {again}", file=sys.stderr)
 
 
-def _start(
-    context: Any, bench: Bench[Any, Any, Any], settings: Any, lost_by: tuple[type[Exception], ...]
-) -> _Worker:
+def _start(context: Any, work: Work[Any, Any, Any]) -> _Worker:
     ours, theirs = context.Pipe()
-    process = context.Process(target=_work, args=(theirs, bench, settings, lost_by), daemon=True)
+    process = context.Process(
+        target=_work, args=(theirs, work.bench, work.settings, work.lost_by), daemon=True
+    )
     process.start()
     theirs.close()
     return _Worker(process=process, connection=ours)
@@ -220,19 +219,16 @@ def _end(workers: Sequence[_Worker]) -> None:
 
 
 def _work(
-    connection: Connection,
-    bench: Bench[Any, Any, Any],
-    settings: Any,
-    lost_by: tuple[type[Exception], ...],
+    connection: Connection, bench: Bench[Any, Any, Any], settings: Any, lost_by: tuple[type[Exception], ...]
 ) -> None:
     """A process's life: receive a job, do it, say so."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     leave_with_parent()
     try:
         use_one_core()
-        with bench(settings) as work:
+        with bench(settings) as do:
             while True:
-                for result in work(connection.recv()):
+                for result in do(connection.recv()):
                     connection.send(("result", result))
                 connection.send(("done", None))
     except (EOFError, BrokenPipeError):

@@ -23,7 +23,7 @@ from mskgrasp.pictures import draw_plan
 from mskgrasp.plan import make_planner
 from mskgrasp.planner import GraspPlan, PlannerConfig
 from mskgrasp.predictors import LOWESS, LowessPredictor, NetworkPredictor, Predictor
-from mskgrasp.processes import results
+from mskgrasp.processes import Work, results
 from mskgrasp.settings import Tape
 from mskgrasp.trial import Policy, Trial, clear, finish, run_trial, trial_key
 from mskgrasp.trial_files import trial_file, write_trial
@@ -190,16 +190,15 @@ def run_trials(setup: Setup, scenes: Sequence[Scene], n_workers: int) -> Generat
         HalError: The one cell was lost; a real one may not be built again behind its operator's back.
         WorkerFailed: A trial failed for a reason that trying again will not mend.
     """
-    return results(
+    work = Work(
         _trial_bench,
         setup,
-        scenes,
-        n_workers,
         name=lambda scene: f"trial {scene[0].key}",
         rest=lambda scene, n_told: scene[n_told:] or None,
         remedy="leave its part out with --parts",
         lost_by=(HalError,),
     )
+    return results(work, scenes, n_workers)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mskgrasp.errors import UsageError
-from mskgrasp.processes import MAX_TRIES, Done, Lost, Told, WorkerFailed, results, spread
+from mskgrasp.processes import MAX_TRIES, Done, Lost, Told, Work, WorkerFailed, results, spread
 
 
 @contextmanager
@@ -43,19 +43,19 @@ def counting(folder: Path) -> Iterator[Callable[[tuple[int, ...]], Iterator[int]
 
 
 def test_all_jobs_are_done_once_wherever():
-    alone = list(results(bench, 3, range(1, 5), 1))
+    alone = list(results(Work(bench, 3), range(1, 5), 1))
     assert alone == [3, os.getpid(), 6, os.getpid(), 9, os.getpid(), 12, os.getpid()]
-    several = list(results(bench, 3, range(1, 5), 2))
+    several = list(results(Work(bench, 3), range(1, 5), 2))
     pids = {value for value in several if value > 12}
     assert sorted(value for value in several if value <= 12) == [3, 6, 9, 12]
     assert len(several) == 8 and os.getpid() not in pids
-    assert list(results(bench, 3, [], 2)) == []
+    assert list(results(Work(bench, 3), [], 2)) == []
 
 
 def test_what_a_dead_process_has_not_told_is_done_again(tmp_path: Path):
     jobs: list[tuple[int, ...]] = [(1, 2, 3)]
     (job,), again = jobs, (2, 3)
-    events = list(spread(counting, tmp_path, jobs, 1, rest=lambda job, n: job[n:]))
+    events = list(spread(Work(counting, tmp_path, rest=lambda job, n: job[n:]), jobs, 1))
     assert events[:2] == [Told(job, 1), Lost(job, 1, again, "exit code 9")]
     assert events[2:4] == [Told(again, 2), Told(again, 3)]
     (last,) = events[4:]
@@ -63,30 +63,29 @@ def test_what_a_dead_process_has_not_told_is_done_again(tmp_path: Path):
 
 
 def test_a_process_that_died_after_all_was_told_has_done_its_job(tmp_path: Path):
-    events = list(spread(counting, tmp_path, [(1,)], 1, rest=lambda job, n: job[n:] or None))
+    events = list(spread(Work(counting, tmp_path, rest=lambda job, n: job[n:] or None), [(1,)], 1))
     assert events[0] == Told((1,), 1) and isinstance(events[1], Done) and len(events) == 2
 
 
 def test_a_job_that_every_process_dies_of_ends_the_run_in_one_line(capfd: pytest.CaptureFixture[str]):
     with pytest.raises(WorkerFailed, match=rf"job -1 could not .*{MAX_TRIES} fresh.*exit code 9.*--workers"):
-        list(results(bench, 3, [1, -1], 2, name=lambda job: f"job {job}"))
+        list(results(Work(bench, 3, name=lambda job: f"job {job}"), [1, -1], 2))
     assert capfd.readouterr().err.count("job -1 is made again") == MAX_TRIES - 1
 
 
 def test_a_worker_that_fails_says_why():
     with pytest.raises(WorkerFailed, match="no such thing"):
-        list(results(bench, 3, [1, -2], 2))
+        list(results(Work(bench, 3), [1, -2], 2))
 
 
 def test_what_a_fresh_process_may_mend_is_tried_again(capfd: pytest.CaptureFixture[str]):
     with pytest.raises(WorkerFailed, match="the cell does not answer"):
-        list(results(bench, 3, [1, -3], 2, lost_by=(TimeoutError,)))
+        list(results(Work(bench, 3, lost_by=(TimeoutError,)), [1, -3], 2))
     assert capfd.readouterr().err.count("-3 is made again") == MAX_TRIES - 1
 
 
 def test_whoever_closes_the_iterator_ends_the_workers():
-    with closing(results(bench, 3, list(range(1, 20)), 2)) as found:
-        seen = [next(found), next(found)]
-    pid = max(seen)
+    with closing(results(Work(bench, 3), list(range(1, 20)), 2)) as found:
+        pid = next(value for value in found if value > 3 * 19)
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.work import ShardTask
 from mskgrasp.processes import Lost as ProcessLost
-from mskgrasp.processes import Told, spread
+from mskgrasp.processes import Told, Work, spread
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,9 +48,8 @@ def make_shards(
         WorkerFailed: A shard failed for a reason that trying again will not mend.
     """
     successes: dict[ShardTask, int] = {}
-    events = spread(
-        _shard_bench, config, tasks, n_workers, name=_name, remedy="leave the part out with --parts"
-    )
+    work = Work(_shard_bench, config, name=_name, remedy="leave the part out with --parts")
+    events = spread(work, tasks, n_workers)
     try:
         for event in events:
             if isinstance(event, Told):
