@@ -15,11 +15,14 @@ REPOSITORY = Path(__file__).parents[1]
 PARTS = ["parallel_key_a16x10x56", "hex_nut_m30"]
 
 
-def command(out: Path, *options: str) -> list[str]:
+def arguments(out: Path, *options: str) -> list[str]:
     config = out.parent / "small.yaml"
     config.write_text(yaml.safe_dump(dict(parts=PARTS, attempts_per_part=6, shard_size=3, seed=5)))
-    program = [sys.executable, "-m", "mskgrasp.collect"]
-    return [*program, "--config", str(config), "--out", str(out), *options]
+    return ["--config", str(config), "--out", str(out), *options]
+
+
+def command(out: Path, *options: str) -> list[str]:
+    return [sys.executable, "-m", "mskgrasp.collect", *arguments(out, *options)]
 
 
 def collect(out: Path, *options: str) -> subprocess.CompletedProcess[str]:

@@ -1,11 +1,17 @@
-"""Programs in processes of their own, for tests."""
+"""Programs for tests: in processes of their own, or in this one, which has imported everything already."""
 
 from __future__ import annotations
 
+import io
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+
+import pytest
+
+from mskgrasp import cli
 
 # A shell's background job ignores Ctrl-C, and so would all that it starts: pytest, and the program.
 _HEAR = (
@@ -28,3 +34,25 @@ def running(module: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
             yield process
         finally:
             process.kill()
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A program that ran to its end."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def run_here(main: Callable[[], int | None], *arguments: str) -> Ended:
+    """What a program's ``main`` prints and how it ends, as if it were called with these arguments."""
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        redirect_stdout(io.StringIO()) as printed,
+        redirect_stderr(io.StringIO()) as complained,
+        pytest.raises(SystemExit) as ended,
+    ):
+        patch.setattr(sys, "argv", ["program", *arguments])
+        cli.run(main)
+    return Ended(int(ended.value.code or 0), printed.getvalue(), complained.getvalue())

@@ -1,7 +1,6 @@
 import csv
 import dataclasses
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -25,6 +24,7 @@ from mskgrasp.training import (
 )
 from mskgrasp.training import train as learn
 from tests import synthetic
+from tests.programs import run_here
 
 SMALL = NetworkConfig(
     patch_pixels=40, channels=8, trunk_width=64, action_width=32, head_width=64, dropout=0.0
@@ -244,14 +244,7 @@ def test_a_loss_that_is_no_number_stops_the_run_in_one_line(samples, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-def message(monkeypatch, capsys, *arguments) -> tuple[int, str]:
-    monkeypatch.setattr(sys, "argv", ["train", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        cli.run(train.main)
-    return int(ended.value.code or 0), capsys.readouterr().err
-
-
-def test_mistakes_on_the_command_line_are_one_line_each(monkeypatch, capsys, tmp_path, dataset):
+def test_mistakes_on_the_command_line_are_one_line_each(tmp_path, dataset):
     out = tmp_path / "out"
     full = tmp_path / "full"
     full.mkdir()
@@ -271,8 +264,9 @@ def test_mistakes_on_the_command_line_are_one_line_each(monkeypatch, capsys, tmp
     if not torch.cuda.is_available():
         cases.append((("--data", dataset, "--out", out, "--device", "cuda"), 2, "no CUDA device"))
     for arguments, code, words in cases:
-        ended, text = message(monkeypatch, capsys, *arguments)
-        assert ended == code and words in text and text.count("\n") == 1, (arguments, text)
+        done = run_here(train.main, *map(str, arguments))
+        assert done.returncode == code and words in done.stderr, (arguments, done)
+        assert done.stderr.count("\n") == 1
     assert not out.exists()
 
 

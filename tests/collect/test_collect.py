@@ -7,7 +7,6 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -16,12 +15,13 @@ import numpy as np
 import pytest
 import yaml
 
-from mskgrasp.collect.__main__ import is_done
+from mskgrasp.collect.__main__ import is_done, main
 from mskgrasp.collect.work import ShardTask
 from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.errors import BadDataset
 from mskgrasp.files import only_here
-from tests.collecting import PARTS, REPOSITORY, assert_equal, collect, command
+from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, collect, command
+from tests.programs import run_here
 
 
 def test_a_run_leaves_shards_settings_summary_and_picture(collected):
@@ -50,13 +50,13 @@ def test_labels_obey_the_definitions(collected):
 
 def test_a_finished_run_has_nothing_left_to_do(collected):
     stamps = [path.stat().st_mtime_ns for path in list_shards(collected)]
-    done = collect(collected, "--workers", "2")
+    done = run_here(main, *arguments(collected, "--workers", "2"))
     assert done.returncode == 0 and "12 of them already there" in done.stdout
     assert [path.stat().st_mtime_ns for path in list_shards(collected)] == stamps
 
 
 def test_other_settings_are_refused_for_a_begun_dataset(collected):
-    done = collect(collected, "--seed", "6")
+    done = run_here(main, *arguments(collected, "--seed", "6"))
     assert done.returncode == 2
     assert "seed differ" in done.stderr and len(done.stderr.strip().splitlines()) == 1
 
@@ -148,10 +148,7 @@ def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(collected
 def test_a_wrong_configuration_is_one_line_that_names_it(tmp_path, text, code, message):
     config = tmp_path / "wrong.yaml"
     config.write_text(text)
-    done = subprocess.run(
-        [sys.executable, "-m", "mskgrasp.collect", "--config", str(config), "--out", str(tmp_path / "data")],
-        capture_output=True, text=True, cwd=REPOSITORY, timeout=120,
-    )  # fmt: skip
+    done = run_here(main, "--config", str(config), "--out", str(tmp_path / "data"))
     assert done.returncode == code
     assert message in done.stderr.strip().splitlines()[-1]
     assert "Traceback" not in done.stderr
@@ -176,7 +173,7 @@ def test_two_collections_do_not_write_into_one_folder(collected, tmp_path):
     shutil.copytree(collected, out)
     with only_here(out) as alone, only_here(out) as both:
         assert alone and not both
-        done = collect(out)
+        done = run_here(main, *arguments(out))
     assert done.returncode == 2 and "another collection is writing" in done.stderr
     with only_here(out) as alone:
         assert alone

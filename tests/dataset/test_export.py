@@ -2,8 +2,6 @@ from __future__ import annotations
 
 import json
 import logging
-import subprocess
-import sys
 from pathlib import Path
 
 import gymnasium
@@ -22,7 +20,7 @@ from mskgrasp.dataset.verbs import main
 from mskgrasp.errors import BadDataset, UsageError
 from mskgrasp.grasp import FAILURES
 from tests import synthetic
-from tests.collecting import REPOSITORY
+from tests.programs import run_here
 
 
 @pytest.fixture(scope="module")
@@ -152,11 +150,7 @@ def test_the_pose_after_a_failure_is_not_known(trajectories, joined):
 @pytest.mark.parametrize(("form", "name"), [("npz", "data.npz"), ("maniskill", "data.h5")])
 def test_nothing_is_overwritten(collected, tmp_path, form, name):
     (tmp_path / name).write_text("precious")
-    done = subprocess.run(
-        [sys.executable, "-m", "mskgrasp.dataset", "export", str(collected), "--format", form,
-         "--out", str(tmp_path / name)],
-        capture_output=True, text=True, cwd=REPOSITORY, timeout=120,
-    )  # fmt: skip
+    done = run_here(main, "export", str(collected), "--format", form, "--out", str(tmp_path / name))
     assert done.returncode == 2 and "exists" in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == [name]

@@ -10,16 +10,9 @@ import pytest
 
 from hal import calibrate, doctor
 from hal.charuco import Board, detect
-from mskgrasp import cli
+from tests.programs import run_here
 
 CELLS = Path(__file__).parents[2] / "configs" / "cells"
-
-
-def run(monkeypatch: pytest.MonkeyPatch, capsys, program, *arguments: str) -> tuple[int, str]:
-    monkeypatch.setattr("sys.argv", ["program", *arguments])
-    with pytest.raises(SystemExit) as ended:
-        cli.run(program.main)
-    return int(str(ended.value.code)), capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -45,19 +38,18 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys, program, *arguments: str) -> tu
     ],
 )
 def test_wrong_input_is_one_line_and_exit_code_2(
-    monkeypatch: pytest.MonkeyPatch, capsys, tmp_path: Path, program, arguments: list[str], message: str
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program, arguments: list[str], message: str
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty.yaml").touch()
-    code, printed = run(monkeypatch, capsys, program, *arguments)
-    assert code == 2 and message in printed
-    assert printed.startswith("error: ") and printed.count("\n") == 1
+    done = run_here(program.main, *arguments)
+    assert done.returncode == 2 and message in done.stderr
+    assert done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
 
 
-def test_the_printed_board_is_the_board_at_its_true_size(tmp_path: Path, monkeypatch, capsys):
+def test_the_printed_board_is_the_board_at_its_true_size(tmp_path: Path):
     path = tmp_path / "board.png"
-    code, _ = run(monkeypatch, capsys, calibrate, "--print-board", str(path))
-    assert code == 0
+    assert run_here(calibrate.main, "--print-board", str(path)).returncode == 0
     page = (matplotlib.image.imread(path)[::4, ::4, :3] * 255).astype(np.uint8)  # 600 dpi to 150
     assert page.shape[1] == pytest.approx(0.297 / 0.0254 * 150, abs=1)
     board = Board()

@@ -1,14 +1,15 @@
 """A cache folder of the tests' own; the built-in parts are made once for all of them."""
 
 import os
-import subprocess
-import sys
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from mskgrasp.parts import Part, build_part, starter_names
+from mskgrasp.parts.verbs import main
+from tests.programs import Ended, run_here
 
 
 @pytest.fixture(scope="session")
@@ -57,17 +58,8 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
 
 
 @pytest.fixture
-def program(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Runs ``python -m mskgrasp.parts`` in an empty folder."""
-
-    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "mskgrasp.parts", *arguments],
-            capture_output=True,
-            text=True,
-            cwd=tmp_path,
-            env=os.environ | {"COLUMNS": "200"},
-            timeout=120,
-        )
-
-    return run
+def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ended]:
+    """Runs ``mskgrasp.parts`` in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    return partial(run_here, main)

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import h5py
 import pytest
 
+from hal.record import main
 from hal.replay import read_recording, recorded_cell
-from tests.programs import running
+from tests.programs import Ended, run_here, running
 from tests.replay.toy import toy_cell
 
 TIMEOUT_S = 120.0
@@ -31,8 +30,8 @@ def cell_file(tmp_path: Path) -> Path:
     return path
 
 
-def record(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "hal.record", *arguments], capture_output=True, text=True)
+def record(*arguments: str) -> Ended:
+    return run_here(main, *arguments)
 
 
 def test_frames_of_any_cell_are_written_with_the_arms_state(cell_file: Path, tmp_path: Path):
@@ -45,11 +44,10 @@ def test_frames_of_any_cell_are_written_with_the_arms_state(cell_file: Path, tmp
 
 def test_a_program_runs_on_the_recorded_cell_and_its_faults_are_kept(cell_file: Path, tmp_path: Path):
     out = tmp_path / "run.h5"
-    done = record(
-        "--cell", str(cell_file), "--out", str(out), "--run",
-        f"hal.record --out {tmp_path / 'inner.h5'} --frames 4 --interval 0",
-    )  # fmt: skip
-    assert done.returncode == 1 and "ends after 3 commands; the program asks for capture()" in done.stderr
+    inner = f"hal.record --out {tmp_path / 'inner.h5'} --frames 4 --interval 0"
+    with running("hal.record", "--cell", str(cell_file), "--out", str(out), "--run", inner) as program:
+        _, printed = program.communicate(timeout=TIMEOUT_S)
+    assert program.returncode == 1 and "ends after 3 commands; the program asks for capture()" in printed
     recording = read_recording(out)
     assert recording.n_frames == 3
     assert recording.events[-1].error is not None and recording.events[-1].error[0] == "NotRecorded"

@@ -14,11 +14,13 @@ import pytest
 from mskgrasp.errors import BadConfig
 from mskgrasp.parts import find_part
 from mskgrasp.settings import Physics
+from mskgrasp.validate.__main__ import main
 from mskgrasp.validate.by_hand import Check, run_checks
 from mskgrasp.validate.compare import cheapest, compare, complaints
 from mskgrasp.validate.config import CELL_FLOOR, FLOOR, REFERENCE, Setting, ValidateConfig
 from mskgrasp.validate.convergence import Outcomes, draw_grasps, run_settings
 from mskgrasp.validate.report import impossible
+from tests.programs import run_here
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -139,7 +141,7 @@ def test_the_production_settings_pass_every_closed_form_check(tmp_path):
     ],
 )
 def test_mistakes_are_one_line(tmp_path, arguments, code, message):
-    done = validate(*arguments, "--out", str(tmp_path / "out"))
+    done = run_here(main, *arguments, "--out", str(tmp_path / "out"))
     assert done.returncode == code
     assert message in done.stderr.strip().splitlines()[-1] and "Traceback" not in done.stderr
     assert not (tmp_path / "out").exists()
