@@ -53,13 +53,6 @@ def _as_kind(values: np.ndarray, like: Array) -> Array:
     return np.asarray(values, dtype=like.dtype)
 
 
-def _rays(shape: tuple[int, ...], intrinsics: np.ndarray) -> np.ndarray:
-    """(h, w, 3) points at depth 1 that the pixels look at, camera frame."""
-    rows, columns = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
-    pixels = np.stack([columns, rows, np.ones_like(rows)], axis=-1)
-    return pixels @ np.linalg.inv(np.asarray(intrinsics, dtype=np.float64)).T
-
-
 def view_part(
     depth: Array,
     intrinsics: np.ndarray,
@@ -116,8 +109,10 @@ def view_part(
     T_base_axes = _box_axes(T_base_camera)
     cos, sin = quat_to_matrix(T_base_axes.quat_wxyz)[:2, 0]
     pitch = float(np.median(depth[mask])) / np.array([intrinsics[0][0], intrinsics[1][1]])
-    along_x = _extent(cos * x + sin * y, mask, float(pitch[0]))
-    along_y = _extent((cos * y - sin * x).T, mask.T, float(pitch[1]))
+    around = _bounds(mask)
+    x_near, y_near, part = x[around], y[around], mask[around]
+    along_x = _extent(cos * x_near + sin * y_near, part, float(pitch[0]))
+    along_y = _extent((cos * y_near - sin * x_near).T, part.T, float(pitch[1]))
     top = _robust_top(heights[mask])
     middle = np.array([sum(along_x) / 2, sum(along_y) / 2, 0.0])
     centre_base = T_base_axes.apply(middle)
@@ -145,8 +140,15 @@ def view_part(
 def _points_base(depth: np.ndarray, intrinsics: np.ndarray, T_base_camera: Pose) -> np.ndarray:
     """(3, h, w) x, y, z of what every pixel sees, base frame."""
     rotation = quat_to_matrix(np.asarray(T_base_camera.quat_wxyz, dtype=np.float64))
-    directions = np.moveaxis(_rays(depth.shape, intrinsics) @ rotation.T, -1, 0)
-    return directions * depth + np.reshape(T_base_camera.position, (3, 1, 1))
+    # Where a ray of depth 1 ends is linear in the pixel.
+    along_u, along_v, first = (rotation @ np.linalg.inv(np.asarray(intrinsics, dtype=np.float64))).T
+    columns, rows = np.arange(depth.shape[1]), np.arange(depth.shape[0])[:, None]
+    points = np.empty((3, *depth.shape))
+    for axis in range(3):
+        np.add(along_u[axis] * columns, along_v[axis] * rows + first[axis], out=points[axis])
+        points[axis] *= depth
+        points[axis] += T_base_camera.position[axis]
+    return points
 
 
 def _check_depth(depth: np.ndarray) -> None:
@@ -177,13 +179,23 @@ def _box_axes(T_base_camera: Pose) -> Pose:
     return Pose(position=np.zeros(3), quat_wxyz=np.array([np.cos(half), 0.0, 0.0, np.sin(half)]))
 
 
+def _bounds(mask: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns of a mask that ends before the border, with one more on every side."""
+    found = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
+    rows, columns = (slice(int(one[0]) - 1, int(one[-1]) + 2) for one in found)
+    return rows, columns
+
+
 def _extent(along: np.ndarray, mask: np.ndarray, pitch: float) -> tuple[float, float]:
-    """Bounds of the masked points in a coordinate (h, w) that runs along the image's rows."""
+    """Bounds of the masked points in a coordinate (h, w) that runs along the image's rows.
+
+    The mask ends before the border.
+    """
     bounds = []
     for sign in (-1.0, 1.0):
         outward = np.where(mask, sign * along, -np.inf)
         row, column = np.unravel_index(int(np.argmax(outward)), mask.shape)
-        neighbours = [outward[row, c] for c in (column - 1, column + 1) if 0 <= c < mask.shape[1]]
+        neighbours = outward[row, column - 1], outward[row, column + 1]
         # On a wall two neighbouring pixels have the same coordinate: its place is known exactly. On a
         # flat top they are a pixel apart, and the edge is, on average, half of that further out.
         step = outward[row, column] - max(neighbours)

@@ -22,6 +22,7 @@ from mskgrasp.networks import (
     NetworkConfig,
     Normalisation,
 )
+from mskgrasp.symmetry import views
 
 PRETRAINED = Path(__file__).parent / "pretrained"
 """The model that ships."""
@@ -93,7 +94,18 @@ class Models:
         """
         self._check(patches, self.meta.network.patch_shape)
         centre_grasp, height = (values.to(patches.dtype) for values in (centre_grasp, height))
-        return self._calibrated(*self.gdn(patches, centre_grasp, height, theta))
+        if not self.meta.network.symmetric_views:
+            return self._calibrated(*self.gdn(patches, centre_grasp, height, theta))
+        means, variances = [], []
+        for seen, centre, signs in views(patches, centre_grasp):
+            mean, variance = self.gdn(seen, centre, height)
+            means.append(signs * mean)
+            variances.append(variance)
+        mean = torch.stack(means).mean(0)
+        if variances[0] is None:
+            return mean, None
+        disagreement = torch.stack(means).var(0, correction=0)
+        return self._calibrated(mean, torch.stack(variances).mean(0) + disagreement)
 
     def _probability(self, logits: Tensor) -> Tensor:
         found = self.meta.calibration

@@ -33,6 +33,10 @@ class NetworkConfig(Config):
     dropout: float = Field(default=0.5, ge=0.0, lt=1.0)
     variance: bool = True
     """False: the displacement network predicts the mean alone (the paper's GCIP-M)."""
+    symmetric_views: bool = False
+    """A grasp's displacement is the mean of what the network says of the four views that a parallel jaw
+    cannot tell apart (`mskgrasp.symmetry`), its variance that of their mixture: equal grasps are told the
+    same."""
     quality_stride: int = Field(default=1, ge=1, le=8)
     """hand: the quality network sees every so many-th pixel: it has thousands of grasps to look at."""
     quality_columns: int | None = Field(default=None, ge=4, le=256)
@@ -56,6 +60,8 @@ class NetworkConfig(Config):
             raise ValueError("architecture: patch needs a square patch; leave patch_columns away")
         if self.image == "object" and self.architecture != "patch":
             raise ValueError("image: object needs architecture: patch")
+        if self.image == "object" and self.symmetric_views:
+            raise ValueError("symmetric_views turns patches with their grasp; image: object has none")
         if self.architecture == "patch" and self.quality_stride != 1:
             raise ValueError("architecture: patch shows all pixels to both networks; quality_stride is 1")
         if self.architecture == "patch" and self.quality_columns is not None:

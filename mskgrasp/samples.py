@@ -251,27 +251,3 @@ def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "cat
 
 def _name_hash(name: str) -> float:
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big") / 2**64
-
-
-def mirror_and_turn(
-    patches: Tensor, centre_grasp: Tensor, target: Tensor, generator: torch.Generator
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Turns a random half of the samples by half a turn, and mirrors a random half of them.
-
-    A parallel jaw is the same after half a turn about its approach, and after mirroring its closing
-    direction (the part's mirror image is as good a part), so the samples are as true as before.
-
-    Args:
-        patches: (n, 1, p, p).
-        centre_grasp: (n, 3), grasp frame.
-        target: (n, 4) displacement, grasp frame.
-        generator: On the device of the patches.
-    """
-    turn, mirror = torch.rand((2, len(patches)), generator=generator, device=patches.device) < 0.5
-    patches = torch.where(turn[:, None, None, None], patches.flip(-1, -2), patches)
-    patches = torch.where(mirror[:, None, None, None], patches.flip(-2), patches)
-    turned = torch.where(turn, -1.0, 1.0)
-    mirrored = torch.where(mirror, -1.0, 1.0)
-    same = torch.ones_like(turned)
-    signs = torch.stack([turned, turned * mirrored, same, mirrored], dim=-1)
-    return patches, centre_grasp * signs[:, :3], target * signs

@@ -19,7 +19,8 @@ from mskgrasp.config import Config
 from mskgrasp.errors import BadDataset, MskgraspError, UsageError
 from mskgrasp.models import ModelMeta, Models, build_models
 from mskgrasp.networks import NetworkConfig, Normalisation, displacement_loss, with_noise
-from mskgrasp.samples import Samples, mirror_and_turn, part_sides
+from mskgrasp.samples import Samples, part_sides
+from mskgrasp.symmetry import mirror_and_turn
 
 _LEAST_TARGET_STD = (1e-4, 1e-4, 1e-4, 1e-3)
 """Metres and radians: what varies less (parts that never rise in the hand) is noise of the simulation."""

@@ -9,10 +9,9 @@ import torch
 from mskgrasp import cli, train
 from mskgrasp.dataset import shard_path, write_shard
 from mskgrasp.errors import BadDataset, BadModel, UsageError
-from mskgrasp.grasp import centre_in_grasp_frame
 from mskgrasp.models import build_models, load_models, save_model
 from mskgrasp.networks import NetworkConfig
-from mskgrasp.samples import mirror_and_turn, part_sides, read_samples
+from mskgrasp.samples import part_sides, read_samples
 from mskgrasp.training import (
     LearningConfig,
     Reporter,
@@ -105,36 +104,6 @@ def test_data_of_one_outcome_are_told(samples, success, words):
     alike = dataclasses.replace(samples, success=torch.full((len(samples),), success))
     with pytest.raises(BadDataset, match=words):
         split(alike, CONFIG)
-
-
-def test_turned_and_mirrored_samples_are_what_the_turned_and_mirrored_scene_would_give():
-    box = synthetic.Box(x=0.455, y=0.0, yaw=0.35, size=(0.06, 0.02, 0.03))
-    grasp = np.array([0.46, 0.004, 0.02, 0.1])
-    centre = centre_in_grasp_frame(box.T_base_obj.position, grasp)
-    _, shift = synthetic.attempt(box, grasp)
-    local = synthetic.Box(x=centre[0], y=centre[1], yaw=box.yaw - grasp[3], size=box.size)
-    flat = np.array([0, 0, 0.02, 0])
-    # The mirror image at the grasp's x axis, and the scene that a hand turned by half a turn sees.
-    mirrored = dataclasses.replace(local, y=-local.y, yaw=-local.yaw)
-    turned = dataclasses.replace(local, x=-local.x, y=-local.y)
-    outcomes = [synthetic.attempt(b, flat)[1] for b in (local, mirrored, turned)]
-    assert np.allclose(outcomes[0], shift)
-    patch = torch.rand(1, 1, 6, 6)
-    produced = set()
-    for seed in range(40):
-        generator = torch.Generator().manual_seed(seed)
-        image, c, target = mirror_and_turn(
-            patch, torch.from_numpy(centre)[None], torch.from_numpy(shift)[None], generator
-        )
-        signs = tuple(torch.sign(c[0, :2] / torch.from_numpy(centre[:2])).int().tolist())
-        produced.add(signs)
-        flips = {(1, 1): (), (1, -1): (-2,), (-1, -1): (-1, -2), (-1, 1): (-1,)}[signs]
-        assert torch.equal(image, patch.flip(flips) if flips else patch)
-        if signs == (1, -1):
-            assert np.allclose(target[0], outcomes[1])
-        if signs == (-1, -1):
-            assert np.allclose(target[0], outcomes[2])
-    assert len(produced) == 4
 
 
 def test_a_small_dataset_is_learned_and_beats_the_trivial_predictors(dataset, tmp_path):

@@ -1,0 +1,49 @@
+"""What a parallel jaw cannot tell apart: half a turn about its approach, and the part's mirror image.
+
+After half a turn the same fingers close on the same places; a part mirrored along the closing direction is as
+good a part, and moves as the mirrored part would.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import torch
+from torch import Tensor
+
+
+def mirror_and_turn(
+    patches: Tensor, centre_grasp: Tensor, target: Tensor, generator: torch.Generator
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Turns a random half of the samples by half a turn, and mirrors a random half of them.
+
+    Args:
+        patches: (n, 1, r, c).
+        centre_grasp: (n, 3), grasp frame.
+        target: (n, 4) displacement, grasp frame.
+        generator: On the device of the patches.
+    """
+    turn, mirror = torch.rand((2, len(patches)), generator=generator, device=patches.device) < 0.5
+    patches = torch.where(turn[:, None, None, None], patches.flip(-1, -2), patches)
+    patches = torch.where(mirror[:, None, None, None], patches.flip(-2), patches)
+    signs = _signs(torch.where(turn, -1.0, 1.0), torch.where(mirror, -1.0, 1.0))
+    return patches, centre_grasp * signs[:, :3], target * signs
+
+
+def views(patches: Tensor, centre_grasp: Tensor) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
+    """The four views of grasps: as they are, mirrored, turned by half a turn, and both.
+
+    Yields:
+        Patches (n, 1, r, c), centres (n, 3), and the signs (4,) that turn what is said of the view's
+        displacement into what it says of the grasp's, and back.
+    """
+    for turn in (1.0, -1.0):
+        for mirror in (1.0, -1.0):
+            signs = _signs(patches.new_tensor(turn), patches.new_tensor(mirror))
+            flipped = [axis for axis, sign in ((-1, turn), (-2, turn * mirror)) if sign < 0]
+            yield patches.flip(flipped) if flipped else patches, centre_grasp * signs[:3], signs
+
+
+def _signs(turned: Tensor, mirrored: Tensor) -> Tensor:
+    """(..., 4) signs of x, y, z and theta: -1 where half a turn, or a mirror image, reverses them."""
+    return torch.stack([turned, turned * mirrored, torch.ones_like(turned), mirrored], dim=-1)
