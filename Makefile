@@ -40,7 +40,7 @@ palletize: $(READY) ## Grasp parts, correct by the predicted displacement and pl
 test: $(TESTABLE) ## Run the tests
 	$(RUN) pytest -n 3 --dist loadfile --no-loadscope-reorder --durations 15
 
-test-all: $(TESTABLE) ## The same and the slow ones: every family, both drivers' faults, 20 kills (an hour)
+test-all: $(TESTABLE) ## The same and the slow ones: every family, both drivers' faults, 20 kills
 	MSKGRASP_FAMILIES=99 MSKGRASP_KILLS=10 $(RUN) pytest -n 3 --dist loadfile --no-loadscope-reorder \
 		--durations 15 -m "slow or not slow"
 
