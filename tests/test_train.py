@@ -239,7 +239,7 @@ def test_mistakes_on_the_command_line_are_one_line_each(tmp_path, dataset):
     assert not out.exists()
 
 
-@pytest.mark.parametrize("name", ["default", "paper"])
+@pytest.mark.parametrize("name", ["default", "pretrained", "paper", "paper_quick"])
 def test_the_configurations_that_are_shipped_can_be_read(name):
     config = cli.parse(
         train.TrainConfig,
@@ -247,10 +247,12 @@ def test_the_configurations_that_are_shipped_can_be_read(name):
         description="",
         argv=["--config", str(train.DEFAULT_CONFIG.with_name(f"{name}.yaml")), "--seed", "3"],
     )
-    assert config.seed == 3 and config.calibrate == (name == "default")
-    assert config.network.architecture == ("hand" if name == "default" else "patch")
-    if name == "paper":
+    assert config.seed == 3 and config.calibrate == ("paper" not in name)
+    assert config.network.architecture == ("patch" if "paper" in name else "hand")
+    assert config.network.symmetric_views == ("paper" not in name)
+    if "paper" in name:
         assert config.network == NetworkConfig()
+    if name == "paper":
         assert config.gqn == StageConfig(
             optimiser="rmsprop",
             learning_rate=1e-5,
