@@ -55,7 +55,7 @@ class FrankyDriver:
     def move(self, path: JointPath) -> None:
         """Follows a path through its knots, with the knots' speeds; between them franky interpolates."""
         franky = self._franky
-        path = path.without_creep()
+        path = path.for_solver()
         waypoints = [
             franky.JointWaypoint(
                 franky.JointState(joints, speed),

@@ -18,6 +18,10 @@ CREEP_RAD = 2e-5
 """A joint that moves by less over a whole path stands, rad: 0.02 mm at the hand."""
 
 
+SHORT_RAD = 1e-3
+"""A path on which no joint moves by more has no shape that matters, rad: 1 mm at the hand."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class JointPath:
     """Knots of a motion, evenly spaced in time; the first is where the arm stands.
@@ -37,17 +41,19 @@ class JointPath:
         """Seconds from the first knot to the last."""
         return float(self.seconds[-1])
 
-    def without_creep(self) -> JointPath:
-        """The same path with joints that move by next to nothing standing where they are.
+    def for_solver(self) -> JointPath:
+        """The same path without what is at the end of a trajectory solver's accuracy.
 
-        A profile over a millionth of a radian is at the end of a trajectory solver's accuracy: Ruckig, which
-        franky uses, was seen to find none on such a path (-111), which aborts the motion.
+        Joints that move by next to nothing stand where they are, and a path that is short altogether goes to
+        its end at once. Ruckig, which franky uses, was seen to find no trajectory (-111), which aborts the
+        motion, through knots that lay some microradians apart.
         """
-        still = np.ptp(self.joints, axis=0) < CREEP_RAD
+        ways = np.ptp(self.joints, axis=0)
+        knots = [0, -1] if ways.max() < SHORT_RAD else slice(None)
         return JointPath(
-            seconds=self.seconds,
-            joints=np.where(still, self.joints[0], self.joints),
-            speeds=np.where(still, 0.0, self.speeds),
+            seconds=self.seconds[knots],
+            joints=np.where(ways < CREEP_RAD, self.joints[0], self.joints)[knots],
+            speeds=np.where(ways < CREEP_RAD, 0.0, self.speeds)[knots],
         )
 
 
