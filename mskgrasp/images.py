@@ -110,9 +110,9 @@ def view_part(
     cos, sin = quat_to_matrix(T_base_axes.quat_wxyz)[:2, 0]
     pitch = float(np.median(depth[mask])) / np.array([intrinsics[0][0], intrinsics[1][1]])
     around = _bounds(mask)
-    x_near, y_near, part = x[around], y[around], mask[around]
-    along_x = _extent(cos * x_near + sin * y_near, part, float(pitch[0]))
-    along_y = _extent((cos * y_near - sin * x_near).T, part.T, float(pitch[1]))
+    x_around, y_around, mask_around = x[around], y[around], mask[around]
+    along_x = _extent(cos * x_around + sin * y_around, mask_around, float(pitch[0]))
+    along_y = _extent((cos * y_around - sin * x_around).T, mask_around.T, float(pitch[1]))
     top = _robust_top(heights[mask])
     middle = np.array([sum(along_x) / 2, sum(along_y) / 2, 0.0])
     centre_base = T_base_axes.apply(middle)

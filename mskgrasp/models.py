@@ -101,11 +101,11 @@ class Models:
             mean, variance = self.gdn(seen, centre, height)
             means.append(signs * mean)
             variances.append(variance)
-        mean = torch.stack(means).mean(0)
+        said = torch.stack(means)
+        mean = said.mean(0)
         if variances[0] is None:
             return mean, None
-        disagreement = torch.stack(means).var(0, correction=0)
-        return self._calibrated(mean, torch.stack(variances).mean(0) + disagreement)
+        return self._calibrated(mean, torch.stack(variances).mean(0) + (said - mean).square().mean(0))
 
     def _probability(self, logits: Tensor) -> Tensor:
         found = self.meta.calibration

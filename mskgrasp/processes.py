@@ -183,6 +183,7 @@ def results(
 
 def _start(context: Any, work: Work[Any, Any, Any]) -> _Worker:
     ours, theirs = context.Pipe()
+    # Not all of it: name and rest may be lambdas, which cannot be pickled.
     process = context.Process(
         target=_work, args=(theirs, work.bench, work.settings, work.lost_by), daemon=True
     )

@@ -72,6 +72,8 @@ class LearningConfig(Config):
     def _check(self) -> LearningConfig:
         if self.symmetric and self.network.image == "object":
             raise ValueError("symmetric: true turns patches with their grasp; image: object has none")
+        if self.network.symmetric_views and not self.symmetric:
+            raise ValueError("network.symmetric_views shows views that only symmetric: true teaches")
         return self
 
 

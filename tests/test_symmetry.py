@@ -9,10 +9,18 @@ import pytest
 import torch
 
 from mskgrasp.grasp import centre_in_grasp_frame
-from mskgrasp.models import PRETRAINED, Models, load_models
+from mskgrasp.models import PRETRAINED, Models, build_models, load_models
 from mskgrasp.networks import NetworkConfig
 from mskgrasp.symmetry import mirror_and_turn
+from mskgrasp.training import LearningConfig
 from tests import synthetic
+
+VIEWS = {
+    "half a turn": ((-1, -2), (-1, -1, 1, 1)),
+    "mirror image": ((-2,), (1, -1, 1, -1)),
+    "both": ((-1,), (-1, 1, 1, -1)),
+}
+"""Axes of a patch that are reversed, and signs of x, y, z and theta."""
 
 
 def test_turned_and_mirrored_samples_are_what_the_turned_and_mirrored_scene_would_give():
@@ -25,7 +33,8 @@ def test_turned_and_mirrored_samples_are_what_the_turned_and_mirrored_scene_woul
     # The mirror image at the grasp's x axis, and the scene that a hand turned by half a turn sees.
     mirrored = dataclasses.replace(local, y=-local.y, yaw=-local.yaw)
     turned = dataclasses.replace(local, x=-local.x, y=-local.y)
-    outcomes = [synthetic.attempt(b, flat)[1] for b in (local, mirrored, turned)]
+    both = dataclasses.replace(mirrored, x=-mirrored.x, y=-mirrored.y)
+    outcomes = [synthetic.attempt(b, flat)[1] for b in (local, mirrored, turned, both)]
     assert np.allclose(outcomes[0], shift)
     patch = torch.rand(1, 1, 6, 6)
     produced = set()
@@ -42,6 +51,8 @@ def test_turned_and_mirrored_samples_are_what_the_turned_and_mirrored_scene_woul
             assert np.allclose(target[0], outcomes[1])
         if signs == (-1, -1):
             assert np.allclose(target[0], outcomes[2])
+        if signs == (-1, 1):
+            assert np.allclose(target[0], outcomes[3])
     assert len(produced) == 4
 
 
@@ -75,11 +86,7 @@ def scenes(models: Models, n: int = 5) -> tuple[torch.Tensor, torch.Tensor, torc
     )
 
 
-@pytest.mark.parametrize(
-    ("flipped", "signs"),
-    [((-1, -2), (-1, -1, 1, 1)), ((-2,), (1, -1, 1, -1)), ((-1,), (-1, 1, 1, -1))],
-    ids=["half a turn", "mirror image", "both"],
-)
+@pytest.mark.parametrize(("flipped", "signs"), VIEWS.values(), ids=VIEWS)
 def test_equal_grasps_are_told_the_same_displacement(models, flipped, signs):
     patches, centre, height = scenes(models)
     signs = torch.tensor(signs, dtype=torch.float32)
@@ -97,9 +104,7 @@ def test_views_that_disagree_make_the_displacement_less_certain(models):
     patches, centre, height = scenes(models)
     single = asked(models, symmetric_views=False)
     means, variances = [], []
-    for flipped, signs in (
-        ((), (1, 1, 1, 1)), ((-1, -2), (-1, -1, 1, 1)), ((-2,), (1, -1, 1, -1)), ((-1,), (-1, 1, 1, -1))
-    ):  # fmt: skip
+    for flipped, signs in ((), (1, 1, 1, 1)), *VIEWS.values():
         signs = torch.tensor(signs, dtype=torch.float32)
         mean, variance = single.grasp_displacement(
             patches.flip(flipped) if flipped else patches, centre * signs[:3], height
@@ -111,6 +116,27 @@ def test_views_that_disagree_make_the_displacement_less_certain(models):
     np.testing.assert_allclose(mean, np.mean(means, 0), atol=1e-7)
     expected = np.mean(variances, 0) + scale * np.var(means, 0)
     np.testing.assert_allclose(variance, expected, rtol=1e-4)
+
+
+def test_a_network_of_the_mean_alone_has_four_views_too(models):
+    patches, centre, height = scenes(models)
+    mean_only = models.meta.network.model_copy(update={"variance": False})
+    fresh = build_models(models.meta.model_copy(update={"network": mean_only}))
+    mean, variance = fresh.grasp_displacement(patches, centre, height)
+    flipped, signs = VIEWS["half a turn"]
+    turned, _ = fresh.grasp_displacement(patches.flip(flipped), centre * torch.tensor(signs[:3]), height)
+    assert variance is None and torch.allclose(turned, torch.tensor(signs) * mean, atol=1e-6)
+
+
+def test_no_grasps_have_no_displacement(models):
+    patches, centre, height = scenes(models, 0)
+    mean, variance = models.grasp_displacement(patches, centre, height)
+    assert mean.shape == variance.shape == (0, 4)
+
+
+def test_views_that_the_network_never_learned_are_refused():
+    with pytest.raises(ValueError, match="only symmetric: true teaches"):
+        LearningConfig(symmetric=False, network=NetworkConfig(symmetric_views=True))
 
 
 def test_pictures_that_do_not_turn_have_no_views():

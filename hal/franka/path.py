@@ -17,9 +17,8 @@ PERIOD_S = 0.05
 CREEP_RAD = 2e-5
 """A joint that moves by less over a whole path stands, rad: 0.02 mm at the hand."""
 
-
 SHORT_RAD = 1e-3
-"""A path on which no joint moves by more has no shape that matters, rad: 1 mm at the hand."""
+"""A path on which no joint moves by more has no shape that matters, rad: 1 mm at the hand for each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,9 +43,9 @@ class JointPath:
     def for_solver(self) -> JointPath:
         """The same path without what is at the end of a trajectory solver's accuracy.
 
-        Joints that move by next to nothing stand where they are, and a path that is short altogether goes to
+        Joints that move by next to nothing stand where they are, and a path on which none moves far goes to
         its end at once. Ruckig, which franky uses, was seen to find no trajectory (-111), which aborts the
-        motion, through knots that lay some microradians apart.
+        motion, on one in a thousand paths of some ten microradians.
         """
         ways = np.ptp(self.joints, axis=0)
         knots = [0, -1] if ways.max() < SHORT_RAD else slice(None)

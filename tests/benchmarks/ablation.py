@@ -37,6 +37,7 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         return ours.model_copy(update=changes | {"network": ours.network.model_copy(update=network)})
 
     assert isinstance(paper, NetworkConfig)
+    paper = paper.model_copy(update={"symmetric_views": ours.network.symmetric_views})
     return {
         "ours": ours,
         "the paper's network, trained as ours": ours.model_copy(update={"network": paper}),
