@@ -179,7 +179,9 @@ def _plan_text(plan: GraspPlan) -> str:
 
 def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
     view = plan.view
-    side = max(0.14, 1.5 * float(np.hypot(*view.size[:2])))
+    off = np.abs(plan.grasp[:2] - view.centre_base[:2]).max()
+    fingers = off + np.hypot(MAX_OPENING / 2 + _PAD_THICKNESS, _PAD_WIDTH / 2)
+    side = max(0.14, 1.5 * float(np.hypot(*view.size[:2])), 2.05 * float(fingers))
     # The plane of the part's top: there the picture is free of parallax.
     square = np.array([*view.centre_base[:2], view.table_z + view.size[2], 0.0])
     heights = _from_above(frame.depth, frame.intrinsics, frame.T_base_camera, view.table_z, square, side)
