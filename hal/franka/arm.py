@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any, NoReturn
 
@@ -14,6 +15,7 @@ from hal.arm import JOINT_TOLERANCE, Arm, ArmState, GraspOutcome
 from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery
 from hal.franka.config import JOINT_SPEED, FrankyArmConfig, PandaPyArmConfig
 from hal.franka.driver import DriverSettings, DriverState
+from hal.franka.faults import NoTrajectory
 from hal.franka.frames import check_end_effector, pose_from_columns
 from hal.franka.kinematics import forward_pose, reachable
 from hal.franka.link import DriverLink
@@ -32,6 +34,8 @@ _STILL_WIDTH = 1e-4
 _STILL_JOINT, _STANDING_S = 1e-4, 0.4
 """An arm that comes by less than so many radians nearer to its goal in so many seconds has arrived there."""
 _POLL_S = 0.05
+_TRIES = 3
+"""Ruckig, which franky uses, was seen to find no trajectory on one path in a thousand."""
 
 
 class FrankaArm(Arm):
@@ -123,28 +127,50 @@ class FrankaArm(Arm):
 
     def _move_to_joints(self, joints: np.ndarray, speed: float) -> None:
         config = self._config
-        path = joint_path(
-            np.array(self._ready().joints),
-            joints,
-            speed=min(speed, config.max_joint_speed) * JOINT_SPEED,
-            acceleration=np.full(7, config.joint_acceleration),
+        self._travel(
+            lambda here: joint_path(
+                here,
+                joints,
+                speed=min(speed, config.max_joint_speed) * JOINT_SPEED,
+                acceleration=np.full(7, config.joint_acceleration),
+            )
         )
-        self._follow(path)
 
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
         config = self._config
-        path = straight_path(
-            np.array(self._ready().joints),
-            T_base_tcp,
-            speed=min(speed, config.max_speed),
-            turn_speed=TURN_SPEED,
-            acceleration=config.acceleration,
-            turn_acceleration=config.joint_acceleration,
-            joint_speed=config.max_joint_speed * JOINT_SPEED,
-            lower=self.limits.joint_lower,
-            upper=self.limits.joint_upper,
+        self._travel(
+            lambda here: straight_path(
+                here,
+                T_base_tcp,
+                speed=min(speed, config.max_speed),
+                turn_speed=TURN_SPEED,
+                acceleration=config.acceleration,
+                turn_acceleration=config.joint_acceleration,
+                joint_speed=config.max_joint_speed * JOINT_SPEED,
+                lower=self.limits.joint_lower,
+                upper=self.limits.joint_upper,
+            )
         )
-        self._follow(path)
+
+    def _travel(self, path_from: Callable[[np.ndarray], JointPath]) -> None:
+        """Follows a path from joints (7,); from where the arm then stands, where its driver found no way."""
+        for left in reversed(range(_TRIES)):
+            path = path_from(np.array(self._ready().joints))
+            try:
+                return self._follow(path)
+            except NoTrajectory:
+                if not left or not _is_idle(self._stand_still()):
+                    raise
+
+    def _stand_still(self) -> DriverState:
+        """Waits until the arm stands, or might by now; what is measured then."""
+        state, deadline = self._measure(), time.monotonic() + self._config.settle_s
+        while time.monotonic() < deadline:
+            time.sleep(_STANDING_S)
+            before, state = state, self._measure()
+            if np.abs(np.subtract(state.joints, before.joints)).max() < _STILL_JOINT:
+                break
+        return state
 
     def _follow(self, path: JointPath) -> None:
         # A motion that its driver neither ends nor fails in several times its duration hangs.

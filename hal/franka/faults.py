@@ -15,6 +15,13 @@ _NO_ROBOT = ("connection to fci refused", "host not found", "connection error", 
 _LOST = ("timeout", "connection", "socket", "network", "broken pipe", "reset by peer")
 _ABORTED = ("reflex", "aborted", "preempted", "rejected", "motion", "command", "control", "error")
 
+_NO_TRAJECTORY = "motion planner failed"
+
+
+class NoTrajectory(errors.MotionAborted):
+    """The driver's own solver gave up on a motion; the robot saw no fault."""
+
+
 MESSAGES: dict[str, type[errors.HalError]] = {
     kind.__name__: kind
     for kind in (
@@ -24,6 +31,7 @@ MESSAGES: dict[str, type[errors.HalError]] = {
         errors.MotionAborted,
         errors.NeedsRecovery,
         errors.NotConnected,
+        NoTrajectory,
     )
 }
 """The errors that may come out of a driver's process, by name."""
@@ -55,4 +63,5 @@ def explain(error: BaseException, driver: DriverName, host: str) -> errors.HalEr
             f"the link to {host} is lost ({text.rstrip('.')}); the robot has stopped: check cable and Desk, "
             "then open the cell again"
         )
-    return errors.MotionAborted(f"{text.rstrip('.') or name}; look at the arm, then call recover()")
+    kind = NoTrajectory if _NO_TRAJECTORY in low else errors.MotionAborted
+    return kind(f"{text.rstrip('.') or name}; look at the arm, then call recover()")

@@ -55,7 +55,7 @@ class FrankyDriver:
     def move(self, path: JointPath) -> None:
         """Follows a path through its knots, with the knots' speeds; between them franky interpolates."""
         franky = self._franky
-        path = path.for_solver()
+        path = path.without_creep()
         waypoints = [
             franky.JointWaypoint(
                 franky.JointState(joints, speed),

@@ -17,9 +17,6 @@ PERIOD_S = 0.05
 CREEP_RAD = 2e-5
 """A joint that moves by less over a whole path stands, rad: 0.02 mm at the hand."""
 
-SHORT_RAD = 1e-3
-"""A path on which no joint moves by more has no shape that matters, rad: 1 mm at the hand for each."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class JointPath:
@@ -40,19 +37,17 @@ class JointPath:
         """Seconds from the first knot to the last."""
         return float(self.seconds[-1])
 
-    def for_solver(self) -> JointPath:
-        """The same path without what is at the end of a trajectory solver's accuracy.
+    def without_creep(self) -> JointPath:
+        """The same path with joints that move by next to nothing standing where they are.
 
-        Joints that move by next to nothing stand where they are, and a path on which none moves far goes to
-        its end at once. Ruckig, which franky uses, was seen to find no trajectory (-111), which aborts the
-        motion, on one in a thousand paths of some ten microradians.
+        A profile over a millionth of a radian is at the end of a trajectory solver's accuracy: Ruckig, which
+        franky uses, was seen to find none on such a path (-111), which aborts the motion.
         """
-        ways = np.ptp(self.joints, axis=0)
-        knots = [0, -1] if ways.max() < SHORT_RAD else slice(None)
+        still = np.ptp(self.joints, axis=0) < CREEP_RAD
         return JointPath(
-            seconds=self.seconds[knots],
-            joints=np.where(ways < CREEP_RAD, self.joints[0], self.joints)[knots],
-            speeds=np.where(ways < CREEP_RAD, 0.0, self.speeds)[knots],
+            seconds=self.seconds,
+            joints=np.where(still, self.joints[0], self.joints),
+            speeds=np.where(still, 0.0, self.speeds),
         )
 
 

@@ -15,13 +15,15 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hal import Arm, cell_from_yaml
+from hal.arm import JOINT_TOLERANCE
 from hal.errors import (
     CommunicationLost,
     DriverMissing,
@@ -32,6 +34,7 @@ from hal.errors import (
 )
 from hal.franka import FrankaArm
 from hal.franka.driver import DriverName, DriverSettings
+from hal.franka.path import JointPath, joint_path
 from mskgrasp.geometry import Pose
 from tests.franka.robots import HOSTS, TIMEOUT_S, FakeRobot, fci5, robot_for, write_cell
 
@@ -372,3 +375,25 @@ def test_the_config_bounds_the_speed_whatever_a_program_asks_for(tmp_path: Path)
         begin = time.monotonic()
         arm.move_to_pose(target, speed=1.0)
         assert time.monotonic() - begin > 15 / 8 * 0.05 / 0.05 * 0.9
+
+
+def test_a_motion_that_the_solver_gives_up_is_planned_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Speeds that no joint can have are what makes it give up every time."""
+    impossible = [2, 3]
+
+    def path_from(*args: Any, **settings: Any) -> JointPath:
+        path = joint_path(*args, **settings)
+        if impossible[0] == 0:
+            return path
+        impossible[0] -= 1
+        return replace(path, speeds=1e3 * path.speeds)
+
+    monkeypatch.setattr("hal.franka.arm.joint_path", path_from)
+    with robot_for("franky") as robot, arm_at(tmp_path, "franky", robot.host) as arm:
+        goal = arm.state().joints + np.array([0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1])
+        arm.move_to_joints(goal, speed=0.5)
+        assert impossible[0] == 0 and arm.state().joints == pytest.approx(goal, abs=JOINT_TOLERANCE)
+        impossible[:] = impossible[1:]
+        with pytest.raises(MotionAborted, match="planner failed with error code"):
+            arm.move_to_joints(goal - 0.1, speed=0.5)
+        assert impossible[0] == 0 and arm.state().joints == pytest.approx(goal, abs=JOINT_TOLERANCE)
