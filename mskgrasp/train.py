@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import torch
+from pydantic import Field
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -34,6 +35,8 @@ class TrainConfig(LearningConfig):
     """The dataset folder."""
     out: Path | None = None
     """Where the model goes. A run that was stopped goes on when it is started again in the same way."""
+    epochs: int | None = Field(default=None, ge=1)
+    """Of each network, in place of gqn.epochs and gdn.epochs."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """auto: a CUDA device where there is one."""
 
@@ -74,6 +77,9 @@ def _line(row: dict[str, Any]) -> str:
 
 def run(config: TrainConfig) -> int:
     """Trains, and writes the model, its metrics, the log and the curves into ``config.out``."""
+    if config.epochs is not None:
+        gqn, gdn = (stage.model_copy(update={"epochs": config.epochs}) for stage in (config.gqn, config.gdn))
+        config = config.model_copy(update={"epochs": None, "gqn": gqn, "gdn": gdn})
     if config.data is None or config.out is None:
         missing = "--data" if config.data is None else "--out"
         raise UsageError(f"{missing} is needed: python -m mskgrasp.train --data DATASET --out MODEL")

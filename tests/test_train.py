@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from mskgrasp import cli, train
+from mskgrasp.config import read_config
 from mskgrasp.dataset import shard_path, write_shard
 from mskgrasp.errors import BadDataset, BadModel, UsageError
 from mskgrasp.models import build_models, load_models, save_model
@@ -104,6 +105,18 @@ def test_data_of_one_outcome_are_told(samples, success, words):
     alike = dataclasses.replace(samples, success=torch.full((len(samples),), success))
     with pytest.raises(BadDataset, match=words):
         split(alike, CONFIG)
+
+
+def test_one_number_of_epochs_stands_for_both_networks_and_is_what_a_stopped_run_needs(dataset, tmp_path):
+    out = tmp_path / "model"
+    assert train.run(program(SHORT, data=dataset, out=out, epochs=1)) == 0
+    with open(out / "log.csv") as file:
+        assert [row["stage"] for row in csv.DictReader(file)] == ["gqn", "gdn"]
+    kept = read_config(train.TrainConfig, out / "config.yaml")
+    assert kept.gqn.epochs == kept.gdn.epochs == 1
+    assert train.run(program(SHORT, data=dataset, out=out, epochs=1)) == 0
+    with pytest.raises(UsageError, match="gdn"):
+        train.run(program(SHORT, data=dataset, out=out))
 
 
 def test_a_small_dataset_is_learned_and_beats_the_trivial_predictors(dataset, tmp_path):
