@@ -64,7 +64,8 @@ class Attempt:
     ):
         self._agent = agent
         self._part = part
-        self._hulls = hulls
+        self._corners = [np.concatenate(own) for own in hulls]
+        self._hull_ends = [np.cumsum([len(hull) for hull in own])[:-1] for own in hulls]
         self._motion = motion
         self._contacts = contacts
         self._physics = physics
@@ -92,8 +93,7 @@ class Attempt:
         start, free, reach = self._approach(grasp)
         lifted = grasp.clone()
         lifted[:, 2] += physics.lift_height
-        for pose in (grasp, start, lifted):
-            check_grasps(pose)
+        check_grasps(torch.cat([grasp, start, lifted]))
         began = motion.seconds
         empty = free & (reach == 0)
         # Fingers that have only air to close through begin where their speed is still that of the ramp.
@@ -147,17 +147,17 @@ class Attempt:
         start, free, reach = grasp.clone(), [], []
         pose = base_pose(self._part)
         position, quat_wxyz = pose.position.cpu().numpy(), pose.quat_wxyz.cpu().numpy()
-        for i, hulls in enumerate(self._hulls):
+        for i, (corners, ends) in enumerate(zip(self._corners, self._hull_ends, strict=True)):
             own = Pose(position=position[i].astype(float), quat_wxyz=quat_wxyz[i].astype(float))
             seen = pose_base_grasp(grasp[i].cpu().numpy().astype(float)).inverse() @ own
-            corners = [seen.apply(hull) for hull in hulls]
-            clearance = (
-                hand_clearance(corners) if self._physics.skip_air else Clearance(free=False, reach=0.0)
-            )
+            corners = seen.apply(corners)
+            clearance = Clearance(free=False, reach=0.0)
+            if self._physics.skip_air:
+                clearance = hand_clearance(np.split(corners, ends))
             free.append(clearance.free)
             reach.append(clearance.reach)
             if not clearance.free:
-                top = max(float(hull[:, 2].max()) for hull in corners)
+                top = float(corners[:, 2].max())
                 start[i, 2] += max(0.0, top + lowest_grasp_z(0.0) + self._physics.approach_clearance)
         device = grasp.device
         return start, torch.tensor(free, device=device), torch.tensor(reach, device=device, dtype=grasp.dtype)

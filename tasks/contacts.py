@@ -26,8 +26,9 @@ class HandContacts:
         self._part = part
         self._gpu = scene.gpu_sim_enabled
         if not self._gpu:
-            self._hand = [agent.robot.links_map[name]._objs[0].entity for name in HAND_LINKS]
-            self._fingers = [agent.robot.links_map[name]._objs[0].entity for name in FINGER_LINKS]
+            links = agent.robot.links_map
+            self._hand = {links[name]._objs[0].entity: i for i, name in enumerate(HAND_LINKS)}
+            self._fingers = {links[name]._objs[0].entity: i for i, name in enumerate(FINGER_LINKS)}
             self._entity = part._objs[0]
 
     def hand_force(self) -> Tensor:
@@ -37,9 +38,9 @@ class HandContacts:
         total: dict[int, np.ndarray] = {}
         for contact in self._scene.px.get_contacts():
             for sign, body in zip((1.0, -1.0), contact.bodies, strict=True):
-                for i, entity in enumerate(self._hand):
-                    if body.entity == entity:
-                        total[i] = total.get(i, 0.0) + sign * _impulse(contact)
+                i = self._hand.get(body.entity)
+                if i is not None:
+                    total[i] = total.get(i, 0.0) + sign * _impulse(contact)
         largest = max((float(np.linalg.norm(v)) for v in total.values()), default=0.0)
         return torch.tensor([largest / self._scene.px.timestep])
 
@@ -62,15 +63,15 @@ class HandContacts:
         deepest = 0.0
         for contact in self._scene.px.get_contacts():
             first, second = (body.entity for body in contact.bodies)
-            if self._entity not in (first, second):
-                continue
-            for i, finger in enumerate(self._fingers):
-                if finger in (first, second):
-                    impulses[i] = impulses[i] + _impulse(contact)
-                    deepest = max([deepest, *(-float(point.separation) for point in contact.points)])
+            other = second if first is self._entity else first if second is self._entity else None
+            i = self._fingers.get(other)
+            if i is not None:
+                impulses[i] = impulses[i] + _impulse(contact)
+                deepest = max([deepest, *(-float(point.separation) for point in contact.points)])
         forces = np.array([np.linalg.norm(v) for v in impulses]) / self._scene.px.timestep
         return torch.tensor(forces[None], dtype=torch.float32), torch.tensor([deepest])
 
 
 def _impulse(contact) -> np.ndarray:  # noqa: ANN001 (a pybind class without a stub)
-    return np.sum([point.impulse for point in contact.points], axis=0) if contact.points else np.zeros(3)
+    impulses = [point.impulse for point in contact.points]
+    return np.add.reduce(impulses) if impulses else np.zeros(3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import sapien
 import torch
@@ -25,14 +27,24 @@ def to_base(position_world: Array) -> Array:
 
 def _offset(like: Array) -> Array:
     if isinstance(like, torch.Tensor):
-        return torch.tensor(BASE_IN_WORLD, dtype=like.dtype, device=like.device)
+        return _offset_tensor(like.dtype, like.device)
     return np.asarray(BASE_IN_WORLD)
+
+
+@cache
+def _offset_tensor(dtype: torch.dtype, device: torch.device) -> torch.Tensor:
+    return torch.tensor(BASE_IN_WORLD, dtype=dtype, device=device)
 
 
 def base_pose(body: Actor | Link) -> Pose:
     """Poses of a body of every sub-scene in the base frame: positions (n, 3), quaternions (n, 4)."""
-    pose = body.pose
-    return Pose(position=to_base(pose.p), quat_wxyz=pose.q)
+    if body.scene.gpu_sim_enabled or len(body._objs) > 1:
+        pose = body.pose
+        return Pose(position=to_base(pose.p), quat_wxyz=pose.q)
+    # One sub-scene: the same numbers as ManiSkill's, without its four tensor operations a body.
+    one = body._objs[0]
+    single = one.pose if isinstance(one, sapien.Entity) else one.entity_pose
+    return Pose(position=to_base(torch.tensor(single.p)[None]), quat_wxyz=torch.tensor(single.q)[None])
 
 
 def sapien_camera_pose(T_base_camera: Pose) -> sapien.Pose:

@@ -235,19 +235,24 @@ class GraspDisplacementEnv(BaseEnv):
 
     def capture_depth(self) -> Tensor:
         """(n, h, w) float32 depth in metres from the overhead camera, the robot left out of the picture."""
-        return self.capture_rgbd()[1]
+        return self._look("depth", with_robot=False)["depth"][..., 0]
 
     def capture_rgbd(self, *, with_robot: bool = False) -> tuple[Tensor, Tensor]:
         """Colour (n, h, w, 3) uint8 and depth (n, h, w) float32 metres from the overhead camera."""
+        seen = self._look("rgb", "depth", with_robot=with_robot)
+        return seen["rgb"], seen["depth"][..., 0]
+
+    def _look(self, *what: str, with_robot: bool) -> dict[str, Tensor]:
         self.agent.show(with_robot)
         try:
             self.scene.update_render(update_sensors=True, update_human_render_cameras=False)
             sensor = self._overhead_sensor
             sensor.capture()
-            seen = sensor.get_obs(rgb=True, depth=True, position=False, segmentation=False)
+            return sensor.get_obs(
+                rgb="rgb" in what, depth="depth" in what, position=False, segmentation=False
+            )
         finally:
             self.agent.show(True)
-        return seen["rgb"], seen["depth"][..., 0]
 
     @property
     def _overhead_sensor(self) -> Camera:

@@ -7,7 +7,7 @@ executes one command at a time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import torch
 from mani_skill.envs.scene import ManiSkillScene
@@ -70,13 +70,17 @@ class PandaMotion:
         self._arm_drives = [joint._objs[0] for joint in agent.arm_joints]
         self._finger_drives = [joint._objs[0] for joint in agent.finger_joints]
         self.finger_target = torch.full((self.n,), MAX_OPENING / 2, device=self.device)
-        self.seconds = 0.0
         self.watch: Callable[[float], None] | None = None
         """Told of the simulated time, s, every ``CHECK_S``."""
         self._steps = 0
         self._watch_every = self.n_steps(CHECK_S)
         self._driven: list[tuple[float, float] | None] = [None] * 7
         self._commanded: Tensor | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Simulated so far."""
+        return self._steps / self._physics.rate_hz
 
     def n_steps(self, seconds: float) -> int:
         """Simulation steps in a time, at least one."""
@@ -107,9 +111,10 @@ class PandaMotion:
         else:
             self._drive_arm(list(zip(q[0].tolist(), qd[0].tolist(), strict=True)))
 
-    def _drive_arm(self, targets: list[tuple[float, float]]) -> None:
+    def _drive_arm(self, targets: list[tuple[float, float]], joints: Iterable[int] = range(7)) -> None:
         # Four joints stand still on a vertical line, and a call costs a fiftieth of a simulation step.
-        for number, target in enumerate(targets):
+        for number in joints:
+            target = targets[number]
             if target != self._driven[number]:
                 self._arm_drives[number].set_drive_target(target[0])
                 self._arm_drives[number].set_drive_velocity_target(target[1])
@@ -136,7 +141,6 @@ class PandaMotion:
         for _ in range(n_steps):
             self._scene.step()
             self._steps += 1
-            self.seconds = self._steps / self._physics.rate_hz
             if not self.gpu and self._steps % self._watch_every == 0 and self.watch is not None:
                 self.watch(self.seconds)
         if self.gpu:
@@ -167,16 +171,17 @@ class PandaMotion:
         speed = torch.zeros_like(path)
         speed[1:] = (path[1:] - path[:-1]) * rate
         # One environment: plain numbers, once; a tensor a step would cost as much as the physics.
-        rows = None
+        rows, moving = None, range(7)
         if not self.gpu:
-            pairs = torch.stack([path[:, 0], speed[:, 0]], dim=-1).tolist()
-            rows = [[(position, velocity) for position, velocity in row] for row in pairs]
+            pairs = torch.stack([path[:, 0], speed[:, 0]], dim=-1)
+            moving = (pairs != pairs[0]).any(dim=-1).any(dim=0).nonzero()[:, 0].tolist()
+            rows = [list(map(tuple, row)) for row in pairs.tolist()]
         still = torch.zeros_like(path[0])
         # An arm that is frozen from the first step on stays where it was sent before.
         last = path[0] if self._commanded is None else self._commanded
         for i in range(len(path)):
             if rows is not None:
-                self._drive_arm(rows[i])
+                self._drive_arm(rows[i], moving if i else range(7))
                 last = path[i]
             else:
                 stop = torch.zeros(self.n, dtype=torch.bool, device=self.device) if frozen is None else frozen
