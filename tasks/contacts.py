@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import sapien
 import torch
 from mani_skill.envs.scene import ManiSkillScene
 from mani_skill.utils.structs.actor import Actor
@@ -35,14 +36,29 @@ class HandContacts:
         """(n,) largest net contact force on the hand or a finger, N."""
         if self._gpu:
             return self._agent.robot.get_net_contact_forces(HAND_LINKS).norm(dim=-1).amax(dim=-1)
+        largest = max((float(np.linalg.norm(v)) for v in self._impulses(self._hand).values()), default=0.0)
+        return torch.tensor([largest / self._scene.px.timestep])
+
+    def outer_force(self) -> Tensor:
+        """(n,) net contact force of all else on hand and part together, N; for a hand that holds the part.
+
+        The grip cancels so. On the hand alone it would not: PhysX reports no friction on the CPU.
+        """
+        if self._gpu:
+            hand = self._agent.robot.get_net_contact_forces(HAND_LINKS).sum(dim=-2)
+            return (hand + self._part.get_net_contact_forces()).norm(dim=-1)
+        impulses = self._impulses({**self._hand, self._entity: len(self._hand)})
+        total = sum(impulses.values(), np.zeros(3))
+        return torch.tensor([float(np.linalg.norm(total)) / self._scene.px.timestep])
+
+    def _impulses(self, bodies: dict[sapien.Entity, int]) -> dict[int, np.ndarray]:
         total: dict[int, np.ndarray] = {}
         for contact in self._scene.px.get_contacts():
             for sign, body in zip((1.0, -1.0), contact.bodies, strict=True):
-                i = self._hand.get(body.entity)
+                i = bodies.get(body.entity)
                 if i is not None:
                     total[i] = total.get(i, 0.0) + sign * _impulse(contact)
-        largest = max((float(np.linalg.norm(v)) for v in total.values()), default=0.0)
-        return torch.tensor([largest / self._scene.px.timestep])
+        return total
 
     def pads_on_part(self) -> tuple[Tensor, Tensor]:
         """Grip on the part.

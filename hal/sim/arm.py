@@ -96,23 +96,20 @@ class SapienArm(Arm):
 
     def _follow(self, path: Tensor) -> None:
         motion, contacts = self._world.env.motion, self._world.env.contacts
+        limit = self._world.physics.reflex_force
         reason = ""
 
         def check(_: int) -> bool:
             nonlocal reason
             if self._stop.is_set():
                 reason = "stop() was called"
-            elif float(contacts.hand_force()[0]) > self._reflex_force():
-                reason = f"contact force over {self._reflex_force():.0f} N"
+            elif float(contacts.outer_force()[0] if self._force else contacts.hand_force()[0]) > limit:
+                reason = f"contact force over {limit:.0f} N"
             return bool(reason)
 
         if not motion.follow(path[:, None], check=check):
             raise MotionAborted(f"{reason}: the arm stopped; call recover() when it is safe")
         motion.step(motion.n_steps(SETTLE_S))
-
-    def _reflex_force(self) -> float:
-        """The reflex watches for surprises: the gripper's own force on what it holds is none."""
-        return self._world.physics.reflex_force + 1.5 * self._force
 
     def _target(self) -> Tensor:
         """(7,) where the drives point: a motion starts there, so that nothing jumps."""

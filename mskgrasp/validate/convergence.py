@@ -12,15 +12,14 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import torch
 
-import tasks
 from mskgrasp.collect.shard import draw_attempt
+from mskgrasp.collect.work import versions
 from mskgrasp.cores import one_thread_a_process
 from mskgrasp.errors import MskgraspError
 from mskgrasp.parts import load_part
@@ -209,15 +208,9 @@ def _write(file: Path, **arrays: np.ndarray) -> None:
 def _outcome_file(out: Path, setting: Setting, drawn: Drawn) -> Path:
     grasps = hashlib.sha256(drawn.file.read_bytes()).hexdigest()
     part = load_part(drawn.folder)
-    text = json.dumps([setting.physics.model_dump(), setting.shift, part.content_hash, grasps, _code()])
+    # Outcomes of other code, or of another engine, are not taken for this one's.
+    text = json.dumps([setting.physics.model_dump(), setting.shift, part.content_hash, grasps, versions()])
     return out / "outcomes" / f"{part.name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
-
-
-@cache
-def _code() -> str:
-    """Digest of what simulates: outcomes of other code are not taken for this one's."""
-    files = sorted(Path(tasks.__file__).parent.glob("*.py"))
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def _read(out: Path, setting: Setting, drawn: Sequence[Drawn]) -> Outcomes:

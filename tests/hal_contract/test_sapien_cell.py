@@ -78,3 +78,16 @@ def test_a_part_is_lifted_whatever_the_grip_force(cell: Cell, force: float):
     assert result.aborted is None and result.holding
     go_home(firm)
     assert cell.arm.state().joints == pytest.approx(cell.workspace.home, abs=5e-3)
+
+
+def test_a_held_part_that_is_pressed_on_the_table_stops_the_arm(cell: Cell):
+    """Pads that grip with 40 N push with up to 2 mu F = 40 N before they slide; the reflex is set to 20 N."""
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("hex_nut_m30", 0)
+    x, y, _ = cell.tracker.part_pose().position
+    firm = dataclasses.replace(cell, workspace=dataclasses.replace(cell.workspace, grasp_force=40.0))
+    assert execute_grasp(firm, np.array([x, y, 0.019, 0.3])).holding
+    with pytest.raises(MotionAborted, match="contact force over 20 N"):
+        cell.arm.move_to_pose(pose_base_tcp(np.array([x, y, 0.0115, 0.3])))
+    cell.arm.recover()
+    go_home(cell)
