@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hal.device import Device
-from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace
+from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
 from hal.limits import (
     ArmLimits,
     check_joint_path,
@@ -234,7 +234,7 @@ class Arm(Device):
             try:
                 yield
                 if self._stop.is_set():
-                    raise MotionAborted("stop() was called; call recover() when it is safe")
+                    raise Stopped("stop() was called; call recover() when it is safe")
             except OutOfWorkspace:
                 raise  # found out before anything moved
             except BaseException as error:

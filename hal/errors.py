@@ -35,6 +35,10 @@ class MotionAborted(HalError):
     """A motion ended before its goal: contact, reflex, or stop()."""
 
 
+class Stopped(MotionAborted):
+    """Somebody called stop(): whatever was going on shall not go on by itself."""
+
+
 class NeedsRecovery(HalError):
     """An error happened before; nothing moves until recover() is called."""
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hal.arm import JOINT_TOLERANCE
 from hal.cell import Cell
-from hal.errors import MotionAborted
+from hal.errors import MotionAborted, Stopped
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import HOLD_S, MAX_OPENING, MIN_GAP, pose_base_tcp
 
@@ -50,7 +50,8 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
 
     Raises:
         OutOfWorkspace: The grasp is refused before anything moves.
-        HalError: The arm was lost; a motion that met resistance is a result, not an error.
+        HalError: The arm was lost, or somebody stopped it; a motion that met resistance is a result, not an
+            error.
     """
     arm, lift = cell.arm, cell.workspace.lift_height
     grasp = np.asarray(grasp, dtype=np.float64)
@@ -68,6 +69,8 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
         if closed.holding:
             arm.move_to_pose(pose_base_tcp(lifted), speed=0.25)
             arm.wait(HOLD_S)
+    except Stopped:
+        raise
     except MotionAborted as error:
         state = arm.state()
         return GraspResult(

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from hal import Cell, RgbdFrame, execute_grasp, go_home, put_down
-from hal.errors import MotionAborted, OutOfWorkspace
+from hal.errors import MotionAborted, OutOfWorkspace, Stopped
 from mskgrasp.errors import MarkersNotFound, NoGraspFound, NoPartFound, TapeDoesNotFit
 from mskgrasp.footprint import seen_footprint
 from mskgrasp.geometry import Pose
@@ -142,8 +142,13 @@ class Placer:
         try:
             go_home(self._cell)
         except MotionAborted as error:
-            self._operator.recover(self._cell, str(error))
+            self._recover(error)
             go_home(self._cell)
+
+    def _recover(self, error: MotionAborted) -> None:
+        if isinstance(error, Stopped):
+            raise error
+        self._operator.recover(self._cell, str(error))
 
     def look(self, slots: list[Slot]) -> np.ndarray:
         """A picture (h, w, 3) of the pallet as it is now, the arm at home."""
@@ -195,11 +200,11 @@ class Placer:
         assert by is not None  # truth is refused where nothing tracks the part
         for target in targets:
             try:
-                place(cell, self._pose(plan, by, target))
+                place(cell, self._pose(plan, by, target), self._recover)
             except OutOfWorkspace:
                 continue  # the other way round, perhaps
             except MotionAborted as error:
-                self._operator.recover(cell, str(error))
+                self._recover(error)
                 return replace(known, reason="collided"), target, None
             self.home()
             after = cell.camera.capture()
@@ -216,7 +221,7 @@ class Placer:
         try:
             put_down(self._cell, plan.grasp)
         except MotionAborted as error:
-            self._operator.recover(self._cell, str(error))
+            self._recover(error)
 
     def _measured(
         self,

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from hal import Cell
+from hal.errors import MotionAborted
 from hal.execute import APPROACH, PUT_DOWN
 from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing, wrap_angle
 from mskgrasp.grasp import MAX_OPENING, centre_in_grasp_frame, lowest_grasp_z, pose_base_tcp
 
 RELEASE = 0.02
 """By how much the fingers open to let go of a part, m."""
+EARLY = 0.01
+"""How far above its place a part may meet the table and count as put down, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,23 +111,30 @@ def check_place(cell: Cell, pose: np.ndarray) -> None:
         cell.arm.check_pose(pose_base_tcp(np.array([pose[0], pose[1], height, pose[3]])))
 
 
-def place(cell: Cell, pose: np.ndarray) -> None:
+def place(cell: Cell, pose: np.ndarray, recover: Callable[[MotionAborted], None]) -> None:
     """Carries what the hand holds to a pose, lets it go and rises.
 
-    The fingers open no farther than they must: what lies beside the place stays there.
+    The fingers open no farther than they must: what lies beside the place stays there. A part that hangs
+    askew meets the table early and ends the motion; it stands then, and is let go there.
 
     Args:
         cell: The arm has lifted the part.
         pose: (4,) as `place_pose` gives it.
+        recover: Lets the arm move again after that contact, or refuses by an error.
 
     Raises:
         OutOfWorkspace: The pose is refused before anything moves.
-        MotionAborted: The part met something.
+        MotionAborted: The part met something on its way, more than `EARLY` above the pose.
     """
     check_place(cell, pose)
     above = np.array([pose[0], pose[1], _above(cell, pose), pose[3]])
     cell.arm.move_to_pose(pose_base_tcp(above), speed=0.25)
-    cell.arm.move_to_pose(pose_base_tcp(pose), speed=0.1)
+    try:
+        cell.arm.move_to_pose(pose_base_tcp(pose), speed=0.1)
+    except MotionAborted as error:
+        if cell.arm.state().T_base_tcp.position[2] > pose[2] + EARLY:
+            raise
+        recover(error)
     width = cell.arm.state().gripper_width
     cell.arm.move_gripper(min(MAX_OPENING, width + RELEASE))
     cell.arm.move_to_pose(pose_base_tcp(above), speed=0.25)

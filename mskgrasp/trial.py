@@ -10,7 +10,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from hal import Cell, GraspResult, RgbdFrame, execute_grasp, go_home, put_down
-from hal.errors import MotionAborted, OutOfWorkspace
+from hal.errors import MotionAborted, OutOfWorkspace, Stopped
 from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
 from mskgrasp.errors import MarkersNotFound, NoGraspFound, NoPartFound
 from mskgrasp.geometry import Pose
@@ -296,6 +296,8 @@ def finish(cell: Cell, record: TrialRecord, recover: Recover | None = None) -> N
 
 
 def _recover(cell: Cell, error: MotionAborted, recover: Recover | None) -> None:
+    if isinstance(error, Stopped):
+        raise error
     if recover is None:
         cell.arm.recover()
     else:

@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hal.arm import JOINT_TOLERANCE, Arm, ArmState, GraspOutcome
-from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery
+from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery, Stopped
 from hal.franka.config import JOINT_SPEED, FrankyArmConfig, PandaPyArmConfig
 from hal.franka.driver import DriverSettings, DriverState
 from hal.franka.faults import NoTrajectory
@@ -240,7 +240,7 @@ class FrankaArm(Arm):
 
     def _raise_aborted(self, error: MotionAborted) -> NoReturn:
         if self._stop.is_set():
-            raise MotionAborted("stop() was called; call recover() when it is safe") from error
+            raise Stopped("stop() was called; call recover() when it is safe") from error
         raise error
 
     # ------------------------------------------------------------------ gripper

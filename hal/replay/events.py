@@ -9,7 +9,7 @@ import numpy as np
 
 from hal import errors as hal_errors
 from hal.arm import ArmState, GraspOutcome
-from hal.errors import HalError, MotionAborted
+from hal.errors import HalError, Stopped
 from mskgrasp import errors as base_errors
 from mskgrasp.errors import MskgraspError
 from mskgrasp.geometry import Pose
@@ -93,5 +93,5 @@ def rebuild(error: tuple[str, str]) -> MskgraspError:
     """The error that was raised when it was recorded."""
     name, message = error
     if name == KeyboardInterrupt.__name__:
-        return MotionAborted("at this point of the recording Ctrl-C was pressed; call recover()")
+        return Stopped("at this point of the recording Ctrl-C was pressed; call recover()")
     return _ERRORS.get(name, HalError)(message)

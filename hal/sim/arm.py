@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from hal.arm import Arm, ArmState, GraspOutcome
-from hal.errors import MotionAborted, OutOfWorkspace
+from hal.errors import MotionAborted, OutOfWorkspace, Stopped
 from hal.limits import ArmLimits
 from hal.sim.world import SapienWorld
 from mskgrasp.geometry import Pose, pose_distance, straight_line
@@ -102,12 +102,14 @@ class SapienArm(Arm):
         def check(_: int) -> bool:
             nonlocal reason
             if self._stop.is_set():
-                reason = "stop() was called"
-            elif float(contacts.outer_force()[0] if self._force else contacts.hand_force()[0]) > limit:
+                return True
+            if float(contacts.outer_force()[0] if self._force else contacts.hand_force()[0]) > limit:
                 reason = f"contact force over {limit:.0f} N"
             return bool(reason)
 
         if not motion.follow(path[:, None], check=check):
+            if self._stop.is_set():
+                raise Stopped("stop() was called: the arm stopped; call recover() when it is safe")
             raise MotionAborted(f"{reason}: the arm stopped; call recover() when it is safe")
         motion.step(motion.n_steps(SETTLE_S))
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
 
 import numpy as np
 import pytest
 
 from hal import Cell, execute_grasp, go_home, put_down
-from hal.errors import MotionAborted, NeedsRecovery
+from hal.errors import MotionAborted, NeedsRecovery, Stopped
 from mskgrasp.grasp import pose_base_tcp
+from mskgrasp.placing import place
 
 
 @pytest.mark.parametrize("theta", [0.0, 1.2, -1.5])
@@ -89,5 +91,37 @@ def test_a_held_part_that_is_pressed_on_the_table_stops_the_arm(cell: Cell):
     assert execute_grasp(firm, np.array([x, y, 0.019, 0.3])).holding
     with pytest.raises(MotionAborted, match="contact force over 20 N"):
         cell.arm.move_to_pose(pose_base_tcp(np.array([x, y, 0.0115, 0.3])))
+    cell.arm.recover()
+    go_home(cell)
+
+
+def test_a_part_that_meets_the_table_early_is_let_go_there(cell: Cell):
+    """The hand is sent 6 mm too low."""
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("hex_nut_m30", 0)
+    before = cell.tracker.part_pose().position
+    firm = dataclasses.replace(cell, workspace=dataclasses.replace(cell.workspace, grasp_force=40.0))
+    assert execute_grasp(firm, np.array([before[0], before[1], 0.019, 0.3])).holding
+    stops: list[MotionAborted] = []
+
+    def recover(error: MotionAborted) -> None:
+        stops.append(error)
+        cell.arm.recover()
+
+    place(firm, np.array([before[0] + 0.02, before[1], 0.013, 0.3]), recover)
+    assert len(stops) == 1
+    assert cell.tracker.part_pose().position == pytest.approx(before + [0.02, 0, 0], abs=3e-3)
+    go_home(cell)
+
+
+def test_a_stop_is_no_outcome_of_a_grasp(cell: Cell):
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("hex_nut_m30", 0)
+    x, y, _ = cell.tracker.part_pose().position
+    timer = threading.Timer(0.1, cell.arm.stop)
+    timer.start()
+    with pytest.raises(Stopped):
+        execute_grasp(cell, np.array([x, y, 0.0115, 0.3]))
+    timer.join()
     cell.arm.recover()
     go_home(cell)
