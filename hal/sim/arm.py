@@ -97,20 +97,18 @@ class SapienArm(Arm):
     def _follow(self, path: Tensor) -> None:
         motion, contacts = self._world.env.motion, self._world.env.contacts
         limit = self._world.physics.reflex_force
-        reason = ""
 
         def check(_: int) -> bool:
-            nonlocal reason
-            if self._stop.is_set():
-                return True
-            if float(contacts.outer_force()[0] if self._force else contacts.hand_force()[0]) > limit:
-                reason = f"contact force over {limit:.0f} N"
-            return bool(reason)
+            # What a hand holds is pressed by its fingers: no surprise, and not felt by the arm.
+            force = contacts.outer_force() if self._force else contacts.hand_force()
+            return self._stop.is_set() or float(force[0]) > limit
 
         if not motion.follow(path[:, None], check=check):
             if self._stop.is_set():
                 raise Stopped("stop() was called: the arm stopped; call recover() when it is safe")
-            raise MotionAborted(f"{reason}: the arm stopped; call recover() when it is safe")
+            raise MotionAborted(
+                f"contact force over {limit:.0f} N: the arm stopped; call recover() when it is safe"
+            )
         motion.step(motion.n_steps(SETTLE_S))
 
     def _target(self) -> Tensor:
