@@ -96,12 +96,16 @@ class SapienArm(Arm):
 
     def _follow(self, path: Tensor) -> None:
         motion, contacts = self._world.env.motion, self._world.env.contacts
-        limit = self._world.physics.reflex_force
+
+        def felt() -> float:
+            # What a hand holds is pressed by its fingers: no surprise, and not felt by the arm.
+            return float((contacts.outer_force() if self._force else contacts.hand_force())[0])
+
+        # Pads that close on a groove press the part on the table; that eases as the hand rises.
+        limit = self._world.physics.reflex_force + (felt() if self._force else 0.0)
 
         def check(_: int) -> bool:
-            # What a hand holds is pressed by its fingers: no surprise, and not felt by the arm.
-            force = contacts.outer_force() if self._force else contacts.hand_force()
-            return self._stop.is_set() or float(force[0]) > limit
+            return self._stop.is_set() or felt() > limit
 
         if not motion.follow(path[:, None], check=check):
             if self._stop.is_set():

@@ -82,6 +82,17 @@ def test_a_part_is_lifted_whatever_the_grip_force(cell: Cell, force: float):
     assert cell.arm.state().joints == pytest.approx(cell.workspace.home, abs=5e-3)
 
 
+def test_a_part_that_the_grip_itself_presses_on_the_table_is_lifted(cell: Cell):
+    """Pads that close in the groove of a pulley wedge it down with more than the reflex allows."""
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("v_pulley_56x1x66", 1080180507)
+    before = cell.tracker.part_pose().position
+    result = execute_grasp(cell, np.array([0.4576, 0.0045, 0.0483, 0.9098]))
+    assert result.aborted is None and result.holding
+    assert cell.tracker.part_pose().position[2] > before[2] + 0.8 * cell.workspace.lift_height
+    go_home(cell)
+
+
 def test_a_held_part_that_is_pressed_on_the_table_stops_the_arm(cell: Cell):
     """Pads that grip with 40 N push with up to 2 mu F = 40 N before they slide; the reflex is set to 20 N."""
     assert cell.feeder is not None and cell.tracker is not None
