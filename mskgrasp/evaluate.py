@@ -168,6 +168,11 @@ def _check(config: EvaluateConfig) -> None:
         raise UsageError("--compare and --lowess-data are for --experiment displacement: add that")
     if config.experiment == "displacement" and config.planner.policy != "quality":
         raise UsageError("--experiment displacement runs both policies: leave --planner.policy away")
+    if config.experiment == "displacement" and config.planner.searches:
+        raise UsageError(
+            "--experiment displacement shows all models the same candidates: leave --planner.refinements and "
+            "--planner.check-fingers away"
+        )
 
 
 def _parts(words: Sequence[str]) -> dict[str, str]:

@@ -38,6 +38,11 @@ class PlannerConfig(Config):
     """Grasps a network sees at once: many more do not fit a CPU's cache, few take long to prepare. (The
     paper's network, with patches seven times larger, is fastest with 32.)"""
 
+    @property
+    def searches(self) -> bool:
+        """Whether more is asked for than the best of the candidates."""
+        return self.check_fingers or self.refinements > 0
+
 
 @dataclass(frozen=True)
 class Shortlist:

@@ -21,7 +21,7 @@ from mskgrasp.operator import Operator
 from mskgrasp.parts import find_part
 from mskgrasp.pictures import draw_plan
 from mskgrasp.plan import make_planner
-from mskgrasp.planner import GraspPlan, PlannerConfig
+from mskgrasp.planner import GraspPlan, Planner, PlannerConfig
 from mskgrasp.predictors import LOWESS, LowessPredictor, NetworkPredictor, Predictor
 from mskgrasp.processes import Work, results
 from mskgrasp.settings import Tape
@@ -130,16 +130,9 @@ class TrialRunner:
                 self._operator.lay(self._cell, task.source, seed, name=task.key)
             except TapeDoesNotFit as error:
                 no_tape = f"no room for tape: {error}"  # it lies there all the same, and may be grasped
-            chooser = Chooser(
-                self._candidates,
-                self._predictors[task.chosen_by],
-                task.policy,
-                task.part,
-                self._cell.tracker,
-            )
             record = run_trial(
                 self._cell,
-                chooser,
+                self._chooser(task),
                 part=task.part,
                 number=task.number,
                 seed=seed,
@@ -167,6 +160,18 @@ class TrialRunner:
         if self._operator.asks:
             draw_plan(frame, plan, picture)
         return self._operator.may_move(picture, plan.summary)
+
+    def _chooser(self, task: TrialTask) -> Chooser | Planner:
+        planner = self._candidates.planner
+        if planner.config.searches and planner.config.policy == task.policy and not task.chosen_by:
+            return planner
+        return Chooser(
+            self._candidates,
+            self._predictors[task.chosen_by],
+            task.policy,
+            task.part,
+            self._cell.tracker,
+        )
 
     def _recover(self, reason: str) -> None:
         self._operator.recover(self._cell, reason)

@@ -144,6 +144,14 @@ def test_models_are_compared_and_another_one_joins_without_new_grasps_for_all(
     assert known["translation_rmse"] == report["models"]["gcip_mv"]["quality"]["novel"]["translation_rmse"]
 
 
+def test_the_search_that_is_asked_for_is_the_one_that_is_evaluated(tmp_path: Path):
+    evaluate(config(tmp_path, planner=PlannerConfig(policy="quality", n_candidates=60, refinements=2)))
+    (key,) = trials(tmp_path)
+    _, plan, _ = read_trial(trial_file(tmp_path, key))
+    assert plan is not None and len(plan.candidates) > 60
+    assert plan.quality == plan.qualities.max() > plan.qualities[:60].max()
+
+
 def test_tape_tells_what_the_tracker_knows_or_nothing(tmp_path: Path):
     report = evaluate(
         config(tmp_path / "out", measure="markers", parts=("washer_m36", "parallel_pin_12x60"), trials=1)
@@ -217,6 +225,10 @@ def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
         (dict(experiment="displacement", compare=("a=typo",)), "no model.json in typo"),
         (dict(experiment="displacement", lowess_data=Path("typo")), "no dataset folder typo"),
         (dict(experiment="displacement", planner=PlannerConfig()), "both policies"),
+        (
+            dict(experiment="displacement", planner=PlannerConfig(policy="quality", refinements=1)),
+            "leave --planner.refinements",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_told_in_a_line_and_leaves_nothing(
