@@ -32,6 +32,8 @@ ROTATION_TOLERANCE = 1e-2
 WIDTH_TOLERANCE = 2e-3
 """The pads have arrived within this, metres."""
 
+STOPPED = "stop() was called; call recover() when it is safe"
+
 
 @dataclass(frozen=True, kw_only=True)
 class ArmState:
@@ -234,12 +236,15 @@ class Arm(Device):
             try:
                 yield
                 if self._stop.is_set():
-                    raise Stopped("stop() was called; call recover() when it is safe")
+                    raise Stopped(STOPPED)
             except OutOfWorkspace:
                 raise  # found out before anything moved
             except BaseException as error:
                 self._fault = str(error) or type(error).__name__
                 self._halt()
+                if self._stop.is_set() and isinstance(error, MotionAborted) and type(error) is not Stopped:
+                    # However the motion ended, somebody has stopped it: it is not to be recovered from.
+                    raise Stopped(STOPPED) from error
                 raise
 
     # ------------------------------------------------------------------ what a backend does

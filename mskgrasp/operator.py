@@ -103,7 +103,9 @@ class Operator:
         if self.asks:
             self.tell(f"The arm stopped: {reason}")
             self._ask(
-                "Look at it, clear its way. Enter to go on (it moves up and home), q to stop: ", {"": True}
+                "Look at it, clear its way. Enter to go on (it may open its fingers, moves up and home), "
+                "q to stop: ",
+                {"": True},
             )
         cell.arm.recover()
 

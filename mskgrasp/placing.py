@@ -15,7 +15,7 @@ from mskgrasp.grasp import MAX_OPENING, centre_in_grasp_frame, lowest_grasp_z, p
 
 RELEASE = 0.02
 """By how much the fingers open to let go of a part, m."""
-EARLY = 0.01
+EARLY = 0.007
 """How far above its place a part may meet the table and count as put down, m."""
 
 

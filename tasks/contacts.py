@@ -40,16 +40,29 @@ class HandContacts:
         return torch.tensor([largest / self._scene.px.timestep])
 
     def outer_force(self) -> Tensor:
-        """(n,) net contact force of all else on hand and part together, N; for a hand that holds the part.
+        """(n,) net contact force of all else on the hand and, while it touches it, the part together, N.
 
         The grip cancels so. On the hand alone it would not: PhysX reports no friction on the CPU.
         """
         if self._gpu:
             hand = self._agent.robot.get_net_contact_forces(HAND_LINKS).sum(dim=-2)
-            return (hand + self._part.get_net_contact_forces()).norm(dim=-1)
-        impulses = self._impulses({**self._hand, self._entity: len(self._hand)})
+            part = self._part.get_net_contact_forces()
+            touched = self.pads_on_part()[0].amax(dim=-1, keepdim=True) > 0
+            return torch.where(touched, hand + part, hand).norm(dim=-1)
+        bodies = dict(self._hand)
+        if self._touches_part():
+            bodies[self._entity] = len(bodies)
+        impulses = self._impulses(bodies)
         total = sum(impulses.values(), np.zeros(3))
         return torch.tensor([float(np.linalg.norm(total)) / self._scene.px.timestep])
+
+    def _touches_part(self) -> bool:
+        for contact in self._scene.px.get_contacts():
+            first, second = (body.entity for body in contact.bodies)
+            other = second if first is self._entity else first if second is self._entity else None
+            if other in self._hand and any(np.any(point.impulse) for point in contact.points):
+                return True
+        return False
 
     def _impulses(self, bodies: dict[sapien.Entity, int]) -> dict[int, np.ndarray]:
         total: dict[int, np.ndarray] = {}

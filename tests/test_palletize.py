@@ -44,7 +44,7 @@ def threads() -> Iterator[None]:
 def config(out: Path, **changes: object) -> PalletizeConfig:
     values: dict[str, object] = dict(
         models=PRETRAINED, out=out, parts=(PART,), trials=1, corrections=("none", "truth"),
-        planner=PlannerConfig(n_candidates=100),
+        planner=PlannerConfig(n_candidates=400),
     )  # fmt: skip
     return PalletizeConfig(**(values | changes))  # type: ignore[arg-type]
 
@@ -66,7 +66,7 @@ def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_pa
     assert len(kept.splitlines()) == 1
 
     command = ["palletize", "--models", str(PRETRAINED), "--out", str(out), "--parts", PART, "--trials", "1"]
-    command += ["--corrections", "none", "truth", "--planner.n-candidates", "100"]
+    command += ["--corrections", "none", "truth", "--planner.n-candidates", "400"]
     monkeypatch.setattr("sys.argv", command)
     assert main() == 0
     assert "Corrected by the truth" in capsys.readouterr().out

@@ -140,9 +140,9 @@ def test_a_small_dataset_is_learned_and_beats_the_trivial_predictors(dataset, tm
     card = (out / "card.md").read_text()
     assert f"{gqn['auroc']:.3f}" in card and f"{1e3 * gdn['translation_rmse']:.2f}" in card
     assert str(dataset) not in card + (out / "model.json").read_text()
-    assert (
-        0 < gdn["ause_translation"] < 1 and gdn["intervals"]["translation_rmse"][0] < gdn["translation_rmse"]
-    )
+    # With two validation parts one of them alone may be the whole of a draw: the bounds may be the value.
+    low, high = gdn["intervals"]["translation_rmse"]
+    assert 0 < gdn["ause_translation"] < 1 and 0 < low <= gdn["translation_rmse"] <= high
     files = {path.name for path in out.iterdir()}
     assert files == {
         "model.safetensors",

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hal.arm import JOINT_TOLERANCE, Arm, ArmState, GraspOutcome
+from hal.arm import JOINT_TOLERANCE, STOPPED, Arm, ArmState, GraspOutcome
 from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery, Stopped
 from hal.franka.config import JOINT_SPEED, FrankyArmConfig, PandaPyArmConfig
 from hal.franka.driver import DriverSettings, DriverState
@@ -240,7 +240,7 @@ class FrankaArm(Arm):
 
     def _raise_aborted(self, error: MotionAborted) -> NoReturn:
         if self._stop.is_set():
-            raise Stopped("stop() was called; call recover() when it is safe") from error
+            raise Stopped(STOPPED) from error
         raise error
 
     # ------------------------------------------------------------------ gripper

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hal.arm import Arm, ArmState, GraspOutcome
+from hal.arm import STOPPED, Arm, ArmState, GraspOutcome
 from hal.errors import MotionAborted, OutOfWorkspace, Stopped
 from hal.limits import ArmLimits
 from hal.sim.world import SapienWorld
@@ -96,20 +96,24 @@ class SapienArm(Arm):
 
     def _follow(self, path: Tensor) -> None:
         motion, contacts = self._world.env.motion, self._world.env.contacts
+        limit = self._world.physics.reflex_force
 
         def felt() -> float:
             # What a hand holds is pressed by its fingers: no surprise, and not felt by the arm.
             return float((contacts.outer_force() if self._force else contacts.hand_force())[0])
 
         # Pads that close on a groove press the part on the table; that eases as the hand rises.
-        limit = self._world.physics.reflex_force + (felt() if self._force else 0.0)
+        pressed = felt() if self._force else 0.0
 
         def check(_: int) -> bool:
-            return self._stop.is_set() or felt() > limit
+            nonlocal pressed
+            force = felt()
+            pressed = min(pressed, force)
+            return self._stop.is_set() or force - pressed > limit
 
         if not motion.follow(path[:, None], check=check):
             if self._stop.is_set():
-                raise Stopped("stop() was called: the arm stopped; call recover() when it is safe")
+                raise Stopped(STOPPED)
             raise MotionAborted(
                 f"contact force over {limit:.0f} N: the arm stopped; call recover() when it is safe"
             )

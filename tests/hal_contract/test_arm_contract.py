@@ -19,7 +19,7 @@ import pytest
 
 from hal import Arm, Cell, cell_from_yaml, execute_grasp
 from hal.arm import JOINT_TOLERANCE, POSITION_TOLERANCE, ROTATION_TOLERANCE
-from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace
+from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
 from hal.replay import ReplayArm, ReplayArmConfig, recorded_cell
 from hal.replay.recorder import RecordingArm
 from mskgrasp.geometry import Pose, pose_distance, quat_multiply
@@ -268,7 +268,7 @@ def test_a_grasp_out_of_reach_is_refused_before_anything_moves(cell: Cell):
 def test_stop_from_another_thread_ends_a_motion_and_nothing_moves_before_recover(cell: Cell, name: str):
     far = cell.workspace.home + np.array([0.5, 0, 0, 0, 0, 0, 0])
     with stopped_after(0.05 if name == "sapien" else 0.6, cell, name):
-        with pytest.raises((MotionAborted, NeedsRecovery), match="stop"):
+        with pytest.raises((Stopped, NeedsRecovery), match="stop"):
             for k in range(200):  # a simulated motion may be quicker than the timer
                 cell.arm.move_to_joints(far if k % 2 == 0 else cell.workspace.home)
     stopped = joints_at_rest(cell.arm)
@@ -294,7 +294,7 @@ def test_stop_from_another_thread_ends_a_motion_and_nothing_moves_before_recover
 )
 def test_stop_ends_every_kind_of_motion(cell: Cell, name: str, command):
     with stopped_after(0.005 if name == "sapien" else 0.2, cell, name):
-        with pytest.raises((MotionAborted, NeedsRecovery), match="stop"):
+        with pytest.raises((Stopped, NeedsRecovery), match="stop"):
             for k in range(200):  # a simulated motion may be quicker than the timer
                 command(cell.arm, k)
     with pytest.raises(NeedsRecovery):

@@ -125,6 +125,20 @@ def test_a_part_that_meets_the_table_early_is_let_go_there(cell: Cell):
     go_home(cell)
 
 
+def test_a_part_that_falls_from_the_hand_does_not_stop_the_arm(cell: Cell):
+    """What it does to the table when it lands is no force on the hand any more."""
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("hex_nut_m30", 0)
+    before = cell.tracker.part_pose().position
+    assert execute_grasp(cell, np.array([before[0], before[1], 0.0115, 0.3])).holding
+    agent = cell.feeder.env.agent  # type: ignore[union-attr]  # the feeder is the simulated world
+    agent.set_finger_force(0.01)
+    cell.arm.move_to_pose(pose_base_tcp(np.array([before[0], before[1], 0.17, 0.3])))
+    agent.set_finger_force(agent.physics.finger_force)
+    assert cell.tracker.part_pose().position[2] < before[2] + 0.01
+    go_home(cell)
+
+
 def test_a_stop_is_no_outcome_of_a_grasp(cell: Cell):
     assert cell.feeder is not None and cell.tracker is not None
     cell.feeder.present("hex_nut_m30", 0)

@@ -15,7 +15,15 @@ import numpy as np
 import pytest
 
 from hal import Cell, cell_from_yaml, execute_grasp
-from hal.errors import BadRecording, CaptureFailed, MotionAborted, NeedsRecovery, NotConnected, NotRecorded
+from hal.errors import (
+    BadRecording,
+    CaptureFailed,
+    MotionAborted,
+    NeedsRecovery,
+    NotConnected,
+    NotRecorded,
+    Stopped,
+)
 from hal.replay import (
     ReplayArm,
     ReplayArmConfig,
@@ -138,7 +146,7 @@ def test_stop_from_the_program_ends_what_follows(recording: Path):
     arm = ReplayArm(ReplayArmConfig(driver="replay", recording=recording))
     with arm:
         arm.stop()
-        with pytest.raises(MotionAborted, match="stop"):
+        with pytest.raises(Stopped, match="stop"):
             arm.move_gripper(0.08)
 
 
