@@ -242,8 +242,8 @@ class Arm(Device):
             except BaseException as error:
                 self._fault = str(error) or type(error).__name__
                 self._halt()
-                if self._stop.is_set() and isinstance(error, MotionAborted) and type(error) is not Stopped:
-                    # However the motion ended, somebody has stopped it: it is not to be recovered from.
+                if self._stop.is_set() and isinstance(error, MotionAborted):
+                    # Whatever the backend says of how the motion ended, somebody has stopped it.
                     raise Stopped(STOPPED) from error
                 raise
 

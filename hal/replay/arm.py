@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hal.arm import Arm, ArmState, GraspOutcome
+from hal.arm import STOPPED, Arm, ArmState, GraspOutcome
 from hal.errors import NeedsRecovery, NotRecorded, OutOfWorkspace, Stopped
 from hal.replay.config import ReplayArmConfig
 from hal.replay.events import COMMANDS, arm_state, plain
@@ -113,7 +113,7 @@ class ReplayArm(Arm):
         # A recorded stop ended a recorded motion; one that comes now ends this one.
         if self._stop.is_set() and error is None:
             self._fault, self._astray = "stop() was called", True
-            raise Stopped("stop() was called; call recover() when it is safe")
+            raise Stopped(STOPPED)
         return self._step(call, {key: plain(value) for key, value in arguments.items()})
 
     def _step(self, call: str, arguments: dict[str, Any]) -> Any:

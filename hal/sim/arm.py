@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hal.arm import STOPPED, Arm, ArmState, GraspOutcome
-from hal.errors import MotionAborted, OutOfWorkspace, Stopped
+from hal.arm import Arm, ArmState, GraspOutcome
+from hal.errors import MotionAborted, OutOfWorkspace
 from hal.limits import ArmLimits
 from hal.sim.world import SapienWorld
 from mskgrasp.geometry import Pose, pose_distance, straight_line
@@ -112,8 +112,6 @@ class SapienArm(Arm):
             return self._stop.is_set() or force - pressed > limit
 
         if not motion.follow(path[:, None], check=check):
-            if self._stop.is_set():
-                raise Stopped(STOPPED)
             raise MotionAborted(
                 f"contact force over {limit:.0f} N: the arm stopped; call recover() when it is safe"
             )
