@@ -9,8 +9,8 @@ import numpy as np
 import trimesh
 
 from hal.camera import RgbdFrame
+from mskgrasp.finding import find_part_pixels
 from mskgrasp.geometry import quat_rotate, wrap_half_turn
-from mskgrasp.grasp import PartView
 from mskgrasp.parts import Part
 
 
@@ -55,24 +55,31 @@ def pixel_pitch(frame: RgbdFrame) -> float:
     return float(np.nanmedian(frame.depth)) / float(frame.intrinsics[0][0])
 
 
-def seen_footprint(frame: RgbdFrame, view: PartView, min_height: float) -> Footprint:
+def seen_footprint(
+    frame: RgbdFrame, *, table_z: float, region: tuple[float, float, float, float], min_height: float
+) -> Footprint:
     """The footprint of the part that a frame shows.
 
     Args:
         frame: Of the part on the table.
-        view: Where the part was found in it.
+        table_z: Height of the table, base frame, metres.
+        region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
         min_height: What rises less above the table is table, metres.
+
+    Raises:
+        NoPartFound: The frame shows none.
     """
-    points, pitch = seen_points(frame), pixel_pitch(frame)
-    in_box = np.abs(view.T_base_box.inverse().apply(points)[:, :2]) <= view.size[:2] / 2 + pitch
-    high = in_box.all(axis=1) & (points[:, 2] > view.table_z + min_height)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(
-        high.reshape(frame.depth.shape).astype(np.uint8), connectivity=8
+    found = find_part_pixels(
+        frame.depth,
+        frame.intrinsics,
+        frame.T_base_camera,
+        table_z=table_z,
+        region=region,
+        min_height=min_height,
     )
-    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    found = footprint_of(points[(labels == largest).ravel(), :2])
+    inner = footprint_of(found.points_base[:2, found.mask].T)
     # An edge is, on average, half a pixel further out than the last pixel on it.
-    return Footprint(sides=found.sides + pitch, theta=found.theta)
+    return Footprint(sides=inner.sides + pixel_pitch(frame), theta=inner.theta)
 
 
 def usual_footprint(part: Part) -> Footprint:

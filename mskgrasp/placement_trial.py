@@ -119,7 +119,10 @@ class Placer:
             if self._agreed(frame, plan, task):
                 break
         known = replace(failed, grasp=plan.grasp.tolist(), predicted=plan.displacement.tolist())
-        footprint = seen_footprint(frame, plan.view, self._cell.workspace.min_height)
+        workspace = self._cell.workspace
+        footprint = seen_footprint(
+            frame, table_z=workspace.table_z, region=workspace.region, min_height=workspace.min_height
+        )
         if not task.slot.fits(footprint, SEEN_TOLERANCE):
             return replace(known, reason="slot too small")
         targets = task.slot.targets(footprint)

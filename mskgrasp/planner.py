@@ -12,9 +12,9 @@ from pydantic import Field
 from hal.camera import RgbdFrame
 from mskgrasp.config import Config
 from mskgrasp.errors import BadModel, NoGraspFound
+from mskgrasp.finding import view_part
 from mskgrasp.geometry import wrap_angle
 from mskgrasp.grasp import PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
-from mskgrasp.images import view_part
 from mskgrasp.models import Models
 from mskgrasp.refine import fingers_free, grasps_near
 from mskgrasp.scoring import Scene, displacements, qualities

@@ -15,8 +15,9 @@ from torch import Tensor
 
 from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard, u16_to_depth
 from mskgrasp.errors import BadDataset, NoPartFound
+from mskgrasp.finding import view_part
 from mskgrasp.grasp import centre_in_grasp_frame, to_grasp_displacement
-from mskgrasp.images import crop_patches, height_image, view_part
+from mskgrasp.images import crop_patches, height_image
 from mskgrasp.network_config import NetworkConfig
 from mskgrasp.parts.catalogue import Split, read_index
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from hal.camera import RgbdFrame
 from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, write_shard
+from mskgrasp.finding import view_part
 from mskgrasp.geometry import Pose, quat_about_z, quat_multiply, quat_to_matrix, wrap_half_turn
 from mskgrasp.grasp import (
     FAILURES,
@@ -19,7 +20,6 @@ from mskgrasp.grasp import (
     pose_base_tcp,
     sample_grasps,
 )
-from mskgrasp.images import view_part
 
 TABLE_Z = 0.0
 REGION = (0.335, 0.575, -0.12, 0.12)
@@ -28,6 +28,12 @@ N_PIXELS = 160
 # The camera looks straight down from 0.8 m, its image x along the base's -y.
 OVERHEAD = Pose.from_matrix(
     np.array([[0.0, -1.0, 0.0, 0.455], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.8], [0.0, 0.0, 0.0, 1.0]])
+)
+
+# Tilted by 20 degrees away from straight down, moved so that it still sees the region.
+TILTED = Pose(
+    position=np.array([0.455, -0.27, 0.75]),
+    quat_wxyz=quat_multiply(np.array([np.cos(0.175), np.sin(0.175), 0.0, 0.0]), OVERHEAD.quat_wxyz),
 )
 
 

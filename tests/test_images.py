@@ -4,18 +4,9 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mskgrasp.errors import NoPartFound
-from mskgrasp.geometry import Pose, quat_about_z, quat_multiply
-from mskgrasp.images import crop_patches, height_image, view_part
-from tests import synthetic
-from tests.synthetic import INTRINSICS, OVERHEAD, REGION, Box, render
-
-PIXEL = 0.8 / 365.5  # metres that a pixel covers on the table
-# Tilted by 20 degrees away from straight down, moved so that it still sees the region.
-TILTED = Pose(
-    position=np.array([0.455, -0.27, 0.75]),
-    quat_wxyz=quat_multiply(np.array([np.cos(0.175), np.sin(0.175), 0.0, 0.0]), OVERHEAD.quat_wxyz),
-)
+from mskgrasp.geometry import Pose, quat_about_z
+from mskgrasp.images import crop_patches, height_image
+from tests.synthetic import INTRINSICS, OVERHEAD, TILTED, Box, render
 
 
 def heights_of(boxes, T_base_camera=OVERHEAD):
@@ -43,82 +34,6 @@ def test_heights_of_many_images_use_each_its_own_camera_and_table():
     assert float(both[1].min()) == pytest.approx(0.1, abs=1e-6)
     single = height_image(depth[1], INTRINSICS, TILTED, -0.1)
     assert np.allclose(both[1].numpy(), single, atol=1e-6)
-
-
-@pytest.mark.parametrize("yaw", [0.0, np.pi / 2])
-def test_a_boxs_view_is_within_a_pixel_and_unbiased(yaw):
-    rng = np.random.default_rng(0)
-    centres, sizes = [], []
-    for _ in range(120):
-        size = tuple(rng.uniform([0.02, 0.01, 0.01], [0.1, 0.05, 0.05]))
-        box = Box(x=float(rng.uniform(0.37, 0.54)), y=float(rng.uniform(-0.085, 0.085)), yaw=yaw, size=size)
-        view = synthetic.view(render([box]))
-        along = np.array(size[:2]) if yaw else np.array(size[1::-1])  # image x runs along base -y
-        centres.append((view.centre_base - box.T_base_obj.position) / PIXEL)
-        sizes.append((view.size[:2] - along) / PIXEL)
-        assert view.size[2] == pytest.approx(size[2], abs=1e-5)
-    centres, sizes = np.array(centres), np.array(sizes)
-    assert np.abs(sizes).max() <= 1.0
-    # Half a pixel is what sampling an edge leaves open; on average a third is kept, and nothing is biased.
-    assert np.sqrt((centres**2).mean(axis=0)).max() < 1 / 3
-    assert np.abs(centres).max() < 0.55
-    assert np.abs(centres.mean(axis=0)).max() < 0.06
-
-
-def test_a_tilted_camera_sees_the_same_box():
-    box = Box(x=0.46, y=0.01, yaw=0.0, size=(0.06, 0.03, 0.03))
-    view = view_part(render([box], TILTED), INTRINSICS, TILTED, table_z=0.0, region=REGION)
-    assert np.abs(view.centre_base - box.T_base_obj.position).max() < 1.5 * PIXEL
-    assert np.abs(view.size - [0.03, 0.06, 0.03]).max() < 2 * PIXEL
-
-
-def test_the_box_frame_lies_along_the_images_axes_with_z_up():
-    view = synthetic.view(render([Box(x=0.46, y=0.0, yaw=0.0, size=(0.08, 0.02, 0.03))]))
-    assert np.allclose(view.T_base_box.as_matrix()[:3, 0], [0, -1, 0], atol=1e-9)
-    assert np.allclose(view.T_base_box.as_matrix()[:3, 2], [0, 0, 1])
-    assert view.size[1] > 3 * view.size[0]
-
-
-def test_the_radius_of_gyration_is_that_of_a_rectangle():
-    length, width = 0.08, 0.05
-    view = synthetic.view(render([Box(x=0.455, y=0.0, yaw=0.4, size=(length, width, 0.004))]))
-    assert view.gyration_radius == pytest.approx(np.sqrt((length**2 + width**2) / 12), rel=0.03)
-
-
-def test_specks_flying_pixels_and_holes_do_not_move_the_view():
-    box = Box(x=0.455, y=0.0, yaw=0.2, size=(0.06, 0.03, 0.03))
-    depth = render([box])
-    clean = synthetic.view(depth)
-    depth[30, 40], depth[31, 41] = 0.7, np.nan  # a speck on the table
-    depth[80, 80] = 0.6  # a flying pixel on the part
-    depth[78:80, 78:80] = np.nan
-    spoilt = synthetic.view(depth)
-    assert np.allclose(spoilt.centre_base, clean.centre_base, atol=1e-4)
-    assert np.allclose(spoilt.size, clean.size, atol=1e-4)
-
-
-def test_what_stands_outside_the_region_is_not_the_part():
-    part = Box(x=0.455, y=0.0, yaw=0.0, size=(0.03, 0.03, 0.02))
-    wall = Box(x=0.455, y=0.19, yaw=0.0, size=(0.3, 0.02, 0.05))
-    view = synthetic.view(render([part, wall]))
-    assert np.abs(view.centre_base - part.T_base_obj.position).max() < PIXEL
-
-
-@pytest.mark.parametrize(
-    ("depth", "words"),
-    [
-        (render([]), "nothing rises"),
-        (np.full((160, 160), np.nan, np.float32), "no valid pixel"),
-        (render([]) * 1000, "millimetres"),
-        ((render([]) * 1000).astype(np.uint16), "millimetres"),
-        (render([]) + np.linspace(-0.015, 0.015, 160, dtype=np.float32), "the table is tilted"),
-        (render([Box(x=0.6, y=0.0, yaw=0.0, size=(0.04, 0.04, 0.03))]), "outside the region"),
-    ],
-)
-def test_an_image_without_a_part_is_told_in_one_line(depth, words):
-    with pytest.raises(NoPartFound, match=words) as caught:
-        synthetic.view(depth)
-    assert "\n" not in str(caught.value)
 
 
 def bump(x, y, z, half=0.004):

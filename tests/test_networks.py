@@ -6,8 +6,8 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from mskgrasp.errors import BadModel
+from mskgrasp.finding import view_part
 from mskgrasp.hand_features import HandFeatures
-from mskgrasp.images import view_part
 from mskgrasp.models import ModelMeta, build_models, load_models, save_model
 from mskgrasp.networks import (
     GraspDisplacementNetwork,

@@ -7,9 +7,9 @@ import torch
 from hypothesis import given
 
 from mskgrasp.errors import BadModel, NoGraspFound, NoPartFound
+from mskgrasp.finding import view_part
 from mskgrasp.geometry import wrap_angle
 from mskgrasp.grasp import centre_in_grasp_frame, to_object_displacement
-from mskgrasp.images import view_part
 from mskgrasp.models import ModelMeta, build_models
 from mskgrasp.networks import NetworkConfig, Normalisation
 from mskgrasp.pictures import draw_plan

@@ -13,7 +13,7 @@ from mskgrasp.footprint import Footprint, footprint_of, seen_footprint, usual_fo
 from mskgrasp.geometry import wrap_half_turn
 from mskgrasp.parts import find_part
 from mskgrasp.slots import Slot, check_reach, check_room, parse_target, read_slots
-from tests.synthetic import Box, frame, view
+from tests.synthetic import REGION, TABLE_Z, Box, frame
 
 REPOSITORY = Path(__file__).parents[1]
 GRID = REPOSITORY / "configs" / "palletize" / "grid.yaml"
@@ -23,7 +23,7 @@ GRID = REPOSITORY / "configs" / "palletize" / "grid.yaml"
 def test_a_depth_image_tells_how_a_part_lies(yaw):
     box = Box(x=0.47, y=0.02, yaw=float(yaw), size=(0.06, 0.03, 0.025))
     seen = frame([box])
-    found = seen_footprint(seen, view(seen.depth), 0.002)
+    found = seen_footprint(seen, table_z=TABLE_Z, region=REGION, min_height=0.002)
     assert abs(wrap_half_turn(np.asarray(found.theta - yaw))) < np.radians(3.0)
     np.testing.assert_allclose(found.sides, [0.06, 0.03], atol=0.003)
 
@@ -33,7 +33,7 @@ def test_a_low_part_of_it_counts_too():
     plate = Box(x=0.47, y=0.0, yaw=0.5, size=(0.08, 0.03, 0.004))
     wall = Box(x=0.47 + 0.038 * np.cos(0.5), y=0.038 * np.sin(0.5), yaw=0.5, size=(0.004, 0.03, 0.04))
     seen = frame([plate, wall])
-    found = seen_footprint(seen, view(seen.depth), 0.002)
+    found = seen_footprint(seen, table_z=TABLE_Z, region=REGION, min_height=0.002)
     assert abs(found.theta - 0.5) < np.radians(3.0)
     np.testing.assert_allclose(found.sides, [0.08, 0.03], atol=0.003)
 

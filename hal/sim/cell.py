@@ -35,7 +35,7 @@ class SapienCellConfig(Config):
     home: tuple[float, float, float, float, float, float, float] = READY
     """Joints at which the arm is out of the camera's sight, rad."""
     min_height: float | None = Field(default=None, gt=0)
-    """What rises less over the table is taken for table, m; null: 2 mm, or 6 mm where the camera errs."""
+    """What rises less over the table is taken for table, m; null: 2 mm, or 3 mm where the camera errs."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
     """How far a grasped part is lifted, m."""
     grasp_force: float = Field(default=20.0, gt=0, le=70)

@@ -49,11 +49,11 @@ class SensorNoise(Config):
 
     @property
     def least_height(self) -> float:
-        """What rises less over a table may be noise, metres: two deviations of iid, 4.6 of a kinect2's.
+        """What rises less over a table may be noise, metres, once heights are smoothed (`mskgrasp.finding`).
 
         Higher, and flat parts are lost; lower, and noise around a part counts to it.
         """
-        return 0.002 if self.model == "off" else 0.006
+        return 0.002 if self.model == "off" else 0.003
 
 
 def add_noise(

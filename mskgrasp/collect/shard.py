@@ -16,8 +16,8 @@ import torch
 from mskgrasp.collect.work import ShardTask, versions
 from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, u16_to_depth, write_shard
 from mskgrasp.errors import NoPartFound
+from mskgrasp.finding import view_part
 from mskgrasp.grasp import MAX_DISPLACEMENT, sample_grasps
-from mskgrasp.images import view_part
 from mskgrasp.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
 from tasks import GraspDisplacementEnv
 from tasks.outcome import MAX_PENETRATION, MAX_SPEED

@@ -28,7 +28,7 @@ _PACKAGE = Path(mskgrasp.__file__).parent
 _SIMULATES = (
     *sorted((_PACKAGE.parent / "tasks").glob("*.py")),
     *sorted((_PACKAGE / "settings").glob("*.py")),
-    *(_PACKAGE / name for name in ("geometry.py", "grasp.py", "images.py", "collect/shard.py")),
+    *(_PACKAGE / name for name in ("geometry.py", "grasp.py", "finding.py", "collect/shard.py")),
 )
 """The code that decides what a shard holds."""
 

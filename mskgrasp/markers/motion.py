@@ -31,7 +31,7 @@ def planar_displacement(
         after: The same with the part put down again and the hand gone.
         grasp: (4,) x, y, z, theta as commanded, base frame.
         centre_base: (2,) or (3,) where the part's origin was before, base frame, metres: known, or estimated
-            (`mskgrasp.images.view_part`).
+            (`mskgrasp.finding.view_part`).
 
     Returns:
         (3,) dx, dy, dtheta of the object displacement, axes of the grasp frame, metres and radians in

@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from mskgrasp.images import view_part
+from mskgrasp.finding import view_part
 from mskgrasp.settings import TABLE_Z
 from tasks.renderer import render_backend
 

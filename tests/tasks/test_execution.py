@@ -12,9 +12,9 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from mskgrasp.errors import BadConfig
+from mskgrasp.finding import view_part
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import FAILURES, lowest_grasp_z
-from mskgrasp.images import view_part
 from mskgrasp.settings import REGION, TABLE_Z, ExecutionNoise
 from tasks.renderer import render_backend
 

@@ -1,0 +1,251 @@
+"""Where a part lies in a depth image, found by its height over the table alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+
+from mskgrasp.errors import NoPartFound
+from mskgrasp.geometry import Array, Pose, quat_to_matrix
+from mskgrasp.grasp import PartView
+
+REGION_MARGIN = 0.05
+"""How far a part that lies in the region may reach beyond it, metres."""
+MOST_RAISED = 0.4
+"""Share of the region's pixels that a part may cover: 15 cm of 34 cm, squared, are 20 %."""
+ALONE = 0.2
+"""Share of the part's pixels from which on something else in the region is another part."""
+MIN_PIXELS = 5
+"""Smaller groups of pixels are specks: an M3 nut covers 6 pixels of 2.2 mm."""
+QUIET = 0.0003
+"""Deviation of the heights from which on an image is noisy, metres; one stored in 0.1 mm has 0.05 mm."""
+_PLAUSIBLE_DEPTH = 20.0
+"""Metres; a camera above a table never is that far away, but a depth in millimetres always is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundPart:
+    """The pixels that show the part.
+
+    Attributes:
+        mask: (h, w) bool.
+        points_base: (3, h, w) x, y, z of what every pixel sees, base frame, metres, NaN where invalid.
+        heights: (h, w) above the table, metres; of a noisy image smoothed.
+        n_other: How many pixels the next largest thing in the region has.
+    """
+
+    mask: np.ndarray
+    points_base: np.ndarray
+    heights: np.ndarray
+    n_other: int
+
+
+def find_part_pixels(
+    depth: Array,
+    intrinsics: np.ndarray,
+    T_base_camera: Pose,
+    *,
+    table_z: float,
+    region: tuple[float, float, float, float],
+    min_height: float = 0.002,
+) -> FoundPart:
+    """The largest connected group of pixels higher than ``min_height``.
+
+    Where the image is noisy, 3 x 3 medians, twice, take the noise off the heights, and heights count from
+    where the table is seen, if that is within ``min_height`` of ``table_z``: what a camera measures too far
+    everywhere must not swallow a flat part. An exact image stays as it is.
+
+    Args:
+        depth: (h, w) metres, NaN where invalid.
+        intrinsics: (3, 3) pinhole matrix.
+        T_base_camera: Pose of the camera's optical frame in the base; it need not look straight down.
+        table_z: Height of the table, base frame, metres.
+        region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
+        min_height: What rises less above the table is table, metres.
+
+    Raises:
+        NoPartFound: Nothing rises above the table there, or the image is no depth in metres.
+    """
+    depth = np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth)
+    _check_depth(depth)
+    points = _points_base(depth, intrinsics, T_base_camera)
+    x, y, z = points
+    heights = z - table_z
+    x_min, x_max, y_min, y_max = region
+    near = (x > x_min - REGION_MARGIN) & (x < x_max + REGION_MARGIN)
+    near &= (y > y_min - REGION_MARGIN) & (y < y_max + REGION_MARGIN)
+    seen_table = 0.0
+    if _noise(heights, near) > QUIET:
+        heights = _smoothed(heights)
+        seen_table = float(np.clip(np.median(heights[near]), -min_height, min_height))
+    raised = near & (heights > min_height)
+    if raised.sum() > MOST_RAISED * max(near.sum(), 1):
+        raise NoPartFound(
+            f"{raised.sum() / near.sum():.0%} of the region rise more than {min_height * 1e3:g} mm above the "
+            f"table (median {np.median(heights[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
+            f"{table_z:g} or the camera's pose is wrong; calibrate the camera anew"
+        )
+    mask, n_other = _largest_component(near & (heights > seen_table + min_height))
+    if mask is None:
+        highest = heights[near].max() if near.any() else np.nan
+        raise NoPartFound(
+            f"nothing rises more than {min_height * 1e3:g} mm above the table in the region (highest point "
+            f"{highest * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the camera's pose"
+        )
+    return FoundPart(mask=mask & np.isfinite(z), points_base=points, heights=heights, n_other=n_other)
+
+
+def view_part(
+    depth: Array,
+    intrinsics: np.ndarray,
+    T_base_camera: Pose,
+    *,
+    table_z: float,
+    region: tuple[float, float, float, float],
+    min_height: float = 0.002,
+    alone: bool = False,
+) -> PartView:
+    """Where the part lies on the table: the box around the pixels that show it (`find_part_pixels`).
+
+    The box lies along the image's axes: a side wall that is seen bounds it directly, an edge of the top
+    half a pixel further out than its last pixel. Its top is the height that 2 % of its pixels exceed, so
+    that a flying pixel does not raise it.
+
+    Args:
+        depth: (h, w) metres, NaN where invalid.
+        intrinsics: (3, 3) pinhole matrix.
+        T_base_camera: Pose of the camera's optical frame in the base; it need not look straight down.
+        table_z: Height of the table, base frame, metres.
+        region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
+        min_height: What rises less above the table is table, metres.
+        alone: Refuse a second part.
+
+    Raises:
+        NoPartFound: Nothing rises above the table there, it is cut off, not alone, or lies elsewhere; or
+            the image is no depth in metres.
+    """
+    found = find_part_pixels(
+        depth, intrinsics, T_base_camera, table_z=table_z, region=region, min_height=min_height
+    )
+    mask, (x, y, _) = found.mask, found.points_base
+    x_min, x_max, y_min, y_max = region
+    if mask[[0, -1]].any() or mask[:, [0, -1]].any():
+        raise NoPartFound("the part is cut off by the border of the image; move it towards the middle")
+    T_base_axes = _box_axes(T_base_camera)
+    cos, sin = quat_to_matrix(T_base_axes.quat_wxyz)[:2, 0]
+    pitch = float(np.median(np.asarray(depth)[mask])) / np.array([intrinsics[0][0], intrinsics[1][1]])
+    around = _bounds(mask)
+    x_around, y_around, mask_around = x[around], y[around], mask[around]
+    along_x = _extent(cos * x_around + sin * y_around, mask_around, float(pitch[0]))
+    along_y = _extent((cos * y_around - sin * x_around).T, mask_around.T, float(pitch[1]))
+    top = _robust_top(found.heights[mask])
+    middle = np.array([sum(along_x) / 2, sum(along_y) / 2, 0.0])
+    centre_base = T_base_axes.apply(middle)
+    if not (x_min <= centre_base[0] <= x_max and y_min <= centre_base[1] <= y_max):
+        raise NoPartFound(
+            f"the part lies outside the region (centre at {centre_base[0]:.3f}, {centre_base[1]:.3f}, region "
+            f"x {x_min:g}..{x_max:g}, y {y_min:g}..{y_max:g}); move it, or clear away what else is there"
+        )
+    if alone and found.n_other > ALONE * mask.sum():
+        raise NoPartFound(
+            f"two things lie in the region, of {mask.sum()} and {found.n_other} pixels; take one away"
+        )
+    spread = np.stack([x[mask] - centre_base[0], y[mask] - centre_base[1]], axis=-1)
+    return PartView(
+        centre_base=np.array([centre_base[0], centre_base[1], table_z + top / 2]),
+        T_base_box=Pose(
+            position=np.array([centre_base[0], centre_base[1], table_z]), quat_wxyz=T_base_axes.quat_wxyz
+        ),
+        size=np.array([along_x[1] - along_x[0], along_y[1] - along_y[0], top]),
+        gyration_radius=float(np.sqrt((spread**2).sum(axis=1).mean())),
+        table_z=float(table_z),
+    )
+
+
+def _points_base(depth: np.ndarray, intrinsics: np.ndarray, T_base_camera: Pose) -> np.ndarray:
+    """(3, h, w) x, y, z of what every pixel sees, base frame."""
+    rotation = quat_to_matrix(np.asarray(T_base_camera.quat_wxyz, dtype=np.float64))
+    # Where a ray of depth 1 ends is linear in the pixel.
+    along_u, along_v, first = (rotation @ np.linalg.inv(np.asarray(intrinsics, dtype=np.float64))).T
+    columns, rows = np.arange(depth.shape[1]), np.arange(depth.shape[0])[:, None]
+    points = np.empty((3, *depth.shape))
+    for axis in range(3):
+        np.add(along_u[axis] * columns, along_v[axis] * rows + first[axis], out=points[axis])
+        points[axis] *= depth
+        points[axis] += T_base_camera.position[axis]
+    return points
+
+
+def _check_depth(depth: np.ndarray) -> None:
+    valid = depth[np.isfinite(depth)] if np.issubdtype(depth.dtype, np.floating) else depth[depth > 0]
+    if not valid.size:
+        raise NoPartFound("the depth image has no valid pixel; check the camera, its range and its exposure")
+    typical = float(np.median(valid))
+    if not np.issubdtype(depth.dtype, np.floating) or typical > _PLAUSIBLE_DEPTH:
+        raise NoPartFound(
+            f"depth is {depth.dtype} with a median of {typical:g}, expected floating metres; "
+            "convert it from millimetres first"
+        )
+
+
+def _noise(heights: np.ndarray, near: np.ndarray) -> float:
+    """Standard deviation of a pixel's noise, from the steps between neighbours: most are on the table."""
+    steps = np.abs(np.diff(heights, axis=1)[near[:, 1:] & near[:, :-1]])
+    # The median step is 0.6745 deviations of a step, which is sqrt(2) those of a pixel.
+    return float(np.median(steps)) / (0.6745 * np.sqrt(2)) if steps.size else 0.0
+
+
+def _smoothed(heights: np.ndarray) -> np.ndarray:
+    """Heights without most of the noise; where nothing was seen the table is assumed."""
+    smooth = np.where(np.isfinite(heights), heights, 0.0).astype(np.float32)
+    for _ in range(2):
+        smooth = cv2.medianBlur(smooth, 3)
+    return smooth.astype(np.float64)
+
+
+def _largest_component(mask: np.ndarray) -> tuple[np.ndarray | None, int]:
+    """The largest group of neighbouring pixels, and how many pixels the second largest has."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    areas = stats[1:, cv2.CC_STAT_AREA]  # 0 is the background
+    if not len(areas) or areas.max() < MIN_PIXELS:
+        return None, 0
+    return labels == 1 + int(np.argmax(areas)), int(np.sort(areas)[-2]) if len(areas) > 1 else 0
+
+
+def _box_axes(T_base_camera: Pose) -> Pose:
+    """A frame at the base's origin, z up, x along the image's rows as seen from above."""
+    right = quat_to_matrix(np.asarray(T_base_camera.quat_wxyz, dtype=np.float64))[:2, 0]
+    half = np.arctan2(right[1], right[0]) / 2
+    return Pose(position=np.zeros(3), quat_wxyz=np.array([np.cos(half), 0.0, 0.0, np.sin(half)]))
+
+
+def _bounds(mask: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns of a mask that ends before the border, with one more on every side."""
+    found = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
+    rows, columns = (slice(int(one[0]) - 1, int(one[-1]) + 2) for one in found)
+    return rows, columns
+
+
+def _extent(along: np.ndarray, mask: np.ndarray, pitch: float) -> tuple[float, float]:
+    """Bounds of the masked points in a coordinate (h, w) that runs along the image's rows.
+
+    The mask ends before the border.
+    """
+    bounds = []
+    for sign in (-1.0, 1.0):
+        outward = np.where(mask, sign * along, -np.inf)
+        row, column = np.unravel_index(int(np.argmax(outward)), mask.shape)
+        neighbours = outward[row, column - 1], outward[row, column + 1]
+        # On a wall two neighbouring pixels have the same coordinate: its place is known exactly. On a
+        # flat top they are a pixel apart, and the edge is, on average, half of that further out.
+        step = outward[row, column] - max(neighbours)
+        bounds.append(sign * float(outward[row, column] + min(step, pitch) / 2))
+    return bounds[0], bounds[1]
+
+
+def _robust_top(heights: np.ndarray) -> float:
+    k = max(2, int(np.ceil(0.02 * heights.size)))
+    return float(np.partition(heights, -k)[-k])
