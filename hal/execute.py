@@ -21,6 +21,9 @@ RETREAT = 0.05
 PUT_DOWN = 0.002
 """A part is let go this much above the height at which it was grasped, m."""
 
+RELEASE = 0.02
+"""By how much the fingers open at least to let go of a part, m."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class GraspResult:
@@ -56,14 +59,13 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
     arm, lift = cell.arm, cell.workspace.lift_height
     grasp = np.asarray(grasp, dtype=np.float64)
     target = pose_base_tcp(grasp)
-    above = grasp.copy()
-    above[2] = max(cell.workspace.table_z + APPROACH, grasp[2] + 0.02)
+    above = above_grasp(cell, grasp)
     lifted = grasp + np.array([0.0, 0.0, lift, 0.0])
-    for pose in (target, pose_base_tcp(above), pose_base_tcp(lifted)):
+    for pose in (target, above, pose_base_tcp(lifted)):
         arm.check_pose(pose)
     try:
         arm.move_gripper(MAX_OPENING)
-        arm.move_to_pose(pose_base_tcp(above), speed=0.4)
+        arm.move_to_pose(above, speed=0.4)
         arm.move_to_pose(target, speed=0.25)
         closed = arm.grasp(cell.workspace.grasp_force)
         if closed.holding:
@@ -90,20 +92,44 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
     )
 
 
-def put_down(cell: Cell, grasp: np.ndarray, *, height: float = PUT_DOWN) -> None:
-    """Lowers what was lifted to where it was grasped, and opens the fingers.
+def above_grasp(cell: Cell, grasp: np.ndarray) -> Pose:
+    """From where the hand descends straight to a grasp (4,), and to where it rises from it."""
+    height = max(cell.workspace.table_z + APPROACH, grasp[2] + 0.02)
+    return pose_base_tcp(np.array([grasp[0], grasp[1], height, grasp[3]]))
+
+
+def put_down(
+    cell: Cell, grasp: np.ndarray, *, height: float = PUT_DOWN, opening: float = MAX_OPENING
+) -> None:
+    """Lowers what was lifted to where it was grasped, opens the fingers and rises.
 
     Args:
         cell: The hand holds the part over the table.
         grasp: (4,) at which it was grasped.
         height: How much above that it is let go, metres; falling 2 mm, a part may shift by half of one.
+        opening: How far apart the pads are then, metres, at least `RELEASE` more than before. The fingers
+            had room on the way down, but since then the part has moved between them: one that stands in a
+            bore may push it on as it opens all the way.
 
     Raises:
         MotionAborted: The part met the table early, because it hangs lower in the hand than it lay.
     """
-    above = np.asarray(grasp, dtype=np.float64) + np.array([0.0, 0.0, height, 0.0])
-    cell.arm.move_to_pose(pose_base_tcp(above), speed=0.15)
-    cell.arm.move_gripper(MAX_OPENING)
+    place = np.asarray(grasp, dtype=np.float64) + np.array([0.0, 0.0, height, 0.0])
+    cell.arm.move_to_pose(pose_base_tcp(place), speed=0.15)
+    let_go(cell, place, opening=opening)
+
+
+def let_go(cell: Cell, place: np.ndarray, *, opening: float) -> None:
+    """Opens the fingers and rises straight.
+
+    Args:
+        cell: The hand stands at ``place`` and holds a part.
+        place: (4,) x, y, z, theta, base frame.
+        opening: How far apart the pads are then, metres, at least `RELEASE` more than before.
+    """
+    width = max(opening, cell.arm.state().gripper_width + RELEASE)
+    cell.arm.move_gripper(min(MAX_OPENING, width))
+    cell.arm.move_to_pose(above_grasp(cell, place), speed=0.25)
 
 
 def go_home(cell: Cell) -> None:

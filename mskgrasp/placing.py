@@ -9,12 +9,10 @@ import numpy as np
 
 from hal import Cell
 from hal.errors import MotionAborted
-from hal.execute import APPROACH, PUT_DOWN
+from hal.execute import PUT_DOWN, above_grasp, let_go
 from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing, wrap_angle
-from mskgrasp.grasp import MAX_OPENING, centre_in_grasp_frame, lowest_grasp_z, pose_base_tcp
+from mskgrasp.grasp import centre_in_grasp_frame, lowest_grasp_z, pose_base_tcp
 
-RELEASE = 0.02
-"""By how much the fingers open to let go of a part, m."""
 EARLY = 0.007
 """How far above its place a part may meet the table and count as put down, m."""
 
@@ -107,8 +105,8 @@ def check_place(cell: Cell, pose: np.ndarray) -> None:
     Raises:
         OutOfWorkspace: It cannot.
     """
-    for height in (pose[2], _above(cell, pose)):
-        cell.arm.check_pose(pose_base_tcp(np.array([pose[0], pose[1], height, pose[3]])))
+    cell.arm.check_pose(pose_base_tcp(pose))
+    cell.arm.check_pose(above_grasp(cell, pose))
 
 
 def place(cell: Cell, pose: np.ndarray, recover: Callable[[MotionAborted], None]) -> None:
@@ -127,18 +125,11 @@ def place(cell: Cell, pose: np.ndarray, recover: Callable[[MotionAborted], None]
         MotionAborted: The part met something on its way, more than `EARLY` above the pose.
     """
     check_place(cell, pose)
-    above = np.array([pose[0], pose[1], _above(cell, pose), pose[3]])
-    cell.arm.move_to_pose(pose_base_tcp(above), speed=0.25)
+    cell.arm.move_to_pose(above_grasp(cell, pose), speed=0.25)
     try:
         cell.arm.move_to_pose(pose_base_tcp(pose), speed=0.1)
     except MotionAborted as error:
         if cell.arm.state().T_base_tcp.position[2] > pose[2] + EARLY:
             raise
         recover(error)
-    width = cell.arm.state().gripper_width
-    cell.arm.move_gripper(min(MAX_OPENING, width + RELEASE))
-    cell.arm.move_to_pose(pose_base_tcp(above), speed=0.25)
-
-
-def _above(cell: Cell, pose: np.ndarray) -> float:
-    return float(max(cell.workspace.table_z + APPROACH, pose[2] + 0.02))
+    let_go(cell, pose, opening=0.0)

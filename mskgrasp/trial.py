@@ -16,6 +16,7 @@ from mskgrasp.errors import MarkersNotFound, NoGraspFound, NoPartFound
 from mskgrasp.geometry import Pose
 from mskgrasp.grasp import (
     EJECTED_DISTANCE,
+    MAX_OPENING,
     MIN_RISE,
     centre_in_grasp_frame,
     object_displacement,
@@ -247,7 +248,7 @@ def _measure_by_tape(
         before = look(frame)
         try:
             # To the very place: where it falls, it shifts.
-            put_down(cell, plan.grasp, height=0.0)
+            put_down(cell, plan.grasp, height=0.0, opening=_room(plan))
         except MotionAborted as error:
             _recover(cell, error, recover)
             raise MarkersNotFound("not put down: the part hangs lower in the hand than it lay") from error
@@ -261,6 +262,15 @@ def _measure_by_tape(
         )  # fmt: skip
     measured = [float(dx), float(dy), float("nan"), float(dtheta)]
     return TrialRecord(trial=replace(trial, measured=measured), frame=frame, plan=plan, after=after)
+
+
+def _room(plan: GraspPlan) -> float:
+    """How far the fingers may open about the part once it is displaced as planned, metres.
+
+    They had room on the way down when open all the way; the part is since then nearer to one of them.
+    """
+    aside = abs(plan.displacement[1]) + 2 * plan.displacement_std[1]
+    return MAX_OPENING - 2 * float(np.nan_to_num(aside))
 
 
 def _as_stored(frame: RgbdFrame) -> RgbdFrame:

@@ -150,3 +150,21 @@ def test_a_stop_is_no_outcome_of_a_grasp(cell: Cell):
     timer.join()
     cell.arm.recover()
     go_home(cell)
+
+
+@pytest.mark.parametrize(("opening", "pushed"), [(0.08, True), (0.041, False)])
+def test_a_finger_in_a_bore_leaves_the_part_where_it_is_if_it_opens_no_farther_than_it_must(
+    cell: Cell, opening: float, pushed: bool
+):
+    """A ring is gripped by its wall and drawn aside; open all the way, the inner finger pushes it on."""
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("shaft_collar_45", 836804417)
+    grasp = np.array([0.5128, -0.0410, 0.01365, 0.7254])
+    before = cell.tracker.part_pose().position
+    assert execute_grasp(cell, grasp).holding
+    held = cell.tracker.part_pose().position
+    assert np.hypot(*(held - before)[:2]) > 0.014
+    put_down(cell, grasp, height=0.0, opening=opening)
+    go_home(cell)
+    moved = float(np.hypot(*(cell.tracker.part_pose().position - held)[:2]))
+    assert moved > 0.004 if pushed else moved < 0.0003
