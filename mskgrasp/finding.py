@@ -33,13 +33,16 @@ class FoundPart:
     Attributes:
         mask: (h, w) bool.
         points_base: (3, h, w) x, y, z of what every pixel sees, base frame, metres, NaN where invalid.
-        heights: (h, w) above the table, metres; of a noisy image the median of 3 x 3 pixels, twice.
+        heights: (h, w) above the table as it is seen, metres; of a noisy image the median of 3 x 3 pixels,
+            twice.
+        table_offset: By how much the table is seen higher than ``table_z``, metres; 0 in an exact image.
         n_other: How many pixels the next largest thing in the region has.
     """
 
     mask: np.ndarray
     points_base: np.ndarray
     heights: np.ndarray
+    table_offset: float
     n_other: int
 
 
@@ -79,10 +82,10 @@ def find_part_pixels(
     x_min, x_max, y_min, y_max = region
     near = (x > x_min - REGION_MARGIN) & (x < x_max + REGION_MARGIN)
     near &= (y > y_min - REGION_MARGIN) & (y < y_max + REGION_MARGIN)
-    seen_table, reach = 0.0, 1
+    table_offset, reach = 0.0, 1
     if _noise(heights, near) > QUIET:
         tops, heights, reach = _median(heights), _mean(heights, 2 * min_height), 5
-        seen_table = float(np.clip(np.median(heights[near]), -min_height, min_height))
+        table_offset = float(np.clip(np.median(heights[near]), -min_height, min_height))
     raised = near & (heights > min_height)
     if raised.sum() > MOST_RAISED * max(near.sum(), 1):
         raise NoPartFound(
@@ -90,14 +93,20 @@ def find_part_pixels(
             f"table (median {np.median(heights[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
             f"{table_z:g} or the camera's pose is wrong; calibrate the camera anew"
         )
-    mask, n_other = _largest_group(near & (heights > seen_table + min_height), reach)
+    mask, n_other = _largest_group(near & (heights > table_offset + min_height), reach)
     if mask is None:
         highest = heights[near].max() if near.any() else np.nan
         raise NoPartFound(
             f"nothing rises more than {min_height * 1e3:g} mm above the table in the region (highest point "
             f"{highest * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the camera's pose"
         )
-    return FoundPart(mask=mask & np.isfinite(z), points_base=points, heights=tops, n_other=n_other)
+    return FoundPart(
+        mask=mask & np.isfinite(z),
+        points_base=points,
+        heights=tops - table_offset,
+        table_offset=table_offset,
+        n_other=n_other,
+    )
 
 
 def view_part(
@@ -164,6 +173,7 @@ def view_part(
         size=np.array([along_x[1] - along_x[0], along_y[1] - along_y[0], top]),
         gyration_radius=float(np.sqrt((spread**2).sum(axis=1).mean())),
         table_z=float(table_z),
+        table_offset=found.table_offset,
     )
 
 

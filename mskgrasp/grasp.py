@@ -154,6 +154,7 @@ class PartView:
         size: (3,) extent of the box along those axes, metres; size[2] is the part's height.
         gyration_radius: RMS distance of the part's visible points from the centre seen from above, m.
         table_z: Height of the table, base frame, metres.
+        table_offset: By how much a noisy camera sees the table above ``table_z``, metres; 0 if exact.
     """
 
     centre_base: np.ndarray
@@ -161,6 +162,7 @@ class PartView:
     size: np.ndarray
     gyration_radius: float
     table_z: float
+    table_offset: float = 0.0
 
 
 def sample_grasps(view: PartView, n: int, rng: np.random.Generator) -> np.ndarray:

@@ -22,6 +22,15 @@ _HIGH = 0.05
 """Metres that the networks see as one: along the pads, and over the table."""
 
 
+def learning_in_bfloat16(features: nn.Module) -> torch.autocast:
+    """Features that learn in mixed precision run their convolutions in it; they predict in float32."""
+    return torch.autocast(
+        next(features.parameters()).device.type,
+        dtype=torch.bfloat16,
+        enabled=bool(features.mixed_precision and features.training),
+    )
+
+
 class HandFeatures(nn.Module):
     """What is around a grasp, and where the part's centre lies from it, as one vector."""
 
@@ -46,6 +55,7 @@ class HandFeatures(nn.Module):
         self.image = nn.Sequential(nn.Linear(n_read, config.trunk_width), nn.ReLU(inplace=True))
         self.action = nn.Sequential(nn.Linear(4, config.action_width), nn.ReLU(inplace=True))
         self.n_features = config.trunk_width + config.action_width
+        self.mixed_precision = False
         scale = 1 / torch.tensor([_EDGE, _NEAR, _EDGE, _HIGH])
         self.channel_scale: Tensor
         self.register_buffer("channel_scale", scale[:, None, None], persistent=False)
@@ -81,4 +91,6 @@ class HandFeatures(nn.Module):
     def forward(self, prepared: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:
         """Features (n, f) of prepared patches, object centres (n, 3) and heights (n,), metres."""
         action = torch.cat([centre_grasp / self.action_scale, height[:, None] / _HIGH], dim=-1)
-        return torch.cat([self.image(self.convolutions(prepared)), self.action(action)], dim=-1)
+        with learning_in_bfloat16(self):
+            image = self.image(self.convolutions(prepared))
+        return torch.cat([image.float(), self.action(action)], dim=-1)

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from mskgrasp.geometry import wrap_angle
-from mskgrasp.hand_features import HandFeatures
+from mskgrasp.hand_features import HandFeatures, learning_in_bfloat16
 from mskgrasp.network_config import NetworkConfig, Normalisation
 
 STANDARDISE_EPSILON = 1e-4
@@ -51,6 +51,7 @@ class PatchFeatures(nn.Module):
         )
         self.action = nn.Sequential(nn.Linear(n_action, config.action_width), nn.ReLU(), dropout)
         self.n_features = config.trunk_width + config.action_width
+        self.mixed_precision = False
         self.action_scale: Tensor
         scale = (*normalisation.action_scale, torch.pi / 2)
         self.register_buffer("action_scale", torch.tensor(scale[:n_action]), persistent=False)
@@ -61,8 +62,9 @@ class PatchFeatures(nn.Module):
 
     def forward(self, prepared: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:  # noqa: ARG002
         """Features (n, f) of prepared patches (n, 1, p, p) and object centres (n, 3), metres."""
-        image = self.image(self.convolutions(prepared))
-        return torch.cat([image, self.action(centre_grasp / self.action_scale)], dim=-1)
+        with learning_in_bfloat16(self):
+            image = self.image(self.convolutions(prepared))
+        return torch.cat([image.float(), self.action(centre_grasp / self.action_scale)], dim=-1)
 
 
 def make_features(

@@ -40,7 +40,7 @@ class Scene:
         """The scene of a frame."""
         depth = torch.as_tensor(np.asarray(frame.depth, dtype=np.float32), device=device)
         return cls(
-            heights=height_image(depth, frame.intrinsics, frame.T_base_camera, table_z),
+            heights=height_image(depth, frame.intrinsics, frame.T_base_camera, table_z + view.table_offset),
             intrinsics=frame.intrinsics,
             T_base_camera=frame.T_base_camera,
             table_z=table_z,

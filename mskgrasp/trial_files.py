@@ -52,6 +52,7 @@ def write_trial(path: Path, frame: RgbdFrame, plan: GraspPlan | None, after: Rgb
             "view_size": view.size,
             "view_gyration_radius": view.gyration_radius,
             "view_table_z": view.table_z,
+            "view_table_offset": view.table_offset,
         }
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
@@ -131,6 +132,7 @@ def _plan(arrays: dict[str, np.ndarray]) -> GraspPlan:
             size=arrays["view_size"].reshape(3),
             gyration_radius=float(arrays["view_gyration_radius"]),
             table_z=float(arrays["view_table_z"]),
+            table_offset=float(arrays.get("view_table_offset", 0.0)),
         ),
         candidates=arrays["plan_candidates"].astype(np.float64).reshape(-1, 4),
         seconds={},

@@ -1,9 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import torch
 
 from hal.sim.noise import SensorNoise, add_noise
 from mskgrasp.errors import NoPartFound
 from mskgrasp.finding import view_part
+from mskgrasp.scoring import Scene
 from tests import synthetic
 from tests.synthetic import INTRINSICS, OVERHEAD, REGION, TABLE_Z, TILTED, Box, render
 
@@ -135,7 +139,12 @@ def test_heights_count_from_the_table_that_a_noisy_camera_sees():
     depth = render([Box(x=0.455, y=0.0, yaw=0.0, size=(0.06, 0.04, 0.005))]) + np.float32(0.0025)
     noisy = depth + np.random.default_rng(0).normal(0.0, 0.001, depth.shape).astype(np.float32)
     find = {"table_z": TABLE_Z, "region": REGION, "min_height": 0.003}
-    assert view_part(noisy, INTRINSICS, OVERHEAD, **find).size[:2] == pytest.approx([0.04, 0.06], abs=0.006)
+    view = view_part(noisy, INTRINSICS, OVERHEAD, **find)
+    assert view.table_offset == pytest.approx(-0.0025, abs=2e-4)
+    assert view.size == pytest.approx([0.04, 0.06, 0.005], abs=0.006)
+    assert view.size[2] == pytest.approx(0.005, abs=0.001)
+    scene = Scene.of(replace(synthetic.frame([]), depth=noisy), view, TABLE_Z, torch.device("cpu"))
+    assert abs(float(scene.heights.median())) < 2e-4
     with pytest.raises(NoPartFound, match="nothing rises"):
         view_part(depth, INTRINSICS, OVERHEAD, **find)
     with pytest.raises(NoPartFound, match="nothing rises"):  # farther off than what is forgiven

@@ -23,6 +23,7 @@ from mskgrasp.training import (
     split,
 )
 from mskgrasp.training import train as learn
+from mskgrasp.validation import predict_grasp_displacement
 from tests import synthetic
 from tests.programs import run_here
 
@@ -40,6 +41,25 @@ SHORT = CONFIG.model_copy(
     update={
         "gqn": StageConfig(learning_rate=1e-3, epochs=2, batch_size=32),
         "gdn": StageConfig(learning_rate=1e-3, epochs=3, batch_size=32),
+    }
+)
+HAND = CONFIG.model_copy(
+    update={
+        "network": NetworkConfig(
+            architecture="hand",
+            patch_pixels=33,
+            patch_side=0.132,
+            quality_stride=2,
+            quality_columns=9,
+            layers=(8, 8),
+            displacement_layers=(8, 16),
+            trunk_width=32,
+            action_width=32,
+            head_width=32,
+            dropout=0.0,
+        ),
+        "gqn": StageConfig(learning_rate=4e-3, epochs=14, batch_size=32),
+        "gdn": StageConfig(learning_rate=4e-3, epochs=10, batch_size=16),
     }
 )
 
@@ -219,6 +239,25 @@ def test_a_mean_only_network_and_the_papers_optimiser_can_be_trained(samples, tm
     assert len(history) == 2 and models.meta.metrics["gdn"]["nll"] is None
 
 
+@pytest.mark.parametrize("config", [SHORT, HAND], ids=["the paper's", "ours"])
+def test_what_learned_in_mixed_precision_is_as_good_and_predicts_in_float32(dataset, tmp_path, config):
+    config = config.model_copy(update={"gqn": SHORT.gqn, "gdn": SHORT.gdn})
+    samples = read_samples(dataset, config.network)
+    plain, history = learn(samples, config, checkpoint_path=tmp_path / "plain")
+    mixed, again = learn(
+        samples, config.model_copy(update={"mixed_precision": True}), checkpoint_path=tmp_path / "mixed"
+    )
+    assert all(value.dtype == torch.float32 for value in mixed.gdn.state_dict().values())
+    losses = np.array([[row["validation_loss"] for row in rows] for rows in (history, again)])
+    assert 0 < np.abs(losses[0] - losses[1]).max() < 0.1 * np.abs(losses[0]).max()
+    rows = torch.arange(20)
+    assert mixed.gdn.features.mixed_precision and not plain.gdn.features.mixed_precision
+    first = predict_grasp_displacement(mixed, samples, rows)
+    mixed.gdn.features.mixed_precision = False
+    for one, other in zip(first, predict_grasp_displacement(mixed, samples, rows), strict=True):
+        assert np.array_equal(one, other)
+
+
 def test_a_loss_that_is_no_number_stops_the_run_in_one_line(samples, tmp_path):
     wild = StageConfig(learning_rate=1e30, schedule="constant", epochs=2, batch_size=32)
     with pytest.raises(TrainingDiverged, match="gqn.learning_rate") as caught:
@@ -290,27 +329,6 @@ def test_parts_outside_the_success_range_are_left_out(dataset):
         assert torch.equal(kept.patches[kept.part == i], samples.patches[rows])
     with pytest.raises(BadDataset, match="widen success_range"):
         samples.of_parts_between(0.999, 0.9991)
-
-
-HAND = CONFIG.model_copy(
-    update={
-        "network": NetworkConfig(
-            architecture="hand",
-            patch_pixels=33,
-            patch_side=0.132,
-            quality_stride=2,
-            quality_columns=9,
-            layers=(8, 8),
-            displacement_layers=(8, 16),
-            trunk_width=32,
-            action_width=32,
-            head_width=32,
-            dropout=0.0,
-        ),
-        "gqn": StageConfig(learning_rate=4e-3, epochs=14, batch_size=32),
-        "gdn": StageConfig(learning_rate=4e-3, epochs=10, batch_size=16),
-    }
-)
 
 
 def test_our_network_learns_and_its_intervals_hold_what_they_say(tmp_path):

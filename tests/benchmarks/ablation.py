@@ -65,6 +65,7 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         "no floor of the deviations": with_(network={"least_std": (0.0, 0.0)}),
         "no dropout": with_(network={"dropout": 0.0}),
         "not calibrated": with_(calibrate=False),
+        "mixed precision": with_(mixed_precision=True),
     }
 
 
