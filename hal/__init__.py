@@ -4,12 +4,12 @@ from hal.arm import Arm, ArmState, GraspOutcome
 from hal.camera import Camera, RgbdFrame
 from hal.cell import Cell, PartFeeder, PartTracker, Workspace
 from hal.errors import HalError
-from hal.execute import GraspResult, execute_grasp, go_home, put_down
+from hal.execute import GraspResult, execute_grasp, go_home, let_go, lower, put_down
 from hal.limits import ArmLimits
 from hal.open_cell import cell_from_yaml, open_cell
 
 __all__ = [
     "Arm", "ArmLimits", "ArmState", "Camera", "Cell", "GraspOutcome", "GraspResult", "HalError",
     "PartFeeder", "PartTracker", "RgbdFrame", "Workspace", "cell_from_yaml", "execute_grasp", "go_home",
-    "open_cell", "put_down",
+    "let_go", "lower", "open_cell", "put_down",
 ]  # fmt: skip

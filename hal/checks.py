@@ -53,7 +53,7 @@ _MAX_AGE_S = 0.5
 _GOOD_RATE = 5.0
 _GOOD_VALID = 0.9
 _LEAST_VALID = 0.5
-_TABLE_OK = 0.002
+_TABLE_OK = 0.0025
 _TILT_OK = np.radians(0.5)
 _RMS_OK = (0.005, np.radians(3.0))  # of single pictures: a flat board seen alone turns by a degree or two
 _ENOUGH_POSES = 12
@@ -354,7 +354,7 @@ def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
         yield Finding(
             level="fail",
             subject="table",
-            text=f"{said}: parts lower than that are lost, or table is taken for parts; touch the table with "
+            text=f"{said}: no part is looked for where the table seems that far off; touch the table with "
             f"closed fingers: if table_z holds, add {off:+.4f} to camera.depth_offset (the camera measures "
             f"{'short' if off > 0 else 'too far'}), else correct table_z",
         )

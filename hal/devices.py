@@ -40,7 +40,7 @@ class WorkspaceConfig(Config):
     box_upper: Three = (0.75, 0.4, 0.75)
     """The other corner, m."""
     min_height: float = Field(default=0.006, gt=0)
-    """What rises less over the table is taken for table, m; over the noise of a Kinect v2 (1.5 mm)."""
+    """What rises less over the table is taken for table, m: real tables are not level, and cameras drift."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
     """How far a grasped part is lifted, m."""
     grasp_force: float = Field(default=20.0, gt=0, le=70)

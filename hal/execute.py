@@ -107,16 +107,24 @@ def put_down(
         cell: The hand holds the part over the table.
         grasp: (4,) at which it was grasped.
         height: How much above that it is let go, metres; falling 2 mm, a part may shift by half of one.
-        opening: How far apart the pads are then, metres, at least `RELEASE` more than before. The fingers
-            had room on the way down, but since then the part has moved between them: one that stands in a
-            bore may push it on as it opens all the way.
+        opening: As in `let_go`.
+
+    Raises:
+        MotionAborted: The part met the table early, because it hangs lower in the hand than it lay; or the
+            hand met something as it let go and rose.
+    """
+    lower(cell, grasp, height=height)
+    let_go(cell, grasp, opening=opening)
+
+
+def lower(cell: Cell, grasp: np.ndarray, *, height: float = 0.0) -> None:
+    """Lowers what was lifted to where it was grasped, or ``height`` metres above.
 
     Raises:
         MotionAborted: The part met the table early, because it hangs lower in the hand than it lay.
     """
     place = np.asarray(grasp, dtype=np.float64) + np.array([0.0, 0.0, height, 0.0])
     cell.arm.move_to_pose(pose_base_tcp(place), speed=0.15)
-    let_go(cell, place, opening=opening)
 
 
 def let_go(cell: Cell, place: np.ndarray, *, opening: float) -> None:
@@ -124,9 +132,17 @@ def let_go(cell: Cell, place: np.ndarray, *, opening: float) -> None:
 
     Args:
         cell: The hand stands at ``place`` and holds a part.
-        place: (4,) x, y, z, theta, base frame.
-        opening: How far apart the pads are then, metres, at least `RELEASE` more than before.
+        place: (4,) x, y, z, theta, base frame; the hand may stand a little higher.
+        opening: How far apart the pads are then, metres; 0 for no farther than they must, which is by
+            `RELEASE`. The fingers had room on the way down to the grasp, but since then the part has moved
+            between them: one that stands in a bore may push it on as it opens all the way.
+
+    Raises:
+        MotionAborted: The hand met something.
+        ValueError: The hand does not open so far.
     """
+    if not 0 <= opening <= MAX_OPENING:
+        raise ValueError(f"opening {opening} m is outside 0 .. {MAX_OPENING} m")
     width = max(opening, cell.arm.state().gripper_width + RELEASE)
     cell.arm.move_gripper(min(MAX_OPENING, width))
     cell.arm.move_to_pose(above_grasp(cell, place), speed=0.25)

@@ -21,7 +21,7 @@ ALONE = 0.2
 MIN_PIXELS = 5
 """Smaller groups of pixels are specks: an M3 nut covers 6 pixels of 2.2 mm."""
 QUIET = 0.0003
-"""Deviation of the heights from which on an image is noisy, metres; one stored in 0.1 mm has 0.05 mm."""
+"""Deviation of the heights from which on an image is noisy, metres; one stored in 0.1 mm has up to 0.03."""
 _PLAUSIBLE_DEPTH = 20.0
 """Metres; a camera above a table never is that far away, but a depth in millimetres always is."""
 
@@ -33,8 +33,8 @@ class FoundPart:
     Attributes:
         mask: (h, w) bool.
         points_base: (3, h, w) x, y, z of what every pixel sees, base frame, metres, NaN where invalid.
-        heights: (h, w) above the table as it is seen, metres; of a noisy image the median of 3 x 3 pixels,
-            twice.
+        heights: (h, w) above the table as it is seen, metres, NaN where invalid; of a noisy image the median
+            of 3 x 3 pixels, twice.
         table_offset: By how much the table is seen higher than ``table_z``, metres; 0 in an exact image.
         n_other: How many pixels the next largest thing in the region has.
     """
@@ -58,10 +58,10 @@ def find_part_pixels(
     """The largest connected group of pixels higher than ``min_height``; an exact image is taken as it is.
 
     Where the image is noisy, a pixel is as high as its surroundings on average (Gaussian, 1 pixel), all
-    clipped to twice ``min_height``: so an edge stays where it is, however high. Heights count from where the
-    table is seen, if that is within ``min_height`` of ``table_z``: what a camera measures too far
-    everywhere must not swallow a flat part. Groups up to four pixels apart are one: noise breaks what is
-    narrow.
+    clipped to twice ``min_height``: so an edge of what is higher stays where it is. Heights count from where
+    the table is seen: what a camera measures too far everywhere must not swallow a flat part. Groups up to
+    four pixels apart are one, because noise breaks what is narrow. ``min_height`` is at least the deviation
+    of a pixel's noise.
 
     Args:
         depth: (h, w) metres, NaN where invalid.
@@ -72,7 +72,8 @@ def find_part_pixels(
         min_height: What rises less above the table is table, metres.
 
     Raises:
-        NoPartFound: Nothing rises above the table there, or the image is no depth in metres.
+        NoPartFound: Nothing rises above the table there, a noisy camera sees the table more than
+            ``min_height`` from ``table_z``, or the image is no depth in metres.
     """
     depth = np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth)
     _check_depth(depth)
@@ -83,30 +84,33 @@ def find_part_pixels(
     near = (x > x_min - REGION_MARGIN) & (x < x_max + REGION_MARGIN)
     near &= (y > y_min - REGION_MARGIN) & (y < y_max + REGION_MARGIN)
     table_offset, reach = 0.0, 1
-    if _noise(heights, near) > QUIET:
-        tops, heights, reach = _median(heights), _mean(heights, 2 * min_height), 5
-        table_offset = float(np.clip(np.median(heights[near]), -min_height, min_height))
+    noise = _noise(heights, near)
+    if noise > QUIET:
+        min_height, reach = max(min_height, noise), 5
+        tops = _median(heights)
+        table_offset = _offset(tops[near], min_height)
+        if abs(table_offset) > min_height:
+            raise NoPartFound(
+                f"the table is seen {1e3 * table_offset:+.1f} mm from table_z {table_z:g}, at most "
+                f"{min_height * 1e3:g} mm are forgiven: the camera's pose or table_z is wrong; calibrate anew"
+            )
+        tops = tops - table_offset
+        heights = _mean(heights - table_offset, 2 * min_height)
     raised = near & (heights > min_height)
     if raised.sum() > MOST_RAISED * max(near.sum(), 1):
         raise NoPartFound(
             f"{raised.sum() / near.sum():.0%} of the region rise more than {min_height * 1e3:g} mm above the "
-            f"table (median {np.median(heights[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
+            f"table (median {np.median(tops[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
             f"{table_z:g} or the camera's pose is wrong; calibrate the camera anew"
         )
-    mask, n_other = _largest_group(near & (heights > table_offset + min_height), reach)
+    mask, n_other = _largest_group(raised, reach)
     if mask is None:
-        highest = heights[near].max() if near.any() else np.nan
+        highest = tops[near].max() if near.any() else np.nan
         raise NoPartFound(
             f"nothing rises more than {min_height * 1e3:g} mm above the table in the region (highest point "
             f"{highest * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the camera's pose"
         )
-    return FoundPart(
-        mask=mask & np.isfinite(z),
-        points_base=points,
-        heights=tops - table_offset,
-        table_offset=table_offset,
-        n_other=n_other,
-    )
+    return FoundPart(mask=mask, points_base=points, heights=tops, table_offset=table_offset, n_other=n_other)
 
 
 def view_part(
@@ -132,12 +136,13 @@ def view_part(
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
         min_height: What rises less above the table is table, metres.
-        alone: Refuse a second part.
+        alone: Refuse a second part; in a noisy image one that is more than four pixels away.
 
     Raises:
         NoPartFound: Nothing rises above the table there, it is cut off, not alone, or lies elsewhere; or
             the image is no depth in metres.
     """
+    depth = np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth)
     found = find_part_pixels(
         depth, intrinsics, T_base_camera, table_z=table_z, region=region, min_height=min_height
     )
@@ -147,7 +152,7 @@ def view_part(
         raise NoPartFound("the part is cut off by the border of the image; move it towards the middle")
     T_base_axes = _box_axes(T_base_camera)
     cos, sin = quat_to_matrix(T_base_axes.quat_wxyz)[:2, 0]
-    pitch = float(np.median(np.asarray(depth)[mask])) / np.array([intrinsics[0][0], intrinsics[1][1]])
+    pitch = float(np.median(depth[mask])) / np.array([intrinsics[0][0], intrinsics[1][1]])
     around = _bounds(mask)
     x_around, y_around, mask_around = x[around], y[around], mask[around]
     along_x = _extent(cos * x_around + sin * y_around, mask_around, float(pitch[0]))
@@ -211,15 +216,28 @@ def _noise(heights: np.ndarray, near: np.ndarray) -> float:
 
 
 def _median(heights: np.ndarray) -> np.ndarray:
-    """The table where nothing was seen."""
-    median = np.nan_to_num(heights).astype(np.float32)
+    """Of 3 x 3 pixels, twice; NaN where nothing is seen."""
+    seen = np.isfinite(heights)
+    median = np.where(seen, heights, 0.0).astype(np.float32)
     for _ in range(2):
         median = cv2.medianBlur(median, 3)
-    return median.astype(np.float64)
+    return np.where(seen, median, np.nan)
+
+
+def _offset(heights: np.ndarray, least: float) -> float:
+    """The table's height among (n,) heights, most of which are the table's."""
+    first = np.median(heights)
+    return float(np.median(heights[np.abs(heights - first) < least]))
 
 
 def _mean(heights: np.ndarray, most: float) -> np.ndarray:
-    return np.asarray(cv2.GaussianBlur(np.nan_to_num(heights).clip(-most, most), (0, 0), 1.0))
+    """Of what is seen around a pixel, clipped; NaN where nothing is seen."""
+    seen = np.isfinite(heights)
+    total, weight = (
+        np.asarray(cv2.GaussianBlur(values, (0, 0), 1.0))
+        for values in (np.where(seen, heights, 0.0).clip(-most, most), seen.astype(np.float64))
+    )
+    return np.where(seen, total / np.maximum(weight, 1e-9), np.nan)
 
 
 def _largest_group(mask: np.ndarray, reach: int) -> tuple[np.ndarray | None, int]:

@@ -23,7 +23,7 @@ _HIGH = 0.05
 
 
 def learning_in_bfloat16(features: nn.Module) -> torch.autocast:
-    """Features that learn in mixed precision run their convolutions in it; they predict in float32."""
+    """Where features that learn in mixed precision look at the picture; they predict in float32."""
     return torch.autocast(
         next(features.parameters()).device.type,
         dtype=torch.bfloat16,

@@ -169,7 +169,7 @@ def _shard_samples(
 ) -> tuple[tuple[Tensor, ...] | None, Counter[str]]:
     skipped: Counter[str] = Counter()
     depth = u16_to_depth(attempts.depth)
-    rows, centres = [], []
+    rows, centres, offsets = [], [], []
     for row, image in enumerate(depth):
         try:
             view = view_part(
@@ -181,12 +181,14 @@ def _shard_samples(
             continue
         rows.append(row)
         centres.append(view.centre_base)
+        offsets.append(view.table_offset)
     if not rows:
         return None, skipped
     grasp = attempts.grasp[rows].astype(np.float64)
     displacement = attempts.displacement[rows].astype(np.float64)
     centre_grasp = centre_in_grasp_frame(np.array(centres), grasp)
-    heights = height_image(torch.from_numpy(depth[rows]), info.intrinsics, info.T_base_camera, info.table_z)
+    table_z = info.table_z + np.array(offsets)
+    heights = height_image(torch.from_numpy(depth[rows]), info.intrinsics, info.T_base_camera, table_z)
 
     def crop(planes: np.ndarray) -> Tensor:
         patches = crop_patches(

@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from hal import Cell, GraspResult, RgbdFrame, execute_grasp, go_home, put_down
+from hal import Cell, GraspResult, RgbdFrame, execute_grasp, go_home, let_go, lower, put_down
 from hal.errors import MotionAborted, OutOfWorkspace, Stopped
 from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
 from mskgrasp.errors import MarkersNotFound, NoGraspFound, NoPartFound
@@ -243,34 +243,41 @@ def _measure_by_tape(
     def look(at: RgbdFrame) -> Markers:
         return find_markers(at, tape, table_z=cell.workspace.table_z, region=cell.workspace.region)
 
-    after = None
+    after, in_hand = None, True
     try:
         before = look(frame)
         try:
             # To the very place: where it falls, it shifts.
-            put_down(cell, plan.grasp, height=0.0, opening=_room(plan))
+            lower(cell, plan.grasp)
         except MotionAborted as error:
             _recover(cell, error, recover)
             raise MarkersNotFound("not put down: the part hangs lower in the hand than it lay") from error
+        in_hand = False
+        try:
+            let_go(cell, plan.grasp, opening=room(plan))
+        except MotionAborted as error:
+            _recover(cell, error, recover)
+            raise MarkersNotFound("touched: the hand met something as it let go and rose") from error
         clear(cell, recover)
         after = _as_stored(cell.camera.capture())
         dx, dy, dtheta = planar_displacement(before, look(after), plan.grasp, plan.view.centre_base)
     except MarkersNotFound as error:
         return TrialRecord(
             trial=replace(trial, unmeasured=str(error)), frame=frame, plan=plan, after=after,
-            in_hand=after is None,
+            in_hand=in_hand,
         )  # fmt: skip
     measured = [float(dx), float(dy), float("nan"), float(dtheta)]
     return TrialRecord(trial=replace(trial, measured=measured), frame=frame, plan=plan, after=after)
 
 
-def _room(plan: GraspPlan) -> float:
+def room(plan: GraspPlan) -> float:
     """How far the fingers may open about the part once it is displaced as planned, metres.
 
-    They had room on the way down when open all the way; the part is since then nearer to one of them.
+    They had room on the way down when open all the way; the part is since then nearer to one of them. Its
+    turn is left out.
     """
-    aside = abs(plan.displacement[1]) + 2 * plan.displacement_std[1]
-    return MAX_OPENING - 2 * float(np.nan_to_num(aside))
+    aside = abs(plan.displacement[1]) + 2 * np.nan_to_num(plan.displacement_std[1])
+    return max(0.0, MAX_OPENING - 2 * float(aside))
 
 
 def _as_stored(frame: RgbdFrame) -> RgbdFrame:

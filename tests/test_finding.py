@@ -134,18 +134,53 @@ def test_noise_does_not_raise_the_top():
     assert np.abs(np.mean(tops) - 0.03) < 0.002 and np.std(tops) < 0.001
 
 
-def test_heights_count_from_the_table_that_a_noisy_camera_sees():
-    """It measures 2.5 mm too far: a part of 5 mm rises 2.5 mm over where the table is said to be."""
-    depth = render([Box(x=0.455, y=0.0, yaw=0.0, size=(0.06, 0.04, 0.005))]) + np.float32(0.0025)
-    noisy = depth + np.random.default_rng(0).normal(0.0, 0.001, depth.shape).astype(np.float32)
-    find = {"table_z": TABLE_Z, "region": REGION, "min_height": 0.003}
-    view = view_part(noisy, INTRINSICS, OVERHEAD, **find)
-    assert view.table_offset == pytest.approx(-0.0025, abs=2e-4)
-    assert view.size == pytest.approx([0.04, 0.06, 0.005], abs=0.006)
-    assert view.size[2] == pytest.approx(0.005, abs=0.001)
-    scene = Scene.of(replace(synthetic.frame([]), depth=noisy), view, TABLE_Z, torch.device("cpu"))
-    assert abs(float(scene.heights.median())) < 2e-4
-    with pytest.raises(NoPartFound, match="nothing rises"):
-        view_part(depth, INTRINSICS, OVERHEAD, **find)
-    with pytest.raises(NoPartFound, match="nothing rises"):  # farther off than what is forgiven
-        view_part(noisy + np.float32(0.004), INTRINSICS, OVERHEAD, **find)
+FIND = {"table_z": TABLE_Z, "region": REGION, "min_height": 0.003}
+
+
+def noisy(depth, deviation=0.001, seed=0):
+    return depth + np.random.default_rng(seed).normal(0.0, deviation, depth.shape).astype(np.float32)
+
+
+@pytest.mark.parametrize("offset", [-0.0025, -0.001, 0.001, 0.0025])
+@pytest.mark.parametrize("size", [(0.06, 0.04, 0.005), (0.06, 0.007, 0.007), (0.06, 0.04, 0.03)])
+def test_heights_count_from_the_table_that_a_noisy_camera_sees(offset, size):
+    """Measured 2.5 mm too far, a part of 5 mm rises 2.5 mm over where the table is said to be."""
+    depth = render([Box(x=0.455, y=0.0, yaw=0.0, size=size)])
+    view = view_part(noisy(depth - np.float32(offset)), INTRINSICS, OVERHEAD, **FIND)
+    assert view.table_offset == pytest.approx(offset, abs=2e-4)
+    assert view.size == pytest.approx(synthetic.view(depth).size, abs=0.005)
+    assert view.size[2] == pytest.approx(size[2], abs=0.0015)
+    seen = replace(synthetic.frame([]), depth=noisy(depth - np.float32(offset)))
+    scene = Scene.of(seen, view, TABLE_Z, torch.device("cpu"))
+    assert abs(float(scene.heights.median())) < 3e-4
+
+
+@pytest.mark.parametrize("offset", [-0.005, 0.005])
+def test_a_table_that_is_seen_far_from_where_it_is_said_to_be_is_an_error(offset):
+    depth = render([Box(x=0.455, y=0.0, yaw=0.4, size=(0.06, 0.04, 0.02))]) - np.float32(offset)
+    with pytest.raises(NoPartFound, match=r"the table is seen .5\.. mm from table_z"):
+        view_part(noisy(depth), INTRINSICS, OVERHEAD, **FIND)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_holes_in_a_noisy_image_are_not_table(share):
+    depth = render([Box(x=0.455, y=0.0, yaw=0.4, size=(0.06, 0.04, 0.012))])
+    clean = synthetic.view(depth)
+    holes = noisy(depth, 0.0015)
+    holes[np.random.default_rng(1).random(depth.shape) < share] = np.nan
+    view = view_part(holes, INTRINSICS, OVERHEAD, **FIND)
+    assert view.size == pytest.approx(clean.size, abs=0.006)
+    assert view.centre_base == pytest.approx(clean.centre_base, abs=0.003)
+
+
+def test_more_noise_than_the_least_height_shows_no_parts_that_are_not_there():
+    for seed in range(30):
+        with pytest.raises(NoPartFound):
+            view_part(noisy(render([]), 0.006, seed), INTRINSICS, OVERHEAD, **FIND)
+
+
+def test_depth_in_steps_of_a_tenth_of_a_millimetre_is_exact_for_a_tilted_camera_too():
+    depth = render([Box(x=0.46, y=0.01, yaw=0.3, size=(0.06, 0.03, 0.0025))], TILTED)
+    stepped = (depth * 1e4).round().astype(np.float32) * np.float32(1e-4)
+    view = view_part(stepped, INTRINSICS, TILTED, table_z=0.0, region=REGION)
+    assert view.table_offset == 0.0 and view.size[2] == pytest.approx(0.0025, abs=2e-4)

@@ -12,7 +12,7 @@ import pytest
 from hal.camera import RgbdFrame
 from mskgrasp.errors import BadDataset, UsageError
 from mskgrasp.models import PRETRAINED, load_models
-from mskgrasp.planner import Planner, PlannerConfig
+from mskgrasp.planner import GraspPlan, Planner, PlannerConfig
 from mskgrasp.runs import TRIALS, append, read
 from mskgrasp.stored_trials import draw_trial, find_trial
 from mskgrasp.trial import Prediction, Trial
@@ -31,7 +31,7 @@ def seen() -> RgbdFrame:
     return dataclasses.replace(frame, depth=depth, fine_colour=fine)
 
 
-def stored(run: Path, one: Trial) -> tuple[RgbdFrame, object]:
+def stored(run: Path, one: Trial) -> tuple[RgbdFrame, GraspPlan]:
     planner = Planner(
         load_models(PRETRAINED),
         PlannerConfig(n_candidates=50),
@@ -40,6 +40,7 @@ def stored(run: Path, one: Trial) -> tuple[RgbdFrame, object]:
     )
     frame = seen()
     plan = planner.plan(frame, np.random.default_rng(0))
+    plan = dataclasses.replace(plan, view=dataclasses.replace(plan.view, table_offset=-0.002))
     write_trial(trial_file(run, one.key), frame, plan, None)
     append(run / TRIALS, one.to_json())
     return frame, plan
@@ -58,6 +59,8 @@ def test_a_trial_comes_back_as_it_was_and_is_drawn(tmp_path: Path):
         if isinstance(value := getattr(plan, field.name), np.ndarray):
             np.testing.assert_allclose(getattr(planned, field.name), value, rtol=1e-6, err_msg=field.name)
     np.testing.assert_array_equal(planned.grasp, plan.grasp)
+    for name in ("centre_base", "size", "gyration_radius", "table_z", "table_offset"):
+        np.testing.assert_allclose(getattr(planned.view, name), getattr(plan.view, name), err_msg=name)
     draw_trial(tmp_path, find_trial(tmp_path, one.key), tmp_path / "replay" / "one.png")
     assert (tmp_path / "replay" / "one.png").stat().st_size > 10_000
 

@@ -32,7 +32,8 @@ def main() -> None:
     images = []
     for index in rng.permutation(len(paths))[: options.images // 3]:
         arrays, info = read_columns(paths[index], ["depth"])
-        images += [(u16_to_depth(depth), info) for depth in arrays["depth"][:: len(arrays["depth"]) // 3][:3]]
+        rows = np.linspace(0, len(arrays["depth"]) - 1, 3).astype(int)
+        images += [(u16_to_depth(arrays["depth"][row]), info) for row in rows]
     exact = [view(depth, info, 0.002) for depth, info in images]
     narrow = np.array([one is not None and one.size.min() < NARROW for one in exact])
     table = Table(box=None, pad_edge=False, header_style="bold")

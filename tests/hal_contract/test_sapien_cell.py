@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import pytest
 
-from hal import Cell, execute_grasp, go_home, put_down
+from hal import Cell, execute_grasp, go_home, let_go, put_down
 from hal.errors import MotionAborted, NeedsRecovery, Stopped
 from mskgrasp.grasp import pose_base_tcp
 from mskgrasp.placing import place
@@ -150,6 +150,12 @@ def test_a_stop_is_no_outcome_of_a_grasp(cell: Cell):
     timer.join()
     cell.arm.recover()
     go_home(cell)
+
+
+@pytest.mark.parametrize("opening", [-0.01, 0.09, float("nan")])
+def test_fingers_cannot_let_go_by_any_opening(cell: Cell, opening: float):
+    with pytest.raises(ValueError, match="outside 0"):
+        let_go(cell, np.array([0.5, 0.0, 0.1, 0.0]), opening=opening)
 
 
 @pytest.mark.parametrize(("opening", "pushed"), [(0.08, True), (0.041, False)])

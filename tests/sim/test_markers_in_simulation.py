@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import torch
 
 from hal import Cell, execute_grasp, go_home, put_down
+from hal.errors import MotionAborted
+from mskgrasp import trial
 from mskgrasp.errors import MarkersNotFound
 from mskgrasp.geometry import quat_rotate, wrap_half_turn
 from mskgrasp.grasp import object_displacement, pose_base_tcp
 from mskgrasp.markers import planar_displacement
+from mskgrasp.models import PRETRAINED, load_models
 from mskgrasp.parts import find_part
+from mskgrasp.planner import Planner, PlannerConfig
 from tasks.kinematics import top_down
 from tests.sim.marked_parts import (
     GREY_NOISE,
     PARTS,
+    TAPE,
     Motion,
     blot,
     errors,
@@ -71,6 +77,43 @@ def test_a_grasp_that_shifts_and_turns_a_part_is_measured_on_the_table_as_it_was
     assert abs(true[3]) > np.radians(10) and np.hypot(*true[:2]) > 2e-3
     assert np.hypot(*(measured[:2] - true[:2])) < 0.5e-3
     assert np.degrees(abs(measured[2] - true[3])) < 0.5
+
+
+def test_a_hand_that_meets_something_as_it_lets_go_measures_nothing(cell: Cell, monkeypatch):
+    """The part may have been moved: it is lifted, not measured, and no longer in the hand."""
+    present(cell, "parallel_key_b20x12x80")
+    workspace = cell.workspace
+    planner = Planner(
+        load_models(PRETRAINED),
+        PlannerConfig(n_candidates=200, policy="quality"),
+        table_z=workspace.table_z,
+        region=workspace.region,
+    )
+    let_go, recovered = trial.let_go, []
+
+    def met(cell: Cell, place: np.ndarray, *, opening: float) -> None:
+        let_go(cell, place, opening=opening)
+        raise MotionAborted("contact")
+
+    monkeypatch.setattr(trial, "let_go", met)
+    with cell.arm:
+        go_home(cell)
+        record = trial.run_trial(
+            cell, planner, part="key", number=0, seed=0, tape=TAPE, recover=recovered.append
+        )
+    assert record is not None and record.trial.success and record.trial.measured is None
+    assert record.trial.unmeasured.startswith("touched") and recovered == ["contact"] and not record.in_hand
+
+
+@pytest.mark.parametrize(
+    ("displacement", "deviation", "room"),
+    [(0.0, 0.0, 0.08), (-0.01, 0.002, 0.052), (0.015, np.nan, 0.05), (0.05, 0.001, 0.0)],
+)
+def test_the_fingers_have_as_much_room_as_the_displacement_leaves(displacement, deviation, room):
+    plan = SimpleNamespace(
+        displacement=np.array([0.03, displacement, 0.0, 0.0]), displacement_std=np.full(4, deviation)
+    )
+    assert trial.room(plan) == pytest.approx(room)  # type: ignore[arg-type]  # all that it reads
 
 
 @pytest.fixture(scope="module")
