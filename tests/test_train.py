@@ -103,6 +103,30 @@ def held_out_of(names: tuple[str, ...], fraction: float) -> set[str]:
     return {name for name, side in part_sides(names, fraction, "name").items() if side == "validation"}
 
 
+@pytest.mark.parametrize("image", ["grasp", "object"])
+def test_several_processes_read_the_same_samples(dataset, image):
+    network = SMALL.model_copy(update={"image": image})
+    one, two = (read_samples(dataset, network, workers=n) for n in (1, 2))
+    for field in dataclasses.fields(one):
+        first, second = getattr(one, field.name), getattr(two, field.name)
+        if isinstance(first, torch.Tensor):
+            assert first.dtype == second.dtype and np.array_equal(
+                first, second, equal_nan=first.is_floating_point()
+            )
+        else:
+            assert first == second
+    assert (one.object_patches is None) == (image == "grasp")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_damaged_shard_is_named_whoever_reads_it(tmp_path, workers):
+    dataset = synthetic.write_dataset(tmp_path, n_parts=3, n_attempts=20, seed=0)
+    bad = sorted((dataset / "shards").glob("*.h5"))[1]
+    bad.write_bytes(bad.read_bytes()[:500])
+    with pytest.raises(BadDataset, match=bad.name):
+        read_samples(dataset, SMALL, workers=workers)
+
+
 def test_parts_are_split_by_name_and_stay_on_their_side():
     names = tuple(f"part_{k}" for k in range(400))
     held_out = held_out_of(names, 0.2)
