@@ -22,7 +22,7 @@ from mskgrasp.grasp import (
     object_displacement,
     pose_base_tcp,
 )
-from mskgrasp.markers import Markers, find_markers, planar_displacement
+from mskgrasp.markers import Markers, check_between_pads, find_markers, planar_displacement
 from mskgrasp.planner import GraspPlan
 from mskgrasp.settings import Tape
 
@@ -223,7 +223,7 @@ def run_trial(
     if trial.measured is not None and before is not None:
         true = _of_seen_centre(np.array(trial.measured), before, plan)
         trial = replace(trial, true=true.tolist(), measured=None)
-    return _measure_by_tape(cell, tape, trial, frame, plan, recover)
+    return _measure_by_tape(cell, tape, trial, frame, plan, result.width, recover)
 
 
 def _of_seen_centre(displacement: np.ndarray, before: Pose, plan: GraspPlan) -> np.ndarray:
@@ -236,7 +236,13 @@ def _of_seen_centre(displacement: np.ndarray, before: Pose, plan: GraspPlan) -> 
 
 
 def _measure_by_tape(
-    cell: Cell, tape: Tape, trial: Trial, frame: RgbdFrame, plan: GraspPlan, recover: Recover | None
+    cell: Cell,
+    tape: Tape,
+    trial: Trial,
+    frame: RgbdFrame,
+    plan: GraspPlan,
+    width: float,
+    recover: Recover | None,
 ) -> TrialRecord:
     """Puts the part down where it was grasped and looks how it lies; whatever is in doubt is no number."""
 
@@ -260,13 +266,14 @@ def _measure_by_tape(
             raise MarkersNotFound("touched: the hand met something as it let go and rose") from error
         clear(cell, recover)
         after = _as_stored(cell.camera.capture())
-        dx, dy, dtheta = planar_displacement(before, look(after), plan.grasp, plan.view.centre_base)
+        moved = planar_displacement(before, look(after), plan.grasp, plan.view.centre_base)
+        check_between_pads(moved, centre_in_grasp_frame(plan.view.centre_base, plan.grasp), width)
     except MarkersNotFound as error:
         return TrialRecord(
             trial=replace(trial, unmeasured=str(error)), frame=frame, plan=plan, after=after,
             in_hand=in_hand,
         )  # fmt: skip
-    measured = [float(dx), float(dy), float("nan"), float(dtheta)]
+    measured = [float(moved[0]), float(moved[1]), float("nan"), float(moved[2])]
     return TrialRecord(trial=replace(trial, measured=measured), frame=frame, plan=plan, after=after)
 
 

@@ -14,7 +14,7 @@ from hal.camera import RgbdFrame
 from mskgrasp.errors import MarkersNotFound
 from mskgrasp.geometry import Pose, quat_about_z, wrap_angle
 from mskgrasp.grasp import object_displacement, pose_base_tcp
-from mskgrasp.markers import Markers, find_markers, planar_displacement
+from mskgrasp.markers import Markers, check_between_pads, find_markers, planar_displacement
 from mskgrasp.settings import Tape
 from tests.synthetic import INTRINSICS, N_PIXELS, OVERHEAD, REGION, TABLE_Z
 
@@ -122,6 +122,33 @@ def test_a_wrong_centre_costs_what_the_turn_makes_of_it(before: Markers):
     wrong = planar_displacement(before, after, GRASP, BEFORE.position + [0.002, 0, 0])
     cost = float(np.linalg.norm(wrong - right))
     assert cost == pytest.approx(2 * np.sin(0.12 / 2) * 0.002, rel=0.02) and wrong[2] == right[2]
+
+
+def turned_about_the_tcp(centre: np.ndarray, angle: float) -> np.ndarray:
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.array([[cos, -sin], [sin, cos]]) @ centre - centre
+
+
+SWUNG = turned_about_the_tcp(np.array([0.06, 0.01]), 0.4)
+
+
+@pytest.mark.parametrize(
+    ("displacement", "width", "possible"),
+    [
+        ((0.004, 0.017, 0.0), 0.046, True),  # each pad closed by 17 mm
+        ((0.004, -0.022, 0.0), 0.046, False),
+        ((0.0016, 0.052, -0.01), 0.046, False),  # drawn along by the rising hand
+        ((SWUNG[0], SWUNG[1], 0.4), 0.07, True),  # the far end swings by 24 mm
+        ((SWUNG[0], SWUNG[1] + 0.009, 0.4), 0.07, False),
+    ],
+)
+def test_what_no_jaw_can_have_moved_is_a_mismatch(displacement, width, possible):
+    centre = np.array([0.06, 0.01, 0.0])
+    if possible:
+        check_between_pads(np.array(displacement), centre, width)
+        return
+    with pytest.raises(MarkersNotFound, match="dragged along"):
+        check_between_pads(np.array(displacement), centre, width)
 
 
 @pytest.mark.parametrize("gain", [0.4, 0.7, 1.1])

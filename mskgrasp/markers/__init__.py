@@ -5,6 +5,6 @@ another picture. Whatever may be wrong is `mskgrasp.errors.MarkersNotFound`, nev
 """
 
 from mskgrasp.markers.find import Markers, find_markers
-from mskgrasp.markers.motion import planar_displacement
+from mskgrasp.markers.motion import check_between_pads, planar_displacement
 
-__all__ = ["Markers", "find_markers", "planar_displacement"]
+__all__ = ["Markers", "check_between_pads", "find_markers", "planar_displacement"]

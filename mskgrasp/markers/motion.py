@@ -6,6 +6,7 @@ import numpy as np
 
 from mskgrasp.errors import MarkersNotFound
 from mskgrasp.geometry import wrap_angle
+from mskgrasp.grasp import MAX_OPENING
 from mskgrasp.markers.find import Markers
 
 DISTANCE_CHANGE = 0.001
@@ -14,6 +15,10 @@ SIDE_CHANGE = 0.0006
 """A square keeps each of its sides to this, m, or something covers it, or the part lies tilted."""
 HEIGHT_CHANGE = 0.004
 """A square keeps its height to this, m, or the part lies on another of its sides; a Kinect errs by 1 mm."""
+
+
+PAD_PLAY = 0.002
+"""A part moves across the pads by this more than they do, m: pads and surfaces are not quite parallel."""
 
 
 def planar_displacement(
@@ -47,6 +52,30 @@ def planar_displacement(
     from_middle = np.asarray(centre_base, dtype=np.float64)[:2] - first.mean(axis=0)
     moved = second.mean(axis=0) - first.mean(axis=0) + _turn(dtheta) @ from_middle - from_middle
     return np.array([*(_turn(-float(grasp[3])) @ moved), wrap_angle(dtheta)])
+
+
+def check_between_pads(displacement: np.ndarray, centre_grasp: np.ndarray, width: float) -> None:
+    """Refuses a displacement that no jaw makes: what was dragged along as the hand let go and rose.
+
+    What is between the pads has moved across them no farther than the pad that pushed it.
+
+    Args:
+        displacement: (3,) dx, dy, dtheta as `planar_displacement` gives it, metres and radians.
+        centre_grasp: (2,) or (3,) the part's origin before, in the grasp frame, metres.
+        width: Distance of the pads as they held the part, metres.
+
+    Raises:
+        MarkersNotFound: It is one.
+    """
+    centre = np.asarray(centre_grasp, dtype=np.float64)[:2]
+    # The point of the part that is at the TCP now, where it was before.
+    before = centre - _turn(-float(displacement[2])) @ (centre + displacement[:2])
+    moved, most = abs(float(before[1])), (MAX_OPENING - width) / 2
+    if not moved <= most + PAD_PLAY:
+        raise MarkersNotFound(
+            f"mismatch: between the pads the part seems to have moved by {1e3 * moved:.1f} mm, but they only "
+            f"by {1e3 * most:.1f} mm: it was dragged along as the hand let go; leave this trial out"
+        )
 
 
 def _turn(angle: float) -> np.ndarray:
