@@ -31,6 +31,7 @@ class FoundPart:
     """The pixels that show the part.
 
     Attributes:
+        depth: (h, w) metres, NaN where invalid.
         mask: (h, w) bool.
         points_base: (3, h, w) x, y, z of what every pixel sees, base frame, metres, NaN where invalid.
         heights: (h, w) above the table as it is seen, metres, NaN where invalid; of a noisy image the median
@@ -39,6 +40,7 @@ class FoundPart:
         n_other: How many pixels the next largest thing in the region has.
     """
 
+    depth: np.ndarray
     mask: np.ndarray
     points_base: np.ndarray
     heights: np.ndarray
@@ -110,7 +112,9 @@ def find_part_pixels(
             f"nothing rises more than {min_height * 1e3:g} mm above the table in the region (highest point "
             f"{highest * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the camera's pose"
         )
-    return FoundPart(mask=mask, points_base=points, heights=tops, table_offset=table_offset, n_other=n_other)
+    return FoundPart(
+        depth=depth, mask=mask, points_base=points, heights=tops, table_offset=table_offset, n_other=n_other
+    )
 
 
 def view_part(
@@ -142,7 +146,6 @@ def view_part(
         NoPartFound: Nothing rises above the table there, it is cut off, not alone, or lies elsewhere; or
             the image is no depth in metres.
     """
-    depth = np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth)
     found = find_part_pixels(
         depth, intrinsics, T_base_camera, table_z=table_z, region=region, min_height=min_height
     )
@@ -152,7 +155,7 @@ def view_part(
         raise NoPartFound("the part is cut off by the border of the image; move it towards the middle")
     T_base_axes = _box_axes(T_base_camera)
     cos, sin = quat_to_matrix(T_base_axes.quat_wxyz)[:2, 0]
-    pitch = float(np.median(depth[mask])) / np.array([intrinsics[0][0], intrinsics[1][1]])
+    pitch = float(np.median(found.depth[mask])) / np.array([intrinsics[0][0], intrinsics[1][1]])
     around = _bounds(mask)
     x_around, y_around, mask_around = x[around], y[around], mask[around]
     along_x = _extent(cos * x_around + sin * y_around, mask_around, float(pitch[0]))

@@ -62,8 +62,7 @@ class LearningConfig(Config):
     symmetric: bool = True
     """Half of the samples are turned by half a turn, half are mirrored: the physics does not care."""
     mixed_precision: bool = False
-    """What looks at the picture learns in bfloat16, all else in float32: faster on a CPU that knows AMX,
-    slower on one that does not know bfloat16."""
+    """What looks at the picture learns in bfloat16, all else in float32: faster on a CPU that knows AMX."""
     beta: float = Field(default=0.0, ge=0.0, le=1.0)
     """0: the paper's likelihood; 0.5: beta-NLL."""
     keep_best: bool = True
