@@ -219,6 +219,21 @@ class GraspDisplacementEnv(BaseEnv):
                 self._errors[i] = self.noise.draw(self._batched_episode_rng[i])
             self._apply(self._errors[0])
 
+    def lay(self, seed: int) -> None:
+        """Begins the episode of ``reset(seed=seed)``, without the observation and the rest of what that does.
+
+        A reset takes as long as twenty steps of the simulation. torch's generator is not seeded: nothing that
+        this task draws comes of it.
+        """
+        everywhere = torch.arange(self.num_envs, device=self.device)
+        self._set_episode_rng(seed, everywhere)
+        self._clear_sim_state()
+        self._initialize_episode(everywhere, {})
+        if self.gpu_sim_enabled:
+            self.scene._gpu_apply_all()
+            self.scene.px.gpu_update_articulation_kinematics()
+            self.scene._gpu_fetch_all()
+
     def _apply(self, error: ExecutionError | None) -> None:
         """Makes gripper, pads and camera those of an attempt; where they vary there is one sub-scene."""
         if error is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
@@ -44,6 +45,21 @@ def test_the_same_seed_lays_the_part_at_the_same_place(boxes):
         env.reset(seed=seed)
         poses.append(env.unwrapped.part_pose().as_vector())
     assert torch.equal(poses[0], poses[2]) and not torch.equal(poses[0], poses[1])
+    env.close()
+
+
+def test_laying_begins_the_very_episode_of_a_reset(boxes):
+    env = make(boxes, obs_mode="none", noise=dict(arm_position_std=0.001, friction_pad_part=(0.4, 0.5)))
+    base = env.unwrapped
+    found = []
+    for begin, seed in itertools.product((lambda seed: base.reset(seed=seed), base.lay), (7, 8)):
+        begin(seed)
+        pose = base.part_pose().as_vector()
+        x, y, _ = pose[0, :3].tolist()
+        outcome = base.try_grasp(torch.tensor([[x, y, 0.015, 0.1 * seed]]))
+        found.append(torch.cat([pose[0], outcome["pose_tcp_obj_after"][0], outcome["width_after"]]))
+    assert torch.equal(found[0], found[2]) and torch.equal(found[1], found[3])
+    assert not torch.equal(found[0], found[1])
     env.close()
 
 
