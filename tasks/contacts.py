@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import sapien
@@ -70,7 +71,7 @@ class HandContacts:
             for sign, body in zip((1.0, -1.0), contact.bodies, strict=True):
                 i = bodies.get(body.entity)
                 if i is not None:
-                    total[i] = total.get(i, 0.0) + sign * _impulse(contact)
+                    total[i] = total.get(i, 0.0) + sign * _impulse(contact.points)
         return total
 
     def pads_on_part(self) -> tuple[Tensor, Tensor]:
@@ -90,17 +91,29 @@ class HandContacts:
             return torch.stack(forces, dim=-1), torch.full_like(forces[0], math.nan)
         impulses = [np.zeros(3), np.zeros(3)]
         deepest = 0.0
+        for i, points in self._finger_points():
+            impulses[i] = impulses[i] + _impulse(points)
+            deepest = max([deepest, *(-float(point.separation) for point in points)])
+        forces = np.array([np.linalg.norm(v) for v in impulses]) / self._scene.px.timestep
+        return torch.tensor(forces[None], dtype=torch.float32), torch.tensor([deepest])
+
+    def penetration(self) -> Tensor:
+        """(n,) how deep a finger and the part overlap, metres; NaN on the GPU."""
+        if self._gpu:
+            return torch.full((self._scene.num_envs,), math.nan, device=self._agent.device)
+        overlaps = [-float(point.separation) for _, points in self._finger_points() for point in points]
+        return torch.tensor([max(overlaps, default=0.0)]).clamp(min=0.0)
+
+    def _finger_points(self) -> Iterator[tuple[int, list]]:
+        """Number of the finger and points of each contact between a finger and the part."""
         for contact in self._scene.px.get_contacts():
             first, second = (body.entity for body in contact.bodies)
             other = second if first is self._entity else first if second is self._entity else None
             i = self._fingers.get(other)
             if i is not None:
-                impulses[i] = impulses[i] + _impulse(contact)
-                deepest = max([deepest, *(-float(point.separation) for point in contact.points)])
-        forces = np.array([np.linalg.norm(v) for v in impulses]) / self._scene.px.timestep
-        return torch.tensor(forces[None], dtype=torch.float32), torch.tensor([deepest])
+                yield i, contact.points
 
 
-def _impulse(contact) -> np.ndarray:  # noqa: ANN001 (a pybind class without a stub)
-    impulses = [point.impulse for point in contact.points]
+def _impulse(points: list) -> np.ndarray:
+    impulses = [point.impulse for point in points]
     return np.add.reduce(impulses) if impulses else np.zeros(3)

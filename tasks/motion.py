@@ -7,7 +7,8 @@ executes one command at a time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 
 import torch
 from mani_skill.envs.scene import ManiSkillScene
@@ -72,19 +73,31 @@ class PandaMotion:
         self.finger_target = torch.full((self.n,), MAX_OPENING / 2, device=self.device)
         self.watch: Callable[[float], None] | None = None
         """Told of the simulated time, s, every ``CHECK_S``."""
-        self._steps = 0
-        self._watch_every = self.n_steps(CHECK_S)
+        self.seconds = 0.0
+        """Simulated so far."""
+        self.rate_hz = physics.rate_hz
+        """Simulation steps a second, now."""
+        self._unwatched = 0
         self._driven: list[tuple[float, float] | None] = [None] * 7
         self._commanded: Tensor | None = None
 
-    @property
-    def seconds(self) -> float:
-        """Simulated so far."""
-        return self._steps / self._physics.rate_hz
-
     def n_steps(self, seconds: float) -> int:
-        """Simulation steps in a time, at least one."""
-        return max(1, round(seconds * self._physics.rate_hz))
+        """Simulation steps in a time at the rate of now, at least one."""
+        return max(1, round(seconds * self.rate_hz))
+
+    @contextmanager
+    def coarsely(self) -> Iterator[None]:
+        """Simulates with the coarse rate of the settings while the context lasts."""
+        fine = self.rate_hz
+        self._set_rate(min(fine, self._physics.coarse_rate_hz))
+        try:
+            yield
+        finally:
+            self._set_rate(fine)
+
+    def _set_rate(self, rate_hz: int) -> None:
+        self.rate_hz = rate_hz
+        self._scene.timestep = 1 / rate_hz
 
     def place(self, q: Tensor, width: Tensor | None = None) -> None:
         """Puts the arm at joints (n, 7) at once, at rest, fingers open by ``width`` (n,) metres or wholly."""
@@ -99,6 +112,7 @@ class PandaMotion:
             self._scene._gpu_fetch_all()
         self.set_fingers(fingers[:, 0])
         self._driven = [None] * 7  # others may have written to the drives since
+        self._unwatched = 0
         self.set_arm(q, torch.zeros_like(q))
 
     def set_arm(self, q: Tensor, qd: Tensor) -> None:
@@ -129,6 +143,22 @@ class PandaMotion:
         else:
             self._drive_fingers(float(target[0]))
 
+    def run_fingers(self, hands: Tensor) -> None:
+        """Makes the fingers of some hands (n,) close as they would long after a ramp began.
+
+        They lag behind their targets by damping * speed / stiffness, less what they move in the mean between a
+        step's target, which it holds, and the solver's iterations, equal shares of the step.
+        """
+        speed, physics = self._physics.finger_speed, self._physics
+        within = (1 - 1 / physics.position_iterations) / (2 * self.rate_hz)
+        lag = speed * max(0.0, physics.finger_damping / physics.finger_stiffness - within)
+        qvel = self._agent.robot.get_qvel().clone()
+        qvel[:, 7:9] = torch.where(hands[:, None], -speed, qvel[:, 7:9])
+        self._agent.robot.set_qvel(qvel)
+        if self.gpu:
+            self._scene._gpu_apply_all()
+        self.set_fingers(torch.where(hands, self.finger_target - lag, self.finger_target))
+
     def _drive_fingers(self, target: float) -> None:
         for drive in self._finger_drives:
             drive.set_drive_target(target)
@@ -138,15 +168,22 @@ class PandaMotion:
         if self.gpu:
             self._scene.px.gpu_apply_articulation_target_position()
             self._scene.px.gpu_apply_articulation_target_velocity()
+        watch_every = self.n_steps(CHECK_S)
         for _ in range(n_steps):
             self._scene.step()
-            self._steps += 1
-            if not self.gpu and self._steps % self._watch_every == 0 and self.watch is not None:
-                self.watch(self.seconds)
+            self.seconds += 1 / self.rate_hz
+            self._unwatched += 1
+            if not self.gpu and self._unwatched >= watch_every:
+                self._look()
         if self.gpu:
             self._scene._gpu_fetch_all()
-            if self.watch is not None and self._steps % self._watch_every < n_steps:
-                self.watch(self.seconds)
+            if self._unwatched >= watch_every:
+                self._look()
+
+    def _look(self) -> None:
+        self._unwatched = 0
+        if self.watch is not None:
+            self.watch(self.seconds)
 
     def follow(
         self,
@@ -167,7 +204,7 @@ class PandaMotion:
         Returns:
             False where ``check`` ended the motion.
         """
-        rate = self._physics.rate_hz
+        rate = self.rate_hz
         speed = torch.zeros_like(path)
         speed[1:] = (path[1:] - path[:-1]) * rate
         # One environment: plain numbers, once; a tensor a step would cost as much as the physics.
@@ -220,15 +257,15 @@ class PandaMotion:
         if frozen is not None:
             way = torch.where(frozen, torch.zeros_like(way), way)
         goal = start + way
-        n_ramp = max(1, math.ceil(float(way.abs().max()) / speed * self._physics.rate_hz))
-        done = torch.arange(1, n_ramp + 1, device=self.device)[:, None] * speed / self._physics.rate_hz
+        n_ramp = max(1, math.ceil(float(way.abs().max()) / speed * self.rate_hz))
+        done = torch.arange(1, n_ramp + 1, device=self.device)[:, None] * speed / self.rate_hz
         ramp = start + way.sign() * torch.minimum(done, way.abs())
         quiet = torch.zeros(self.n, dtype=torch.int64, device=self.device)
         # A held part stops the fingers before their targets; wait until the drives press in full.
         lag = (force or self._physics.finger_force) / self._physics.finger_stiffness
         last = self._agent.robot.get_qpos()[:, 7:9]
         every = self.n_steps(CHECK_S)
-        far = STILL_FINGER * every / self._physics.rate_hz
+        far = STILL_FINGER * every / self.rate_hz
         rows = None if self.gpu else ramp[:, 0].tolist()
         for i in range(n_ramp + self.n_steps(FINGER_TIMEOUT_S)):
             if i < n_ramp and rows is not None:

@@ -71,8 +71,11 @@ class CollectConfig(Config):
     def _check(self) -> CollectConfig:
         if self.shard_size > 10_000:
             raise ValueError("shard_size is at most 10000")
-        if self.physics.rate_hz < LEAST_RATE_HZ:
-            raise ValueError(f"physics.rate_hz is at least {LEAST_RATE_HZ}: labels made with less are wrong")
+        for name in ("rate_hz", "coarse_rate_hz"):
+            if getattr(self.physics, name) < LEAST_RATE_HZ:
+                raise ValueError(
+                    f"physics.{name} is at least {LEAST_RATE_HZ}: labels made with less are wrong"
+                )
         self.camera.check_sees(REGION)
         return self
 

@@ -16,6 +16,9 @@ class Physics(Config):
 
     rate_hz: int = Field(default=500, ge=100)
     """Simulation steps a second. Under 250 Hz light parts creep out of the fingers: data is not collected."""
+    coarse_rate_hz: int = Field(default=250, ge=100)
+    """The same, at most ``rate_hz``, where no finger closes on the part: while it settles, in lift and hold,
+    and while one that was not held comes to rest. The last 20 ms, after which it is looked at, are fine."""
     position_iterations: int = Field(default=15, ge=4)
     """Solver iterations a step."""
     contact_offset: float = Field(default=0.003, gt=0, le=0.02)

@@ -103,7 +103,7 @@ class Bench:
         """Advances the simulation; returns the time that it advanced, s."""
         n = self.env.motion.n_steps(seconds)
         self.env.motion.step(n)
-        return n / self.physics.rate_hz
+        return n / self.env.motion.rate_hz
 
     def push(self, force: list[float], seconds: float) -> float:
         """The same with a constant force (x, y, z), N, on the part's centre of mass."""
@@ -112,7 +112,7 @@ class Bench:
             body = self.body
             body.add_force_at_point(force, body.entity.pose.p)
             self.env.motion.step(1)
-        return n / self.physics.rate_hz
+        return n / self.env.motion.rate_hz
 
     def pinch(self, part: Part, along: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
         """Closes the hand aloft on a weightless part, then gives the part its weight.

@@ -96,7 +96,9 @@ class ValidateConfig(Config):
             for rate, count in sorted(pairs)
         ]
         whole = {"skip_air": False}
-        finest = self.at(max(self.rates_hz), max(self.iterations)).model_copy(update=whole)
+        finest = self.at(max(self.rates_hz), max(self.iterations)).model_copy(
+            update=whole | {"coarse_rate_hz": max(self.rates_hz)}
+        )
         return [
             *grid,
             Setting(name=REFERENCE, physics=finest),

@@ -134,6 +134,7 @@ def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(collected
     [
         ("atempts_per_part: 3", 2, "unknown key 'atempts_per_part'"),
         ("physics: {rate_hz: 100}", 2, "physics.rate_hz is at least 250"),
+        ("physics: {coarse_rate_hz: 125}", 2, "physics.coarse_rate_hz is at least 250"),
         ("[1, 2]", 2, "expected a mapping"),
         ("parts: [", 2, "not valid YAML"),
         ("parts: [no_such_part]", 2, "no_such_part"),

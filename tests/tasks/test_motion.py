@@ -41,3 +41,58 @@ def test_a_descent_overshoots_by_less_than_half_the_table_clearance(env, boxes, 
         heights.append(float(env.tcp_pose().position[0, 2]))
     assert float(goal[0, 2]) - min(heights) < TABLE_CLEARANCE / 2
     assert heights[-1] == pytest.approx(float(goal[0, 2]), abs=1e-4)
+
+
+def test_steps_are_coarse_as_long_as_they_are_asked_to_be(env, monkeypatch):
+    motion, scene = env.motion, env.scene
+    began = motion.seconds
+    with pytest.raises(KeyboardInterrupt), motion.coarsely():
+        assert (motion.rate_hz, scene.timestep, motion.n_steps(0.1)) == (250, pytest.approx(0.004), 25)
+        motion.step(25)
+        raise KeyboardInterrupt
+    assert (motion.rate_hz, scene.timestep, motion.n_steps(0.1)) == (500, pytest.approx(0.002), 50)
+    motion.step(50)
+    assert motion.seconds - began == pytest.approx(0.2)
+    monkeypatch.setattr(motion, "_physics", env.physics.model_copy(update={"coarse_rate_hz": 1000}))
+    with motion.coarsely():
+        assert motion.rate_hz == 500
+
+
+def test_running_fingers_move_as_those_that_began_long_ago(env):
+    motion, robot = env.motion, env.agent.robot
+    env.reset(seed=0, options=dict(pose_base_obj=np.array([[0.5, -0.5, 0.015, 1, 0, 0, 0]])))
+    home = torch.as_tensor(env.agent.rest_qpos[None, :7], dtype=torch.float64)
+
+    def ramp(opening: float, running: bool, until: float) -> np.ndarray:
+        """(steps, 2) places of both fingers."""
+        motion.place(home, torch.tensor([opening]))
+        motion.run_fingers(torch.tensor([running]))
+        target, places = motion.finger_target.clone(), []
+        while not places or places[-1].mean() > until:
+            target = target - env.physics.finger_speed / motion.rate_hz
+            motion.set_fingers(target)
+            motion.step()
+            places.append(robot.get_qpos()[0, 7:9].numpy())
+        return np.array(places)
+
+    slow, quick = ramp(0.08, False, 0.006), ramp(0.03, True, 0.006)
+    speed = env.physics.finger_speed
+    assert np.diff(quick, axis=0) * motion.rate_hz == pytest.approx(-speed, rel=2e-3)
+    # The last centimetre takes both as many steps.
+    steps = [(places.mean(axis=1) < 0.014).sum() for places in (slow, quick)]
+    assert abs(int(steps[0]) - int(steps[1])) <= 1
+    assert ramp(0.03, False, 0.0148)[0] == pytest.approx(0.015, abs=2e-5), (
+        "fingers that do not run start at rest"
+    )
+
+
+@pytest.mark.parametrize("at", [(0.5, 0.0, 0.15), (0.503, 0.006, -0.2), (0.498, -0.008, 0.02)])
+def test_a_coarse_lift_leaves_a_light_block_where_a_fine_one_does(env, attempt, monkeypatch, at):
+    *place, turn = at
+    coarse = attempt((0.5, 0.0, 0.02, 0.0), at=place, turn=turn)
+    fine = env.physics.model_copy(update={"coarse_rate_hz": env.physics.rate_hz})
+    monkeypatch.setattr(env, "physics", fine)
+    whole = attempt((0.5, 0.0, 0.02, 0.0), at=place, turn=turn)
+    assert bool(coarse["success"]) and bool(whole["success"])
+    difference = (coarse["displacement"] - whole["displacement"]).abs()
+    assert difference[:3].max() < 5e-5 and difference[3] < 1e-3

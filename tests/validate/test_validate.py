@@ -118,7 +118,9 @@ def test_the_grid_holds_the_setting_under_test_and_the_floor():
     assert {"250 Hz, 8 it", "1000 Hz, 50 it", "500 Hz, 15 it"} < set(settings)
     assert settings[CELL_FLOOR].shift == 1e-4 and settings[CELL_FLOOR].physics == settings[FLOOR].physics
     assert settings[FLOOR].shift == 1e-5 and settings[FLOOR].physics == settings[REFERENCE].physics
-    assert settings[REFERENCE].physics.rate_hz == 1000 and not settings[REFERENCE].physics.skip_air
+    finest = settings[REFERENCE].physics
+    assert finest.rate_hz == finest.coarse_rate_hz == 1000 and not finest.skip_air
+    assert settings["1000 Hz, 50 it"].physics.coarse_rate_hz == Physics().coarse_rate_hz
 
 
 def test_the_production_settings_pass_every_closed_form_check(tmp_path):
