@@ -146,8 +146,8 @@ class PandaMotion:
     def run_fingers(self, hands: Tensor) -> None:
         """Makes the fingers of some hands (n,) close as they would long after a ramp began.
 
-        They lag behind their targets by damping * speed / stiffness, less what they move in the mean between a
-        step's target, which it holds, and the solver's iterations, equal shares of the step.
+        They lag behind their targets by damping * speed / stiffness, less what they move in the mean between
+        a step's target, which it holds, and the solver's iterations, equal shares of the step.
         """
         speed, physics = self._physics.finger_speed, self._physics
         within = (1 - 1 / physics.position_iterations) / (2 * self.rate_hz)
