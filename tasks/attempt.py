@@ -24,7 +24,7 @@ from tasks.clearance import Clearance, hand_clearance
 from tasks.contacts import HandContacts
 from tasks.frames import base_pose
 from tasks.kinematics import top_down
-from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration
+from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration, run_up
 from tasks.outcome import MAX_DRIFT, MAX_TURN, MIN_PAD_FORCE, Observed, judge
 from tasks.panda import GraspPanda
 from tasks.watch import SpeedWatch
@@ -35,8 +35,9 @@ AFTERMATH_S = 0.3
 """How long a part that was not lifted may fall, roll and come to rest before it is judged, s."""
 REST_WINDOW_S = 0.06
 """A part that did not move for so long has come to rest, s."""
-RUN_UP = 0.008
-"""Way after which closing fingers move as their ramp does, to a hundredth of their lag, m."""
+AHEAD = 0.003
+"""Distance from the part, m, at which fingers begin that have only air before them: more than a part moves
+that settles and yet counts as at rest."""
 LEFT_BEHIND = 0.02
 """The hand this much farther from the part than a success may be has lost it, m."""
 
@@ -69,6 +70,7 @@ class Attempt:
         self._motion = motion
         self._contacts = contacts
         self._physics = physics
+        self._run_up = run_up(physics)
         self._speed = SpeedWatch(part, gpu=motion.gpu)
         motion.watch = self._speed.look
 
@@ -96,10 +98,9 @@ class Attempt:
         check_grasps(torch.cat([grasp, start, lifted]))
         began = motion.seconds
         empty = free & (reach == 0)
-        # Fingers that have only air to close through begin where the first contact could be generated.
-        offset = physics.contact_offset
-        running = free & ~empty & (reach + max(RUN_UP, offset) <= MAX_OPENING / 2)
-        width = torch.where(running, 2 * (reach + offset), torch.full_like(reach, MAX_OPENING))
+        # Fingers that would have only air to close through, and room for their run-up, begin near the part.
+        running = free & ~empty & (reach + max(self._run_up, AHEAD) <= MAX_OPENING / 2)
+        width = torch.where(running, 2 * (reach + AHEAD), torch.full_like(reach, MAX_OPENING))
         down = self._line(start, grasp, physics.descend_speed)
         motion.place(down[0], width)
         self._speed.start(motion.seconds)
@@ -128,11 +129,11 @@ class Attempt:
             def all_met() -> bool:
                 return bool((apart | (self._gap() <= MIN_GAP)).all())
 
-            motion.run_fingers(running)
+            motion.run_fingers(running & ~apart)
             motion.move_fingers(-MAX_OPENING / 2, frozen=apart, check=all_met)
             held, penetration = self.grip()
         # What the fingers do to the part is done: what follows needs no such fine steps. The last look does:
-        # a light part trembles between the pads, and by four times as much at half the rate.
+        # a part trembles between the pads, and more at half the rate.
         with motion.coarsely():
             carried = bool((alive & held).any())
             if carried:

@@ -187,7 +187,8 @@ class GraspDisplacementEnv(BaseEnv):
         self._errors: list[ExecutionError | None] = [None] * self.num_envs
         if self.scene.can_render():
             without_reflection_table(self._overhead_sensor)
-        self.motion = PandaMotion(self.scene, self.agent, self.physics)
+        coarse_hz = self.physics.coarse_hz(min(part.mass for part in self.parts))
+        self.motion = PandaMotion(self.scene, self.agent, self.physics, coarse_hz)
         self.contacts = HandContacts(self.scene, self.agent, self.part)
         self.attempt = Attempt(self.agent, self.part, self._hulls, self.motion, self.contacts, self.physics)
 
@@ -220,10 +221,10 @@ class GraspDisplacementEnv(BaseEnv):
             self._apply(self._errors[0])
 
     def lay(self, seed: int) -> None:
-        """Begins the episode of ``reset(seed=seed)``, without the observation and the rest of what that does.
+        """Begins the episode of ``reset(seed=seed)`` for `try_grasp`, without the rest of what that does.
 
-        A reset takes as long as twenty steps of the simulation. torch's generator is not seeded: nothing that
-        this task draws comes of it.
+        A reset takes as long as twenty steps of the simulation. No observation is made, the controllers of
+        the other control modes are not reset, nor is torch's generator seeded: nothing here is drawn from it.
         """
         everywhere = torch.arange(self.num_envs, device=self.device)
         self._set_episode_rng(seed, everywhere)

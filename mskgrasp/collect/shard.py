@@ -38,7 +38,7 @@ class Simulator:
         self._noise = noise
         self._env: gymnasium.Env | None = None
 
-    def _load(self, folder: str) -> GraspDisplacementEnv:
+    def load(self, folder: str) -> GraspDisplacementEnv:
         """A fresh scene with the part: what earlier shards left behind in PhysX must not matter."""
         if self._env is None:
             self._env = gymnasium.make(
@@ -70,7 +70,7 @@ class Simulator:
         Yields:
             After each 1 for a success, 0 for a failure and -1 for a discarded one.
         """
-        env = self._load(task.folder)
+        env = self.load(task.folder)
         part = env.parts[0]
         intrinsics = self._camera.intrinsics()
         T_base_camera = self._camera.T_base_camera(env.region_centre)

@@ -193,7 +193,7 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
             env_kwargs=dict(
                 obs_mode="depth",
                 control_mode="grasp",
-                physics=dict(info.physics),
+                physics=_physics(info),
                 noise=dict(info.noise),
                 camera=camera,
             ),
@@ -215,6 +215,11 @@ def _pose_after(attempts: Attempts, lift_height: float) -> np.ndarray:
     lifted[:, 2] += lift_height
     after = pose_base_tcp(lifted) @ Pose.from_vector(attempts.pose_tcp_obj_after.astype(np.float64))
     return np.where(attempts.success[:, None], after.as_vector(), np.nan)
+
+
+def _physics(info: ShardInfo) -> dict[str, Any]:
+    """The settings of a shard; one that knows of no coarse rate was simulated finely throughout."""
+    return dict(coarse_rate_hz=info.physics.get("rate_hz")) | info.physics
 
 
 def _outcome(attempts: Attempts, info: ShardInfo, row: int) -> dict[str, Any]:

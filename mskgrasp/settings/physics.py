@@ -17,9 +17,12 @@ class Physics(Config):
     rate_hz: int = Field(default=500, ge=100)
     """Simulation steps a second. Under 250 Hz light parts creep out of the fingers: data is not collected."""
     coarse_rate_hz: int = Field(default=250, ge=100)
-    """The same, at most ``rate_hz``, where no finger closes on the part: while it settles, in lift and hold,
-    and while one that was not held comes to rest. The last 20 ms, after which it is looked at, are fine."""
-    position_iterations: int = Field(default=15, ge=4)
+    """The same, at most ``rate_hz``, where no finger closes, for parts of ``coarse_mass`` and more: while
+    they settle, in lift and hold, and while one that was not held comes to rest. The last 20 ms, before the
+    part is looked at in the hand, are fine. Of attempts alone: the simulated cell is never coarse."""
+    coarse_mass: float = Field(default=0.04, gt=0)
+    """Lighter parts are simulated finely throughout, kg: the grip shakes them, the more the longer a step."""
+    position_iterations: int = Field(default=25, ge=4)
     """Solver iterations a step."""
     contact_offset: float = Field(default=0.003, gt=0, le=0.02)
     """Distance at which contacts are generated, m; ManiSkill's 20 mm costs two to four times the time."""
@@ -63,7 +66,13 @@ class Physics(Config):
     def _check(self) -> Physics:
         if self.friction_table < 0:
             raise ValueError("friction_table_part must be at least half of friction_pad_part")
+        if self.coarse_rate_hz > self.rate_hz:
+            raise ValueError(f"coarse_rate_hz is at most rate_hz, {self.rate_hz}, got {self.coarse_rate_hz}")
         return self
+
+    def coarse_hz(self, mass: float) -> int:
+        """Simulation steps a second of a part of some mass, kg, where no finger closes."""
+        return self.rate_hz if mass < self.coarse_mass else self.coarse_rate_hz
 
     @property
     def friction_table(self) -> float:

@@ -47,7 +47,7 @@ class ValidateConfig(Config):
     workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
     """Processes; 0: one for each core."""
     rates_hz: tuple[int, ...] = (125, 250, 500, 1000)
-    """Simulation rates; the highest belongs to the finest setting."""
+    """Simulation rates while fingers close; the finest setting has the highest of them throughout."""
     iterations: tuple[int, ...] = (8, 15, 25, 50)
     """Solver iterations; the highest belong to the finest setting."""
     variants: Annotated[dict[str, dict[str, float | bool]], tyro.conf.Suppress] = {}
@@ -75,8 +75,9 @@ class ValidateConfig(Config):
 
     def at(self, rate_hz: int, iterations: int) -> Physics:
         """The settings under test at another rate and other iterations."""
-        values = self.physics.model_dump() | {"rate_hz": rate_hz, "position_iterations": iterations}
-        return Physics.model_validate(values)
+        coarse = min(rate_hz, self.physics.coarse_rate_hz)
+        values = {"rate_hz": rate_hz, "coarse_rate_hz": coarse, "position_iterations": iterations}
+        return Physics.model_validate(self.physics.model_dump() | values)
 
     def varied(self, name: str) -> Physics:
         """The settings under test with a variant's values."""

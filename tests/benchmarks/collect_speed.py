@@ -2,8 +2,9 @@
 
 In one run, on one core, with the same parts, physics, starts and grasps, part by part in turn:
 (a) a plain ManiSkill loop, ``pd_ee_pose`` at 20 Hz and ``obs_mode="depth"``; (b) a raw SAPIEN script
-that runs every attempt to its end; (c) the collector, shards written to disk. Processor time of all of it,
-the loading of the part's scene included. Then the collector as users start it, with one worker and with two.
+that runs every attempt to its end, at the fine rate throughout; (c) the collector, shards written to
+disk. Processor time of all of it, the loading of the part's scene included. Then the collector as users
+start it, with one worker and with two.
 """
 
 from __future__ import annotations
@@ -190,7 +191,7 @@ class Ours:
 
     def draw(self, part: Part, n: int) -> list[Draw]:
         """The first attempts at a part, as the collector draws them."""
-        env = self.simulator._load(str(part.folder))
+        env = self.simulator.load(str(part.folder))
         drawn: list[Draw] = []
         attempt = 0
         while len(drawn) < n:

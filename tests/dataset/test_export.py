@@ -171,6 +171,18 @@ def test_wrong_names_and_places_are_usage_errors(collected, tmp_path):
         main(["export", str(tmp_path / "nowhere"), "--format", "npz", "--out", str(tmp_path / "x.npz")])
 
 
+@pytest.mark.parametrize(
+    ("stored", "coarse"), [("", 500), (', "coarse_rate_hz": 250', 250)], ids=["old", "of today"]
+)
+def test_shards_of_before_the_coarse_rate_are_exported_as_they_were_made(tmp_path, stored, coarse):
+    folder = synthetic.write_dataset(tmp_path / "boxes", n_parts=1, n_attempts=3, seed=0)
+    with h5py.File(list_shards(folder)[0], "r+") as file:
+        file.attrs["physics"] = f'{{"lift_height": 0.1, "rate_hz": 500{stored}}}'
+    export_maniskill(folder, tmp_path / "x.h5")
+    env_info = json.loads((tmp_path / "x.json").read_text())["env_info"]
+    assert env_info["env_kwargs"]["physics"]["coarse_rate_hz"] == coarse
+
+
 @pytest.mark.parametrize("export", [export_npz, export_maniskill])
 def test_a_bad_shard_stops_an_export_and_leaves_nothing_behind(tmp_path, export):
     folder = synthetic.write_dataset(tmp_path / "boxes", n_parts=2, n_attempts=3, seed=0)

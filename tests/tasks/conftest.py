@@ -24,7 +24,7 @@ def boxes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Part]:
     return dict(made, wide=make_box(cache, "wide", (0.05, 0.09, 0.03), 0.1))
 
 
-MASSES = {"light": 0.024, "kilo": 1.0, "heavy": 1.55, "too-heavy": 2.15}
+MASSES = {"feather": 0.0025, "light": 0.024, "lead": 0.05, "kilo": 1.0, "heavy": 1.55, "too-heavy": 2.15}
 
 
 @pytest.fixture(scope="session")
@@ -50,5 +50,16 @@ def attempt(env: GraspDisplacementEnv, boxes: dict[str, Part]) -> Attempt:
         env.reset(seed=0, options=dict(parts=[folder], reconfigure=True, pose_base_obj=np.array([pose])))
         info = env.step(np.array([grasp], dtype=np.float32))[-1]
         return {name: value[0] for name, value in info.items() if torch.is_tensor(value) and value.ndim}
+
+    return run
+
+
+@pytest.fixture
+def lay(env: GraspDisplacementEnv, boxes: dict[str, Part]) -> Callable[[str], None]:
+    """Lays a box far from the hand, in a fresh scene."""
+
+    def run(part: str) -> None:
+        far = np.array([[0.5, -0.5, 0.015, 1, 0, 0, 0]])
+        env.reset(seed=0, options=dict(parts=[str(boxes[part].folder)], reconfigure=True, pose_base_obj=far))
 
     return run

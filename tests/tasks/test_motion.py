@@ -5,7 +5,9 @@ import pytest
 import torch
 
 from mskgrasp.grasp import TABLE_CLEARANCE, lowest_grasp_z
-from tasks.motion import PEAK_ACCELERATION, ease, ease_duration
+from mskgrasp.settings import Physics
+from tasks.attempt import AHEAD
+from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration, run_up
 
 
 @pytest.mark.parametrize(("distance", "speed"), [(0.01, 0.25), (0.06, 0.25), (0.3, 0.25), (0.02, 1.0)])
@@ -43,7 +45,8 @@ def test_a_descent_overshoots_by_less_than_half_the_table_clearance(env, boxes, 
     assert heights[-1] == pytest.approx(float(goal[0, 2]), abs=1e-4)
 
 
-def test_steps_are_coarse_as_long_as_they_are_asked_to_be(env, monkeypatch):
+def test_steps_are_coarse_as_long_as_they_are_asked_to_be(env, lay):
+    lay("lead")
     motion, scene = env.motion, env.scene
     began = motion.seconds
     with pytest.raises(KeyboardInterrupt), motion.coarsely():
@@ -53,14 +56,35 @@ def test_steps_are_coarse_as_long_as_they_are_asked_to_be(env, monkeypatch):
     assert (motion.rate_hz, scene.timestep, motion.n_steps(0.1)) == (500, pytest.approx(0.002), 50)
     motion.step(50)
     assert motion.seconds - began == pytest.approx(0.2)
-    monkeypatch.setattr(motion, "_physics", env.physics.model_copy(update={"coarse_rate_hz": 1000}))
-    with motion.coarsely():
-        assert motion.rate_hz == 500
 
 
-def test_running_fingers_move_as_those_that_began_long_ago(env):
+@pytest.mark.parametrize(("part", "carried_at"), [("feather", 500), ("light", 500), ("lead", 250)])
+def test_heavy_parts_alone_are_lifted_coarsely_and_all_are_looked_at_finely(
+    env, attempt, monkeypatch, part, carried_at
+):
+    found: list[tuple[str, int, float]] = []
+    for name in ("step", "move_fingers", "follow"):
+        inner = getattr(PandaMotion, name)
+
+        def noted(self, *given, inner=inner, name=name, **named):
+            began = self.seconds
+            result = inner(self, *given, **named)
+            found.append((name, self.rate_hz, self.seconds - began))
+            return result
+
+        monkeypatch.setattr(PandaMotion, name, noted)
+    outcome = attempt((0.5, 0.0, 0.02, 0.0), part=part, at=(0.5, 0.004), turn=0.1)
+    assert bool(outcome["success"])
+    assert outcome["penetration"] < 1e-3
+    assert [rate for name, rate, _ in found if name == "move_fingers"] == [500]
+    assert [rate for name, rate, _ in found if name == "follow"] == [carried_at]
+    assert found[0][:2] == ("step", carried_at)  # it settles
+    assert found[-1] == ("step", 500, pytest.approx(0.02))
+
+
+def test_running_fingers_move_as_those_that_began_long_ago(env, lay):
+    lay("light")
     motion, robot = env.motion, env.agent.robot
-    env.reset(seed=0, options=dict(pose_base_obj=np.array([[0.5, -0.5, 0.015, 1, 0, 0, 0]])))
     home = torch.as_tensor(env.agent.rest_qpos[None, :7], dtype=torch.float64)
 
     def ramp(opening: float, running: bool, until: float) -> np.ndarray:
@@ -86,13 +110,60 @@ def test_running_fingers_move_as_those_that_began_long_ago(env):
     )
 
 
+def test_in_an_attempt_fingers_begin_near_the_part_and_run(env, attempt, monkeypatch):
+    places: list[np.ndarray] = []
+    move, step = PandaMotion.move_fingers, PandaMotion.step
+
+    def watched(self, *given, **named):
+        def looked(motion, n_steps=1):
+            step(motion, n_steps)
+            places.append(motion._agent.robot.get_qpos()[0, 7:9].numpy())
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(PandaMotion, "step", looked)
+            return move(self, *given, **named)
+
+    monkeypatch.setattr(PandaMotion, "move_fingers", watched)
+    attempt((0.5, 0.0, 0.02, 0.0))  # a block 20 mm wide in the middle
+    first = np.array(places[:10])
+    assert first[0] == pytest.approx(0.010 + AHEAD - 0.0002, abs=2e-5)
+    assert np.diff(first, axis=0) * env.physics.rate_hz == pytest.approx(-env.physics.finger_speed, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("drive", "millimetres"),
+    [
+        ({}, (7.5, 9.0)),
+        ({"finger_armature": 1.0}, (24.0, 29.0)),
+        ({"finger_damping": 500.0}, (150.0, 180.0)),
+        ({"finger_damping": 0.0}, (np.inf, np.inf)),
+    ],
+)
+def test_the_run_up_of_fingers_is_that_of_their_drives(drive, millimetres):
+    physics = Physics(**drive)
+    way = 1e3 * run_up(physics)
+    assert millimetres[0] <= way <= millimetres[1]
+    if not np.isfinite(way):
+        return
+    # The drive itself, integrated: what is missing of its steady lag after that way is under two hundredths.
+    mass, dt = physics.finger_armature + 0.015, 1e-5
+    lag = speed = 0.0
+    for _ in range(round(way * 1e-3 / physics.finger_speed / dt)):
+        pull = physics.finger_stiffness * lag - physics.finger_damping * speed
+        speed += dt * pull / mass
+        lag += dt * (physics.finger_speed - speed)
+    assert lag == pytest.approx(
+        physics.finger_damping / physics.finger_stiffness * physics.finger_speed, rel=0.02
+    )
+
+
 @pytest.mark.parametrize("at", [(0.5, 0.0, 0.15), (0.503, 0.006, -0.2), (0.498, -0.008, 0.02)])
-def test_a_coarse_lift_leaves_a_light_block_where_a_fine_one_does(env, attempt, monkeypatch, at):
+def test_a_coarse_lift_leaves_a_block_where_a_fine_one_does(env, attempt, monkeypatch, at):
     *place, turn = at
-    coarse = attempt((0.5, 0.0, 0.02, 0.0), at=place, turn=turn)
+    coarse = attempt((0.5, 0.0, 0.02, 0.0), part="lead", at=place, turn=turn)
     fine = env.physics.model_copy(update={"coarse_rate_hz": env.physics.rate_hz})
     monkeypatch.setattr(env, "physics", fine)
-    whole = attempt((0.5, 0.0, 0.02, 0.0), at=place, turn=turn)
+    whole = attempt((0.5, 0.0, 0.02, 0.0), part="lead", at=place, turn=turn)
     assert bool(coarse["success"]) and bool(whole["success"])
     difference = (coarse["displacement"] - whole["displacement"]).abs()
     assert difference[:3].max() < 5e-5 and difference[3] < 1e-3

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mskgrasp.config import check_config, read_config
 from mskgrasp.errors import BadConfig
 from mskgrasp.parts import find_part
 from mskgrasp.settings import Physics
@@ -115,12 +116,24 @@ def test_grasps_are_tried_once_and_read_afterwards(tmp_path):
 def test_the_grid_holds_the_setting_under_test_and_the_floor():
     config = ValidateConfig(rates_hz=(250, 1000), iterations=(8, 50), physics=Physics(rate_hz=500))
     settings = {setting.name: setting for setting in config.settings()}
-    assert {"250 Hz, 8 it", "1000 Hz, 50 it", "500 Hz, 15 it"} < set(settings)
+    assert {"250 Hz, 8 it", "1000 Hz, 50 it", "500 Hz, 25 it"} < set(settings)
     assert settings[CELL_FLOOR].shift == 1e-4 and settings[CELL_FLOOR].physics == settings[FLOOR].physics
     assert settings[FLOOR].shift == 1e-5 and settings[FLOOR].physics == settings[REFERENCE].physics
     finest = settings[REFERENCE].physics
     assert finest.rate_hz == finest.coarse_rate_hz == 1000 and not finest.skip_air
     assert settings["1000 Hz, 50 it"].physics.coarse_rate_hz == Physics().coarse_rate_hz
+
+
+def test_a_coarser_grid_is_coarse_throughout():
+    assert ValidateConfig(physics=Physics()).at(125, 8).coarse_rate_hz == 125
+    with pytest.raises(BadConfig, match="coarse_rate_hz is at most rate_hz, 200, got 250"):
+        check_config(Physics, dict(rate_hz=200), "physics")
+
+
+def test_the_default_validation_is_of_the_settings_that_are_the_default():
+    config = read_config(ValidateConfig, REPOSITORY / "configs" / "validate" / "default.yaml")
+    assert config.physics == Physics()
+    assert min(find_part(name).mass for name in config.parts if name != "starter") < 0.003
 
 
 def test_the_production_settings_pass_every_closed_form_check(tmp_path):
