@@ -5,6 +5,8 @@ Every default has its reason beside it; docs/physics.md tells the measurements.
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import Field, model_validator
 
 from mskgrasp.config import Config
@@ -62,12 +64,24 @@ class Physics(Config):
     reflex_force: float = Field(default=20.0, gt=0)
     """Contact force on the hand that ends a descent, N, as the robot's reflex would."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _no_coarser_than_told(cls, values: Any) -> Any:
+        # Who lowers the rate alone need not know of the other.
+        if isinstance(values, dict) and "coarse_rate_hz" not in values:
+            rate, usual = values.get("rate_hz"), cls.model_fields["coarse_rate_hz"].default
+            if isinstance(rate, int) and rate < usual:
+                return values | {"coarse_rate_hz": rate}
+        return values
+
     @model_validator(mode="after")
     def _check(self) -> Physics:
         if self.friction_table < 0:
             raise ValueError("friction_table_part must be at least half of friction_pad_part")
         if self.coarse_rate_hz > self.rate_hz:
-            raise ValueError(f"coarse_rate_hz is at most rate_hz, {self.rate_hz}, got {self.coarse_rate_hz}")
+            raise ValueError(
+                f"coarse_rate_hz is at most rate_hz, {self.rate_hz}, got {self.coarse_rate_hz}: lower it, too"
+            )
         return self
 
     def coarse_hz(self, mass: float) -> int:

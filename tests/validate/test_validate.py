@@ -126,8 +126,9 @@ def test_the_grid_holds_the_setting_under_test_and_the_floor():
 
 def test_a_coarser_grid_is_coarse_throughout():
     assert ValidateConfig(physics=Physics()).at(125, 8).coarse_rate_hz == 125
-    with pytest.raises(BadConfig, match="coarse_rate_hz is at most rate_hz, 200, got 250"):
-        check_config(Physics, dict(rate_hz=200), "physics")
+    assert Physics(rate_hz=200).coarse_rate_hz == 200
+    with pytest.raises(BadConfig, match="coarse_rate_hz is at most rate_hz, 200, got 250: lower it, too"):
+        check_config(Physics, dict(rate_hz=200, coarse_rate_hz=250), "physics")
 
 
 def test_the_default_validation_is_of_the_settings_that_are_the_default():
