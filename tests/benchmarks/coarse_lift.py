@@ -77,7 +77,7 @@ def _lift(name: str, n: int) -> tuple[str, np.ndarray]:
     folder = str(find_part(name).folder)
     fine, coarse = (
         Simulator(physics.model_copy(update=change), Overhead(), ExecutionNoise()).load(folder)
-        for change in ({"coarse_rate_hz": physics.rate_hz}, {"coarse_mass": 0.0})
+        for change in ({"coarse_rate_hz": physics.rate_hz}, {"coarse_mass": 1e-6})
     )
     rng = np.random.default_rng(0)
     rows = []
