@@ -6,6 +6,7 @@ nothing. Quaternions are ``quat_wxyz``; ``T_a_b`` is the pose of b in a.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,11 +34,18 @@ def _wrap(angle: Array, period: float) -> Array:
     return array_namespace(wrapped).where(wrapped >= period / 2, wrapped - period, wrapped)
 
 
+def components(vectors: Array) -> Sequence[Array]:
+    """Views (...) of the last axis of vectors (..., k), one by one."""
+    if hasattr(vectors, "unbind"):
+        return vectors.unbind(-1)
+    return [vectors[..., i] for i in range(vectors.shape[-1])]  # a third of the time of numpy's unstack
+
+
 def quat_multiply(left_wxyz: Array, right_wxyz: Array) -> Array:
     """Hamilton product of quaternions (..., 4)."""
     xp = array_namespace(left_wxyz, right_wxyz)
-    w1, x1, y1, z1 = (left_wxyz[..., i] for i in range(4))
-    w2, x2, y2, z2 = (right_wxyz[..., i] for i in range(4))
+    w1, x1, y1, z1 = components(left_wxyz)
+    w2, x2, y2, z2 = components(right_wxyz)
     return xp.stack(
         [
             w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
@@ -58,11 +66,18 @@ def quat_conjugate(quat_wxyz: Array) -> Array:
 def quat_rotate(quat_wxyz: Array, points: Array) -> Array:
     """Points (..., 3) rotated by unit quaternions (..., 4)."""
     xp = array_namespace(quat_wxyz, points)
-    shape = np.broadcast_shapes(tuple(quat_wxyz.shape[:-1]), tuple(points.shape[:-1])) + (3,)
-    axis = xp.broadcast_to(quat_wxyz[..., 1:], shape)
-    points = xp.broadcast_to(points, shape)
-    cross = xp.linalg.cross(axis, points)
-    return points + 2 * (quat_wxyz[..., :1] * cross + xp.linalg.cross(axis, cross))
+    w, x, y, z = components(quat_wxyz)
+    px, py, pz = components(points)
+    # Both cross products written out: for a single pose, numpy's own takes four times as long.
+    cx, cy, cz = y * pz - z * py, z * px - x * pz, x * py - y * px
+    return xp.stack(
+        [
+            px + 2 * (w * cx + (y * cz - z * cy)),
+            py + 2 * (w * cy + (z * cx - x * cz)),
+            pz + 2 * (w * cz + (x * cy - y * cx)),
+        ],
+        axis=-1,
+    )
 
 
 def quat_about_z(angle: Array) -> Array:
@@ -86,7 +101,7 @@ def twist_and_swing(quat_wxyz: Array) -> tuple[Array, Array]:
         swing: Angle by which z is tilted (...), radians in [0, pi].
     """
     xp = array_namespace(quat_wxyz)
-    w, x, y, z = (quat_wxyz[..., i] for i in range(4))
+    w, x, y, z = components(quat_wxyz)
     twist = wrap_angle(2 * xp.atan2(z, w))
     swing = 2 * xp.atan2(xp.sqrt(x * x + y * y), xp.sqrt(w * w + z * z))
     return twist, swing
@@ -95,7 +110,7 @@ def twist_and_swing(quat_wxyz: Array) -> tuple[Array, Array]:
 def rotation_angle(quat_wxyz: Array) -> Array:
     """Angles (...) of the rotations of unit quaternions (..., 4), radians in [0, pi]."""
     xp = array_namespace(quat_wxyz)
-    w, x, y, z = (quat_wxyz[..., i] for i in range(4))
+    w, x, y, z = components(quat_wxyz)
     return 2 * xp.atan2(xp.sqrt(x * x + y * y + z * z), xp.abs(w))
 
 
@@ -111,7 +126,7 @@ def quat_from_matrix(rotation: np.ndarray) -> np.ndarray:
 def quat_to_matrix(quat_wxyz: Array) -> Array:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
     xp = array_namespace(quat_wxyz)
-    w, x, y, z = (quat_wxyz[..., i] for i in range(4))
+    w, x, y, z = components(quat_wxyz)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],

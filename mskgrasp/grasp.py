@@ -19,6 +19,7 @@ from array_api_compat import array_namespace
 from mskgrasp.geometry import (
     Array,
     Pose,
+    components,
     quat_about_z,
     quat_conjugate,
     quat_multiply,
@@ -96,12 +97,10 @@ def object_displacement(T_tcp_obj_before: Pose, T_tcp_obj_after: Pose) -> tuple[
 def _tcp_to_grasp_frame(T_tcp_obj: Pose) -> Pose:
     """Turns a pose in the TCP frame (z down) by Rx(pi) into the grasp frame (z up)."""
     xp = array_namespace(T_tcp_obj.position)
-    flip = xp.zeros_like(T_tcp_obj.quat_wxyz)
-    flip[..., 1] = 1.0
-    return Pose(
-        position=quat_rotate(flip, T_tcp_obj.position),
-        quat_wxyz=quat_multiply(flip, T_tcp_obj.quat_wxyz),
-    )
+    x, y, z = components(T_tcp_obj.position)
+    qw, qx, qy, qz = components(T_tcp_obj.quat_wxyz)
+    # Multiplied out: (0, 1, 0, 0) * (qw, qx, qy, qz).
+    return Pose(position=xp.stack([x, -y, -z], axis=-1), quat_wxyz=xp.stack([-qx, qw, -qz, qy], axis=-1))
 
 
 def centre_in_grasp_frame(centre_base: Array, grasp: Array) -> Array:

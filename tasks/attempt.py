@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import torch
+from array_api_compat import array_namespace
 from mani_skill.utils.structs.actor import Actor
 from torch import Tensor
 
-from mskgrasp.geometry import Pose
+from mskgrasp.geometry import Array, Pose
 from mskgrasp.grasp import (
     MAX_OPENING,
     MIN_GAP,
@@ -22,7 +24,7 @@ from mskgrasp.grasp import (
 from mskgrasp.settings import TABLE_Z, Physics
 from tasks.clearance import Clearance, hand_clearance
 from tasks.contacts import HandContacts
-from tasks.frames import base_pose
+from tasks.frames import own_pose
 from tasks.kinematics import top_down
 from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration, run_up
 from tasks.outcome import MAX_DRIFT, MAX_TURN, MIN_PAD_FORCE, Observed, judge
@@ -66,12 +68,13 @@ class Attempt:
         self._agent = agent
         self._part = part
         self._corners = [np.concatenate(own) for own in hulls]
-        self._hull_ends = [np.cumsum([len(hull) for hull in own])[:-1] for own in hulls]
+        self._spans = [_spans(own) for own in hulls]
         self._motion = motion
         self._contacts = contacts
         self._physics = physics
         self._run_up = run_up(physics)
-        self._speed = SpeedWatch(part, gpu=motion.gpu)
+        self._arrays = motion.arrays
+        self._speed = SpeedWatch(part, motion.arrays)
         motion.watch = self._speed.look
 
     def run(self, commanded: Tensor, executed: Tensor | None = None) -> dict[str, Tensor]:
@@ -90,44 +93,47 @@ class Attempt:
         Raises:
             ValueError: A grasp is too low or out of the arm's reach.
         """
-        physics, motion = self._physics, self._motion
-        grasp = commanded if executed is None else executed
+        wanted = self._arrays.of(commanded)
+        outcome = self._run(wanted, wanted if executed is None else self._arrays.of(executed))
+        return {name: torch.as_tensor(values) for name, values in outcome.items()}
+
+    def _run(self, commanded: Array, grasp: Array) -> dict[str, Array]:
+        physics, motion, xp = self._physics, self._motion, self._arrays.xp
         start, free, reach = self._approach(grasp)
-        lifted = grasp.clone()
-        lifted[:, 2] += physics.lift_height
-        check_grasps(torch.cat([grasp, start, lifted]))
+        lifted = _raised(grasp, physics.lift_height)
+        check_grasps(xp.concat([grasp, start, lifted]))
         began = motion.seconds
         empty = free & (reach == 0)
         # Fingers that would have only air to close through, and room for their run-up, begin near the part.
         running = free & ~empty & (reach + max(self._run_up, AHEAD) <= MAX_OPENING / 2)
-        width = torch.where(running, 2 * (reach + AHEAD), torch.full_like(reach, MAX_OPENING))
-        down = self._line(start, grasp, physics.descend_speed)
-        motion.place(down[0], width)
+        width = xp.where(running, 2 * (reach + AHEAD), xp.full_like(reach, MAX_OPENING))
+        down = None if bool(free.all()) else self._line(start, grasp, physics.descend_speed)
+        motion.place(top_down(_double(grasp))[0] if down is None else down[0], width)
         self._speed.start(motion.seconds)
-        laid = base_pose(self._part)
+        laid = self._part_pose()
         with motion.coarsely():
             motion.step(motion.n_steps(physics.settle_s))
-        rest = base_pose(self._part)
+        rest = self._part_pose()
         settled = at_rest(laid, rest)
-        collided, touched = torch.zeros_like(settled), torch.zeros_like(settled)
+        collided, touched = xp.zeros_like(settled), xp.zeros_like(settled)
 
         def reflex(_: int) -> bool:
-            force = self._contacts.hand_force().to(motion.device)
-            collided.logical_or_(force > physics.reflex_force)
-            touched.logical_or_(force > 0)
+            force = self._contacts.hand_force()
+            collided[:] = collided | (force > physics.reflex_force)
+            touched[:] = touched | (force > 0)
             return bool((collided | ~settled | free).all())
 
-        if not bool(free.all()):
+        if down is not None:
             motion.follow(down, check=reflex, frozen=collided)
         # A part that moved although nothing touched it was still toppling.
-        settled = settled & (touched | at_rest(rest, base_pose(self._part)))
-        held, penetration = torch.zeros_like(settled), torch.zeros(motion.n, device=motion.device)
+        settled = settled & (touched | at_rest(rest, self._part_pose()))
+        held, penetration = xp.zeros_like(settled), xp.zeros_like(reach)
         alive = settled & ~collided & ~empty
         if bool(alive.any()):
             apart = collided | empty
 
             def all_met() -> bool:
-                return bool((apart | (self._gap() <= MIN_GAP)).all())
+                return bool((apart | (motion.gap() <= MIN_GAP)).all())
 
             motion.run_fingers(running & ~apart)
             motion.move_fingers(-MAX_OPENING / 2, frozen=apart, check=all_met)
@@ -137,12 +143,19 @@ class Attempt:
         with motion.coarsely():
             carried = bool((alive & held).any())
             if carried:
-                carried = self._lift(grasp, lifted, alive & held, collided, penetration)
+                carried, deepest = self._lift(grasp, lifted, alive & held, collided)
+                penetration = xp.maximum(penetration, deepest)
             if not carried and bool(alive.any()):
                 self._wait_for_rest()
         return self._outcome(commanded, rest, settled, collided, held, penetration, began)
 
-    def _approach(self, grasp: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def _part_pose(self) -> Pose:
+        return own_pose(self._part, self._arrays)
+
+    def _hand_pose(self) -> Pose:
+        return own_pose(self._agent.tcp, self._arrays)
+
+    def _approach(self, grasp: Array) -> tuple[Array, Array, Array]:
         """Where the descent begins (n, 4), whether it meets nothing (n,), and what stands between the pads.
 
         Returns:
@@ -151,73 +164,72 @@ class Attempt:
             free: (n,) bool.
             reach: (n,) greatest distance from the middle of what stands between the pads, m.
         """
-        start, free, reach = grasp.clone(), [], []
-        pose = base_pose(self._part)
-        position, quat_wxyz = pose.position.cpu().numpy(), pose.quat_wxyz.cpu().numpy()
-        for i, (corners, ends) in enumerate(zip(self._corners, self._hull_ends, strict=True)):
-            own = Pose(position=position[i].astype(float), quat_wxyz=quat_wxyz[i].astype(float))
-            seen = pose_base_grasp(grasp[i].cpu().numpy().astype(float)).inverse() @ own
-            corners = seen.apply(corners)
+        above, free, reach = [], [], []
+        grasps = self._arrays.numpy(grasp)
+        poses = self._arrays.numpy(self._part_pose().as_vector())
+        for i, (corners, spans) in enumerate(zip(self._corners, self._spans, strict=True)):
+            corners = (pose_base_grasp(grasps[i]).inverse() @ Pose.from_vector(poses[i])).apply(corners)
             clearance = Clearance(free=False, reach=0.0)
             if self._physics.skip_air:
-                clearance = hand_clearance(np.split(corners, ends))
+                clearance = hand_clearance([corners[span] for span in spans])
             free.append(clearance.free)
             reach.append(clearance.reach)
-            if not clearance.free:
-                top = float(corners[:, 2].max())
-                start[i, 2] += max(0.0, top + lowest_grasp_z(0.0) + self._physics.approach_clearance)
-        device = grasp.device
-        return start, torch.tensor(free, device=device), torch.tensor(reach, device=device, dtype=grasp.dtype)
+            top = float(corners[:, 2].max())
+            clear = max(0.0, top + lowest_grasp_z(0.0) + self._physics.approach_clearance)
+            above.append(0.0 if clearance.free else clear)
+        own = self._arrays.of
+        start = _raised(grasp, own(np.array(above, np.float32)))
+        return start, own(np.array(free)), own(np.array(reach, np.float32))
 
     def _wait_for_rest(self) -> None:
         """Lets parts that were not lifted fall and roll: in flight, a look would call them by its moment."""
         motion = self._motion
-        before = base_pose(self._part)
+        before = self._part_pose()
         for _ in range(round(AFTERMATH_S / REST_WINDOW_S)):
             motion.step(motion.n_steps(REST_WINDOW_S))
-            now = base_pose(self._part)
+            now = self._part_pose()
             if bool(at_rest(before, now).all()):
                 return
             before = now
 
-    def _lift(
-        self, grasp: Tensor, lifted: Tensor, alive: Tensor, collided: Tensor, penetration: Tensor
-    ) -> bool:
-        """Lifts and holds; False where nothing was left to hold. Deepens ``penetration`` in place."""
-        motion, physics = self._motion, self._physics
-        hand_z = base_pose(self._agent.tcp).position[:, 2]
-        part_z = base_pose(self._part).position[:, 2]
+    def _lift(self, grasp: Array, lifted: Array, alive: Array, collided: Array) -> tuple[bool, Array]:
+        """Lifts and holds; False where nothing was left to hold, and (n,) the deepest overlap seen, m."""
+        motion, physics, xp = self._motion, self._physics, self._arrays.xp
 
-        most_behind = (1 - MIN_RISE) * physics.lift_height + LEFT_BEHIND
+        def behind() -> Array:
+            return self._hand_pose().position[:, 2] - self._part_pose().position[:, 2]
+
+        most_behind = behind() + (1 - MIN_RISE) * physics.lift_height + LEFT_BEHIND
+        deepest = self._arrays.full(motion.n, 0.0)
 
         def all_lost(_: int) -> bool:
-            hand_rise = base_pose(self._agent.tcp).position[:, 2] - hand_z
-            part_rise = base_pose(self._part).position[:, 2] - part_z
-            lost = ~alive | (self._gap() <= MIN_GAP) | (hand_rise - part_rise > most_behind)
-            torch.maximum(penetration, self._contacts.penetration().to(penetration), out=penetration)
+            nonlocal deepest
+            deepest = xp.maximum(deepest, self._contacts.penetration())
+            lost = ~alive | (motion.gap() <= MIN_GAP) | (behind() > most_behind)
             return bool(lost.all())
 
         up = self._line(grasp, lifted, physics.lift_speed)
         # An arm that its reflex has stopped stays where it is.
-        if not motion.follow(up, check=all_lost, check_every=self._motion.n_steps(0.05), frozen=collided):
-            return False
+        if not motion.follow(up, check=all_lost, check_every=motion.n_steps(0.05), frozen=collided):
+            return False, deepest
         motion.step(motion.n_steps(physics.hold_s - SPEED_WINDOW_S))
-        return True
+        return True, deepest
 
     def _outcome(
         self,
-        commanded: Tensor,
+        commanded: Array,
         rest: Pose,
-        settled: Tensor,
-        collided: Tensor,
-        held: Tensor,
-        penetration: Tensor,
+        settled: Array,
+        collided: Array,
+        held: Array,
+        penetration: Array,
         began: float,
-    ) -> dict[str, Tensor]:
+    ) -> dict[str, Array]:
+        xp = self._arrays.xp
         speed = self.relative_speed()
-        now, tcp = base_pose(self._part), base_pose(self._agent.tcp)
+        now, tcp = self._part_pose(), self._hand_pose()
         touch, deepest = self.grip()
-        deepest = torch.maximum(penetration, deepest)
+        deepest, gap = xp.maximum(penetration, deepest), self._motion.gap()
         moved = now.position - rest.position
         success, failure = judge(
             Observed(
@@ -225,36 +237,35 @@ class Attempt:
                 collided=collided,
                 held_closed=held,
                 pads_touch=touch,
-                gap=self._gap(),
+                gap=gap,
                 rise=moved[:, 2] / self._physics.lift_height,
                 relative_speed=speed,
                 penetration=deepest,
-                wandered=moved[:, :2].norm(dim=-1),
+                wandered=_length(moved[:, :2]),
             )
         )
         before, after = pose_base_tcp(commanded).inverse() @ rest, tcp.inverse() @ now
         displacement, tilt = object_displacement(before, after)
-        unknown = torch.full_like(displacement, math.nan)
         return dict(
             success=success,
             failure=failure,
-            displacement=torch.where(success[:, None], displacement, unknown),
-            tilt=torch.where(success, tilt, unknown[:, 0]),
-            width_after=self._gap(),
+            displacement=xp.where(success[:, None], displacement, xp.full_like(displacement, math.nan)),
+            tilt=xp.where(success, tilt, xp.full_like(tilt, math.nan)),
+            width_after=gap,
             pose_base_obj=rest.as_vector(),
             pose_tcp_obj_before=before.as_vector(),
             pose_tcp_obj_after=after.as_vector(),
             penetration=deepest,
-            fastest=self._speed.fastest(deepest),
-            seconds=torch.full_like(deepest, self._motion.seconds - began),
+            fastest=self._speed.fastest(),
+            seconds=xp.full_like(deepest, self._motion.seconds - began),
         )
 
-    def grip(self) -> tuple[Tensor, Tensor]:
+    def grip(self) -> tuple[Array, Array]:
         """(n,) whether both pads hold something, and (n,) the deepest overlap of finger and part, m."""
-        force, penetration = (one.to(self._motion.device) for one in self._contacts.pads_on_part())
-        return (force > MIN_PAD_FORCE).all(dim=-1) & (self._gap() > MIN_GAP), penetration
+        force, penetration = self._contacts.pads_on_part()
+        return (force > MIN_PAD_FORCE).all(-1) & (self._motion.gap() > MIN_GAP), penetration
 
-    def relative_speed(self) -> Tensor:
+    def relative_speed(self) -> Array:
         """(n,) speed of the part's origin in the hand over the next 20 ms, which it simulates, m/s.
 
         From positions: after a TGS step PhysX's velocities still hold impulses that a contact undoes.
@@ -263,31 +274,29 @@ class Attempt:
         n_steps = self._motion.n_steps(SPEED_WINDOW_S)
         self._motion.step(n_steps)
         end = self._part_in_hand()
-        return (end - start).norm(dim=-1) * self._motion.rate_hz / n_steps
+        return _length(end - start) * self._motion.rate_hz / n_steps
 
-    def _part_in_hand(self) -> Tensor:
-        return base_pose(self._agent.tcp).inverse().apply(base_pose(self._part).position)
+    def _part_in_hand(self) -> Array:
+        return self._hand_pose().inverse().apply(self._part_pose().position)
 
-    def _gap(self) -> Tensor:
-        return self._agent.robot.get_qpos()[:, 7:9].sum(dim=-1)
-
-    def _line(self, start: Tensor, goal: Tensor, speed: float) -> Tensor:
+    def _line(self, start: Array, goal: Array, speed: float) -> Array:
         """(steps, n, 7) joints along straight lines between grasps; as long as the longest line needs."""
-        distance = float((goal - start)[:, :3].norm(dim=-1).max())
+        start, goal = self._arrays.of(start), self._arrays.of(goal)
+        distance = float(_length((goal - start)[:, :3]).max())
         n_steps = self._motion.n_steps(ease_duration(distance, speed, PEAK_ACCELERATION))
-        share = ease(n_steps, self._motion.device)[:, None, None]
-        start, goal = start.double(), goal.double()
+        share = self._arrays.of(ease(n_steps))[:, None, None]
+        start, goal = _double(start), _double(goal)
         return top_down(start + share * (goal - start))[0]
 
 
-def at_rest(before: Pose, after: Pose) -> Tensor:
+def at_rest(before: Pose, after: Pose) -> Array:
     """(n,) whether the parts neither moved nor turned between two looks, beyond the bounds of rest."""
-    cosine = (before.quat_wxyz * after.quat_wxyz).sum(dim=-1).abs()
-    moved = (after.position - before.position).norm(dim=-1)
+    cosine = abs((before.quat_wxyz * after.quat_wxyz).sum(-1))
+    moved = _length(after.position - before.position)
     return (moved < MAX_DRIFT) & (cosine > math.cos(MAX_TURN / 2))
 
 
-def check_grasps(grasp: Tensor) -> None:
+def check_grasps(grasp: Array) -> None:
     """Refuses grasps that would drive the pads into the table or that the arm cannot reach.
 
     Raises:
@@ -299,7 +308,28 @@ def check_grasps(grasp: Tensor) -> None:
             f"grasp z {float(grasp[:, 2].min()):.4f} m would put the pads into the table; "
             f"the lowest is {lowest:.4f} m"
         )
-    reachable = top_down(grasp.double())[1]
+    reachable = top_down(_double(grasp))[1]
     if not bool(reachable.all()):
         first = [round(v, 4) for v in grasp[~reachable][0].tolist()]
         raise ValueError(f"grasp {first} (x, y, z, theta) is out of the arm's reach")
+
+
+def _spans(hulls: list[np.ndarray]) -> list[slice]:
+    """Where each hull's corners are among all of them."""
+    ends = np.cumsum([len(hull) for hull in hulls]).tolist()
+    return [slice(start, end) for start, end in pairwise([0, *ends])]
+
+
+def _raised(grasp: Array, by: Array | float) -> Array:
+    raised = array_namespace(grasp).asarray(grasp, copy=True)
+    raised[:, 2] += by
+    return raised
+
+
+def _length(vectors: Array) -> Array:
+    return (vectors * vectors).sum(-1) ** 0.5
+
+
+def _double(values: Array) -> Array:
+    xp = array_namespace(values)
+    return xp.astype(values, xp.float64)

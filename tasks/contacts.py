@@ -6,12 +6,13 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-import sapien
 import torch
 from mani_skill.envs.scene import ManiSkillScene
 from mani_skill.utils.structs.actor import Actor
-from torch import Tensor
+from sapien.physx import PhysxBaseComponent, PhysxRigidDynamicComponent
 
+from mskgrasp.geometry import Array
+from tasks.arrays import arrays_for
 from tasks.panda import FINGER_LINKS, HAND_LINKS, GraspPanda
 
 
@@ -27,20 +28,21 @@ class HandContacts:
         self._agent = agent
         self._part = part
         self._gpu = scene.gpu_sim_enabled
+        self._arrays = arrays_for(scene)
         if not self._gpu:
             links = agent.robot.links_map
-            self._hand = {links[name]._objs[0].entity: i for i, name in enumerate(HAND_LINKS)}
-            self._fingers = {links[name]._objs[0].entity: i for i, name in enumerate(FINGER_LINKS)}
-            self._entity = part._objs[0]
+            self._hand = {links[name]._objs[0]: i for i, name in enumerate(HAND_LINKS)}
+            self._fingers = {links[name]._objs[0]: i for i, name in enumerate(FINGER_LINKS)}
+            self._body = part._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
 
-    def hand_force(self) -> Tensor:
+    def hand_force(self) -> Array:
         """(n,) largest net contact force on the hand or a finger, N."""
         if self._gpu:
             return self._agent.robot.get_net_contact_forces(HAND_LINKS).norm(dim=-1).amax(dim=-1)
         largest = max((float(np.linalg.norm(v)) for v in self._impulses(self._hand).values()), default=0.0)
-        return torch.tensor([largest / self._scene.px.timestep])
+        return self._arrays.full(1, largest / self._scene.px.timestep)
 
-    def outer_force(self) -> Tensor:
+    def outer_force(self) -> Array:
         """(n,) net contact force of all else on the hand and, while it touches it, the part together, N.
 
         The grip cancels so. On the hand alone it would not: PhysX reports no friction on the CPU.
@@ -52,29 +54,29 @@ class HandContacts:
             return torch.where(touched, hand + part, hand).norm(dim=-1)
         bodies = dict(self._hand)
         if self._touches_part():
-            bodies[self._entity] = len(bodies)
+            bodies[self._body] = len(bodies)
         impulses = self._impulses(bodies)
         total = sum(impulses.values(), np.zeros(3))
-        return torch.tensor([float(np.linalg.norm(total)) / self._scene.px.timestep])
+        return self._arrays.full(1, float(np.linalg.norm(total)) / self._scene.px.timestep)
 
     def _touches_part(self) -> bool:
         for contact in self._scene.px.get_contacts():
-            first, second = (body.entity for body in contact.bodies)
-            other = second if first is self._entity else first if second is self._entity else None
+            first, second = contact.bodies
+            other = second if first is self._body else first if second is self._body else None
             if other in self._hand and any(np.any(point.impulse) for point in contact.points):
                 return True
         return False
 
-    def _impulses(self, bodies: dict[sapien.Entity, int]) -> dict[int, np.ndarray]:
+    def _impulses(self, bodies: dict[PhysxBaseComponent, int]) -> dict[int, np.ndarray]:
         total: dict[int, np.ndarray] = {}
         for contact in self._scene.px.get_contacts():
             for sign, body in zip((1.0, -1.0), contact.bodies, strict=True):
-                i = bodies.get(body.entity)
+                i = bodies.get(body)
                 if i is not None:
                     total[i] = total.get(i, 0.0) + sign * _impulse(contact.points)
         return total
 
-    def pads_on_part(self) -> tuple[Tensor, Tensor]:
+    def pads_on_part(self) -> tuple[Array, Array]:
         """Grip on the part.
 
         Returns:
@@ -94,21 +96,21 @@ class HandContacts:
         for i, points in self._finger_points():
             impulses[i] = impulses[i] + _impulse(points)
             deepest = max([deepest, *(-float(point.separation) for point in points)])
-        forces = np.array([np.linalg.norm(v) for v in impulses]) / self._scene.px.timestep
-        return torch.tensor(forces[None], dtype=torch.float32), torch.tensor([deepest])
+        forces = np.array([[np.linalg.norm(v) for v in impulses]]) / self._scene.px.timestep
+        return self._arrays.of(forces.astype(np.float32)), self._arrays.full(1, deepest)
 
-    def penetration(self) -> Tensor:
+    def penetration(self) -> Array:
         """(n,) how deep a finger and the part overlap, metres; NaN on the GPU."""
         if self._gpu:
-            return torch.full((self._scene.num_envs,), math.nan, device=self._agent.device)
-        overlaps = [-float(point.separation) for _, points in self._finger_points() for point in points]
-        return torch.tensor([max(overlaps, default=0.0)]).clamp(min=0.0)
+            return self._arrays.full(self._scene.num_envs, math.nan)
+        separations = [point.separation for _, points in self._finger_points() for point in points]
+        return self._arrays.full(1, max(0.0, -min(separations, default=0.0)))
 
     def _finger_points(self) -> Iterator[tuple[int, list]]:
         """Number of the finger and points of each contact between a finger and the part."""
         for contact in self._scene.px.get_contacts():
-            first, second = (body.entity for body in contact.bodies)
-            other = second if first is self._entity else first if second is self._entity else None
+            first, second = contact.bodies
+            other = second if first is self._body else first if second is self._body else None
             i = self._fingers.get(other)
             if i is not None:
                 yield i, contact.points

@@ -10,9 +10,11 @@ import torch
 from mani_skill.utils.structs import Actor, Link
 
 from mskgrasp.geometry import Array, Pose
+from tasks.arrays import Arrays, arrays_for
 
 BASE_IN_WORLD = (-0.615, 0.0, 0.0)
 """Where ManiSkill's tabletop tasks put the Panda; the table's top is at z = 0 of the world."""
+_OFFSET = np.array(BASE_IN_WORLD, np.float32)
 
 
 def to_world(position_base: Array) -> Array:
@@ -36,15 +38,21 @@ def _offset_tensor(dtype: torch.dtype, device: torch.device) -> torch.Tensor:
     return torch.tensor(BASE_IN_WORLD, dtype=dtype, device=device)
 
 
-def base_pose(body: Actor | Link) -> Pose:
-    """Poses of a body of every sub-scene in the base frame: positions (n, 3), quaternions (n, 4)."""
-    if body.scene.gpu_sim_enabled or len(body._objs) > 1:
+def own_pose(body: Actor | Link, arrays: Arrays) -> Pose:
+    """`base_pose` of the kind of array that the simulation computes with."""
+    if body.scene.gpu_sim_enabled:
         pose = body.pose
         return Pose(position=to_base(pose.p), quat_wxyz=pose.q)
     # One sub-scene: the same numbers as ManiSkill's, without its four tensor operations a body.
     one = body._objs[0]
     single = one.pose if isinstance(one, sapien.Entity) else one.entity_pose
-    return Pose(position=to_base(torch.tensor(single.p)[None]), quat_wxyz=torch.tensor(single.q)[None])
+    return Pose(position=arrays.of(single.p - _OFFSET)[None], quat_wxyz=arrays.of(single.q)[None])
+
+
+def base_pose(body: Actor | Link) -> Pose:
+    """Poses of a body of every sub-scene in the base frame: positions (n, 3), quaternions (n, 4); tensors."""
+    pose = own_pose(body, arrays_for(body.scene))
+    return Pose(position=torch.as_tensor(pose.position), quat_wxyz=torch.as_tensor(pose.quat_wxyz))
 
 
 def sapien_camera_pose(T_base_camera: Pose) -> sapien.Pose:

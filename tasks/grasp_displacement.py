@@ -27,11 +27,14 @@ from tasks.attempt import Attempt
 from tasks.camera import camera_config, without_reflection_table
 from tasks.contacts import HandContacts
 from tasks.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_world
+from tasks.kinematics import HOME
 from tasks.motion import PandaMotion
 from tasks.panda import GraspPanda, panda_for
 from tasks.part_actor import build_part, hull_corners
 from tasks.physics import MOST_HULLS, sim_config
 from tasks.placement import random_resting_pose
+
+_EXACT = ExecutionNoise()
 
 
 @register_env("GraspDisplacement-v1", max_episode_steps=250)
@@ -107,8 +110,13 @@ class GraspDisplacementEnv(BaseEnv):
         self.noise = check_config(ExecutionNoise, noise or {}, "noise")
         self._check_noise(num_envs)
         self.region = tuple(region)
+        self.intrinsics = self.overhead.intrinsics()
+        self.T_base_camera = self.overhead.T_base_camera(self.region_centre)
         self._part_names = list(parts) if parts else None
         self._n_scenes = num_envs
+        # Which part comes where may be drawn later: room for the most complex one everywhere.
+        names = self._part_names or []
+        self._most_hulls = max((find_part(name).n_hulls for name in names), default=MOST_HULLS)
         self.parts: list[Part] = []
         self._outcome: dict[str, Tensor] | None = None
         super().__init__(*args, robot_uids=panda_for(self.physics, self.region), num_envs=num_envs, **kwargs)
@@ -127,10 +135,7 @@ class GraspDisplacementEnv(BaseEnv):
 
     @property
     def _default_sim_config(self) -> SimConfig:
-        # Which part comes where may be drawn later: room for the most complex one everywhere.
-        names = self._part_names or []
-        most = max((find_part(name).n_hulls for name in names), default=MOST_HULLS)
-        return sim_config(self.physics, most * self._n_scenes)
+        return sim_config(self.physics, self._most_hulls * self._n_scenes)
 
     @property
     def _default_sensor_configs(self) -> list[CameraConfig]:
@@ -169,6 +174,7 @@ class GraspDisplacementEnv(BaseEnv):
         self.part = Actor.merge(actors, name="part")
         self.add_to_state_dict_registry(self.part)
         self._hulls = [hull_corners(part) for part in self.parts]
+        self._corners = [np.concatenate(own) for own in self._hulls]
 
     def _build_table(self) -> None:
         builder = self.scene.create_actor_builder()
@@ -199,7 +205,7 @@ class GraspDisplacementEnv(BaseEnv):
             rows = [
                 random_resting_pose(
                     self.parts[i],
-                    np.concatenate(self._hulls[i]),
+                    self._corners[i],
                     self.region,
                     self._batched_episode_rng[i],
                 )
@@ -209,13 +215,12 @@ class GraspDisplacementEnv(BaseEnv):
         pose = torch.as_tensor(np.asarray(given), dtype=torch.float32, device=self.device).reshape(-1, 7)
         self._laid_z[env_idx] = pose[:, 2]
         self.part.set_pose(ManiSkillPose.create_from_pq(to_world(pose[:, :3]), pose[:, 3:]))
-        qpos = np.tile(self.agent.rest_qpos, (len(env_idx), 1))
-        self.agent.reset(qpos)
         if len(env_idx) == self.num_envs and self.agent.control_mode == "grasp":
             # This mode's controller sets no targets: the drives would pull towards the last attempt.
-            rest = torch.as_tensor(self.agent.rest_qpos[:7], dtype=torch.float64, device=self.device)
-            self.motion.place(rest.expand(self.num_envs, 7))
-        if self.noise != ExecutionNoise():
+            self.motion.place(np.tile(HOME, (self.num_envs, 1)))
+        else:
+            self.agent.reset(np.tile(self.agent.rest_qpos, (len(env_idx), 1)))
+        if self.noise != _EXACT:
             for i in env_idx.tolist():
                 self._errors[i] = self.noise.draw(self._batched_episode_rng[i])
             self._apply(self._errors[0])
@@ -227,7 +232,11 @@ class GraspDisplacementEnv(BaseEnv):
         the other control modes are not reset, nor is torch's generator seeded: nothing here is drawn from it.
         """
         everywhere = torch.arange(self.num_envs, device=self.device)
-        self._set_episode_rng(seed, everywhere)
+        if self.num_envs == 1:  # the generator that there is: a new one takes as long as seven steps
+            self._episode_seed = np.array([seed])
+            self._batched_episode_rng.rngs[0].seed(seed)
+        else:
+            self._set_episode_rng(seed, everywhere)
         self._clear_sim_state()
         self._initialize_episode(everywhere, {})
         if self.gpu_sim_enabled:
@@ -244,7 +253,7 @@ class GraspDisplacementEnv(BaseEnv):
         if error.friction_pad_part is not None:
             self.agent.set_pad_friction(2 * error.friction_pad_part - self.physics.friction_pad_part)
         if self.noise.moves_camera and self.scene.can_render():
-            true = error.true_camera(self.overhead.T_base_camera(self.region_centre))
+            true = error.true_camera(self.T_base_camera)
             self._overhead_sensor.camera._render_cameras[0].set_local_pose(sapien_camera_pose(true))
 
     # ------------------------------------------------------------------ looking
@@ -317,7 +326,7 @@ class GraspDisplacementEnv(BaseEnv):
         if self._outcome is not None:
             return dict(self._outcome, fail=~self._outcome["success"])
         risen = self.part.pose.p[:, 2] - self._laid_z
-        held, _ = self.attempt.grip()
+        held = torch.as_tensor(self.attempt.grip()[0])
         aloft = risen >= MIN_RISE * self.physics.lift_height
         return dict(success=held & aloft)
 

@@ -1,4 +1,4 @@
-"""Kinematics of the Franka Panda with its hand, batched torch on any device.
+"""Kinematics of the Franka Panda with its hand, batched.
 
 Parameters: Franka Control Interface documentation, "Denavit-Hartenberg parameters" (Craig's
 convention), end effector turned by -45 degrees and moved by 0.1034 m (Franka Hand).
@@ -9,7 +9,10 @@ from __future__ import annotations
 import math
 
 import torch
+from array_api_compat import array_namespace
 from torch import Tensor
+
+from mskgrasp.geometry import Array, components
 
 JOINT_LOWER = (-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973)
 JOINT_UPPER = (2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973)
@@ -65,39 +68,41 @@ def _link(theta: Tensor, a: float, d: float, alpha: float) -> Tensor:
     return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=-2)
 
 
-def top_down(grasps: Tensor) -> tuple[Tensor, Tensor]:
+def top_down(grasps: Array) -> tuple[Array, Array]:
     """Joint angles that put the hand, pointing straight down, at grasps; closed form.
 
     With joints 3 and 5 at zero the arm stays in a vertical plane through the base axis: joint 1 turns
     that plane, joints 2 and 4 are a two-link arm, joint 6 makes the hand vertical and joint 7 turns it.
 
     Args:
-        grasps: (..., 4) x, y, z, theta in the base frame, metres and radians.
+        grasps: numpy or torch, (..., 4) x, y, z, theta in the base frame, metres and radians.
 
     Returns:
         q: (..., 7) radians; meaningless where not reachable.
         reachable: (...) bool, within the arm's length and its joint limits.
     """
-    x, y, z, theta = grasps.unbind(-1)
-    q1 = torch.atan2(y, x)
-    radius = torch.sqrt(x * x + y * y) - _A[6]
+    xp = array_namespace(grasps)
+    x, y, z, theta = components(grasps)
+    q1 = xp.atan2(y, x)
+    radius = xp.sqrt(x * x + y * y) - _A[6]
     height = z + _FLANGE + _TCP - _D[0]
     distance2 = radius * radius + height * height
     cosine = (distance2 - _UPPER_ARM**2 - _FOREARM**2) / (2 * _UPPER_ARM * _FOREARM)
-    within = cosine.abs() <= 1
-    bend = torch.arccos(cosine.clamp(-1, 1))
+    within = abs(cosine) <= 1
+    bend = xp.acos(xp.clip(cosine, -1, 1))
     # The elbow's offsets turn both links by a constant angle against the joint's zero.
     offset = math.atan2(0.0825, 0.316) + math.atan2(0.0825, 0.384)
     q4 = -(bend + offset)
-    lead = torch.atan2(radius, height)
-    inner = torch.atan2(_FOREARM * torch.sin(bend), _UPPER_ARM + _FOREARM * torch.cos(bend))
+    lead = xp.atan2(radius, height)
+    inner = xp.atan2(_FOREARM * xp.sin(bend), _UPPER_ARM + _FOREARM * xp.cos(bend))
     q2 = lead - inner - math.atan2(0.0825, 0.316)
     q6 = q2 - q4
     q7 = math.pi / 4 + q1 - theta
-    zero = torch.zeros_like(q1)
-    q = torch.stack([q1, q2, zero, q4, zero, q6, q7], dim=-1)
-    lower, upper = (torch.tensor(v, dtype=q.dtype, device=q.device) for v in (JOINT_LOWER, JOINT_UPPER))
-    return q, within & ((q >= lower) & (q <= upper)).all(-1)
+    zero = xp.zeros_like(q1)
+    turning = ((0, q1), (1, q2), (3, q4), (5, q6), (6, q7))
+    for joint, angle in turning:
+        within = within & (angle >= JOINT_LOWER[joint]) & (angle <= JOINT_UPPER[joint])
+    return xp.stack([q1, q2, zero, q4, zero, q6, q7], axis=-1), within
 
 
 def track(path: Tensor, start: Tensor, *, iterations: int = 8) -> tuple[Tensor, Tensor]:

@@ -7,15 +7,17 @@ executes one command at a time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-import torch
+import numpy as np
 from mani_skill.envs.scene import ManiSkillScene
-from torch import Tensor
+from sapien.physx import PhysxArticulationJoint
 
+from mskgrasp.geometry import Array
 from mskgrasp.grasp import MAX_OPENING
 from mskgrasp.settings import Physics
+from tasks.arrays import arrays_for
 from tasks.panda import GraspPanda
 
 STILL_FINGER = 2e-3
@@ -33,13 +35,13 @@ CHECK_S = 0.02
 """Time between two looks at fingers that close, and at the part's speed, s."""
 
 
-def ease(n_steps: int, device: torch.device) -> Tensor:
+def ease(n_steps: int) -> np.ndarray:
     """(n_steps,) fractions of a path from just above 0 to 1, without speed or acceleration at its ends.
 
     The minimum-jerk profile (Flash and Hogan 1985, equation 5): with an acceleration at the end the arm
     would overshoot by its inertia over its stiffness, more than the clearance between pads and table.
     """
-    t = torch.arange(1, n_steps + 1, dtype=torch.float64, device=device) / n_steps
+    t = np.arange(1, n_steps + 1) / n_steps
     return t**3 * (10 - 15 * t + 6 * t**2)
 
 
@@ -83,20 +85,23 @@ class PandaMotion:
         self._physics = physics
         self._coarse_hz = coarse_hz
         self.gpu = scene.gpu_sim_enabled
-        self.device = agent.device
+        self.arrays = arrays_for(scene)
+        """The kind that all methods return, and compute with; they take either."""
         self.n = scene.num_envs
+        self._articulation = agent.robot._objs[0]
         self._arm_drives = [joint._objs[0] for joint in agent.arm_joints]
         self._finger_drives = [joint._objs[0] for joint in agent.finger_joints]
-        self.finger_target = torch.full((self.n,), MAX_OPENING / 2, device=self.device)
+        self.finger_target = self.arrays.full(self.n, MAX_OPENING / 2)
         self.watch: Callable[[float], None] | None = None
         """Told of the simulated time, s, every ``CHECK_S``."""
         self.seconds = 0.0
         """Simulated so far."""
         self.rate_hz = physics.rate_hz
         """Simulation steps a second, now."""
+        self._watch_every = self.n_steps(CHECK_S)
         self._unwatched = 0
         self._driven: list[tuple[float, float] | None] = [None] * 7
-        self._commanded: Tensor | None = None
+        self._commanded: Array = None
 
     def n_steps(self, seconds: float) -> int:
         """Simulation steps in a time at the rate of now, at least one."""
@@ -114,67 +119,84 @@ class PandaMotion:
 
     def _set_rate(self, rate_hz: int) -> None:
         self.rate_hz = rate_hz
+        self._watch_every = self.n_steps(CHECK_S)
         self._scene.timestep = 1 / rate_hz
 
-    def place(self, q: Tensor, width: Tensor | None = None) -> None:
-        """Puts the arm at joints (n, 7) at once, at rest, fingers open by ``width`` (n,) metres or wholly."""
-        opening = torch.full((self.n,), MAX_OPENING, device=self.device) if width is None else width
-        fingers = (opening.to(torch.float32) / 2)[:, None].expand(-1, 2)
-        qpos = torch.cat([q.to(torch.float32), fingers], dim=-1)
-        self._agent.robot.set_qpos(qpos)
-        self._agent.robot.set_qvel(torch.zeros_like(qpos))
+    def fingers(self) -> Array:
+        """(n, 2) measured distances of the fingers from the middle, m."""
         if self.gpu:
+            return self._agent.robot.get_qpos()[:, 7:9]
+        return self.arrays.of(self._articulation.qpos[None, 7:9])
+
+    def gap(self) -> Array:
+        """(n,) distance of the pads, m."""
+        return self.fingers().sum(-1)
+
+    def place(self, q: Array, width: Array | None = None) -> None:
+        """Puts the arm at joints (n, 7) at once, at rest, fingers open by ``width`` (n,) metres or wholly."""
+        xp, arrays = self.arrays.xp, self.arrays
+        opening = arrays.full(self.n, MAX_OPENING) if width is None else arrays.of(width)
+        fingers = xp.astype(opening, xp.float32) / 2
+        q = arrays.of(q)
+        qpos = xp.concat([xp.astype(q, xp.float32), xp.stack([fingers, fingers], axis=-1)], axis=-1)
+        if self.gpu:
+            self._agent.robot.set_qpos(qpos)
+            self._agent.robot.set_qvel(xp.zeros_like(qpos))
             self._scene._gpu_apply_all()
             self._scene.px.gpu_update_articulation_kinematics()
             self._scene._gpu_fetch_all()
-        self.set_fingers(fingers[:, 0])
+        else:
+            self._articulation.qpos = np.asarray(qpos[0])
+            self._articulation.qvel = np.zeros(9, np.float32)
+        self.set_fingers(fingers)
         self._driven = [None] * 7  # others may have written to the drives since
         self._unwatched = 0
-        self.set_arm(q, torch.zeros_like(q))
+        self.set_arm(q, xp.zeros_like(q))
 
-    def set_arm(self, q: Tensor, qd: Tensor) -> None:
+    def set_arm(self, q: Array, qd: Array) -> None:
         """Drive targets of the arm: (n, 7) radians and radians a second."""
-        self._commanded = q
+        self._commanded = self.arrays.of(q)
         if self.gpu:
-            robot = self._agent.robot
-            robot.set_joint_drive_targets(q.to(torch.float32), self._agent.arm_joints)
-            robot.set_joint_drive_velocity_targets(qd.to(torch.float32), self._agent.arm_joints)
-        else:
-            self._drive_arm(list(zip(q[0].tolist(), qd[0].tolist(), strict=True)))
-
-    def _drive_arm(self, targets: list[tuple[float, float]], joints: Iterable[int] = range(7)) -> None:
-        # Four joints stand still on a vertical line, and a call costs a fiftieth of a simulation step.
-        for number in joints:
-            target = targets[number]
+            robot, xp = self._agent.robot, self.arrays.xp
+            robot.set_joint_drive_targets(xp.astype(q, xp.float32), self._agent.arm_joints)
+            robot.set_joint_drive_velocity_targets(xp.astype(qd, xp.float32), self._agent.arm_joints)
+            return
+        for number, target in enumerate(zip(q[0].tolist(), qd[0].tolist(), strict=True)):
+            # A call costs a fiftieth of a simulation step.
             if target != self._driven[number]:
                 self._arm_drives[number].set_drive_target(target[0])
                 self._arm_drives[number].set_drive_velocity_target(target[1])
                 self._driven[number] = target
 
-    def set_fingers(self, target: Tensor) -> None:
+    def set_fingers(self, target: Array) -> None:
         """Drive targets of both fingers: (n,) metres from the middle, negative to press."""
-        self.finger_target = target
+        self.finger_target = self.arrays.of(target)
         if self.gpu:
-            pair = target[:, None].expand(-1, 2)
+            pair = self.finger_target[:, None].expand(-1, 2)
             self._agent.robot.set_joint_drive_targets(pair, self._agent.finger_joints)
         else:
-            self._drive_fingers(float(target[0]))
+            self._drive_fingers(float(self.finger_target[0]))
 
-    def run_fingers(self, hands: Tensor) -> None:
+    def run_fingers(self, hands: Array) -> None:
         """Makes the fingers of some hands (n,) close as they would long after a ramp began.
 
         They lag behind their targets by damping * speed / stiffness, less what they move in the mean between
         a step's target, which it holds, and the solver's iterations, equal shares of the step.
         """
-        speed, physics = self._physics.finger_speed, self._physics
+        speed, physics, xp = self._physics.finger_speed, self._physics, self.arrays.xp
         within = (1 - 1 / physics.position_iterations) / (2 * self.rate_hz)
         lag = speed * max(0.0, physics.finger_damping / physics.finger_stiffness - within)
-        qvel = self._agent.robot.get_qvel().clone()
-        qvel[:, 7:9] = torch.where(hands[:, None], -speed, qvel[:, 7:9])
-        self._agent.robot.set_qvel(qvel)
+        hands = self.arrays.of(hands)
         if self.gpu:
+            qvel = self._agent.robot.get_qvel().clone()
+            qvel[:, 7:9] = xp.where(hands[:, None], -speed, qvel[:, 7:9])
+            self._agent.robot.set_qvel(qvel)
             self._scene.px.gpu_apply_articulation_qvel()
-        self.set_fingers(torch.where(hands, self.finger_target - lag, self.finger_target))
+        elif bool(hands[0]):
+            qvel = self._articulation.qvel
+            qvel[7:9] = -speed
+            self._articulation.qvel = qvel
+        self.set_fingers(xp.where(hands, self.finger_target - lag, self.finger_target))
 
     def _drive_fingers(self, target: float) -> None:
         for drive in self._finger_drives:
@@ -185,16 +207,15 @@ class PandaMotion:
         if self.gpu:
             self._scene.px.gpu_apply_articulation_target_position()
             self._scene.px.gpu_apply_articulation_target_velocity()
-        watch_every = self.n_steps(CHECK_S)
         for _ in range(n_steps):
             self._scene.step()
             self.seconds += 1 / self.rate_hz
             self._unwatched += 1
-            if not self.gpu and self._unwatched >= watch_every:
+            if not self.gpu and self._unwatched >= self._watch_every:
                 self._look()
         if self.gpu:
             self._scene._gpu_fetch_all()
-            if self._unwatched >= watch_every:
+            if self._unwatched >= self._watch_every:
                 self._look()
 
     def _look(self) -> None:
@@ -204,11 +225,11 @@ class PandaMotion:
 
     def follow(
         self,
-        path: Tensor,
+        path: Array,
         *,
         check: Callable[[int], bool] | None = None,
         check_every: int = 4,
-        frozen: Tensor | None = None,
+        frozen: Array | None = None,
     ) -> bool:
         """Follows joint targets, one a simulation step.
 
@@ -221,32 +242,43 @@ class PandaMotion:
         Returns:
             False where ``check`` ended the motion.
         """
-        rate = self.rate_hz
-        speed = torch.zeros_like(path)
-        speed[1:] = (path[1:] - path[:-1]) * rate
-        # One environment: plain numbers, once; a tensor a step would cost as much as the physics.
-        rows, moving = None, range(7)
-        if not self.gpu:
-            pairs = torch.stack([path[:, 0], speed[:, 0]], dim=-1)
-            moving = (pairs != pairs[0]).any(dim=-1).any(dim=0).nonzero()[:, 0].tolist()
-            rows = [list(map(tuple, row)) for row in pairs.tolist()]
-        still = torch.zeros_like(path[0])
+        xp, path = self.arrays.xp, self.arrays.of(path)
+        speed = xp.zeros_like(path)
+        speed[1:] = (path[1:] - path[:-1]) * self.rate_hz
+        still = xp.zeros_like(path[0])
+        moving = [] if self.gpu else self._moving(path[:, 0], speed[:, 0])
         # An arm that is frozen from the first step on stays where it was sent before.
         last = path[0] if self._commanded is None else self._commanded
         for i in range(len(path)):
-            if rows is not None:
-                self._drive_arm(rows[i], moving if i else range(7))
-                last = path[i]
+            if self.gpu:
+                stop = self.arrays.full(self.n, False) if frozen is None else frozen
+                last = xp.where(stop[:, None], last, path[i])
+                self.set_arm(last, xp.where(stop[:, None], still, speed[i]))
             else:
-                stop = torch.zeros(self.n, dtype=torch.bool, device=self.device) if frozen is None else frozen
-                last = torch.where(stop[:, None], last, path[i])
-                self.set_arm(last, torch.where(stop[:, None], still, speed[i]))
+                last = path[i]
+                if i == 0:
+                    self.set_arm(last, speed[i])
+                for drive, places, rates in moving:
+                    drive.set_drive_target(places[i])
+                    drive.set_drive_velocity_target(rates[i])
             self.step()
             if check is not None and i % check_every == check_every - 1 and check(i):
-                self.set_arm(last, still)
+                self._stay(last)
                 return False
-        self.set_arm(last, still)
+        self._stay(last)
         return True
+
+    def _stay(self, q: Array) -> None:
+        self._driven = [None] * 7  # a path writes past this record
+        self.set_arm(q, self.arrays.xp.zeros_like(q))
+
+    def _moving(self, path: Array, speed: Array) -> list[tuple[PhysxArticulationJoint, list, list]]:
+        """The joints that a path (steps, 7) moves, with its places and speeds (steps, 7) as plain numbers.
+
+        Arrays at every step would cost as much as the physics. Four joints stand still on a vertical line.
+        """
+        moving = np.flatnonzero(np.asarray((path != path[:1]).any(0))).tolist()
+        return [(self._arm_drives[j], path[:, j].tolist(), speed[:, j].tolist()) for j in moving]
 
     def move_fingers(
         self,
@@ -254,7 +286,7 @@ class PandaMotion:
         *,
         force: float | None = None,
         check: Callable[[], bool] | None = None,
-        frozen: Tensor | None = None,
+        frozen: Array | None = None,
     ) -> bool:
         """Ramps the fingers' targets to ``target`` (metres from the middle) and waits until they stop.
 
@@ -269,42 +301,43 @@ class PandaMotion:
         Returns:
             False where ``check`` ended the motion.
         """
+        xp, arrays = self.arrays.xp, self.arrays
         speed, start = self._physics.finger_speed, self.finger_target
         way = target - start
         if frozen is not None:
-            way = torch.where(frozen, torch.zeros_like(way), way)
+            way = xp.where(arrays.of(frozen), xp.zeros_like(way), way)
         goal = start + way
-        n_ramp = max(1, math.ceil(float(way.abs().max()) / speed * self.rate_hz))
-        done = torch.arange(1, n_ramp + 1, device=self.device)[:, None] * speed / self.rate_hz
-        ramp = start + way.sign() * torch.minimum(done, way.abs())
-        quiet = torch.zeros(self.n, dtype=torch.int64, device=self.device)
+        n_ramp = max(1, math.ceil(float(abs(way).max()) / speed * self.rate_hz))
+        done = arrays.of(np.arange(1, n_ramp + 1, dtype=np.float32))[:, None] * speed / self.rate_hz
+        ramp = start + xp.sign(way) * xp.minimum(done, abs(way))
+        quiet = xp.zeros_like(way)
         # A held part stops the fingers before their targets; wait until the drives press in full.
         lag = (force or self._physics.finger_force) / self._physics.finger_stiffness
-        last = self._agent.robot.get_qpos()[:, 7:9]
-        every = self.n_steps(CHECK_S)
+        last = self.fingers()
+        every, enough = self.n_steps(CHECK_S), self.n_steps(STILL_S)
         far = STILL_FINGER * every / self.rate_hz
-        rows = None if self.gpu else ramp[:, 0].tolist()
+        targets = None if self.gpu else ramp[:, 0].tolist()
         for i in range(n_ramp + self.n_steps(FINGER_TIMEOUT_S)):
-            if i < n_ramp and rows is not None:
-                self._drive_fingers(rows[i])
+            if i < n_ramp and targets is not None:
+                self._drive_fingers(targets[i])
             elif i < n_ramp:
                 self.set_fingers(ramp[i])
             self.step()
             if i % every != every - 1:
                 continue
             if check is not None and check():
-                self.set_fingers(self._agent.robot.get_qpos()[:, 7:9].mean(dim=-1))
+                self.set_fingers(self.gap() / 2)
                 return False
-            fingers = self._agent.robot.get_qpos()[:, 7:9]
-            still = ((fingers - last).abs() < far).all(dim=-1)
+            fingers = self.fingers()
+            still = (abs(fingers - last) < far).all(-1)
             last = fingers
-            middle = fingers.mean(dim=-1)
+            middle = fingers.sum(-1) / 2
             ahead = ramp[min(i, n_ramp - 1)] - middle
             # Fingers that open press the other way until the target has passed them: they are not done.
-            pressing = torch.where(way == 0, ahead.abs(), ahead * way.sign()) > lag
-            arrived = (middle - goal).abs() < 1e-3
-            quiet = torch.where(still & (pressing | arrived), quiet + every, 0)
-            if bool((quiet >= self.n_steps(STILL_S)).all()):
+            pressing = xp.where(way == 0, abs(ahead), ahead * xp.sign(way)) > lag
+            arrived = abs(middle - goal) < 1e-3
+            quiet = xp.where(still & (pressing | arrived), quiet + every, xp.zeros_like(quiet))
+            if bool((quiet >= enough).all()):
                 break
         self.set_fingers(goal)
         return True

@@ -1,12 +1,12 @@
-"""When an attempt is a success, and why it failed otherwise; pure batched functions."""
+"""When an attempt is a success, and why it failed otherwise; batched, for numpy and torch alike."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import torch
-from torch import Tensor
+from array_api_compat import array_namespace
 
+from mskgrasp.geometry import Array
 from mskgrasp.grasp import EJECTED_DISTANCE, FAILURES, MIN_GAP, MIN_RISE
 
 MAX_RELATIVE_SPEED = 0.05
@@ -41,18 +41,18 @@ class Observed:
         wandered: Horizontal distance of the part from where it lay, m.
     """
 
-    settled: Tensor
-    collided: Tensor
-    held_closed: Tensor
-    pads_touch: Tensor
-    gap: Tensor
-    rise: Tensor
-    relative_speed: Tensor
-    penetration: Tensor
-    wandered: Tensor
+    settled: Array
+    collided: Array
+    held_closed: Array
+    pads_touch: Array
+    gap: Array
+    rise: Array
+    relative_speed: Array
+    penetration: Array
+    wandered: Array
 
 
-def judge(seen: Observed) -> tuple[Tensor, Tensor]:
+def judge(seen: Observed) -> tuple[Array, Array]:
     """Success and failure code of attempts.
 
     Returns:
@@ -63,7 +63,8 @@ def judge(seen: Observed) -> tuple[Tensor, Tensor]:
     overlap = seen.penetration > MAX_PENETRATION  # NaN compares false: unknown is no evidence
     steady = (seen.relative_speed < MAX_RELATIVE_SPEED) & ~overlap
     success = seen.settled & ~seen.collided & seen.held_closed & holds & steady
-    failure = torch.full_like(seen.gap, CODE["unsettled"], dtype=torch.uint8)
+    xp = array_namespace(seen.gap)
+    failure = xp.full_like(seen.gap, CODE["unsettled"], dtype=xp.uint8)
     failure[~holds] = CODE["slipped"]
     failure[~seen.held_closed] = CODE["missed"]
     failure[~holds & (seen.wandered > EJECTED_DISTANCE)] = CODE["ejected"]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
-import torch
 from mani_skill.utils.structs.actor import Actor
-from torch import Tensor
+
+from mskgrasp.geometry import Array
+from tasks.arrays import Arrays
 
 
 class SpeedWatch:
@@ -14,18 +15,19 @@ class SpeedWatch:
 
     Args:
         part: The part of each of n sub-scenes.
-        gpu: Whether PhysX runs on a GPU.
+        arrays: The kind in which the speeds are told.
     """
 
-    def __init__(self, part: Actor, *, gpu: bool):
+    def __init__(self, part: Actor, arrays: Arrays):
         self._part = part
-        self._entity = None if gpu else part._objs[0]
+        self._arrays = arrays
+        self._entity = None if part.scene.gpu_sim_enabled else part._objs[0]
         self.start(0.0)
 
     def start(self, seconds: float) -> None:
         """Forgets what was seen; ``seconds`` is the simulated time."""
         self._last, self._seconds = self._position(), seconds
-        self._fastest: float | Tensor = 0.0
+        self._fastest: Array = 0.0 if self._entity else self._arrays.full(len(self._last), 0.0)
 
     def look(self, seconds: float) -> None:
         """Compares with the look before."""
@@ -33,17 +35,16 @@ class SpeedWatch:
         self._seconds, last, self._last = seconds, self._last, now
         if passed <= 0:
             return
-        if isinstance(now, Tensor):
+        if self._entity is None:
             speed = (now - last).norm(dim=-1) / passed
-            self._fastest = torch.maximum(speed, torch.as_tensor(self._fastest, device=speed.device))
+            self._fastest = self._arrays.xp.maximum(speed, self._fastest)
         else:
-            x, y, z = now - last
-            self._fastest = max(float(self._fastest), (x * x + y * y + z * z) ** 0.5 / passed)
+            self._fastest = max(self._fastest, math.dist(now, last) / passed)
 
-    def fastest(self, like: Tensor) -> Tensor:
-        """(n,) m/s, of the type and on the device of another tensor."""
-        return torch.as_tensor(self._fastest, dtype=like.dtype, device=like.device).expand(like.shape)
+    def fastest(self) -> Array:
+        """(n,) m/s, float32."""
+        return self._arrays.full(1, self._fastest) if self._entity else self._fastest
 
-    def _position(self) -> Any:
-        # One sub-scene: asking the engine costs a hundredth of a tensor operation.
-        return self._part.pose.p.clone() if self._entity is None else self._entity.pose.p
+    def _position(self) -> Array:
+        # One sub-scene: plain numbers, as there are forty looks an attempt.
+        return self._part.pose.p.clone() if self._entity is None else self._entity.pose.p.tolist()

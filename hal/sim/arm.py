@@ -74,7 +74,7 @@ class SapienArm(Arm):
         start = self._target()
         goal = torch.as_tensor(joints, dtype=torch.float64)
         seconds = ease_duration(float((goal - start).abs().max()), speed * JOINT_SPEED, JOINT_ACCELERATION)
-        share = ease(self._world.env.motion.n_steps(seconds), start.device)[:, None]
+        share = torch.from_numpy(ease(self._world.env.motion.n_steps(seconds)))[:, None]
         self._follow(start + share * (goal - start))
 
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
@@ -91,7 +91,7 @@ class SapienArm(Arm):
         if float(error.max()) > UNREACHED or not self._within_limits(joints.numpy()):
             target = ", ".join(f"{value:.3f}" for value in T_base_tcp.position)
             raise OutOfWorkspace(f"no straight line from here to TCP ({target}) m within the joint limits")
-        share = ease(self._world.env.motion.n_steps(seconds), start.device)
+        share = torch.from_numpy(ease(self._world.env.motion.n_steps(seconds)))
         self._follow(_interpolate(torch.cat([start[None], joints]), share))
 
     def _follow(self, path: Tensor) -> None:

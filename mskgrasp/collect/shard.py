@@ -72,8 +72,6 @@ class Simulator:
         """
         env = self.load(task.folder)
         part = env.parts[0]
-        intrinsics = self._camera.intrinsics()
-        T_base_camera = self._camera.T_base_camera(env.region_centre)
         rows: list[dict[str, np.ndarray]] = []
         discarded: Counter[str] = Counter()
         for attempt in range(task.first, task.first + task.n):
@@ -98,8 +96,8 @@ class Simulator:
             family=part.family,
             index=task.index,
             seed=task.seed,
-            intrinsics=intrinsics,
-            T_base_camera=T_base_camera,
+            intrinsics=env.intrinsics,
+            T_base_camera=env.T_base_camera,
             table_z=TABLE_Z,
             region=REGION,
             physics=self._physics.model_dump(),
@@ -131,8 +129,8 @@ def draw_attempt(
     try:
         view = view_part(
             u16_to_depth(depth),
-            env.overhead.intrinsics(),
-            env.overhead.T_base_camera(env.region_centre),
+            env.intrinsics,
+            env.T_base_camera,
             table_z=TABLE_Z,
             region=REGION,
         )

@@ -14,7 +14,7 @@ from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration, ru
 def test_a_path_passes_neither_its_speed_nor_its_acceleration(distance, speed):
     seconds = ease_duration(distance, speed, PEAK_ACCELERATION)
     n = 2000
-    way = distance * np.concatenate([[0.0], ease(n, torch.device("cpu")).numpy()])
+    way = distance * np.concatenate([[0.0], ease(n)])
     velocity = np.diff(way) * n / seconds
     acceleration = np.diff(velocity) * n / seconds
     assert way[-1] == pytest.approx(distance)
@@ -91,7 +91,7 @@ def test_running_fingers_move_as_those_that_began_long_ago(env, lay):
         """(steps, 2) places of both fingers."""
         motion.place(home, torch.tensor([opening]))
         motion.run_fingers(torch.tensor([running]))
-        target, places = motion.finger_target.clone(), []
+        target, places = motion.finger_target, []
         while not places or places[-1].mean() > until:
             target = target - env.physics.finger_speed / motion.rate_hz
             motion.set_fingers(target)
