@@ -68,12 +68,14 @@ class HandContacts:
         return False
 
     def _impulses(self, bodies: dict[PhysxBaseComponent, int]) -> dict[int, np.ndarray]:
+        """Sum of the impulses on each of these bodies that is touched, N s, by its number."""
         total: dict[int, np.ndarray] = {}
         for contact in self._scene.px.get_contacts():
             for sign, body in zip((1.0, -1.0), contact.bodies, strict=True):
                 i = bodies.get(body)
                 if i is not None:
-                    total[i] = total.get(i, 0.0) + sign * _impulse(contact.points)
+                    # Contact by contact: so what two of these bodies do to each other cancels exactly.
+                    total[i] = total.get(i, 0.0) + sign * _sum([point.impulse for point in contact.points])
         return total
 
     def pads_on_part(self) -> tuple[Array, Array]:
@@ -91,12 +93,12 @@ class HandContacts:
                 for name in FINGER_LINKS
             ]
             return torch.stack(forces, dim=-1), torch.full_like(forces[0], math.nan)
-        impulses = [np.zeros(3), np.zeros(3)]
+        impulses: tuple[list, list] = ([], [])
         deepest = 0.0
         for i, points in self._finger_points():
-            impulses[i] = impulses[i] + _impulse(points)
-            deepest = max([deepest, *(-float(point.separation) for point in points)])
-        forces = np.array([[np.linalg.norm(v) for v in impulses]]) / self._scene.px.timestep
+            impulses[i].extend(point.impulse for point in points)
+            deepest = max([deepest, *(-point.separation for point in points)])
+        forces = np.array([[np.linalg.norm(_sum(one)) for one in impulses]]) / self._scene.px.timestep
         return self._arrays.of(forces.astype(np.float32)), self._arrays.full(1, deepest)
 
     def penetration(self) -> Array:
@@ -116,6 +118,5 @@ class HandContacts:
                 yield i, contact.points
 
 
-def _impulse(points: list) -> np.ndarray:
-    impulses = [point.impulse for point in points]
+def _sum(impulses: list[np.ndarray]) -> np.ndarray:
     return np.add.reduce(impulses) if impulses else np.zeros(3)
