@@ -147,7 +147,7 @@ def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Pat
                 axes.axhline(
                     gdn[other][key] * factor, color=FAINT, lw=1.2, ls=style, label=other.replace("_", " ")
                 )
-            axes.set(title=f"Displacement: {key.split('_')[0]} RMSE, {unit}", xlabel="epoch")
+            axes.set(title=f"{key.split('_')[0].capitalize()} RMSE, {unit}", xlabel="epoch")
             axes.set_ylim(bottom=0)
             axes.legend(frameon=False, fontsize=8)
         figure.savefig(path)
