@@ -20,7 +20,13 @@ from mskgrasp.collect.work import versions
 from mskgrasp.grasp import MAX_DISPLACEMENT
 from mskgrasp.validate.by_hand import Check
 from mskgrasp.validate.compare import MOST_DISAGREEMENT, MOST_TIMES_FLOOR, Comparison, complaints
-from mskgrasp.validate.config import CELL_FLOOR, FLOOR, NOTHING_SKIPPED, REFERENCE, ValidateConfig
+from mskgrasp.validate.config import (
+    CELL_FLOOR,
+    FLOOR,
+    REFERENCE,
+    ValidateConfig,
+    setting_name,
+)
 from mskgrasp.validate.convergence import Outcomes
 from mskgrasp.validate.fidelity import Fidelity
 from tasks.outcome import MAX_PENETRATION, MAX_SPEED
@@ -196,26 +202,29 @@ def _draw_checks(axes: Any, checks: Sequence[Check]) -> None:
 
 
 def _draw_cost(
-    axes: Any, found: dict[str, Comparison], config: ValidateConfig, name: str, label: str, scale: float
+    axes: Any, found: dict[str, Comparison], config: ValidateConfig, column: str, label: str, scale: float
 ) -> None:
-    floor = scale * getattr(found[FLOOR], name)
-    if name == "agreement":
+    floor = scale * getattr(found[FLOOR], column)
+    if column == "agreement":
         axes.axhspan(floor - scale * MOST_DISAGREEMENT, 100, color="#e3efe5", lw=0)
     else:
         axes.axhspan(0, MOST_TIMES_FLOOR * floor, color="#e3efe5", lw=0)
-    for line, style in ((floor, ":"), (scale * getattr(found[CELL_FLOOR], name), "--")):
+    for line, style in ((floor, ":"), (scale * getattr(found[CELL_FLOOR], column), "--")):
         axes.axhline(line, color=_INK, lw=0.8, ls=style)
-    for setting, comparison in found.items():
-        if setting in (*_FLOORS, REFERENCE, NOTHING_SKIPPED, *config.variants):
-            continue
-        value = scale * getattr(comparison, name)
-        fine = not complaints(comparison, found[FLOOR], found[REFERENCE].success_rate)
-        axes.plot(comparison.cpu_ms, value, "o", ms=6, color=_GOOD if fine else _BAD)
-        text = setting.replace(" Hz, ", "/").replace(" it", "")
-        weight = "bold" if setting == config.production else "normal"
-        axes.annotate(
-            text, (comparison.cpu_ms, value), (5, 4), textcoords="offset points", fontsize=7.5, weight=weight
-        )
+    rates = sorted({*config.rates_hz, config.physics.rate_hz})
+    for count in sorted({*config.iterations, config.physics.position_iterations}):
+        names = [setting_name(rate, count) for rate in rates]
+        row = [(rate, name, found[name]) for rate, name in zip(rates, names, strict=True) if name in found]
+        places = [(one.cpu_ms, scale * getattr(one, column)) for _, _, one in row]
+        axes.plot(*zip(*places, strict=True), color="#adb5bd", lw=1, zorder=1)
+        axes.annotate(f"{count} iterations", places[0], (-4, -11), textcoords="offset points", fontsize=7.5)
+        for (rate, name, comparison), place in zip(row, places, strict=True):
+            fine = not complaints(comparison, found[FLOOR], found[REFERENCE].success_rate)
+            axes.plot(*place, "o", ms=6, color=_GOOD if fine else _BAD)
+            weight = "bold" if name == config.production else "normal"
+            axes.annotate(
+                f"{rate} Hz", place, (5, 4), textcoords="offset points", fontsize=7.5, weight=weight
+            )
     axes.set(xlabel="processor time of a grasp, ms", ylabel=label, xscale="log")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(ScalarFormatter())
