@@ -79,8 +79,7 @@ def find_part_pixels(
         NoPartFound: Nothing rises above the table there, a noisy camera sees the table more than
             ``min_height`` from ``table_z``, or the image is no depth in metres.
     """
-    depth = np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth)
-    _check_depth(depth)
+    depth = _checked(np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth))
     points = _points_base(depth, intrinsics, T_base_camera)
     x, y, z = points
     tops = heights = z - table_z
@@ -202,18 +201,20 @@ def _rays(shape: tuple[int, int], intrinsics: tuple[float, ...], quat_wxyz: tupl
     return rays
 
 
-def _check_depth(depth: np.ndarray) -> None:
+def _checked(depth: np.ndarray) -> np.ndarray:
+    """A depth image with NaN for all that is not finite."""
     floating = np.issubdtype(depth.dtype, np.floating)
     valid = np.isfinite(depth) if floating else depth > 0
     n_valid = np.count_nonzero(valid)
     if not n_valid:
         raise NoPartFound("the depth image has no valid pixel; check the camera, its range and its exposure")
     # Counting tells on which side of a bound the median is, in a tenth of its time.
-    if not floating or 2 * np.count_nonzero(depth > _PLAUSIBLE_DEPTH) > n_valid:
+    if not floating or 2 * np.count_nonzero(valid & (depth > _PLAUSIBLE_DEPTH)) > n_valid:
         raise NoPartFound(
             f"depth is {depth.dtype} with a median of {np.median(depth[valid]):g}, expected floating metres; "
             "convert it from millimetres first"
         )
+    return depth if n_valid == depth.size else np.where(valid, depth, np.nan)
 
 
 def _noise(heights: np.ndarray, near: np.ndarray) -> float:

@@ -35,7 +35,7 @@ class Arrays:
         return array_namespace(self.of(()))
 
     def of(self, values: Array) -> Array:
-        """Numbers, an array or a tensor as an array of this kind, of the same type."""
+        """An array or a tensor as an array of this kind, of the same type; without a copy where it can."""
         if self.device is None:
             return np.asarray(values)
         return torch.as_tensor(values, device=self.device)
@@ -46,7 +46,7 @@ class Arrays:
 
     def full(self, n: int, value: float | bool) -> Array:
         """(n,) of one value: bool, or float32."""
-        kind = np.bool_ if isinstance(value, bool) else np.float32
+        kind = np.bool_ if isinstance(value, (bool, np.bool_)) else np.float32
         return self.of(np.full(n, value, kind))
 
 

@@ -74,7 +74,7 @@ class HandContacts:
             for sign, body in zip((1.0, -1.0), contact.bodies, strict=True):
                 i = bodies.get(body)
                 if i is not None:
-                    # Contact by contact: so what two of these bodies do to each other cancels exactly.
+                    # Contact by contact: so the forces of equal grips cancel to the bit.
                     total[i] = total.get(i, 0.0) + sign * _sum([point.impulse for point in contact.points])
         return total
 

@@ -100,7 +100,6 @@ class PandaMotion:
         """Simulation steps a second, now."""
         self._watch_every = self.n_steps(CHECK_S)
         self._unwatched = 0
-        self._driven: list[tuple[float, float] | None] = [None] * 7
         self._commanded: Array = None
 
     def n_steps(self, seconds: float) -> int:
@@ -149,24 +148,21 @@ class PandaMotion:
             self._articulation.qpos = np.asarray(qpos[0])
             self._articulation.qvel = np.zeros(9, np.float32)
         self.set_fingers(fingers)
-        self._driven = [None] * 7  # others may have written to the drives since
         self._unwatched = 0
         self.set_arm(q, xp.zeros_like(q))
 
     def set_arm(self, q: Array, qd: Array) -> None:
         """Drive targets of the arm: (n, 7) radians and radians a second."""
-        self._commanded = self.arrays.of(q)
+        q, qd = self.arrays.of(q), self.arrays.of(qd)
+        self._commanded = q
         if self.gpu:
             robot, xp = self._agent.robot, self.arrays.xp
             robot.set_joint_drive_targets(xp.astype(q, xp.float32), self._agent.arm_joints)
             robot.set_joint_drive_velocity_targets(xp.astype(qd, xp.float32), self._agent.arm_joints)
             return
-        for number, target in enumerate(zip(q[0].tolist(), qd[0].tolist(), strict=True)):
-            # A call costs a fiftieth of a simulation step.
-            if target != self._driven[number]:
-                self._arm_drives[number].set_drive_target(target[0])
-                self._arm_drives[number].set_drive_velocity_target(target[1])
-                self._driven[number] = target
+        for drive, place, rate in zip(self._arm_drives, q[0].tolist(), qd[0].tolist(), strict=True):
+            drive.set_drive_target(place)
+            drive.set_drive_velocity_target(rate)
 
     def set_fingers(self, target: Array) -> None:
         """Drive targets of both fingers: (n,) metres from the middle, negative to press."""
@@ -242,40 +238,38 @@ class PandaMotion:
         Returns:
             False where ``check`` ended the motion.
         """
-        xp, path = self.arrays.xp, self.arrays.of(path)
+        xp, arrays = self.arrays.xp, self.arrays
+        path = arrays.of(path)
         speed = xp.zeros_like(path)
         speed[1:] = (path[1:] - path[:-1]) * self.rate_hz
         still = xp.zeros_like(path[0])
         moving = [] if self.gpu else self._moving(path[:, 0], speed[:, 0])
+        stop = arrays.full(self.n, False) if frozen is None else arrays.of(frozen)
         # An arm that is frozen from the first step on stays where it was sent before.
         last = path[0] if self._commanded is None else self._commanded
+        if not self.gpu:
+            self.set_arm(path[0], speed[0])
         for i in range(len(path)):
             if self.gpu:
-                stop = self.arrays.full(self.n, False) if frozen is None else frozen
                 last = xp.where(stop[:, None], last, path[i])
                 self.set_arm(last, xp.where(stop[:, None], still, speed[i]))
             else:
                 last = path[i]
-                if i == 0:
-                    self.set_arm(last, speed[i])
                 for drive, places, rates in moving:
                     drive.set_drive_target(places[i])
                     drive.set_drive_velocity_target(rates[i])
             self.step()
             if check is not None and i % check_every == check_every - 1 and check(i):
-                self._stay(last)
+                self.set_arm(last, still)
                 return False
-        self._stay(last)
+        self.set_arm(last, still)
         return True
-
-    def _stay(self, q: Array) -> None:
-        self._driven = [None] * 7  # a path writes past this record
-        self.set_arm(q, self.arrays.xp.zeros_like(q))
 
     def _moving(self, path: Array, speed: Array) -> list[tuple[PhysxArticulationJoint, list, list]]:
         """The joints that a path (steps, 7) moves, with its places and speeds (steps, 7) as plain numbers.
 
-        Arrays at every step would cost as much as the physics. Four joints stand still on a vertical line.
+        Arrays at every step would cost as much as the physics, the call of a drive a fiftieth of it: on a
+        vertical line four joints stand still.
         """
         moving = np.flatnonzero(np.asarray((path != path[:1]).any(0))).tolist()
         return [(self._arm_drives[j], path[:, j].tolist(), speed[:, j].tolist()) for j in moving]

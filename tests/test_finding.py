@@ -90,6 +90,14 @@ def test_an_image_without_a_part_is_told_in_one_line(depth, words):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("nothing", [np.nan, np.inf, -np.inf])
+def test_pixels_without_a_depth_are_left_out(nothing):
+    depth = render([Box(x=0.5, y=0.0, yaw=0.0, size=(0.04, 0.03, 0.02))])
+    partly = depth.copy()
+    partly[:35], partly[-35:] = nothing, nothing  # 44 % of the pixels
+    assert synthetic.view(partly).size == pytest.approx(synthetic.view(depth).size)
+
+
 def noisy_view(depth, model, seed, min_height=0.003):
     noisy = add_noise(depth, INTRINSICS, SensorNoise(model=model), np.random.default_rng(seed))
     return view_part(
