@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import pytest
+import torch
+
+from mskgrasp.grasp import FAILURES
+from mskgrasp.settings import Physics
+from tests.tasks.toy_engine import ToyScene, toy_attempt
+
+# Each row a sub-scene: the block, half the width that it stops the pads at, how it is carried, the force.
+REASONS = ("none", "collided", "missed", "slipped", "none")
+BLOCKS = torch.tensor(
+    [[0.5, 0, 0.015], [0.5, 0.045, 0.015], [0.5, 0.15, 0.015], [0.45, 0.02, 0.015], [0.52, -0.01, 0.015]]
+)
+BETWEEN = torch.tensor([0.01, 0.01, 0.0, 0.01, 0.006])
+CARRIED = torch.tensor([1.0, 1.0, 1.0, 0.2, 0.9])
+STRUCK = torch.tensor([0.0, 80.0, 0.0, 0.0, 0.0])
+GRASPS = torch.tensor(
+    [
+        [0.5, 0, 0.02, 0],
+        [0.5, 0, 0.02, 0],
+        [0.5, 0, 0.02, 0],
+        [0.45, 0.02, 0.02, 0],
+        [0.52, -0.012, 0.03, 0.1],
+    ]
+)
+# Where hands end is no label: all of them lift where one does.
+LABELS = ("success", "failure", "displacement", "tilt", "pose_base_obj", "pose_tcp_obj_before")
+
+
+def outcomes(rows: list[int], physics: Physics) -> dict[str, torch.Tensor]:
+    scene = ToyScene(BLOCKS[rows], BETWEEN[rows], CARRIED[rows], STRUCK[rows])
+    return toy_attempt(scene, physics).run(GRASPS[rows])
+
+
+@pytest.mark.parametrize("skip_air", [True, False])
+def test_sub_scenes_do_not_depend_on_each_other(skip_air):
+    physics = Physics(skip_air=skip_air)
+    together = outcomes(list(range(len(REASONS))), physics)
+    assert tuple(FAILURES[int(code)] for code in together["failure"]) == REASONS
+    for row in range(len(REASONS)):
+        alone = outcomes([row], physics)
+        for name in LABELS:
+            torch.testing.assert_close(
+                together[name][row], alone[name][0], atol=2e-5, rtol=0, equal_nan=True, msg=f"{row} {name}"
+            )
+
+
+def test_what_a_carried_block_did_is_told_for_its_own_sub_scene():
+    found = outcomes(list(range(len(REASONS))), Physics())
+    lift = Physics().lift_height
+    succeeded = [reason == "none" for reason in REASONS]
+    assert found["success"].tolist() == succeeded
+    assert torch.isfinite(found["displacement"]).all(dim=-1).tolist() == succeeded
+    assert found["displacement"][0].tolist() == pytest.approx([0, 0, 0, 0], abs=1e-4)
+    # The last one is carried nine tenths of the way.
+    assert found["displacement"][4, 2] == pytest.approx(-0.1 * lift, abs=1e-3)
+    closed = [0, 3, 4]
+    assert found["width_after"][closed].tolist() == pytest.approx((2 * BETWEEN[closed]).tolist(), abs=1e-4)
+    assert torch.isnan(found["penetration"]).all()  # a GPU reports no contact points
