@@ -41,42 +41,45 @@ def components(vectors: Array) -> Sequence[Array]:
     return [vectors[..., i] for i in range(vectors.shape[-1])]  # a third of the time of numpy's unstack
 
 
+def joined(parts: Sequence[Array]) -> Array:
+    """(..., k) of k arrays (...): what `components` takes apart."""
+    if hasattr(parts[0], "unbind"):
+        return array_namespace(*parts).stack(list(parts), axis=-1)
+    return np.concatenate([part[..., None] for part in parts], axis=-1)  # a quarter of the time of stack
+
+
 def quat_multiply(left_wxyz: Array, right_wxyz: Array) -> Array:
     """Hamilton product of quaternions (..., 4)."""
-    xp = array_namespace(left_wxyz, right_wxyz)
     w1, x1, y1, z1 = components(left_wxyz)
     w2, x2, y2, z2 = components(right_wxyz)
-    return xp.stack(
+    return joined(
         [
             w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
             w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
             w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
             w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
-        ],
-        axis=-1,
+        ]
     )
 
 
 def quat_conjugate(quat_wxyz: Array) -> Array:
     """The inverse of unit quaternions (..., 4)."""
-    xp = array_namespace(quat_wxyz)
-    return xp.concat([quat_wxyz[..., :1], -quat_wxyz[..., 1:]], axis=-1)
+    w, x, y, z = components(quat_wxyz)
+    return joined([w, -x, -y, -z])
 
 
 def quat_rotate(quat_wxyz: Array, points: Array) -> Array:
     """Points (..., 3) rotated by unit quaternions (..., 4)."""
-    xp = array_namespace(quat_wxyz, points)
     w, x, y, z = components(quat_wxyz)
     px, py, pz = components(points)
     # Both cross products written out: for a single pose, numpy's own takes four times as long.
     cx, cy, cz = y * pz - z * py, z * px - x * pz, x * py - y * px
-    return xp.stack(
+    return joined(
         [
             px + 2 * (w * cx + (y * cz - z * cy)),
             py + 2 * (w * cy + (z * cx - x * cz)),
             pz + 2 * (w * cz + (x * cy - y * cx)),
-        ],
-        axis=-1,
+        ]
     )
 
 
@@ -84,7 +87,7 @@ def quat_about_z(angle: Array) -> Array:
     """Rotations by ``angle`` radians (...) about z, as quaternions (..., 4)."""
     xp = array_namespace(angle)
     zero = xp.zeros_like(angle)
-    return xp.stack([xp.cos(angle / 2), zero, zero, xp.sin(angle / 2)], axis=-1)
+    return joined([xp.cos(angle / 2), zero, zero, xp.sin(angle / 2)])
 
 
 def twist_and_swing(quat_wxyz: Array) -> tuple[Array, Array]:

@@ -20,6 +20,7 @@ from mskgrasp.geometry import (
     Array,
     Pose,
     components,
+    joined,
     quat_about_z,
     quat_conjugate,
     quat_multiply,
@@ -70,7 +71,7 @@ def pose_base_tcp(grasp: Array) -> Pose:
     half = grasp[..., 3] / 2
     zero = xp.zeros_like(half)
     # Rz(theta) Rx(pi), multiplied out: (cos, 0, 0, sin) * (0, 1, 0, 0).
-    quat_wxyz = xp.stack([zero, xp.cos(half), xp.sin(half), zero], axis=-1)
+    quat_wxyz = joined([zero, xp.cos(half), xp.sin(half), zero])
     return Pose(position=grasp[..., :3], quat_wxyz=quat_wxyz)
 
 
@@ -96,11 +97,10 @@ def object_displacement(T_tcp_obj_before: Pose, T_tcp_obj_after: Pose) -> tuple[
 
 def _tcp_to_grasp_frame(T_tcp_obj: Pose) -> Pose:
     """Turns a pose in the TCP frame (z down) by Rx(pi) into the grasp frame (z up)."""
-    xp = array_namespace(T_tcp_obj.position)
     x, y, z = components(T_tcp_obj.position)
     qw, qx, qy, qz = components(T_tcp_obj.quat_wxyz)
     # Multiplied out: (0, 1, 0, 0) * (qw, qx, qy, qz).
-    return Pose(position=xp.stack([x, -y, -z], axis=-1), quat_wxyz=xp.stack([-qx, qw, -qz, qy], axis=-1))
+    return Pose(position=joined([x, -y, -z]), quat_wxyz=joined([-qx, qw, -qz, qy]))
 
 
 def centre_in_grasp_frame(centre_base: Array, grasp: Array) -> Array:

@@ -12,7 +12,7 @@ import torch
 from array_api_compat import array_namespace
 from torch import Tensor
 
-from mskgrasp.geometry import Array, components
+from mskgrasp.geometry import Array, components, joined
 
 JOINT_LOWER = (-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973)
 JOINT_UPPER = (2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973)
@@ -102,7 +102,7 @@ def top_down(grasps: Array) -> tuple[Array, Array]:
     turning = ((0, q1), (1, q2), (3, q4), (5, q6), (6, q7))
     for joint, angle in turning:
         within = within & (angle >= JOINT_LOWER[joint]) & (angle <= JOINT_UPPER[joint])
-    return xp.stack([q1, q2, zero, q4, zero, q6, q7], axis=-1), within
+    return joined([q1, q2, zero, q4, zero, q6, q7]), within
 
 
 def track(path: Tensor, start: Tensor, *, iterations: int = 8) -> tuple[Tensor, Tensor]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import sapien
@@ -142,11 +143,14 @@ class GraspPanda(Panda):
 
     def show(self, visible: bool) -> None:
         """Shows or hides the robot in rendered images; an overhead camera looks before the arm enters."""
-        for link in self.robot.links:
-            for one in link._objs:
-                body = one.entity.find_component_by_type(sapien.render.RenderBodyComponent)
-                if body is not None:
-                    body.visibility = 1.0 if visible else 0.0
+        for body in self._seen:
+            body.visibility = 1.0 if visible else 0.0
+
+    @cached_property
+    def _seen(self) -> list[sapien.render.RenderBodyComponent]:
+        entities = [one.entity for link in self.robot.links for one in link._objs]
+        found = [one.find_component_by_type(sapien.render.RenderBodyComponent) for one in entities]
+        return [body for body in found if isinstance(body, sapien.render.RenderBodyComponent)]
 
 
 _ARM_DRIVE = dict(stiffness=ARM_STIFFNESS, damping=ARM_DAMPING, force_limit=ARM_TORQUE_LIMIT)
