@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
@@ -32,6 +33,7 @@ from mskgrasp.validate.fidelity import Fidelity
 from tasks.outcome import MAX_PENETRATION, MAX_SPEED
 
 _FLOORS = (FLOOR, CELL_FLOOR)
+_MARKERS = "o^sDvP"
 _GOOD, _BAD, _INK = "#2b8a3e", "#c92a2a", "#22252b"
 
 
@@ -212,19 +214,24 @@ def _draw_cost(
     for line, style in ((floor, ":"), (scale * getattr(found[CELL_FLOOR], column), "--")):
         axes.axhline(line, color=_INK, lw=0.8, ls=style)
     rates = sorted({*config.rates_hz, config.physics.rate_hz})
-    for count in sorted({*config.iterations, config.physics.position_iterations}):
-        names = [setting_name(rate, count) for rate in rates]
-        row = [(rate, name, found[name]) for rate, name in zip(rates, names, strict=True) if name in found]
-        places = [(one.cpu_ms, scale * getattr(one, column)) for _, _, one in row]
-        axes.plot(*zip(*places, strict=True), color="#adb5bd", lw=1, zorder=1)
-        axes.annotate(f"{count} iterations", places[0], (-4, -11), textcoords="offset points", fontsize=7.5)
-        for (rate, name, comparison), place in zip(row, places, strict=True):
-            fine = not complaints(comparison, found[FLOOR], found[REFERENCE].success_rate)
-            axes.plot(*place, "o", ms=6, color=_GOOD if fine else _BAD)
-            weight = "bold" if name == config.production else "normal"
-            axes.annotate(
-                f"{rate} Hz", place, (5, 4), textcoords="offset points", fontsize=7.5, weight=weight
-            )
+    counts = sorted({*config.iterations, config.physics.position_iterations})
+    for k, count in enumerate(counts):
+        names = [name for rate in rates if (name := setting_name(rate, count)) in found]
+        places = [(found[name].cpu_ms, scale * getattr(found[name], column)) for name in names]
+        colour = colormaps["viridis"](0.85 * k / max(1, len(counts) - 1))
+        axes.plot(*zip(*places, strict=True), color=colour, lw=1.2, label=f"{count} iterations", zorder=1)
+        for name, place in zip(names, places, strict=True):
+            fine = not complaints(found[name], found[FLOOR], found[REFERENCE].success_rate)
+            marker = _MARKERS[rates.index(int(name.split()[0])) % len(_MARKERS)]
+            axes.plot(*place, marker, ms=6, color=colour, mfc=colour if fine else "white", zorder=2)
+            if name == config.production:
+                axes.plot(*place, "o", ms=13, color=_INK, mfc="none", zorder=3, label="under test")
+    for rate, marker in zip(rates, _MARKERS, strict=False):
+        axes.plot([], [], marker, ms=5, color=_INK, mfc="white", label=f"{rate} Hz")
+    if column == "agreement":
+        axes.legend(
+            fontsize=7.5, loc="lower right", frameon=False, title="filled: adds nothing", title_fontsize=7.5
+        )
     axes.set(xlabel="processor time of a grasp, ms", ylabel=label, xscale="log")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(ScalarFormatter())
