@@ -232,7 +232,7 @@ class GraspDisplacementEnv(BaseEnv):
         the other control modes are not reset, nor is torch's generator seeded: nothing here is drawn from it.
         """
         everywhere = torch.arange(self.num_envs, device=self.device)
-        if self.num_envs == 1:  # the generator that there is: a new one takes as long as seven steps
+        if self.num_envs == 1:  # the generator that there is: a new one takes half as long as a step
             self._episode_seed = np.array([seed])
             self._batched_episode_rng.rngs[0].seed(seed)
         else:

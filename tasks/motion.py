@@ -268,8 +268,7 @@ class PandaMotion:
     def _moving(self, path: Array, speed: Array) -> list[tuple[PhysxArticulationJoint, list, list]]:
         """The joints that a path (steps, 7) moves, with its places and speeds (steps, 7) as plain numbers.
 
-        Arrays at every step would cost as much as the physics, the call of a drive a fiftieth of it: on a
-        vertical line four joints stand still.
+        An attempt has hundreds of steps; on a vertical line four joints stand still, and need no call.
         """
         moving = np.flatnonzero(np.asarray((path != path[:1]).any(0))).tolist()
         return [(self._arm_drives[j], path[:, j].tolist(), speed[:, j].tolist()) for j in moving]

@@ -215,22 +215,26 @@ def _draw_cost(
         axes.axhline(line, color=_INK, lw=0.8, ls=style)
     rates = sorted({*config.rates_hz, config.physics.rate_hz})
     counts = sorted({*config.iterations, config.physics.position_iterations})
+    markers = {rate: _MARKERS[k % len(_MARKERS)] for k, rate in enumerate(rates)}
     for k, count in enumerate(counts):
-        names = [name for rate in rates if (name := setting_name(rate, count)) in found]
-        places = [(found[name].cpu_ms, scale * getattr(found[name], column)) for name in names]
+        row = [(rate, name) for rate in rates if (name := setting_name(rate, count)) in found]
+        places = [(found[name].cpu_ms, scale * getattr(found[name], column)) for _, name in row]
         colour = colormaps["viridis"](0.85 * k / max(1, len(counts) - 1))
         axes.plot(*zip(*places, strict=True), color=colour, lw=1.2, label=f"{count} iterations", zorder=1)
-        for name, place in zip(names, places, strict=True):
+        for (rate, name), place in zip(row, places, strict=True):
             fine = not complaints(found[name], found[FLOOR], found[REFERENCE].success_rate)
-            marker = _MARKERS[rates.index(int(name.split()[0])) % len(_MARKERS)]
-            axes.plot(*place, marker, ms=6, color=colour, mfc=colour if fine else "white", zorder=2)
+            axes.plot(*place, markers[rate], ms=6, color=colour, mfc=colour if fine else "white", zorder=2)
             if name == config.production:
-                axes.plot(*place, "o", ms=13, color=_INK, mfc="none", zorder=3, label="under test")
-    for rate, marker in zip(rates, _MARKERS, strict=False):
+                axes.plot(*place, "o", ms=13, color=_INK, mfc="none", zorder=3)
+    for rate, marker in markers.items():
         axes.plot([], [], marker, ms=5, color=_INK, mfc="white", label=f"{rate} Hz")
     if column == "agreement":
         axes.legend(
-            fontsize=7.5, loc="lower right", frameon=False, title="filled: adds nothing", title_fontsize=7.5
+            fontsize=7.5,
+            loc="lower right",
+            frameon=False,
+            title="circled: under test\nfilled: adds nothing",
+            title_fontsize=7.5,
         )
     axes.set(xlabel="processor time of a grasp, ms", ylabel=label, xscale="log")
     for axis in (axes.xaxis, axes.yaxis):

@@ -173,8 +173,8 @@ class Raw:
 class Clock:
     """Processor time spent inside some functions.
 
-    To read the clock twice takes a hundredth of a simulation step: what that adds is measured on a function
-    that does nothing, and taken off.
+    An attempt has hundreds of steps: what reading the clock adds to each is measured on a function that does
+    nothing, and taken off.
     """
 
     def __init__(self) -> None:

@@ -30,9 +30,6 @@ HERE = Path(__file__).parent
 STORED = HERE / "regression.json"
 LEVEL = 0.99
 """Of confidence: one false alarm in a hundred runs and figure."""
-ROUNDING = 1e-3
-"""Share of a stored error by which it must have changed: trials that differ in the last bit are as before,
-though every one of them may err more, by a millionth."""
 
 Row = dict[str, Any]
 
@@ -173,11 +170,9 @@ def _errors(
 
     every = np.concatenate(values)
     low, high = bootstrap_interval(values, difference, level=LEVEL)
-    stored = statistic(every[:, 0])
-    least = ROUNDING * stored
-    verdict = "worse" if low > least else "better" if high < -least else "as before"
+    verdict = "worse" if low > 0 else "better" if high < 0 else "as before"
     return dict(
-        n=len(every), stored=stored, now=statistic(every[:, 1]), interval=[low, high], p=None,
+        n=len(every), stored=statistic(every[:, 0]), now=statistic(every[:, 1]), interval=[low, high], p=None,
         verdict=verdict,
     )  # fmt: skip
 
