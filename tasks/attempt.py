@@ -26,7 +26,7 @@ from tasks.clearance import Clearance, hand_clearance
 from tasks.contacts import HandContacts
 from tasks.frames import own_pose
 from tasks.kinematics import top_down
-from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration, run_up
+from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease_at, ease_duration, finger_lag, run_up
 from tasks.outcome import MAX_DRIFT, MAX_TURN, MIN_PAD_FORCE, Observed, judge
 from tasks.panda import GraspPanda
 from tasks.watch import SpeedWatch
@@ -40,6 +40,11 @@ REST_WINDOW_S = 0.06
 AHEAD = 0.003
 """Distance from the part, m, at which fingers begin that have only air before them: more than a part moves
 that settles and yet counts as at rest."""
+TAKE_OFF_S = 0.2
+"""The first part of the lift, s, which is as fine as the closing: what turns in the hand does so while the
+table lets go of it, within the first centimetre."""
+REFLEX_S = 0.008
+"""Time between two looks at the force on a hand that descends, s."""
 LEFT_BEHIND = 0.02
 """The hand this much farther from the part than a success may be has lost it, m."""
 
@@ -106,7 +111,7 @@ class Attempt:
         empty = free & (reach == 0)
         # Fingers that would have only air to close through, and room for their run-up, begin near the part.
         running = free & ~empty & (reach + max(self._run_up, AHEAD) <= MAX_OPENING / 2)
-        width = xp.where(running, 2 * (reach + AHEAD), xp.full_like(reach, MAX_OPENING))
+        width = xp.where(running, 2 * self._beginning(reach), xp.full_like(reach, MAX_OPENING))
         down = None if bool(free.all()) else self._line(start, grasp, physics.descend_speed)
         motion.place(top_down(_double(grasp))[0] if down is None else down[0], width)
         self._speed.start(motion.seconds)
@@ -124,7 +129,10 @@ class Attempt:
             return bool((collided | ~settled | free).all())
 
         if down is not None:
-            motion.follow(down, check=reflex, frozen=collided)
+            motion.follow(
+                down, check=reflex, check_every=motion.n_steps(REFLEX_S), frozen=collided
+            )
+            motion.arrive(frozen=collided)
         # A part that moved although nothing touched it was still toppling.
         settled = settled & (touched | at_rest(rest, self._part_pose()))
         held, penetration = xp.zeros_like(settled), xp.zeros_like(reach)
@@ -140,12 +148,12 @@ class Attempt:
             held, penetration = self.grip()
         # What the fingers do to the part is done: what follows needs no such fine steps. The last look does:
         # a part trembles between the pads, and more at half the rate.
-        with motion.coarsely():
-            carried = bool((alive & held).any())
-            if carried:
-                carried, deepest = self._lift(grasp, lifted, alive & held, collided)
-                penetration = xp.maximum(penetration, deepest)
-            if not carried and bool(alive.any()):
+        carried = bool((alive & held).any())
+        if carried:
+            carried, deepest = self._lift(grasp, lifted, alive & held, collided)
+            penetration = xp.maximum(penetration, deepest)
+        if not carried and bool(alive.any()):
+            with motion.coarsely():
                 self._wait_for_rest()
         return self._outcome(commanded, rest, settled, collided, held, penetration, began)
 
@@ -181,6 +189,16 @@ class Attempt:
         start = _raised(grasp, own(np.array(above, np.float32)))
         return start, own(np.array(free)), own(np.array(reach, np.float32))
 
+    def _beginning(self, reach: Array) -> Array:
+        """(n,) where fingers with only air before them begin, from the middle, m.
+
+        A place that they would have been at after a step of the whole ramp: then they meet the part at the
+        same moment of a step as fingers that have come all the way.
+        """
+        step = self._physics.finger_speed / self._motion.rate_hz
+        first = MAX_OPENING / 2 + finger_lag(self._physics)
+        return first - self._arrays.xp.floor((first - reach - AHEAD) / step) * step
+
     def _wait_for_rest(self) -> None:
         """Lets parts that were not lifted fall and roll: in flight, a look would call them by its moment."""
         motion = self._motion
@@ -208,11 +226,20 @@ class Attempt:
             lost = ~alive | (motion.gap() <= MIN_GAP) | (behind() > most_behind)
             return bool(lost.all())
 
-        up = self._line(grasp, lifted, physics.lift_speed)
-        # An arm that its reflex has stopped stays where it is.
-        if not motion.follow(up, check=all_lost, check_every=motion.n_steps(0.05), frozen=collided):
+        def rise(times: np.ndarray) -> bool:
+            up = self._way(grasp, lifted, np.minimum(times / seconds, 1))
+            # An arm that its reflex has stopped stays where it is.
+            return motion.follow(up, check=all_lost, check_every=motion.n_steps(0.05), frozen=collided)
+
+        seconds = ease_duration(physics.lift_height, physics.lift_speed, PEAK_ACCELERATION)
+        fine = min(TAKE_OFF_S, seconds)
+        if not rise(_moments(fine, motion.n_steps(fine))):
             return False, deepest
-        motion.step(motion.n_steps(physics.hold_s - SPEED_WINDOW_S))
+        with motion.coarsely():
+            rest = seconds - fine
+            if rest > 0 and not rise(fine + _moments(rest, motion.n_steps(rest))):
+                return False, deepest
+            motion.step(motion.n_steps(physics.hold_s - SPEED_WINDOW_S))
         return True, deepest
 
     def _outcome(
@@ -284,7 +311,11 @@ class Attempt:
         start, goal = self._arrays.of(start), self._arrays.of(goal)
         distance = float(_length((goal - start)[:, :3]).max())
         n_steps = self._motion.n_steps(ease_duration(distance, speed, PEAK_ACCELERATION))
-        share = self._arrays.of(ease(n_steps))[:, None, None]
+        return self._way(start, goal, np.arange(1, n_steps + 1) / n_steps)
+
+    def _way(self, start: Array, goal: Array, times: np.ndarray) -> Array:
+        """(steps, n, 7) joints at times of a straight line between grasps, as shares of its duration."""
+        share = self._arrays.of(ease_at(times))[:, None, None]
         start, goal = _double(start), _double(goal)
         return top_down(start + share * (goal - start))[0]
 
@@ -318,6 +349,11 @@ def _spans(hulls: list[np.ndarray]) -> list[slice]:
     """Where each hull's corners are among all of them."""
     ends = np.cumsum([len(hull) for hull in hulls]).tolist()
     return [slice(start, end) for start, end in pairwise([0, *ends])]
+
+
+def _moments(seconds: float, n_steps: int) -> np.ndarray:
+    """(n_steps,) ends of equal steps of a time, s."""
+    return seconds * np.arange(1, n_steps + 1) / n_steps
 
 
 def _raised(grasp: Array, by: Array | float) -> Array:

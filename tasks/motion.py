@@ -20,6 +20,8 @@ from mskgrasp.settings import Physics
 from tasks.arrays import arrays_for
 from tasks.panda import GraspPanda
 
+ARRIVAL_S = 0.02
+"""How long an arm may take to come to a stop at the end of a path, s."""
 STILL_FINGER = 2e-3
 """A finger slower than this, m/s, has met what it holds. Speeds are differences of positions: PhysX's
 TGS solver reports the velocity of a pressed joint with the drive's impulse still in it."""
@@ -36,12 +38,16 @@ CHECK_S = 0.02
 
 
 def ease(n_steps: int) -> np.ndarray:
-    """(n_steps,) fractions of a path from just above 0 to 1, without speed or acceleration at its ends.
+    """(n_steps,) fractions of a path from just above 0 to 1, after equal steps of its time; see `ease_at`."""
+    return ease_at(np.arange(1, n_steps + 1) / n_steps)
+
+
+def ease_at(t: np.ndarray) -> np.ndarray:
+    """Fractions of a path at shares of its time, from 0 to 1, without speed or acceleration at its ends.
 
     The minimum-jerk profile (Flash and Hogan 1985, equation 5): with an acceleration at the end the arm
     would overshoot by its inertia over its stiffness, more than the clearance between pads and table.
     """
-    t = np.arange(1, n_steps + 1) / n_steps
     return t**3 * (10 - 15 * t + 6 * t**2)
 
 
@@ -67,6 +73,11 @@ def run_up(physics: Physics) -> float:
     rest = half**2 - physics.finger_stiffness / mass
     slowest = half if rest < 0 else physics.finger_stiffness / mass / (half + math.sqrt(rest))
     return 6.6 * physics.finger_speed / slowest if slowest > 0 else math.inf
+
+
+def finger_lag(physics: Physics) -> float:
+    """How far a finger that closes is behind its ramp in the long run, m: its drive has no speed as a target."""
+    return physics.finger_speed * physics.finger_damping / physics.finger_stiffness
 
 
 class PandaMotion:
@@ -98,6 +109,9 @@ class PandaMotion:
         """Simulated so far."""
         self.rate_hz = physics.rate_hz
         """Simulation steps a second, now."""
+        # A step holds its target, and its iterations are equal shares of it: aimed at the end of the step,
+        # a drive would be ahead of its path, the more the longer a step. Aimed at the mean, it is not.
+        self._within = (1 - 1 / physics.position_iterations) / 2
         self._watch_every = self.n_steps(CHECK_S)
         self._unwatched = 0
         self._commanded: Array = None
@@ -176,12 +190,13 @@ class PandaMotion:
     def run_fingers(self, hands: Array) -> None:
         """Makes the fingers of some hands (n,) close as they would long after a ramp began.
 
-        They lag behind their targets by damping * speed / stiffness, less what they move in the mean between
-        a step's target, which it holds, and the solver's iterations, equal shares of the step.
+        A step has one target, which pulls a finger through its first half and brakes it through the second:
+        where steps meet it is slower than in the mean, by the mean over a step of what the pull has added.
         """
-        speed, physics, xp = self._physics.finger_speed, self._physics, self.arrays.xp
-        within = (1 - 1 / physics.position_iterations) / (2 * self.rate_hz)
-        lag = speed * max(0.0, physics.finger_damping / physics.finger_stiffness - within)
+        physics, xp = self._physics, self.arrays.xp
+        lag, mass = finger_lag(physics), physics.finger_armature + FINGER_MASS
+        slower = physics.finger_stiffness / mass / (12 * self.rate_hz**2)
+        speed = physics.finger_speed * max(0.0, 1 - slower)
         hands = self.arrays.of(hands)
         if self.gpu:
             qvel = self._agent.robot.get_qvel().clone()
@@ -219,6 +234,32 @@ class PandaMotion:
         if self.watch is not None:
             self.watch(self.seconds)
 
+    def arrive(self, frozen: Array) -> None:
+        """Waits until the arms stand, and puts those that are not frozen (n,) exactly where they were sent.
+
+        The drives leave an arm some tens of micrometres short, the more the finer the steps: a joint turns
+        in float32, and what a slow one turns in one iteration is rounded away. The real controller integrates
+        its error away. Fingers stay as they are.
+        """
+        xp, arrays = self.arrays.xp, self.arrays
+        self.step(self.n_steps(ARRIVAL_S))
+        stop = arrays.of(frozen)
+        if self.gpu:
+            robot = self._agent.robot
+            qpos, qvel = robot.get_qpos().clone(), robot.get_qvel().clone()
+            exact = xp.astype(self._commanded, xp.float32)
+            qpos[:, :7] = xp.where(stop[:, None], qpos[:, :7], exact)
+            qvel[:, :7] = xp.where(stop[:, None], qvel[:, :7], xp.zeros_like(exact))
+            robot.set_qpos(qpos)
+            robot.set_qvel(qvel)
+            self._scene._gpu_apply_all()
+            self._scene.px.gpu_update_articulation_kinematics()
+            self._scene._gpu_fetch_all()
+        elif not bool(stop[0]):
+            qpos, qvel = self._articulation.qpos, self._articulation.qvel
+            qpos[:7], qvel[:7] = self._commanded[0], 0
+            self._articulation.qpos, self._articulation.qvel = qpos, qvel
+
     def follow(
         self,
         path: Array,
@@ -230,7 +271,7 @@ class PandaMotion:
         """Follows joint targets, one a simulation step.
 
         Args:
-            path: (steps, n, 7) radians.
+            path: (steps, n, 7) radians, at the end of each step; it begins where the arms were sent before.
             check: Called every ``check_every`` steps with the index of the step; True ends the motion.
             check_every: How often, steps.
             frozen: (n,) bool, arms that stay where their targets are; read at every step.
@@ -240,19 +281,19 @@ class PandaMotion:
         """
         xp, arrays = self.arrays.xp, self.arrays
         path = arrays.of(path)
-        speed = xp.zeros_like(path)
-        speed[1:] = (path[1:] - path[:-1]) * self.rate_hz
-        still = xp.zeros_like(path[0])
-        moving = [] if self.gpu else self._moving(path[:, 0], speed[:, 0])
-        stop = arrays.full(self.n, False) if frozen is None else arrays.of(frozen)
         # An arm that is frozen from the first step on stays where it was sent before.
         last = path[0] if self._commanded is None else self._commanded
+        speed = (path - xp.concat([last[None], path[:-1]])) * self.rate_hz
+        aims = path - self._within / self.rate_hz * speed
+        still = xp.zeros_like(path[0])
+        moving = [] if self.gpu else self._moving(aims[:, 0], speed[:, 0])
+        stop = arrays.full(self.n, False) if frozen is None else arrays.of(frozen)
         if not self.gpu:
-            self.set_arm(path[0], speed[0])
+            self.set_arm(aims[0], speed[0])
         for i in range(len(path)):
             if self.gpu:
                 last = xp.where(stop[:, None], last, path[i])
-                self.set_arm(last, xp.where(stop[:, None], still, speed[i]))
+                self.set_arm(xp.where(stop[:, None], last, aims[i]), xp.where(stop[:, None], still, speed[i]))
             else:
                 last = path[i]
                 for drive, places, rates in moving:
@@ -301,7 +342,8 @@ class PandaMotion:
             way = xp.where(arrays.of(frozen), xp.zeros_like(way), way)
         goal = start + way
         n_ramp = max(1, math.ceil(float(abs(way).max()) / speed * self.rate_hz))
-        done = arrays.of(np.arange(1, n_ramp + 1, dtype=np.float32))[:, None] * speed / self.rate_hz
+        steps = np.arange(1, n_ramp + 1, dtype=np.float32) - self._within
+        done = arrays.of(steps)[:, None] * speed / self.rate_hz
         ramp = start + xp.sign(way) * xp.minimum(done, abs(way))
         quiet = xp.zeros_like(way)
         # A held part stops the fingers before their targets; wait until the drives press in full.
