@@ -38,13 +38,15 @@ AFTERMATH_S = 0.3
 REST_WINDOW_S = 0.06
 """A part that did not move for so long has come to rest, s."""
 AHEAD = 0.003
-"""Distance from the part, m, at which fingers begin that have only air before them: more than a part moves
-that settles and yet counts as at rest."""
-TAKE_OFF_S = 0.2
-"""The first part of the lift, s, which is as fine as the closing: what turns in the hand does so while the
+"""Least distance from the part, m, at which fingers begin that have only air before them: more than a part
+moves that settles and yet counts as at rest."""
+TAKE_OFF = 0.012
+"""The first part of the lift, m, which is as fine as the closing: what turns in the hand does so while the
 table lets go of it, within the first centimetre."""
 REFLEX_S = 0.008
 """Time between two looks at the force on a hand that descends, s."""
+ARRIVAL_S = 0.024
+"""How long a hand that has descended may take to come to a stop, s."""
 LEFT_BEHIND = 0.02
 """The hand this much farther from the part than a success may be has lost it, m."""
 
@@ -110,7 +112,8 @@ class Attempt:
         began = motion.seconds
         empty = free & (reach == 0)
         # Fingers that would have only air to close through, and room for their run-up, begin near the part.
-        running = free & ~empty & (reach + max(self._run_up, AHEAD) <= MAX_OPENING / 2)
+        room = max(self._run_up, AHEAD + physics.finger_speed / motion.rate_hz)
+        running = free & ~empty & (reach + room <= MAX_OPENING / 2)
         width = xp.where(running, 2 * self._beginning(reach), xp.full_like(reach, MAX_OPENING))
         down = None if bool(free.all()) else self._line(start, grasp, physics.descend_speed)
         motion.place(top_down(_double(grasp))[0] if down is None else down[0], width)
@@ -129,10 +132,13 @@ class Attempt:
             return bool((collided | ~settled | free).all())
 
         if down is not None:
-            motion.follow(
-                down, check=reflex, check_every=motion.n_steps(REFLEX_S), frozen=collided
-            )
-            motion.arrive(frozen=collided)
+            look = motion.n_steps(REFLEX_S)
+            if motion.follow(down, check=reflex, check_every=look, frozen=collided):
+                for _ in range(round(ARRIVAL_S / REFLEX_S)):
+                    motion.step(look)
+                    reflex(0)
+            # A hand that rests on something yields: it is not where it was sent.
+            motion.arrive(frozen=collided | ~settled | (self._contacts.hand_force() > 0))
         # A part that moved although nothing touched it was still toppling.
         settled = settled & (touched | at_rest(rest, self._part_pose()))
         held, penetration = xp.zeros_like(settled), xp.zeros_like(reach)
@@ -146,11 +152,9 @@ class Attempt:
             motion.run_fingers(running & ~apart)
             motion.move_fingers(-MAX_OPENING / 2, frozen=apart, check=all_met)
             held, penetration = self.grip()
-        # What the fingers do to the part is done: what follows needs no such fine steps. The last look does:
-        # a part trembles between the pads, and more at half the rate.
         carried = bool((alive & held).any())
         if carried:
-            carried, deepest = self._lift(grasp, lifted, alive & held, collided)
+            carried, deepest = self._lift(grasp, lifted, alive & held, collided | ~settled)
             penetration = xp.maximum(penetration, deepest)
         if not carried and bool(alive.any()):
             with motion.coarsely():
@@ -210,8 +214,11 @@ class Attempt:
                 return
             before = now
 
-    def _lift(self, grasp: Array, lifted: Array, alive: Array, collided: Array) -> tuple[bool, Array]:
-        """Lifts and holds; False where nothing was left to hold, and (n,) the deepest overlap seen, m."""
+    def _lift(self, grasp: Array, lifted: Array, alive: Array, stay: Array) -> tuple[bool, Array]:
+        """Lifts and holds; False where nothing was left to hold, and (n,) the deepest overlap seen, m.
+
+        Arms that stay (n,) may have been stopped on their way down.
+        """
         motion, physics, xp = self._motion, self._physics, self._arrays.xp
 
         def behind() -> Array:
@@ -227,17 +234,19 @@ class Attempt:
             return bool(lost.all())
 
         def rise(times: np.ndarray) -> bool:
-            up = self._way(grasp, lifted, np.minimum(times / seconds, 1))
-            # An arm that its reflex has stopped stays where it is.
-            return motion.follow(up, check=all_lost, check_every=motion.n_steps(0.05), frozen=collided)
+            up = self._way(grasp, lifted, times)
+            return motion.follow(up, check=all_lost, check_every=motion.n_steps(0.05), frozen=stay)
 
         seconds = ease_duration(physics.lift_height, physics.lift_speed, PEAK_ACCELERATION)
-        fine = min(TAKE_OFF_S, seconds)
-        if not rise(_moments(fine, motion.n_steps(fine))):
+        times = _moments(motion.n_steps(seconds))
+        times = times[: 1 + int(np.searchsorted(physics.lift_height * ease_at(times), TAKE_OFF))]
+        if not rise(times):
             return False, deepest
+        # What the fingers and the table do to the part is done: what follows needs no such fine steps. The
+        # last look does: a part trembles between the pads, and more at half the rate.
         with motion.coarsely():
-            rest = seconds - fine
-            if rest > 0 and not rise(fine + _moments(rest, motion.n_steps(rest))):
+            rest = 1 - times[-1]
+            if rest > 0 and not rise(times[-1] + rest * _moments(motion.n_steps(rest * seconds))):
                 return False, deepest
             motion.step(motion.n_steps(physics.hold_s - SPEED_WINDOW_S))
         return True, deepest
@@ -311,7 +320,7 @@ class Attempt:
         start, goal = self._arrays.of(start), self._arrays.of(goal)
         distance = float(_length((goal - start)[:, :3]).max())
         n_steps = self._motion.n_steps(ease_duration(distance, speed, PEAK_ACCELERATION))
-        return self._way(start, goal, np.arange(1, n_steps + 1) / n_steps)
+        return self._way(start, goal, _moments(n_steps))
 
     def _way(self, start: Array, goal: Array, times: np.ndarray) -> Array:
         """(steps, n, 7) joints at times of a straight line between grasps, as shares of its duration."""
@@ -351,9 +360,9 @@ def _spans(hulls: list[np.ndarray]) -> list[slice]:
     return [slice(start, end) for start, end in pairwise([0, *ends])]
 
 
-def _moments(seconds: float, n_steps: int) -> np.ndarray:
-    """(n_steps,) ends of equal steps of a time, s."""
-    return seconds * np.arange(1, n_steps + 1) / n_steps
+def _moments(n_steps: int) -> np.ndarray:
+    """(n_steps,) ends of equal steps, as shares of their time."""
+    return np.arange(1, n_steps + 1) / n_steps
 
 
 def _raised(grasp: Array, by: Array | float) -> Array:

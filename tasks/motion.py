@@ -20,8 +20,6 @@ from mskgrasp.settings import Physics
 from tasks.arrays import arrays_for
 from tasks.panda import GraspPanda
 
-ARRIVAL_S = 0.02
-"""How long an arm may take to come to a stop at the end of a path, s."""
 STILL_FINGER = 2e-3
 """A finger slower than this, m/s, has met what it holds. Speeds are differences of positions: PhysX's
 TGS solver reports the velocity of a pressed joint with the drive's impulse still in it."""
@@ -76,7 +74,7 @@ def run_up(physics: Physics) -> float:
 
 
 def finger_lag(physics: Physics) -> float:
-    """How far a finger that closes is behind its ramp in the long run, m: its drive has no speed as a target."""
+    """How far a closing finger is behind its ramp in the long run, m: its drive has no speed as a target."""
     return physics.finger_speed * physics.finger_damping / physics.finger_stiffness
 
 
@@ -235,15 +233,14 @@ class PandaMotion:
             self.watch(self.seconds)
 
     def arrive(self, frozen: Array) -> None:
-        """Waits until the arms stand, and puts those that are not frozen (n,) exactly where they were sent.
+        """Puts arms that have come to a stop, but for the frozen ones (n,), exactly where they were sent.
 
         The drives leave an arm some tens of micrometres short, the more the finer the steps: a joint turns
         in float32, and what a slow one turns in one iteration is rounded away. The real controller integrates
         its error away. Fingers stay as they are.
         """
-        xp, arrays = self.arrays.xp, self.arrays
-        self.step(self.n_steps(ARRIVAL_S))
-        stop = arrays.of(frozen)
+        xp = self.arrays.xp
+        stop = self.arrays.of(frozen)
         if self.gpu:
             robot = self._agent.robot
             qpos, qvel = robot.get_qpos().clone(), robot.get_qvel().clone()
@@ -252,7 +249,8 @@ class PandaMotion:
             qvel[:, :7] = xp.where(stop[:, None], qvel[:, :7], xp.zeros_like(exact))
             robot.set_qpos(qpos)
             robot.set_qvel(qvel)
-            self._scene._gpu_apply_all()
+            self._scene.px.gpu_apply_articulation_qpos()
+            self._scene.px.gpu_apply_articulation_qvel()
             self._scene.px.gpu_update_articulation_kinematics()
             self._scene._gpu_fetch_all()
         elif not bool(stop[0]):
@@ -341,7 +339,7 @@ class PandaMotion:
         if frozen is not None:
             way = xp.where(arrays.of(frozen), xp.zeros_like(way), way)
         goal = start + way
-        n_ramp = max(1, math.ceil(float(abs(way).max()) / speed * self.rate_hz))
+        n_ramp = max(1, math.ceil(float(abs(way).max()) / speed * self.rate_hz + self._within))
         steps = np.arange(1, n_ramp + 1, dtype=np.float32) - self._within
         done = arrays.of(steps)[:, None] * speed / self.rate_hz
         ramp = start + xp.sign(way) * xp.minimum(done, abs(way))

@@ -20,8 +20,9 @@ class Physics(Config):
     """Simulation steps a second. Under 250 Hz light parts creep out of the fingers: data is not collected."""
     coarse_rate_hz: int = Field(default=250, ge=100)
     """The same, at most ``rate_hz``, where no finger closes, for parts of ``coarse_mass`` and more: while
-    they settle, in lift and hold, and while one that was not held comes to rest. The first 0.2 s of the lift,
-    as the part leaves the table, and the last 20 ms, before it is looked at in the hand, are fine. Of attempts alone: the simulated cell is never coarse."""
+    they settle, in lift and hold, and while one that was not held comes to rest. The first 12 mm of the lift,
+    in which the part leaves the table, and the last 20 ms, before it is looked at in the hand, are fine. Of
+    attempts alone: the simulated cell is never coarse."""
     coarse_mass: float = Field(default=0.04, gt=0)
     """Lighter parts are simulated finely throughout, kg: the grip shakes them, the more the longer a step."""
     position_iterations: int = Field(default=25, ge=4)
@@ -43,7 +44,7 @@ class Physics(Config):
     """Force of each pad on the part, N."""
     finger_stiffness: float = Field(default=8000.0, gt=0)
     """Drive stiffness of a finger, N/m; with the force limit and the speed it says how soon a pad presses in
-    full: 25 ms after it was stopped."""
+    full: 12 ms after it was stopped."""
     finger_damping: float = Field(default=100.0, ge=0)
     """Drive damping of a finger, N s/m: critical, with the armature."""
     finger_armature: float = Field(default=0.3, ge=0)

@@ -18,7 +18,7 @@ from tasks.kinematics import top_down
 from tasks.panda import ARM_DAMPING, ARM_STIFFNESS, ARM_TORQUE_LIMIT
 from tasks.part_actor import _visual
 
-SETTLE_S, DESCEND_S, CLOSE_S, LIFT_S = 0.06, 0.4, 0.5, 0.75
+SETTLE_S, DESCEND_S, LIFT_S = 0.06, 0.4, 0.75
 """Long enough for every part; a script without feedback has to wait for the slowest."""
 OPEN = 0.04
 
@@ -104,7 +104,8 @@ class RawSapien:
         start = self.part.pose.p[2]
         self._line(above, grasp, DESCEND_S)
         target = OPEN
-        for _ in range(round(CLOSE_S * p.rate_hz)):
+        close_s = (OPEN + p.finger_force / p.finger_stiffness) / p.finger_speed  # until pads press in full
+        for _ in range(round(close_s * p.rate_hz)):
             target = max(-OPEN, target - p.finger_speed / p.rate_hz)
             for joint in self.joints[7:]:
                 joint.set_drive_target(target)

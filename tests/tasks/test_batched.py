@@ -58,3 +58,17 @@ def test_what_a_carried_block_did_is_told_for_its_own_sub_scene():
     closed = [0, 3, 4]
     assert found["width_after"][closed].tolist() == pytest.approx((2 * BETWEEN[closed]).tolist(), abs=1e-4)
     assert torch.isnan(found["penetration"]).all()  # a GPU reports no contact points
+
+
+def test_frozen_arms_stay_where_they_are_and_the_others_arrive():
+    scene = ToyScene(BLOCKS[:2], BETWEEN[:2], CARRIED[:2], STRUCK[:2])
+    motion = toy_attempt(scene, Physics())._motion
+    goal = torch.full((2, 7), 0.1, dtype=torch.float64) + scene.qpos[:, :7]
+    motion.set_arm(goal, torch.zeros(2, 7))
+    motion.step()
+    before = scene.qpos.clone()
+    assert not torch.allclose(before[1, :7], goal[1].float())
+    motion.arrive(torch.tensor([True, False]))
+    assert torch.equal(scene.qpos[0], before[0])
+    torch.testing.assert_close(scene.qpos[1, :7], goal[1].float(), atol=1e-6, rtol=0)
+    assert torch.equal(scene.qpos[:, 7:], before[:, 7:])

@@ -79,7 +79,8 @@ def test_heavy_parts_alone_are_lifted_coarsely_and_all_are_looked_at_finely(
     assert bool(outcome["success"])
     assert outcome["penetration"] < 1e-3
     assert [rate for name, rate, _ in found if name == "move_fingers"] == [500]
-    assert [rate for name, rate, _ in found if name == "follow"] == [500, carried_at]  # take-off, and the rest
+    # Take-off, and the rest of the lift.
+    assert [rate for name, rate, _ in found if name == "follow"] == [500, carried_at]
     assert found[0][:2] == ("step", carried_at)  # it settles
     assert found[-1] == ("step", 500, pytest.approx(0.02))
 
@@ -199,6 +200,24 @@ def test_an_arm_arrives_exactly_and_keeps_its_fingers(env, lay):
     assert robot.get_qpos()[0, 7:9].numpy() == pytest.approx(0.025, abs=1e-5)
     tcp = env.tcp_pose().position[0].numpy()
     assert tcp == pytest.approx(goal[0, :3].numpy(), abs=2e-6)
+
+
+def test_a_hand_that_rests_on_the_part_is_not_pressed_into_it(env, attempt, monkeypatch):
+    overlaps: list[float] = []
+    short: list[float] = []
+    z = 0.03 + 0.0095 - 0.0001  # a pad of the open hand would end 0.1 mm inside the block
+
+    def looked(self, *given, **named):
+        overlaps.append(float(env.contacts.penetration()[0]))
+        short.append(float(env.tcp_pose().position[0, 2]) - z)
+        return move(self, *given, **named)
+
+    move = PandaMotion.move_fingers
+    monkeypatch.setattr(PandaMotion, "move_fingers", looked)
+    attempt((0.5, 0.0, z, 0.0), part="heavy", at=(0.5, 0.045))
+    assert len(overlaps) == 1
+    assert overlaps[0] < 2e-5
+    assert short[0] > 5e-5
 
 
 def test_an_arm_that_its_reflex_has_stopped_is_not_put_where_it_was_sent(env, lay):

@@ -45,7 +45,8 @@ class ToyScene:
         self.between, self.carried, self.struck = between, carried, struck
         self.qpos, self.target = torch.zeros(self.num_envs, 9), torch.zeros(self.num_envs, 9)
         self.part = blocks + torch.tensor(BASE_IN_WORLD)
-        calls = ("gpu_update_articulation_kinematics", "gpu_apply_articulation_qvel")
+        applied = ("gpu_apply_articulation_qpos", "gpu_apply_articulation_qvel")
+        calls = ("gpu_update_articulation_kinematics", *applied)
         targets = ("gpu_apply_articulation_target_position", "gpu_apply_articulation_target_velocity")
         self.px = SimpleNamespace(**{name: lambda: None for name in (*calls, *targets)})
 
