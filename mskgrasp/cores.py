@@ -1,15 +1,17 @@
-"""Processes that keep to one core each, and do not outlive the one that started them."""
+"""Processes that keep to one core each, leave Ctrl-C to the one that started them, and do not outlive it."""
 
 from __future__ import annotations
 
 import logging
 import multiprocessing
 import os
+import signal
 import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 
 
 @contextmanager
@@ -24,6 +26,21 @@ def one_thread_a_process() -> Iterator[None]:
             del os.environ["OMP_NUM_THREADS"]
         else:
             os.environ["OMP_NUM_THREADS"] = before
+
+
+@contextmanager
+def out_of_reach_of_ctrl_c() -> Iterator[None]:
+    """Processes started meanwhile never hear Ctrl-C, this one hears it afterwards: it decides what is to end.
+
+    A terminal sends it to all of them. What a process does about it itself comes too late: until then it
+    imports, and would end with a traceback.
+    """
+    resource_tracker.ensure_running()  # starting it lets signals through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def leave_with_parent() -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import signal
 import sys
 import traceback
 from collections import deque
@@ -20,7 +19,7 @@ from typing import Any, Generic, TypeVar
 from tqdm import tqdm
 
 from mskgrasp.cli import explain_os_error
-from mskgrasp.cores import leave_with_parent, one_thread_a_process, use_one_core
+from mskgrasp.cores import leave_with_parent, one_thread_a_process, out_of_reach_of_ctrl_c, use_one_core
 from mskgrasp.errors import MskgraspError
 
 MAX_TRIES = 3
@@ -120,7 +119,7 @@ def spread(
     workers: list[_Worker] = []
     try:
         while waiting or any(worker.ticket for worker in workers):
-            with one_thread_a_process():
+            with one_thread_a_process(), out_of_reach_of_ctrl_c():
                 while waiting and len(workers) < min(n_workers, len(jobs)):
                     workers.append(_start(context, work))
             for worker in workers:
@@ -159,15 +158,16 @@ def spread(
 
 
 def results(
-    work: Work[Settings, Job, Result], jobs: Sequence[Job], n_workers: int
+    work: Work[Settings, Job, Result], jobs: Sequence[Job], n_workers: int, apart: bool = False
 ) -> Generator[Result, None, None]:
     """What `spread` is told, and a line on stderr where a process was lost.
 
-    With one worker, or one job, the jobs are done in this process; then whatever they raise is raised here.
+    A single job is done in this process, as are all with one worker unless they are to be done apart; then
+    whatever they raise is raised here.
     """
     if not jobs:
         return
-    if n_workers == 1 or len(jobs) < 2:
+    if len(jobs) < 2 or (n_workers == 1 and not apart):
         with work.bench(work.settings) as do:
             for job in jobs:
                 yield from do(job)
@@ -223,7 +223,6 @@ def _work(
     connection: Connection, bench: Bench[Any, Any, Any], settings: Any, lost_by: tuple[type[Exception], ...]
 ) -> None:
     """A process's life: receive a job, do it, say so."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     leave_with_parent()
     try:
         use_one_core()

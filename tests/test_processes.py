@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -82,6 +85,39 @@ def test_what_a_fresh_process_may_mend_is_tried_again(capfd: pytest.CaptureFixtu
     with pytest.raises(WorkerFailed, match="the cell does not answer"):
         list(results(Work(bench, 3, lost_by=(TimeoutError,)), [1, -3], 2))
     assert capfd.readouterr().err.count("-3 is made again") == MAX_TRIES - 1
+
+
+@contextmanager
+def signals(_: None) -> Iterator[Callable[[int], Iterator[set[int]]]]:
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    yield lambda job: iter([blocked])
+
+
+def test_ctrl_c_reaches_the_program_but_no_worker_however_young():
+    blocked = list(results(Work(signals, None), [0], 1, apart=True)) + list(
+        results(Work(signals, None), [1, 2], 2)
+    )
+    assert [signal.SIGINT in found for found in blocked] == [False, True, True]
+    # A terminal sends it to all of them, whatever they are doing: these workers have just begun to import.
+    code = """
+import os, signal
+from mskgrasp import processes
+from mskgrasp.cli import run
+from tests.test_processes import bench
+
+def start_and_interrupt(*arguments, start=processes._start):
+    worker = start(*arguments)
+    os.killpg(0, signal.SIGINT)
+    return worker
+
+processes._start = start_and_interrupt
+run(lambda: list(processes.results(processes.Work(bench, 3), [1, 2], 2)))
+"""
+    told = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # where the tests' own is ignored
+    )  # fmt: skip
+    assert (told.returncode, told.stderr) == (130, "stopped by Ctrl-C; what was finished is kept\n")
 
 
 def test_whoever_closes_the_iterator_ends_the_workers():

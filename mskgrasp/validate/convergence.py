@@ -5,12 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-import multiprocessing
 import os
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,19 +18,14 @@ import torch
 
 from mskgrasp.collect.shard import draw_attempt
 from mskgrasp.collect.work import versions
-from mskgrasp.cores import one_thread_a_process
-from mskgrasp.errors import MskgraspError
 from mskgrasp.parts import load_part
+from mskgrasp.processes import Work, results
 from mskgrasp.settings import Physics
 from mskgrasp.validate.config import Setting
 from tasks import GraspDisplacementEnv
 from tasks.renderer import render_backend
 
 KEPT = ("success", "failure", "displacement", "tilt", "penetration", "fastest", "seconds")
-
-
-class ValidationFailed(MskgraspError):
-    """The validation could not be carried out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +74,7 @@ def draw_grasps(
     """Draws n starts and grasps of each part as the collector does; those that were drawn before are kept.
 
     Raises:
-        ValidationFailed: A worker died.
+        WorkerFailed: Processes died again and again.
     """
     drawn = []
     for folder in folders:
@@ -89,8 +82,7 @@ def draw_grasps(
         name = f"{part.name}-{part.content_hash[:12]}-{seed}-{n}.npz"
         drawn.append(Drawn(folder=folder, file=out / "grasps" / name))
     jobs = [(str(one.folder), n, seed, str(one.file)) for one in drawn if not one.file.exists()]
-    with one_thread_a_process():
-        _in_parallel(_draw, jobs, workers, report)
+    _in_parallel(_draw, jobs, workers, report)
     return drawn
 
 
@@ -111,7 +103,7 @@ def run_settings(
         report: Told how many grasps were tried.
 
     Raises:
-        ValidationFailed: A worker died.
+        WorkerFailed: Processes died again and again.
     """
     jobs = []
     for setting in settings:
@@ -124,27 +116,24 @@ def run_settings(
                 jobs.append((setting, one, file))
     # The finest first: what takes longest must not be begun last.
     jobs.sort(key=lambda job: -job[0].physics.rate_hz * job[0].physics.position_iterations)
-    with one_thread_a_process():
-        _in_parallel(_try_grasps, jobs, workers, report)
+    _in_parallel(_try_grasps, jobs, workers, report)
     return {setting.name: _read(out, setting, drawn) for setting in settings}
 
 
 def _in_parallel(
     function: Callable[..., int], jobs: Sequence[tuple], workers: int, report: Callable[[int], None]
 ) -> None:
-    if not jobs:
-        return
-    context = multiprocessing.get_context("spawn")  # a forked simulator shares the parent's driver state
-    pool = ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context)
-    try:
-        for future in as_completed([pool.submit(function, *job) for job in jobs]):
-            report(future.result())
-    except BrokenProcessPool as error:
-        raise ValidationFailed(
-            "a worker died (out of memory?): run again with fewer --workers; what was finished is kept"
-        ) from error
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    # Apart, even with one worker: every job loads its own scenes, and a process is one simulator's.
+    for tried in results(Work(_bench, function, name=lambda job: str(job[0])), jobs, workers, apart=True):
+        report(tried)
+
+
+@contextmanager
+def _bench(function: Callable[..., int]) -> Iterator[Callable[[tuple], Iterator[int]]]:
+    def work(job: tuple) -> Iterator[int]:
+        yield function(*job)
+
+    yield work
 
 
 def _make_env(folder: str, physics: Physics, renderer: str) -> tuple[gymnasium.Env, GraspDisplacementEnv]:
