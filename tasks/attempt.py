@@ -119,8 +119,8 @@ class Attempt:
         motion.place(top_down(_double(grasp))[0] if down is None else down[0], width)
         self._speed.start(motion.seconds)
         laid = self._part_pose()
-        with motion.coarsely():
-            motion.step(motion.n_steps(physics.settle_s))
+        # Finely: a part lies some micrometres deep in the table, and how many depends on the step.
+        motion.step(motion.n_steps(physics.settle_s))
         rest = self._part_pose()
         settled = at_rest(laid, rest)
         collided, touched = xp.zeros_like(settled), xp.zeros_like(settled)

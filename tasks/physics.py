@@ -35,12 +35,17 @@ def _power_of_two(count: int) -> int:
     return 1 << max(0, count - 1).bit_length()
 
 
+def _control_freq(rate_hz: int) -> int:
+    """20 Hz, as in ManiSkill's own tasks, or what is next below it that divides the rate."""
+    return next(hz for hz in range(20, 0, -1) if rate_hz % hz == 0)
+
+
 def sim_config(physics: Physics, n_hulls: int) -> SimConfig:
     """ManiSkill's configuration for these settings, and for so many hulls in all sub-scenes together."""
     return SimConfig(
         spacing=2.0,  # far sub-scenes lose float32 precision; parts and arms need under 2 m
         sim_freq=physics.rate_hz,
-        control_freq=physics.rate_hz // 25,
+        control_freq=_control_freq(physics.rate_hz),
         gpu_memory_config=gpu_memory(n_hulls),
         scene_config=SceneConfig(
             contact_offset=physics.contact_offset,

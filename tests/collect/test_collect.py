@@ -45,7 +45,7 @@ def test_labels_obey_the_definitions(collected):
         held = attempts.displacement[attempts.success]
         assert (np.linalg.norm(held[:, :3], axis=1) < 0.05).all()
         assert (attempts.grasp[:, 2] >= 0.0105 - 1e-6).all()
-        assert info.physics["rate_hz"] == 500
+        assert info.physics["rate_hz"] == 1000
 
 
 def test_a_finished_run_has_nothing_left_to_do(collected):

@@ -114,7 +114,9 @@ def test_grasps_are_tried_once_and_read_afterwards(tmp_path):
 
 
 def test_the_grid_holds_the_setting_under_test_and_the_floor():
-    config = ValidateConfig(rates_hz=(250, 1000), iterations=(8, 50), physics=Physics(rate_hz=500))
+    config = ValidateConfig(
+        rates_hz=(250, 1000), iterations=(8, 50), physics=Physics(rate_hz=500, position_iterations=25)
+    )
     settings = {setting.name: setting for setting in config.settings()}
     assert {"250 Hz, 8 it", "1000 Hz, 50 it", "500 Hz, 25 it"} < set(settings)
     assert settings[CELL_FLOOR].shift == 1e-4 and settings[CELL_FLOOR].physics == settings[FLOOR].physics
