@@ -26,6 +26,8 @@ TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
 SETTLE_S = 0.15
 """How long the drives may settle at the end of a motion, s."""
+LOOK_S = 0.004
+"""Time between two looks at the force on a hand that moves, s."""
 UNREACHED = 1e-4
 _WAYPOINT_M = 0.01
 
@@ -103,15 +105,18 @@ class SapienArm(Arm):
             return float((contacts.outer_force() if self._force else contacts.hand_force())[0])
 
         # Pads that close on a groove press the part on the table; that eases as the hand rises.
-        pressed = felt() if self._force else 0.0
+        pressed = last = felt() if self._force else 0.0
 
         def check(_: int) -> bool:
-            nonlocal pressed
+            nonlocal pressed, last
+            # In the mean of two looks: a part that is set down meets the table within a step, with a force
+            # that is the higher the shorter the step.
             force = felt()
+            mean, last = (last + force) / 2, force
             pressed = min(pressed, force)
-            return self._stop.is_set() or force - pressed > limit
+            return self._stop.is_set() or mean - pressed > limit
 
-        if not motion.follow(path[:, None], check=check):
+        if not motion.follow(path[:, None], check=check, check_every=motion.n_steps(LOOK_S)):
             raise MotionAborted(
                 f"contact force over {limit:.0f} N: the arm stopped; call recover() when it is safe"
             )

@@ -205,7 +205,7 @@ def test_an_arm_arrives_exactly_and_keeps_its_fingers(env, lay):
 def test_a_hand_that_rests_on_the_part_is_not_pressed_into_it(env, attempt, monkeypatch):
     overlaps: list[float] = []
     short: list[float] = []
-    z = 0.03 + 0.0095 - 0.0001  # a pad of the open hand would end 0.1 mm inside the block
+    z = 0.03 + 0.0095 - 0.00007  # a pad of the open hand would end 0.07 mm inside the block
 
     def looked(self, *given, **named):
         overlaps.append(float(env.contacts.penetration()[0]))
@@ -230,13 +230,12 @@ def test_an_arm_that_its_reflex_has_stopped_is_not_put_where_it_was_sent(env, la
     assert np.abs(robot.get_qpos()[0, :7].numpy() - home[0].numpy()).max() < 0.29
 
 
-@pytest.mark.parametrize("rate_hz", [250, 500])
-def test_where_an_arm_is_on_its_path_does_not_depend_on_the_rate(env, lay, monkeypatch, rate_hz):
+def test_where_an_arm_is_on_its_path_does_not_depend_on_the_rate(env, lay, monkeypatch):
     """Aimed at the ends of its steps it would be ahead, the more the longer they are."""
     goal = np.array([[0.5, 0.05, 0.15, 0.0]])
 
-    def leads(rate: int) -> np.ndarray:
-        """How far the hand is ahead of its path, every 20 ms, m."""
+    def leads(rate: int) -> tuple[np.ndarray, np.ndarray]:
+        """How far the hand is ahead of its path, every 20 ms, m; and the path's speed then, m/s."""
         lay("light")
         motion = env.motion
         monkeypatch.setattr(motion, "rate_hz", rate)
@@ -245,15 +244,21 @@ def test_where_an_arm_is_on_its_path_does_not_depend_on_the_rate(env, lay, monke
         heights = 0.05 + 0.1 * ease(len(path))
         motion.place(path[0])
         found: list[float] = []
+        every = rate // 50
         motion.follow(
             path,
             check=lambda i: found.append(float(env.tcp_pose().position[0, 2]) - heights[i]),
-            check_every=rate // 50,
+            check_every=every,
         )
         env.scene.timestep = 1 / env.physics.rate_hz
-        return np.array(found)
+        speeds = np.gradient(heights) * rate
+        return np.array(found), speeds[every - 1 :: every]
 
-    usual, other = leads(env.physics.rate_hz), leads(rate_hz)
-    n = min(len(usual), len(other))
+    (finest, speeds), (fine, _), (coarse, _) = leads(1000), leads(500), leads(250)
+    n = min(len(finest), len(fine), len(coarse))
     assert n > 20
-    assert np.abs(usual[:n] - other[:n]).max() < 3e-5
+    assert np.abs(fine[:n] - coarse[:n]).max() < 3e-5
+    # In iterations of 20 us joints that turn in float32 jitter by some 20 um: the mean is to be the same.
+    for other in (fine, coarse):
+        seconds = (other[:n] - finest[:n]) @ speeds[:n] / (speeds[:n] @ speeds[:n])
+        assert abs(seconds) < 1e-4
