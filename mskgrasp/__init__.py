@@ -1,15 +1,11 @@
 """Grasps of industrial parts that are robust, precise, and know how the part will shift."""
 
+import signal
 import sys
 
 __version__ = "0.1.0"
 
-if sys.argv[:1] == ["-m"]:
-    # A program is being started: Ctrl-C while its imports run is as little a defect as later.
-    def _quiet_interrupt(kind, error, trace, report=sys.excepthook) -> None:  # noqa: ANN001
-        if issubclass(kind, KeyboardInterrupt):
-            print("stopped by Ctrl-C before anything was done", file=sys.stderr)
-        else:
-            report(kind, error, trace)
-
-    sys.excepthook = _quiet_interrupt
+if sys.argv[:1] == ["-m"] and sys.orig_argv[-len(sys.argv)].startswith("mskgrasp."):
+    # A program is being started, and Ctrl-C waits for `mskgrasp.cli.run`: a library whose import it would
+    # interrupt may swallow it, and go on without what it was importing.
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

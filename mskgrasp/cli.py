@@ -5,8 +5,11 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
+import os
 import re
+import signal
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -111,18 +114,29 @@ def explain_os_error(error: OSError) -> str:
     return f"{error.strerror or error}{place}; {remedy}"
 
 
+def _heed_ctrl_c(unraisable: Any, report: Callable[[Any], None] = sys.unraisablehook) -> None:
+    """One that comes while Python cleans up an object would be reported, and forgotten: it comes again."""
+    if unraisable.exc_type is KeyboardInterrupt:
+        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
+    else:
+        report(unraisable)
+
+
 def run(main: Callable[[], int | None]) -> None:
     """Runs a program's ``main`` and ends the process: 0, 1 failure, 2 usage, 130 Ctrl-C.
 
     An error that a user can mend becomes one line on standard error; anything else is a defect and
     keeps its traceback.
     """
+    sys.unraisablehook = _heed_ctrl_c
     try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # it was held while all was imported
         code = main() or 0
     except MskgraspError as error:
         print(f"error: {error}", file=sys.stderr)
         code = error.exit_code
     except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # who presses it twice wants no more than this
         print("stopped by Ctrl-C; what was finished is kept", file=sys.stderr)
         code = 130
     except BrokenPipeError:

@@ -1,4 +1,4 @@
-"""Jobs spread over processes, each with a simulator of its own; results come as soon as they are there.
+"""Jobs spread over processes, each with a bench of its own; results come as soon as they are there.
 
 A process that dies takes nothing with it: what it had not told yet is done again by a fresh one.
 """
@@ -162,12 +162,12 @@ def results(
 ) -> Generator[Result, None, None]:
     """What `spread` is told, and a line on stderr where a process was lost.
 
-    A single job is done in this process, as are all with one worker unless they are to be done apart; then
+    With one worker, or one job, the jobs are done in this process unless they are to be done apart; then
     whatever they raise is raised here.
     """
     if not jobs:
         return
-    if len(jobs) < 2 or (n_workers == 1 and not apart):
+    if not apart and (n_workers == 1 or len(jobs) < 2):
         with work.bench(work.settings) as do:
             for job in jobs:
                 yield from do(job)

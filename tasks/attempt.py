@@ -243,7 +243,7 @@ class Attempt:
         if not rise(times):
             return False, deepest
         # What the fingers and the table do to the part is done: what follows needs no such fine steps. The
-        # last look does: a part trembles between the pads, and more at half the rate.
+        # last look does: a part trembles between the pads, and more in coarse steps.
         with motion.coarsely():
             rest = 1 - times[-1]
             if rest > 0 and not rise(times[-1] + rest * _moments(motion.n_steps(rest * seconds))):

@@ -93,31 +93,77 @@ def signals(_: None) -> Iterator[Callable[[int], Iterator[set[int]]]]:
     yield lambda job: iter([blocked])
 
 
-def test_ctrl_c_reaches_the_program_but_no_worker_however_young():
-    blocked = list(results(Work(signals, None), [0], 1, apart=True)) + list(
-        results(Work(signals, None), [1, 2], 2)
-    )
-    assert [signal.SIGINT in found for found in blocked] == [False, True, True]
-    # A terminal sends it to all of them, whatever they are doing: these workers have just begun to import.
-    code = """
-import os, signal
+def test_no_worker_hears_ctrl_c_and_a_single_job_is_done_here_or_apart():
+    here, apart = (list(results(Work(signals, None), [0], 1, apart=apart)) for apart in (False, True))
+    several = list(results(Work(signals, None), [1, 2], 2))
+    assert [signal.SIGINT in blocked for blocked in here + apart + several] == [False, True, True, True]
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+@pytest.mark.parametrize("threads", [0, 1])
+def test_ctrl_c_while_workers_are_started_is_heard_by_the_program_alone(threads: int):
+    """A terminal sends it to all of them; a progress bar's thread may be the one that is handed it."""
+    code = f"""
+import os, signal, threading, time
+from multiprocessing import util
 from mskgrasp import processes
 from mskgrasp.cli import run
 from tests.test_processes import bench
 
-def start_and_interrupt(*arguments, start=processes._start):
-    worker = start(*arguments)
+def start_and_interrupt(*arguments, start=util.spawnv_passfds):
+    process = start(*arguments)
     os.killpg(0, signal.SIGINT)
-    return worker
+    time.sleep(0.02)
+    return process
 
-processes._start = start_and_interrupt
+util.spawnv_passfds = start_and_interrupt
+for _ in range({threads}):
+    threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
 run(lambda: list(processes.results(processes.Work(bench, 3), [1, 2], 2)))
 """
+    assert interrupted(code) == (130, STOPPED)
+
+
+def test_ctrl_c_while_python_cleans_up_is_not_lost():
+    code = """
+import os, signal, time
+from mskgrasp.cli import run
+
+class Scene:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.1)
+
+def main():
+    Scene()
+    time.sleep(60)
+
+run(main)
+"""
+    assert interrupted(code) == (130, STOPPED)
+
+
+def test_ctrl_c_while_a_program_imports_is_not_lost():
+    program = subprocess.Popen(
+        [sys.executable, "-m", "mskgrasp.plan"], stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
+    status = Path(f"/proc/{program.pid}/status")
+    while not int(status.read_text().partition("SigBlk:")[2].split()[0], 16) & 1 << signal.SIGINT - 1:
+        assert program.poll() is None
+    program.send_signal(signal.SIGINT)
+    assert (program.communicate()[1], program.returncode) == (STOPPED, 130)
+
+
+STOPPED = "stopped by Ctrl-C; what was finished is kept\n"
+
+
+def interrupted(code: str) -> tuple[int, str]:
     told = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, start_new_session=True,
+        [sys.executable, "-c", code], capture_output=True, text=True, start_new_session=True, timeout=50,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # where the tests' own is ignored
     )  # fmt: skip
-    assert (told.returncode, told.stderr) == (130, "stopped by Ctrl-C; what was finished is kept\n")
+    return told.returncode, told.stderr
 
 
 def test_whoever_closes_the_iterator_ends_the_workers():

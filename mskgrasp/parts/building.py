@@ -40,7 +40,7 @@ def build_parts(names: Sequence[str], before: Index, workers: int) -> Generator[
         workers: Processes.
 
     Raises:
-        WorkerFailed: Three processes died of a part.
+        WorkerFailed: A part could not be worked on: three processes died of it, or the disk is full.
         KeyboardInterrupt: The user stopped; a single part's decomposition is finished first, some seconds.
     """
     missing = []
@@ -56,7 +56,7 @@ def build_parts(names: Sequence[str], before: Index, workers: int) -> Generator[
             missing.append(name)
     # A process for each core serves better than the threads of CoACD (1.45 times with two); starting one
     # takes longer than most parts, so that a single part is built here.
-    yield from results(Work(_bench, None), missing, max(1, workers), apart=True)
+    yield from results(Work(_bench, None), missing, max(1, workers), apart=len(missing) > 1)
 
 
 def _ready(name: str, recipe: str) -> Entry | None:

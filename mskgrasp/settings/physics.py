@@ -17,7 +17,7 @@ class Physics(Config):
     """Settings of the simulated cell; SI units."""
 
     rate_hz: int = Field(default=1000, ge=100)
-    """Simulation steps a second. At 500 Hz displacements differ by more than the start of a grasp is known;
+    """Simulation steps a second. At 500 Hz displacements are twice as far from those of finer simulation;
     under 250 Hz light parts creep out of the fingers: data is not collected."""
     coarse_rate_hz: int = Field(default=250, ge=100)
     """The same, at most ``rate_hz``, for parts of ``coarse_mass`` and more, in lift and hold, and while one
@@ -27,7 +27,7 @@ class Physics(Config):
     coarse_mass: float = Field(default=0.04, gt=0)
     """Lighter parts are simulated finely throughout, kg: the grip shakes them, the more the longer a step."""
     position_iterations: int = Field(default=50, ge=4)
-    """Solver iterations a step. With 25 a tenth of the parts creep a millimetre more when lifted."""
+    """Solver iterations a step. With 25 displacements are twice as far from those of finer simulation."""
     contact_offset: float = Field(default=0.003, gt=0, le=0.02)
     """Distance at which contacts are generated, m; ManiSkill's 20 mm costs two to four times the time."""
     persistent_manifold: bool = False

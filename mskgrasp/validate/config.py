@@ -47,9 +47,9 @@ class ValidateConfig(Config):
     workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
     """Processes; 0: one for each core."""
     rates_hz: tuple[int, ...] = (125, 250, 500, 1000)
-    """Simulation rates while fingers close; the finest setting has the highest of them throughout."""
+    """Simulation rates; the finest setting has the highest of them, that under test included, throughout."""
     iterations: tuple[int, ...] = (8, 15, 25, 50)
-    """Solver iterations; the highest belong to the finest setting."""
+    """Solver iterations; the most, those under test included, belong to the finest setting."""
     variants: Annotated[dict[str, dict[str, float | bool]], tyro.conf.Suppress] = {}
     """Other values of some physics settings, by a name for the tables: each is tried at the rate and with the
     iterations under test, and held against the same finest setting. It shows what these values decide."""
@@ -97,8 +97,10 @@ class ValidateConfig(Config):
             for rate, count in sorted(pairs)
         ]
         whole = {"skip_air": False}
-        finest = self.at(max(self.rates_hz), max(self.iterations)).model_copy(
-            update=whole | {"coarse_rate_hz": max(self.rates_hz)}
+        # What is under test is never held against what is coarser.
+        finest_hz = max(*self.rates_hz, self.physics.rate_hz)
+        finest = self.at(finest_hz, max(*self.iterations, self.physics.position_iterations)).model_copy(
+            update=whole | {"coarse_rate_hz": finest_hz}
         )
         return [
             *grid,

@@ -124,7 +124,8 @@ def _in_parallel(
     function: Callable[..., int], jobs: Sequence[tuple], workers: int, report: Callable[[int], None]
 ) -> None:
     # Apart, even with one worker: every job loads its own scenes, and a process is one simulator's.
-    for tried in results(Work(_bench, function, name=lambda job: str(job[0])), jobs, workers, apart=True):
+    work = Work(_bench, function, name=lambda job: Path(job[-1]).name)
+    for tried in results(work, jobs, workers, apart=True):
         report(tried)
 
 

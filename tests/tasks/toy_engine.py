@@ -41,7 +41,7 @@ class ToyScene:
 
     def __init__(self, blocks: Tensor, between: Tensor, carried: Tensor, struck: Tensor):
         self.num_envs = len(blocks)
-        self.timestep = 1 / 500
+        self.timestep = 1 / Physics().rate_hz
         self.between, self.carried, self.struck = between, carried, struck
         self.qpos, self.target = torch.zeros(self.num_envs, 9), torch.zeros(self.num_envs, 9)
         self.part = blocks + torch.tensor(BASE_IN_WORLD)
