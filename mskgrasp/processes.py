@@ -119,9 +119,10 @@ def spread(
     workers: list[_Worker] = []
     try:
         while waiting or any(worker.ticket for worker in workers):
-            with one_thread_a_process(), out_of_reach_of_ctrl_c():
-                while waiting and len(workers) < min(n_workers, len(jobs)):
-                    workers.append(_start(context, work))
+            if waiting and len(workers) < min(n_workers, len(jobs)):
+                with one_thread_a_process(), out_of_reach_of_ctrl_c():
+                    while len(workers) < min(n_workers, len(jobs)):
+                        workers.append(_start(context, work))
             for worker in workers:
                 if worker.ticket is None and waiting:
                     _give(worker, waiting.popleft())
