@@ -230,8 +230,9 @@ def main() -> None:
         robot.step()
         hand.step()
         if robot.mode == MOVING and robot.answered:
-            # A robot waits for nobody; here a busy machine must not make the control loop unstable.
-            robot.channel.wait_for_datagram(0.1)
+            # A robot waits for nobody; here a busy machine must not make the control loop unstable. It waits
+            # half the time after which libfranka takes the link for lost.
+            robot.channel.wait_for_datagram(0.5)
         if robot.tick % 10 == 0 and orders.select(0):
             line = sys.stdin.readline()
             if not line:
