@@ -6,10 +6,8 @@ import difflib
 import hashlib
 import json
 import re
-import sys
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -25,6 +23,7 @@ from mskgrasp.parts.measure import MOST_OBLONG, HullFit, hull_fit, longest_axis,
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
 from mskgrasp.parts.resting import stable_poses
 from mskgrasp.parts.solid import MAX_HULL_VERTICES, Solid
+from mskgrasp.parts.versions import PART_VERSION, stamp
 
 MAX_HULL_FACES = 64
 LEGAL_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
@@ -198,22 +197,15 @@ def write_solid(
     )
 
 
-def source_digest() -> str:
-    """Digest of the code that makes any part: when it changes, parts are made anew."""
-    return _digest_of(tuple(f"mskgrasp.parts.{name}" for name in _SHARED))
-
-
-_SHARED = ("build", "measure", "resting", "solid", "pieces", "decompose")
-
-
 def recipe_hash(name: str) -> str:
-    """Digest of everything that decides how a part comes out: code, dimensions, versions."""
+    """Digest of everything that decides how a part comes out: versions, dimensions, vendors' libraries."""
     recipe = recipe_of(name)
+    module = recipe.make.__module__
     text = [
         SCHEMA_VERSION,
-        source_digest(),
-        _digest_of(_modules_behind(recipe.make.__module__)),
-        cad.versions() if recipe.make.__module__.startswith(cad.__name__) else "",
+        stamp("part", PART_VERSION),
+        stamp(".".join(module.split(".")[-2:]), recipe.version),
+        cad.versions() if module.startswith(cad.__name__) else "",
         recipe.name,
         recipe.family,
         recipe.source,
@@ -222,33 +214,6 @@ def recipe_hash(name: str) -> str:
         recipe.dimensions,
     ]
     return hashlib.sha256(json.dumps(text, sort_keys=True).encode()).hexdigest()
-
-
-@cache
-def _modules_behind(name: str) -> tuple[str, ...]:
-    """A family's module and the modules of this package that it uses, sorted."""
-    found: set[str] = set()
-    pending = [name]
-    while pending:
-        module = pending.pop()
-        if module in found or not module.startswith("mskgrasp.parts."):
-            continue
-        found.add(module)
-        for value in vars(sys.modules[module]).values():
-            used = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
-            if isinstance(used, str) and used in sys.modules:
-                pending.append(used)
-    # Bookkeeping that decides no shape.
-    return tuple(sorted(found - {"mskgrasp.parts.families", "mskgrasp.parts.cad"}))
-
-
-@cache
-def _digest_of(modules: tuple[str, ...]) -> str:
-    digest = hashlib.sha256()
-    for module in modules:
-        path = Path(__file__).parent.parent.parent / (module.replace(".", "/") + ".py")
-        digest.update(path.read_bytes() if path.exists() else module.encode())
-    return digest.hexdigest()
 
 
 def _corners(points: np.ndarray) -> np.ndarray:

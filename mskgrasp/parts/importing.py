@@ -8,7 +8,6 @@ import re
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +16,13 @@ import trimesh
 from mskgrasp.errors import BadPart
 from mskgrasp.parts import store
 from mskgrasp.parts.bodies import Bodies, mend
-from mskgrasp.parts.build import LEGAL_NAME, builtin_names, source_digest, write_solid
+from mskgrasp.parts.build import LEGAL_NAME, builtin_names, write_solid
 from mskgrasp.parts.decompose import convex_pieces
 from mskgrasp.parts.mesh_files import POSSIBLE_SIZE_MM, MeshFile, Unit, read_content, read_mesh
 from mskgrasp.parts.part import Part
 from mskgrasp.parts.simplify import for_collision
 from mskgrasp.parts.solid import Solid
+from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION, stamp
 
 USUAL_DENSITY = (10.0, 25_000.0)
 """Foam and osmium, kg/m^3."""
@@ -77,7 +77,8 @@ def import_file(
     check_density(density)
     name = legal_name(path.stem if name is None else name)
     content = read_content(path)
-    recipe = [family, unit, float(density), licence, bodies, path.name, source_digest(), _own_digest()]
+    versions = stamp("part", PART_VERSION), stamp("import", IMPORT_VERSION)
+    recipe = [family, unit, float(density), licence, bodies, path.name, *versions]
     digest = hashlib.sha256(json.dumps(recipe).encode() + hashlib.sha256(content).digest()).hexdigest()
 
     if bodies != "split":
@@ -181,15 +182,3 @@ def _make(
         )
     except BadPart as error:
         raise BadPart(f"{path}: {error}") from error
-
-
-@lru_cache(maxsize=1)
-def _own_digest() -> str:
-    """Digest of the code that reads and mends files: when it changes, parts are imported anew."""
-    here = Path(__file__).parent
-    digest = hashlib.sha256()
-    for name in ("importing.py", "mesh_files.py", "repair.py", "bodies.py", "simplify.py", "surface.py"):
-        digest.update((here / name).read_bytes())
-    for path in sorted((here / "formats").glob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()

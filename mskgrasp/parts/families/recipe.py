@@ -27,6 +27,7 @@ class Recipe:
         dimensions: What ``make`` gets: lengths in millimetres under names that end in ``_mm``, counts.
         make: Turns the dimensions into a shape; without hulls, they are found by decomposition.
         licence: SPDX identifier.
+        version: Raised when `make` gives another shape for the same dimensions.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Recipe:
     dimensions: dict[str, float]
     make: Maker
     licence: str = "Apache-2.0"
+    version: int = 1
 
 
 def table(file_name: str) -> list[dict[str, float]]:
