@@ -22,7 +22,7 @@ class ShardTask:
 
 
 SIMULATION_VERSION = 1
-"""Raised by every change after which the same seed makes other attempts; `tests/versions.py` names the files."""
+"""Raised by every change after which a seed makes other attempts; `tests/versions.py` names the files."""
 
 _FIRST_SIMULATION = "38dc7f58aea7bdfa"
 """What shards carry that were made by version 1 before versions were counted: a digest of its files."""
