@@ -12,16 +12,9 @@ import numpy as np
 
 from hal.device import Device
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
-from hal.limits import (
-    ArmLimits,
-    check_joint_path,
-    check_line,
-    check_target_joints,
-    check_target_pose,
-    shown,
-)
-from mskgrasp.geometry import Pose, pose_distance
-from mskgrasp.grasp import MAX_OPENING
+from hal.limits import ArmLimits, check_joint_path, check_line, check_target_joints, check_target_pose, shown
+from mskgrasp.core.geometry import Pose, pose_distance
+from mskgrasp.core.grasp import MAX_OPENING
 
 JOINT_TOLERANCE = 5e-3
 """A joint motion has arrived within this, radians."""

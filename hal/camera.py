@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hal.device import Device
-from mskgrasp.geometry import Pose
+from mskgrasp.core.geometry import Pose
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from hal.arm import Arm
 from hal.camera import Camera
-from mskgrasp.geometry import Pose
+from mskgrasp.core.geometry import Pose
 
 
 @dataclass(frozen=True, kw_only=True)

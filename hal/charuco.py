@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from pydantic import Field, model_validator
 
-from mskgrasp.config import Config
-from mskgrasp.geometry import Pose
+from mskgrasp.core.config import Config
+from mskgrasp.core.geometry import Pose
 
 MIN_CORNERS = 6
 """A view with fewer corners than half a small board's says little about the board's pose."""

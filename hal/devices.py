@@ -9,15 +9,15 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from hal.arm import Arm
-from hal.calibration import calibration_path
 from hal.camera import Camera
+from hal.camera_calibration import calibration_path
 from hal.cell import Cell, PartFeeder, Workspace
 from hal.errors import OutOfWorkspace
 from hal.execute import APPROACH
 from hal.limits import ArmLimits
-from mskgrasp.config import Config, check_config
-from mskgrasp.errors import BadConfig
-from mskgrasp.grasp import lowest_grasp_z, pose_base_tcp
+from mskgrasp.core.config import Config, check_config
+from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.grasp import lowest_grasp_z, pose_base_tcp
 
 ArmDriver = Literal["franky", "panda_py", "replay"]
 CameraDriver = Literal["kinect2", "replay", "sapien"]

@@ -1,6 +1,6 @@
 """What can go wrong with a cell; every error says what to do."""
 
-from mskgrasp.errors import MskgraspError
+from mskgrasp.core.errors import MskgraspError
 
 
 class HalError(MskgraspError):

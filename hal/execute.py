@@ -9,8 +9,8 @@ import numpy as np
 from hal.arm import JOINT_TOLERANCE
 from hal.cell import Cell
 from hal.errors import MotionAborted, Stopped
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import HOLD_S, MAX_OPENING, MIN_GAP, pose_base_tcp
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import HOLD_S, MAX_OPENING, MIN_GAP, pose_base_tcp
 
 APPROACH = 0.12
 """Height over the table from which the straight descent begins, m."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hal.errors import OutOfWorkspace
-from mskgrasp.geometry import Pose, straight_line
-from mskgrasp.grasp import PAD_REACH, TABLE_CLEARANCE, lowest_grasp_z
+from mskgrasp.core.geometry import Pose, straight_line
+from mskgrasp.core.grasp import PAD_REACH, TABLE_CLEARANCE, lowest_grasp_z
 
 _CHECKS = 33
 """Points of a motion that are looked at; on a motion of 2 m they are 6 cm apart."""

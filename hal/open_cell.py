@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Literal, assert_never, get_args
 
 from hal.cell import Cell
-from mskgrasp.config import check_config, read_yaml
-from mskgrasp.errors import BadConfig
+from mskgrasp.core.config import check_config, read_yaml
+from mskgrasp.core.errors import BadConfig
 
 CellType = Literal["sapien", "devices", "recorded", "replay"]
 

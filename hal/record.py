@@ -17,9 +17,9 @@ from pydantic import Field
 from hal.open_cell import cell_from_yaml
 from hal.replay import read_recording
 from hal.replay.cell import recorded_cell
-from mskgrasp.cli import parse, run
-from mskgrasp.config import Config
-from mskgrasp.errors import UsageError
+from mskgrasp.core.config import Config
+from mskgrasp.core.errors import UsageError
+from mskgrasp.runtime.cli import parse, run
 
 DESCRIPTION = """Writes the frames of a cell's camera, or a whole run on the cell, into one file.
 

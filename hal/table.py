@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mskgrasp.geometry import Pose
+from mskgrasp.core.geometry import Pose
 
 _INLIER = 0.012
 """What lies nearer to the plane is table, metres: some five times the noise of a Kinect v2."""

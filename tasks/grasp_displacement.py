@@ -17,22 +17,22 @@ from mani_skill.utils.structs.types import SimConfig
 from sapien.physx import PhysxMaterial
 from torch import Tensor
 
-from mskgrasp.config import check_config
-from mskgrasp.errors import BadConfig
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import MIN_RISE, lowest_grasp_z
+from mskgrasp.core.config import check_config
+from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import MIN_RISE, lowest_grasp_z
+from mskgrasp.core.panda_kinematics import HOME
+from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionError, ExecutionNoise, Overhead, Physics, Region
 from mskgrasp.parts import Part, find_part, starter_names
-from mskgrasp.settings import REGION, TABLE_Z, ExecutionError, ExecutionNoise, Overhead, Physics, Region
-from tasks.attempt import Attempt
-from tasks.camera import camera_config, without_reflection_table
-from tasks.contacts import HandContacts
-from tasks.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_world
-from tasks.kinematics import HOME
-from tasks.motion import PandaMotion
-from tasks.panda import GraspPanda, panda_for
-from tasks.part_actor import build_part, hull_corners
-from tasks.physics import MOST_HULLS, sim_config
-from tasks.placement import random_resting_pose
+from tasks.attempt.attempt import Attempt
+from tasks.robot.contacts import HandContacts
+from tasks.robot.motion import PandaMotion
+from tasks.robot.panda import GraspPanda, panda_for
+from tasks.scene.camera import camera_config, without_reflection_table
+from tasks.scene.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_world
+from tasks.scene.part_actor import build_part, hull_corners
+from tasks.scene.physics import MOST_HULLS, sim_config
+from tasks.scene.resting_pose import random_resting_pose
 
 _EXACT = ExecutionNoise()
 
@@ -50,7 +50,7 @@ class GraspDisplacementEnv(BaseEnv):
     - the part: one for each sub-scene, given by ``parts`` or drawn from the built-in ones
     - its resting pose, by the poses' probabilities
     - its place, uniform in a 24 x 24 cm region, and its turn about the vertical
-    - where ``noise`` asks for it: errors of arm, gripper force, friction and camera (`mskgrasp.settings`)
+    - where ``noise`` asks for it: errors of arm, gripper force, friction and camera (`core.settings`)
 
     **Success Conditions:**
     - after the lift and 0.2 s of holding, both pads touch the part and their gap is over 0.5 mm
@@ -91,9 +91,9 @@ class GraspDisplacementEnv(BaseEnv):
         Args:
             *args: Passed to ManiSkill.
             parts: Names or folders of parts, dealt out over the sub-scenes; drawn when None.
-            physics: Overrides of `mskgrasp.settings.Physics`.
-            camera: Overrides of `mskgrasp.settings.Overhead`.
-            noise: Overrides of `mskgrasp.settings.ExecutionNoise`, all of which is off.
+            physics: Overrides of `mskgrasp.core.settings.Physics`.
+            camera: Overrides of `mskgrasp.core.settings.Overhead`.
+            noise: Overrides of `mskgrasp.core.settings.ExecutionNoise`, all of which is off.
             region: Where parts lie, base frame.
             robot_uids: Only ``panda_grasp``.
             num_envs: Sub-scenes; more than one needs PhysX on a GPU.
@@ -296,7 +296,7 @@ class GraspDisplacementEnv(BaseEnv):
     # ------------------------------------------------------------------ stepping
 
     def try_grasp(self, grasp: Tensor) -> dict[str, Tensor]:
-        """One whole attempt in every sub-scene; see `tasks.attempt.Attempt.run`.
+        """One whole attempt in every sub-scene; see `tasks.attempt.attempt.Attempt.run`.
 
         Args:
             grasp: (n, 4) commanded x, y, z, theta, base frame; where the hand truly goes, ``noise`` says.

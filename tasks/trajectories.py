@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 from mani_skill.utils.io_utils import dump_json
 
-from mskgrasp.geometry import Pose, quat_to_matrix
-from tasks.frames import to_world
+from mskgrasp.core.geometry import Pose, quat_to_matrix
+from tasks.scene.frames import to_world
 
 ENV_ID = "GraspDisplacement-v1"
 MAX_EPISODE_STEPS = 250

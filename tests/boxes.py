@@ -10,7 +10,7 @@ import trimesh
 
 from mskgrasp.parts import Part
 from mskgrasp.parts.build import write_solid
-from mskgrasp.parts.solid import Solid
+from mskgrasp.parts.solids.solid import Solid
 
 
 def make_box(cache: Path, name: str, size: tuple[float, float, float], mass: float) -> Part:

@@ -23,13 +23,13 @@ LONGEST = (
     "parts/test_catalogue_parts.py",
     "hal_contract/test_arm_contract.py",
     "collect/test_collect.py",
-    "franka/test_faults.py",
+    "hal/franka/test_faults.py",
     "hal_contract/test_same_code.py",
     "validate/test_validate.py",
     "collect/test_crashes.py",
     "collect/test_cluster.py",
-    "test_evaluate.py",
-    "test_palletize.py",
+    "evaluate/test_evaluate.py",
+    "palletize/test_palletize.py",
     "sim_in_the_loop/test_precise_grasps.py",
 )
 """Files that take a minute or more: begun first, so that no process is left alone with one at the end."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from mskgrasp import cli
+from mskgrasp.runtime import cli
 
 # A shell's background job ignores Ctrl-C, and so would all that it starts: pytest, and the program.
 _HEAR = (

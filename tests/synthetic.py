@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from hal.camera import RgbdFrame
-from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, write_shard
-from mskgrasp.finding import view_part
-from mskgrasp.geometry import Pose, quat_about_z, quat_multiply, quat_to_matrix, wrap_half_turn
-from mskgrasp.grasp import (
+from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, quat_to_matrix, wrap_half_turn
+from mskgrasp.core.grasp import (
     FAILURES,
     MAX_OPENING,
     PAD_REACH,
@@ -20,6 +18,8 @@ from mskgrasp.grasp import (
     pose_base_tcp,
     sample_grasps,
 )
+from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, write_shard
+from mskgrasp.perception.part_detection import view_part
 
 TABLE_Z = 0.0
 REGION = (0.335, 0.575, -0.12, 0.12)

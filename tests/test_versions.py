@@ -1,5 +1,5 @@
-from mskgrasp.collect.work import other_versions, versions
 from mskgrasp.parts.build import builtin_names, recipe_hash
+from mskgrasp.simulation.versions import other_versions, versions
 from tests.versions import changed, code_digest
 
 

@@ -15,30 +15,33 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from mskgrasp.collect.work import SIMULATION_VERSION
-from mskgrasp.parts import cad, families
+from mskgrasp.parts.recipes import cad, families
 from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION
+from mskgrasp.simulation.versions import SIMULATION_VERSION
 
 ROOT = Path(__file__).parents[1]
 STORED = Path(__file__).with_name("versions.json")
 
 SIMULATION = (
     "tasks/**/*.py",
-    "mskgrasp/settings/*.py",
-    "mskgrasp/geometry.py",
-    "mskgrasp/grasp.py",
-    "mskgrasp/finding.py",
-    "mskgrasp/collect/shard.py",
+    "mskgrasp/core/settings/*.py",
+    "mskgrasp/core/geometry.py",
+    "mskgrasp/core/grasp.py",
+    "mskgrasp/core/panda_kinematics.py",
+    "mskgrasp/perception/part_detection.py",
+    "mskgrasp/simulation/shard.py",
 )
-PART = tuple(
-    f"mskgrasp/parts/{name}.py" for name in ("build", "measure", "resting", "solid", "pieces", "decompose")
+PART = (
+    "mskgrasp/parts/build.py",
+    *(
+        f"mskgrasp/parts/solids/{name}.py"
+        for name in ("measure", "stable_poses", "solid", "pieces", "decompose")
+    ),
 )
 IMPORT = (
-    *(
-        f"mskgrasp/parts/{name}.py"
-        for name in ("importing", "mesh_files", "repair", "bodies", "simplify", "surface")
-    ),
-    "mskgrasp/parts/formats/*.py",
+    *(f"mskgrasp/parts/importing/{name}.py" for name in ("import_file", "mesh_files", "repair", "bodies")),
+    *(f"mskgrasp/parts/solids/{name}.py" for name in ("simplify", "surface")),
+    "mskgrasp/parts/importing/formats/*.py",
 )
 
 

@@ -21,8 +21,8 @@ from hal.franka.kinematics import forward_pose, reachable
 from hal.franka.link import DriverLink
 from hal.franka.path import JointPath, joint_path, straight_path
 from hal.limits import ArmLimits
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import MAX_OPENING
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import MAX_OPENING
 
 TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""

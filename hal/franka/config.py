@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from mskgrasp.config import Config
+from mskgrasp.core.config import Config
 
 Seven = tuple[float, float, float, float, float, float, float]
 Robot = Literal["panda", "fr3"]

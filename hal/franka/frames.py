@@ -13,7 +13,7 @@ import numpy as np
 
 from hal.errors import NotConnected
 from hal.franka.kinematics import TCP_OFFSET
-from mskgrasp.geometry import Pose
+from mskgrasp.core.geometry import Pose
 
 _TURN = math.cos(math.pi / 4)
 F_T_EE = np.array([[_TURN, _TURN, 0, 0], [-_TURN, _TURN, 0, 0], [0, 0, 1, TCP_OFFSET], [0, 0, 0, 1.0]])

@@ -1,6 +1,6 @@
 """Kinematics of the Panda and of the FR3, which share their geometry, in plain numpy.
 
-The machine beside a real robot has no simulator, so `tasks.kinematics` (batched torch) is out of reach;
+The machine beside a real robot has no simulator, so `panda_kinematics` (batched torch) is out of reach;
 a test holds both to the same poses. Parameters: Franka Control Interface documentation,
 "Denavit-Hartenberg parameters" (Craig's convention), end effector of the Franka Hand.
 """
@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from mskgrasp.geometry import Pose
+from mskgrasp.core.geometry import Pose
 
 TCP_OFFSET = 0.1034
 """From the flange to the TCP along the hand, metres (libfranka's default end effector, Franka Hand)."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from hal.errors import OutOfWorkspace
 from hal.franka.kinematics import forward_pose, solved, track, within
-from mskgrasp.geometry import Pose, pose_distance, straight_line
+from mskgrasp.core.geometry import Pose, pose_distance, straight_line
 
 PERIOD_S = 0.05
 """Time between two knots of a path, s: a cubic between them is off by less than 0.1 mm at 0.5 m/s."""

@@ -9,14 +9,14 @@ from dataclasses import asdict
 
 import numpy as np
 
-from hal.calibration import Calibration, read_calibration
 from hal.camera import Camera, RgbdFrame
+from hal.camera_calibration import Calibration, read_calibration
 from hal.errors import CaptureFailed, CommunicationLost, NotConnected
 from hal.kinect2.config import Kinect2Config
 from hal.kinect2.driver import Kinect2Settings
 from hal.kinect2.images import HEIGHT, WIDTH, metric_depth, rgb_colour, unmirrored_intrinsics
 from hal.kinect2.link import ProcessEnded, WorkerLink
-from mskgrasp.geometry import Pose
+from mskgrasp.core.geometry import Pose
 
 _log = logging.getLogger(__name__)
 _GRACE_S = 1.0

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from mskgrasp.config import Config
+from mskgrasp.core.config import Config
 
 Pipeline = Literal["cpu", "opengl"]
 

@@ -13,8 +13,8 @@ from hal.replay.config import ReplayArmConfig
 from hal.replay.events import COMMANDS, arm_state, plain
 from hal.replay.playback import Playback
 from hal.replay.reader import read_recording
-from mskgrasp.errors import MskgraspError
-from mskgrasp.geometry import Pose
+from mskgrasp.core.errors import MskgraspError
+from mskgrasp.core.geometry import Pose
 
 
 class ReplayArm(Arm):

@@ -15,7 +15,7 @@ from hal.replay.playback import Playback
 from hal.replay.reader import read_recording
 from hal.replay.recorder import RecordingArm, RecordingCamera, RecordingFeeder, RecordingTracker
 from hal.replay.writer import RecordingWriter
-from mskgrasp.geometry import Pose
+from mskgrasp.core.geometry import Pose
 
 
 def recorded_cell(cell: Cell, out: Path) -> Cell:

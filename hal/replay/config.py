@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from mskgrasp.config import Config
+from mskgrasp.core.config import Config
 
 
 class Tolerances(Config):

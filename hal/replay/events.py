@@ -10,9 +10,9 @@ import numpy as np
 from hal import errors as hal_errors
 from hal.arm import ArmState, GraspOutcome
 from hal.errors import HalError, Stopped
-from mskgrasp import errors as base_errors
-from mskgrasp.errors import MskgraspError
-from mskgrasp.geometry import Pose
+from mskgrasp.core import errors as base_errors
+from mskgrasp.core.errors import MskgraspError
+from mskgrasp.core.geometry import Pose
 
 SCHEMA = 1
 KIND = "mskgrasp cell recording"

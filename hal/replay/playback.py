@@ -12,7 +12,7 @@ from hal.errors import CaptureFailed, NotRecorded
 from hal.replay.config import Tolerances
 from hal.replay.events import COMMANDS, Event, pose, rebuild
 from hal.replay.reader import Recording
-from mskgrasp.geometry import pose_distance
+from mskgrasp.core.geometry import pose_distance
 
 
 class Playback:

@@ -13,7 +13,7 @@ from hal.cell import PartFeeder, PartTracker
 from hal.errors import HalError
 from hal.replay.events import plain
 from hal.replay.writer import RecordingWriter
-from mskgrasp.geometry import Pose
+from mskgrasp.core.geometry import Pose
 
 
 class RecordingCamera(Camera):

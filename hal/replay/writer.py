@@ -18,7 +18,7 @@ from hal.arm import Arm
 from hal.camera import RgbdFrame
 from hal.cell import Workspace
 from hal.replay.events import KIND, SCHEMA, Event, plain
-from mskgrasp.errors import UsageError
+from mskgrasp.core.errors import UsageError
 
 T = TypeVar("T")
 

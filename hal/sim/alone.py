@@ -10,8 +10,8 @@ from pydantic import Field
 from hal.sim.camera import SapienCamera
 from hal.sim.noise import SensorNoise
 from hal.sim.world import SapienWorld
-from mskgrasp.config import Config
-from mskgrasp.settings import Overhead, Physics, Region
+from mskgrasp.core.config import Config
+from mskgrasp.core.settings import Overhead, Physics, Region
 
 
 class SapienCameraConfig(Config):

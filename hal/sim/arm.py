@@ -13,10 +13,10 @@ from hal.arm import Arm, ArmState, GraspOutcome
 from hal.errors import MotionAborted, OutOfWorkspace
 from hal.limits import ArmLimits
 from hal.sim.world import SapienWorld
-from mskgrasp.geometry import Pose, pose_distance, straight_line
-from mskgrasp.grasp import MAX_OPENING, MIN_GAP
-from tasks.kinematics import HOME, forward, track
-from tasks.motion import PEAK_ACCELERATION, ease, ease_duration
+from mskgrasp.core.geometry import Pose, pose_distance, straight_line
+from mskgrasp.core.grasp import MAX_OPENING, MIN_GAP
+from mskgrasp.core.panda_kinematics import HOME, forward, track
+from tasks.robot.motion import PEAK_ACCELERATION, ease, ease_duration
 
 JOINT_SPEED = 2.0
 """Greatest joint speed, rad/s (Panda datasheet: 2.175 rad/s for joints 1 to 4)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import sapien
 
-from mskgrasp.geometry import Pose
+from mskgrasp.core.geometry import Pose
 
 _WHITE = 0.8
 """Share of the light that paper returns; more, and the picture would be overexposed."""

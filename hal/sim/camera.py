@@ -10,7 +10,7 @@ from hal.camera import Camera, RgbdFrame
 from hal.errors import NotConnected
 from hal.sim.noise import SensorNoise, add_noise
 from hal.sim.world import SapienWorld
-from tasks.camera import FAR
+from tasks.scene.camera import FAR
 
 
 class SapienCamera(Camera):

@@ -14,9 +14,9 @@ from hal.sim.arm import SapienArm
 from hal.sim.camera import SapienCamera
 from hal.sim.noise import SensorNoise
 from hal.sim.world import SapienWorld
-from mskgrasp.config import Config
-from mskgrasp.settings import REGION, TABLE_Z, Overhead, Physics, Tape
-from tasks.kinematics import JOINT_LOWER, JOINT_UPPER, top_down
+from mskgrasp.core.config import Config
+from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER, top_down
+from mskgrasp.core.settings import REGION, TABLE_Z, Overhead, Physics, Tape
 
 READY = (0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398)
 """The Panda's usual ready pose, radians: the hand is behind the camera's field of view."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from mani_skill.sensors.camera import Camera, CameraConfig
 
-from mskgrasp.settings import Overhead
+from mskgrasp.core.settings import Overhead
 from tasks import GraspDisplacementEnv
-from tasks.camera import camera_config, without_reflection_table
+from tasks.scene.camera import camera_config, without_reflection_table
 
 SUPERSAMPLING = 2
 """Rays along the edge of a pixel: a real pixel gathers the light of its whole area."""

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from mskgrasp.config import Config
+from mskgrasp.core.config import Config
 
 NoiseModel = Literal["off", "iid", "kinect2"]
 
@@ -49,7 +49,7 @@ class SensorNoise(Config):
 
     @property
     def least_height(self) -> float:
-        """What rises less over a table may be noise, metres, once heights are smoothed (`mskgrasp.finding`).
+        """What rises less over a table may be noise, metres, once heights are smoothed (`part_detection`).
 
         Higher, and flat parts are lost; lower, and noise around a part counts to it.
         """

@@ -8,10 +8,10 @@ import sapien
 from mani_skill.envs.scene import ManiSkillScene
 from mani_skill.utils.structs.actor import Actor
 
+from mskgrasp.core.settings import TABLE_Z, Region
 from mskgrasp.parts import Part
-from mskgrasp.settings import TABLE_Z, Region
-from tasks.frames import base_pose
-from tasks.part_actor import build_part
+from tasks.scene.frames import base_pose
+from tasks.scene.part_actor import build_part
 
 _FALLEN = 0.05
 """A part this far below the table has fallen off it, m."""

@@ -11,10 +11,10 @@ import trimesh
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import ConvexHull, QhullError
 
-from mskgrasp.errors import TapeDoesNotFit
-from mskgrasp.geometry import quat_conjugate, quat_rotate, quat_to_matrix
+from mskgrasp.core.errors import TapeDoesNotFit
+from mskgrasp.core.geometry import quat_conjugate, quat_rotate, quat_to_matrix
+from mskgrasp.core.settings import Tape
 from mskgrasp.parts import Part
-from mskgrasp.settings import Tape
 
 CELL = 0.0005
 """Distance of the rays from above, m."""

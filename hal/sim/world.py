@@ -14,12 +14,12 @@ from hal.sim.board import show_board
 from hal.sim.colour import FineColour
 from hal.sim.pallet import Lying, lay_again, outside
 from hal.sim.tape import stick_tape
-from mskgrasp.errors import TapeDoesNotFit
-from mskgrasp.geometry import Pose
+from mskgrasp.core.errors import TapeDoesNotFit
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.settings import Overhead, Physics, Region, Tape
 from mskgrasp.parts import find_part
-from mskgrasp.settings import Overhead, Physics, Region, Tape
 from tasks import GraspDisplacementEnv
-from tasks.renderer import render_backend
+from tasks.scene.renderer import render_backend
 
 
 class SapienWorld:

@@ -11,7 +11,6 @@ from pathlib import Path
 from rich.console import Console
 from tqdm import tqdm
 
-from mskgrasp.cli import make_folder, parse, run
 from mskgrasp.collect.cluster import (
     check_cluster,
     connected,
@@ -20,14 +19,15 @@ from mskgrasp.collect.cluster import (
     wait_until_seen,
 )
 from mskgrasp.collect.config import CollectConfig
-from mskgrasp.collect.work import ShardTask, other_versions
 from mskgrasp.collect.workers import Finished, Lost, Progress, make_shards
-from mskgrasp.config import read_config, write_config
+from mskgrasp.core.config import read_config, write_config
+from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
+from mskgrasp.core.files import LOCK, only_here
 from mskgrasp.dataset import read_shard, shard_path
-from mskgrasp.errors import BadConfig, BadDataset, BadPart, UsageError
-from mskgrasp.files import LOCK, only_here
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.catalogue import ratings, read_index, spread
+from mskgrasp.runtime.cli import make_folder, parse, run
+from mskgrasp.simulation.versions import ShardTask, other_versions
 
 DESCRIPTION = """Simulates random grasps of parts and records what happened.
 

@@ -17,19 +17,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mskgrasp.cli import explain_os_error
 from mskgrasp.collect.config import CollectConfig
-from mskgrasp.collect.work import ShardTask, versions
 from mskgrasp.collect.workers import Finished, Lost, Progress
-from mskgrasp.cores import use_one_core
+from mskgrasp.core.errors import MskgraspError, UsageError
 from mskgrasp.dataset import shard_path
-from mskgrasp.errors import MskgraspError, UsageError
 from mskgrasp.parts import Part
 from mskgrasp.parts.store import pack_part, receive_part
-from mskgrasp.processes import MAX_TRIES, WorkerFailed
+from mskgrasp.runtime.cli import explain_os_error
+from mskgrasp.runtime.worker_pool import MAX_TRIES, WorkerFailed
+from mskgrasp.runtime.worker_process import use_one_core
+from mskgrasp.simulation.versions import ShardTask, versions
 
 if TYPE_CHECKING:
-    from mskgrasp.collect.shard import Simulator
+    from mskgrasp.simulation.shard import Simulator
 
 NODE_TRIES = 10
 """How often a shard may lose its node, which is hardly its own fault, before the run gives up."""
@@ -286,7 +286,7 @@ def _ready(job: Job) -> Simulator:
                 "path on every node"
             )
         use_one_core()
-        from mskgrasp.collect.shard import Simulator
+        from mskgrasp.simulation.shard import Simulator
 
         _simulator = Simulator(job.config.physics, job.config.camera, job.config.noise)
     return _simulator

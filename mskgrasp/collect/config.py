@@ -8,10 +8,9 @@ from typing import Annotated
 import tyro
 from pydantic import Field, model_validator
 
-from mskgrasp.config import Config
-from mskgrasp.settings import REGION, ExecutionNoise, Overhead, Physics
-
-LEAST_RATE_HZ = 250
+from mskgrasp.core.config import Config
+from mskgrasp.core.settings import REGION, ExecutionNoise, Overhead, Physics
+from mskgrasp.core.settings.physics import LEAST_RATE_HZ
 
 
 class PartFilter(Config):

@@ -12,11 +12,11 @@ from rich.console import Console
 from rich.table import Table
 
 from mskgrasp.collect.config import PartFilter
+from mskgrasp.core.grasp import FAILURES
+from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.dataset import ShardInfo, list_shards, read_shard
 from mskgrasp.dataset.shards import read_columns
-from mskgrasp.grasp import FAILURES
-from mskgrasp.metrics import wilson_interval
-from mskgrasp.pictures import draw_contact_sheet
+from mskgrasp.reports.grasp_figures import draw_contact_sheet
 
 N_PICTURES = 24
 

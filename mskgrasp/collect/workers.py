@@ -7,9 +7,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from mskgrasp.collect.config import CollectConfig
-from mskgrasp.collect.work import ShardTask
-from mskgrasp.processes import Lost as ProcessLost
-from mskgrasp.processes import Told, Work, spread
+from mskgrasp.runtime.worker_pool import Lost as ProcessLost
+from mskgrasp.runtime.worker_pool import Told, Work, spread
+from mskgrasp.simulation.versions import ShardTask
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ def make_shards(
 ) -> Generator[Progress | Finished | Lost, None, None]:
     """Makes shards in parallel and tells of every step; closing the iterator stops all workers.
 
-    A shard whose worker dies is made again by another, at most `mskgrasp.processes.MAX_TRIES` times.
+    A shard whose worker dies is made again by another, at most `worker_pool.MAX_TRIES` times.
 
     Raises:
         WorkerFailed: A shard failed for a reason that trying again will not mend.
@@ -75,7 +75,7 @@ def _name(task: ShardTask) -> str:
 @contextmanager
 def _shard_bench(config: CollectConfig) -> Iterator[Callable[[ShardTask], Iterator[int]]]:
     """A simulator, and the function that makes a shard and writes it, telling of every attempt."""
-    from mskgrasp.collect.shard import Simulator
+    from mskgrasp.simulation.shard import Simulator
 
     simulator = Simulator(config.physics, config.camera, config.noise)
     yield lambda task: simulator.write(task, config.out)

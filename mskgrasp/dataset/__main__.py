@@ -1,7 +1,7 @@
 """``python -m mskgrasp.dataset``: check, describe and export datasets."""
 
-from mskgrasp.cli import run
-from mskgrasp.dataset.verbs import main
+from mskgrasp.dataset.commands.verbs import main
+from mskgrasp.runtime.cli import run
 
 if __name__ == "__main__":
     run(main)

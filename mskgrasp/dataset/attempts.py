@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mskgrasp.errors import BadDataset
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import FAILURES
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import FAILURES
 
 DEPTH_UNIT = 1e-4
 """Metres that one step of a stored depth stands for."""
@@ -44,13 +44,13 @@ COLUMNS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Attempts:
-    """n grasp attempts, one row each; frames and definitions as in `mskgrasp.grasp`.
+    """n grasp attempts, one row each; frames and definitions as in `mskgrasp.core.grasp`.
 
     Attributes:
         depth: (n, h, w) uint16 in 0.1 mm along the optical axis, 0 where invalid, before the arm enters.
         grasp: (n, 4) float32, metres and radians, base frame.
         success: (n,) bool.
-        failure: (n,) uint8, index into `mskgrasp.grasp.FAILURES`; 0 where successful.
+        failure: (n,) uint8, index into `mskgrasp.core.grasp.FAILURES`; 0 where successful.
         displacement: (n, 4) float32 object displacement, NaN where not successful.
         tilt: (n,) float32, radians.
         width_after: (n,) float32 distance between the pads at the end, metres.

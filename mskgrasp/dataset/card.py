@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from mskgrasp.core.grasp import FAILURES
+from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
-from mskgrasp.grasp import FAILURES
-from mskgrasp.metrics import wilson_interval
 
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, headers, rows."""

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from mskgrasp.config import read_yaml
+from mskgrasp.core.config import read_yaml
+from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.dataset.attempts import ShardInfo, problems
 from mskgrasp.dataset.ranges import range_problems
 from mskgrasp.dataset.shards import read_unchecked, shard_path
-from mskgrasp.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.parts import store
 
 SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise")

@@ -1,4 +1,4 @@
-"""Datasets for other tools: one plain .npz file, or ManiSkill's trajectory format."""
+"""Export of datasets as one plain .npz file."""
 
 from __future__ import annotations
 
@@ -13,22 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from mskgrasp.dataset.attempts import COLUMNS, Attempts, ShardInfo, u16_to_depth
-from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns, read_shard
-from mskgrasp.errors import BadDataset, UsageError
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import FAILURES, pose_base_tcp
+from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import FAILURES
+from mskgrasp.dataset.attempts import COLUMNS, ShardInfo
+from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
 
 Watch = Callable[[Sequence[Path]], Iterable[Path]]
 """Given the files that will be read, yields each: the place for a progress bar."""
 SMALL = tuple(name for name in COLUMNS if name != "depth")
 _SHARED = ("region", "table_z", "intrinsics", "T_base_camera", "physics", "noise")
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Part:
-    hash: str
-    family: str
 
 
 def check_export_path(folder: Path, path: Path, suffix: str) -> list[Path]:
@@ -76,12 +70,12 @@ def export_npz(folder: Path, out: Path, watch: Watch = iter) -> int:
     infos: list[ShardInfo] = []
     for path in paths:
         columns, info = read_columns(path, SMALL)
-        _same_settings(path, info, infos[:1])
+        same_settings(path, info, infos[:1])
         infos.append(info)
         for name in SMALL:
             pieces[name].append(columns[name])
     counts = [len(grasps) for grasps in pieces["grasp"]]
-    with _renamed_at_the_end(out.parent, [out]) as temporary:
+    with renamed_at_the_end(out.parent, [out]) as temporary:
         with zipfile.ZipFile(temporary / out.name, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:
             for name, array in _about(infos, counts).items():
                 _add(file, name, array.dtype, array.shape, [array])
@@ -108,7 +102,7 @@ def _images(paths: Iterable[Path], counts: dict[Path, int], size: tuple[int, ...
 
 def _about(infos: list[ShardInfo], counts: list[int]) -> dict[str, np.ndarray]:
     """The arrays of an .npz that are not columns of shards."""
-    parts = _parts(infos)
+    parts = parts_of(infos)
     names, info = sorted(parts), infos[0]
     return dict(
         schema_version=np.array(SCHEMA_VERSION),
@@ -138,101 +132,14 @@ def _add(
             member.write(np.ascontiguousarray(piece).tobytes())
 
 
-def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
-    """Writes a dataset as ManiSkill trajectories: ``out`` (.h5) and the .json file beside it.
-
-    An attempt is a trajectory of one step in control mode ``grasp`` of GraspDisplacement-v1; docs/dataset.md
-    has the mapping. The part's pose afterwards is known of successes alone: they hang in the lifted hand.
-
-    Returns:
-        How many attempts were written.
-
-    Raises:
-        BadDataset: A shard is damaged, or the shards do not belong together.
-        UsageError: A file exists, or cannot be made.
-    """
-    # The simulator's own conventions are its room's; this verb alone looks there.
-    from tasks.trajectories import Episode, write_trajectories
-
-    files = check_export_path(folder, out, ".h5")
-    paths = list_shards(folder)
-    _, info = read_columns(paths[0], ("success",))
-    size = read_columns(paths[0], ("depth",))[0]["depth"].shape[1:]
-
-    lift_height = info.physics.get("lift_height")
-    if not isinstance(lift_height, int | float):
-        raise BadDataset(
-            f"{paths[0]}: physics has no lift_height, without which the part's pose is not known"
-        )
-
-    def episodes() -> Iterator[Episode]:
-        for path in watch(paths):
-            attempts, own = read_shard(path)
-            _same_settings(path, own, [info])
-            if attempts.depth.shape[1:] != size:
-                raise BadDataset(f"{path}: depth images of another size than {size}; collect it again")
-            # Where the arm errs, the hand was not where it was sent, and where it was is not stored.
-            after = _pose_after(attempts, np.nan if _arm_errs(own) else lift_height)
-            for row in range(len(attempts)):
-                won = bool(attempts.success[row])
-                yield Episode(
-                    part=own.part,
-                    grasp=attempts.grasp[row],
-                    depth=np.nan_to_num(u16_to_depth(attempts.depth[row])),
-                    T_base_obj=np.stack([attempts.pose_base_obj[row], after[row]]),
-                    success=won,
-                    info=_outcome(attempts, own, row),
-                )
-
-    height = float(info.T_base_camera.position[2]) - info.table_z
-    camera = dict(height=height, focal_px=float(info.intrinsics[0, 0]), n_pixels=int(size[0]))
-    with _renamed_at_the_end(out.parent, files) as temporary:
-        return write_trajectories(
-            temporary / out.name,
-            episodes(),
-            env_kwargs=dict(
-                obs_mode="depth",
-                control_mode="grasp",
-                physics=_physics(info),
-                noise=dict(info.noise),
-                camera=camera,
-            ),
-            intrinsics=info.intrinsics,
-            T_base_camera=info.T_base_camera,
-            description="random grasps of mskgrasp.collect, one a trajectory",
-        )
+@dataclass(frozen=True, kw_only=True)
+class _Part:
+    hash: str
+    family: str
 
 
-def _arm_errs(info: ShardInfo) -> bool:
-    return any(info.noise.get(name) for name in ("arm_position_std", "arm_angle_std"))
-
-
-def _pose_after(attempts: Attempts, lift_height: float) -> np.ndarray:
-    """(n, 7) the part after the lift, base frame; NaN where it failed: the hand's place is not stored."""
-    if not np.isfinite(lift_height):
-        return np.full((len(attempts), 7), np.nan)
-    lifted = attempts.grasp.astype(np.float64)
-    lifted[:, 2] += lift_height
-    after = pose_base_tcp(lifted) @ Pose.from_vector(attempts.pose_tcp_obj_after.astype(np.float64))
-    return np.where(attempts.success[:, None], after.as_vector(), np.nan)
-
-
-def _physics(info: ShardInfo) -> dict[str, Any]:
-    """The settings of a shard; one that knows of no coarse rate was simulated finely throughout."""
-    return dict(coarse_rate_hz=info.physics.get("rate_hz")) | info.physics
-
-
-def _outcome(attempts: Attempts, info: ShardInfo, row: int) -> dict[str, Any]:
-    known: dict[str, Any] = dict(part=info.part, family=info.family, part_hash=info.part_hash)
-    known["failure"] = FAILURES[attempts.failure[row]]
-    if attempts.success[row]:
-        known["displacement"] = [float(value) for value in attempts.displacement[row]]
-        known["tilt"] = float(attempts.tilt[row])
-        known["width_after"] = float(attempts.width_after[row])
-    return known
-
-
-def _parts(infos: list[ShardInfo]) -> dict[str, _Part]:
+def parts_of(infos: list[ShardInfo]) -> dict[str, _Part]:
+    """Content hash and family of every part, by name."""
     parts: dict[str, _Part] = {}
     for info in infos:
         own = _Part(hash=info.part_hash, family=info.family)
@@ -241,7 +148,8 @@ def _parts(infos: list[ShardInfo]) -> dict[str, _Part]:
     return parts
 
 
-def _same_settings(path: Path, info: ShardInfo, first: Sequence[ShardInfo]) -> None:
+def same_settings(path: Path, info: ShardInfo, first: Sequence[ShardInfo]) -> None:
+    """Raises BadDataset where a shard was made with other settings than the first."""
     for other in first:
         for name in _SHARED:
             one, two = (_comparable(getattr(each, name)) for each in (info, other))
@@ -257,7 +165,7 @@ def _comparable(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-class _renamed_at_the_end:  # noqa: N801 (reads as a verb where it is used)
+class renamed_at_the_end:  # noqa: N801 (reads as a verb where it is used)
     """A folder for files that take their place beside it when all of them are written."""
 
     def __init__(self, folder: Path, files: list[Path]):

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mskgrasp.dataset.attempts import DEPTH_UNIT, Attempts, ShardInfo
-from mskgrasp.geometry import Pose, quat_conjugate, quat_multiply, quat_to_matrix
-from mskgrasp.grasp import (
+from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, quat_to_matrix
+from mskgrasp.core.grasp import (
     MAX_DISPLACEMENT,
     MAX_OPENING,
     MIN_GAP,
@@ -16,6 +15,7 @@ from mskgrasp.grasp import (
     object_displacement,
     pose_base_tcp,
 )
+from mskgrasp.dataset.attempts import DEPTH_UNIT, Attempts, ShardInfo
 
 AROUND_REGION = 0.05
 """A part whose centre lies in the region may reach this far beyond it, metres; so may a grasp of it."""

@@ -11,11 +11,11 @@ from typing import Any
 import h5py
 import numpy as np
 
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.files import write_whole
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import FAILURES
 from mskgrasp.dataset.attempts import COLUMNS, Attempts, ShardInfo, problems, shape_problems
-from mskgrasp.errors import BadDataset
-from mskgrasp.files import write_whole
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import FAILURES
 
 SCHEMA_VERSION = 1
 _FORMAT = "mskgrasp-shard"

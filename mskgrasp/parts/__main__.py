@@ -1,7 +1,7 @@
 """``python -m mskgrasp.parts``: build, import, list and show parts."""
 
-from mskgrasp.cli import run
-from mskgrasp.parts.verbs import main
+from mskgrasp.parts.commands.verbs import main
+from mskgrasp.runtime.cli import run
 
 if __name__ == "__main__":
     run(main)

@@ -16,13 +16,21 @@ from scipy.spatial import ConvexHull
 from trimesh.exchange.gltf import export_glb
 from trimesh.exchange.ply import export_ply
 
-from mskgrasp.errors import BadPart, UnknownPart
-from mskgrasp.parts import cad, families, store
-from mskgrasp.parts.families.recipe import Recipe
-from mskgrasp.parts.measure import MOST_OBLONG, HullFit, hull_fit, longest_axis, mass_properties, oblongness
+from mskgrasp.core.errors import BadPart, UnknownPart
+from mskgrasp.parts import store
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
-from mskgrasp.parts.resting import stable_poses
-from mskgrasp.parts.solid import MAX_HULL_VERTICES, Solid
+from mskgrasp.parts.recipes import cad, families
+from mskgrasp.parts.recipes.recipe import Recipe
+from mskgrasp.parts.solids.measure import (
+    MOST_OBLONG,
+    HullFit,
+    hull_fit,
+    longest_axis,
+    mass_properties,
+    oblongness,
+)
+from mskgrasp.parts.solids.solid import MAX_HULL_VERTICES, Solid
+from mskgrasp.parts.solids.stable_poses import stable_poses
 from mskgrasp.parts.versions import PART_VERSION, stamp
 
 MAX_HULL_FACES = 64
@@ -97,7 +105,7 @@ def with_hulls(solid: Solid) -> Solid:
     if solid.hulls and len(solid.hulls) <= MANY_HULLS:
         return solid
     # CoACD takes a while to load, and most parts do without it.
-    from mskgrasp.parts.decompose import convex_pieces, fewest_hulls
+    from mskgrasp.parts.solids.decompose import convex_pieces, fewest_hulls
 
     mesh = trimesh.Trimesh(np.array(solid.mesh.vertices), solid.mesh.faces, process=False)
     hulls = fewest_hulls(mesh, solid.hulls) if solid.hulls else convex_pieces(mesh)

@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mskgrasp.errors import BadPart
+from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import store
 from mskgrasp.parts.build import builtin_names, recipe_hash, starter_names, unknown_part
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mskgrasp.geometry import Pose
+from mskgrasp.core.geometry import Pose
 
 SCHEMA_VERSION = 2
 

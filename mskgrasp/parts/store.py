@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from mskgrasp.errors import BadPart
-from mskgrasp.geometry import Pose
+from mskgrasp.core.errors import BadPart
+from mskgrasp.core.geometry import Pose
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
 
 FILES: tuple[str, ...] = ("mesh.ply", "hulls.glb", "part.json")

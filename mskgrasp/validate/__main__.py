@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mskgrasp.cli import parse, run
+from mskgrasp.runtime.cli import parse, run
 from mskgrasp.validate.config import ValidateConfig
 
 DESCRIPTION = """Shows whether simulated labels are right: run it after changing a setting or a part.
@@ -25,7 +25,7 @@ def main() -> int:
         description=DESCRIPTION,
         default_config=_DEFAULT if _DEFAULT.exists() else None,
     )
-    from mskgrasp.validate.everything import validate  # loads the simulator: not for a mistyped option
+    from mskgrasp.validate.run import validate  # loads the simulator: not for a mistyped option
 
     return validate(config)
 

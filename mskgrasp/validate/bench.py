@@ -11,15 +11,15 @@ import sapien
 import torch
 from sapien.physx import PhysxRigidDynamicComponent
 
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import MAX_OPENING
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import MAX_OPENING
+from mskgrasp.core.panda_kinematics import top_down
+from mskgrasp.core.settings import Physics
 from mskgrasp.parts import Part, store
 from mskgrasp.parts.build import write_solid
-from mskgrasp.parts.solid import Solid
-from mskgrasp.settings import Physics
+from mskgrasp.parts.solids.solid import Solid
 from tasks import GraspDisplacementEnv
-from tasks.frames import base_pose
-from tasks.kinematics import top_down
+from tasks.scene.frames import base_pose
 
 ALOFT = 0.25
 """Height at which the hand holds bodies that must not meet the table, m."""

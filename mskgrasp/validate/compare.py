@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from mskgrasp.geometry import wrap_angle
+from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.validate.convergence import Outcomes
 
 MOST_DISAGREEMENT = 0.03

@@ -9,8 +9,8 @@ from typing import Annotated
 import tyro
 from pydantic import Field, model_validator
 
-from mskgrasp.config import Config
-from mskgrasp.settings import Physics
+from mskgrasp.core.config import Config
+from mskgrasp.core.settings import Physics
 
 SHIFT = 1e-5
 """By how much the starts of the floor are moved, m: less than any camera or arm could tell."""

@@ -16,14 +16,14 @@ import gymnasium
 import numpy as np
 import torch
 
-from mskgrasp.collect.shard import draw_attempt
-from mskgrasp.collect.work import versions
+from mskgrasp.core.settings import Physics
 from mskgrasp.parts import load_part
-from mskgrasp.processes import Work, results
-from mskgrasp.settings import Physics
+from mskgrasp.runtime.worker_pool import Work, results
+from mskgrasp.simulation.shard import draw_attempt
+from mskgrasp.simulation.versions import versions
 from mskgrasp.validate.config import Setting
 from tasks import GraspDisplacementEnv
-from tasks.renderer import render_backend
+from tasks.scene.renderer import render_backend
 
 KEPT = ("success", "failure", "displacement", "tilt", "penetration", "fastest", "seconds")
 
@@ -34,7 +34,7 @@ class Outcomes:
 
     Attributes:
         success: (n,) bool.
-        failure: (n,) index into `mskgrasp.grasp.FAILURES`.
+        failure: (n,) index into `mskgrasp.core.grasp.FAILURES`.
         displacement: (n, 4) object displacement, NaN where not successful.
         tilt: (n,) rad.
         penetration: (n,) deepest overlap of finger and part, m.

@@ -11,8 +11,8 @@ import trimesh
 from sapien.physx import PhysxCollisionShapeConvexMesh
 
 from mskgrasp.parts import Part
-from mskgrasp.parts.decompose import MOST_P95_MM, MOST_VOLUME_RATIO
-from mskgrasp.parts.measure import hull_fit
+from mskgrasp.parts.solids.decompose import MOST_P95_MM, MOST_VOLUME_RATIO
+from mskgrasp.parts.solids.measure import hull_fit
 from mskgrasp.validate.bench import Bench
 
 MOST_MASS_ERROR = 1e-4

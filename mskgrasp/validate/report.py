@@ -17,20 +17,14 @@ from matplotlib.ticker import NullFormatter, ScalarFormatter
 from rich.console import Console
 from rich.table import Table
 
-from mskgrasp.collect.work import versions
-from mskgrasp.grasp import MAX_DISPLACEMENT
-from mskgrasp.validate.by_hand import Check
+from mskgrasp.core.grasp import MAX_DISPLACEMENT
+from mskgrasp.simulation.versions import versions
+from mskgrasp.validate.closed_form import Check
 from mskgrasp.validate.compare import MOST_DISAGREEMENT, MOST_TIMES_FLOOR, Comparison, complaints
-from mskgrasp.validate.config import (
-    CELL_FLOOR,
-    FLOOR,
-    REFERENCE,
-    ValidateConfig,
-    setting_name,
-)
+from mskgrasp.validate.config import CELL_FLOOR, FLOOR, REFERENCE, ValidateConfig, setting_name
 from mskgrasp.validate.convergence import Outcomes
 from mskgrasp.validate.fidelity import Fidelity
-from tasks.outcome import MAX_PENETRATION, MAX_SPEED
+from tasks.attempt.outcome import MAX_PENETRATION, MAX_SPEED
 
 _FLOORS = (FLOOR, CELL_FLOOR)
 _MARKERS = "o^sDvP"

@@ -20,10 +20,10 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from mskgrasp.config import read_config
-from mskgrasp.networks import NetworkConfig
-from mskgrasp.samples import Samples, read_samples
-from mskgrasp.training import LearningConfig, Sides, split, train
+from mskgrasp.core.config import read_config
+from mskgrasp.learning.networks import NetworkConfig
+from mskgrasp.learning.samples import Samples, read_samples
+from mskgrasp.learning.trainer import LearningConfig, Sides, split, train
 
 REPOSITORY = Path(__file__).parents[2]
 

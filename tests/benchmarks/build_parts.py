@@ -64,8 +64,8 @@ def measure(per_family: int, only: str | None) -> None:
 
 def warm_up(chosen: dict[str, list[str]]) -> None:
     """Loads the libraries, which a build pays for once a process."""
-    from mskgrasp.parts import decompose  # noqa: F401
     from mskgrasp.parts.build import recipe_of
+    from mskgrasp.parts.solids import decompose  # noqa: F401
 
     modules = {recipe_of(names[0]).make.__module__: names[0] for names in chosen.values()}
     for name in modules.values():
@@ -75,8 +75,8 @@ def warm_up(chosen: dict[str, list[str]]) -> None:
 def stages(name: str) -> list[float]:
     """Seconds of each stage for one part."""
     from mskgrasp.parts.build import build_part, recipe_of, with_hulls
-    from mskgrasp.parts.measure import hull_fit
-    from mskgrasp.parts.resting import stable_poses
+    from mskgrasp.parts.solids.measure import hull_fit
+    from mskgrasp.parts.solids.stable_poses import stable_poses
 
     recipe = recipe_of(name)
     clock = time.process_time

@@ -17,11 +17,11 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from mskgrasp.collect.shard import Simulator, draw_attempt
-from mskgrasp.cores import one_thread_a_process
-from mskgrasp.geometry import wrap_angle
+from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.core.settings import ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import chosen_names, find_part
-from mskgrasp.settings import ExecutionNoise, Overhead, Physics
+from mskgrasp.runtime.worker_process import one_thread_a_process
+from mskgrasp.simulation.shard import Simulator, draw_attempt
 
 GRAMS = (0, 10, 20, 30, 45, 70, 120, 250)
 """Bounds of the rows."""

@@ -36,14 +36,14 @@ from tqdm import tqdm
 
 from mskgrasp.collect.__main__ import plan_shards
 from mskgrasp.collect.config import CollectConfig
-from mskgrasp.collect.shard import Simulator, draw_attempt
-from mskgrasp.collect.work import ShardTask
 from mskgrasp.collect.workers import Progress, make_shards
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import PAD_REACH
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import PAD_REACH
+from mskgrasp.core.settings import REGION, ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import Part, find_part, starter_names
-from mskgrasp.settings import REGION, ExecutionNoise, Overhead, Physics
-from tasks.renderer import render_backend
+from mskgrasp.simulation.shard import Simulator, draw_attempt
+from mskgrasp.simulation.versions import ShardTask
+from tasks.scene.renderer import render_backend
 from tests.benchmarks.raw_sapien import RawSapien
 
 Draw = tuple[np.ndarray, np.ndarray, np.ndarray]

@@ -11,11 +11,11 @@ from rich.console import Console
 from rich.table import Table
 
 from hal.sim.noise import NoiseModel, SensorNoise, add_noise
-from mskgrasp import finding
+from mskgrasp.core.errors import NoPartFound
+from mskgrasp.core.grasp import PartView
 from mskgrasp.dataset import ShardInfo, list_shards, u16_to_depth
 from mskgrasp.dataset.shards import read_columns
-from mskgrasp.errors import NoPartFound
-from mskgrasp.grasp import PartView
+from mskgrasp.perception import part_detection as finding
 
 NARROW = 0.008
 """Parts of which a side is less are told apart, metres."""

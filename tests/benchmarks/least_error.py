@@ -20,11 +20,11 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from mskgrasp.collect.shard import FIELDS, Simulator, draw_attempt, impossible
-from mskgrasp.cores import one_thread_a_process
-from mskgrasp.geometry import quat_about_z, quat_multiply, wrap_angle
+from mskgrasp.core.geometry import quat_about_z, quat_multiply, wrap_angle
+from mskgrasp.core.settings import ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import chosen_names, find_part
-from mskgrasp.settings import ExecutionNoise, Overhead, Physics
+from mskgrasp.runtime.worker_process import one_thread_a_process
+from mskgrasp.simulation.shard import FIELDS, Simulator, draw_attempt, impossible
 
 SPREADS = ((1e-5, 0.01), (1e-4, 0.1), (3e-4, 0.3), (1e-3, 1.0))
 """Deviations of the part's place along each axis of the table, m, and of its turn, degrees."""

@@ -22,14 +22,14 @@ from rich.table import Table
 from tqdm import tqdm
 
 from hal import RgbdFrame, open_cell
-from mskgrasp.config import read_config
-from mskgrasp.models import ModelMeta, Models, build_models, load_models
-from mskgrasp.networks import NetworkConfig, Normalisation
+from mskgrasp.core.config import read_config
+from mskgrasp.core.settings import REGION, TABLE_Z
+from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models, load_models
+from mskgrasp.learning.networks import NetworkConfig, Normalisation
+from mskgrasp.learning.trainer import LearningConfig
 from mskgrasp.parts import starter_names
-from mskgrasp.plan import present
-from mskgrasp.planner import Planner, PlannerConfig
-from mskgrasp.settings import REGION, TABLE_Z
-from mskgrasp.training import LearningConfig
+from mskgrasp.planning.for_cell import present
+from mskgrasp.planning.planner import Planner, PlannerConfig
 
 REPOSITORY = Path(__file__).parents[2]
 STAGES = ("sample", "score", "select")

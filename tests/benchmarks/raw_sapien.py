@@ -10,13 +10,13 @@ import torch
 from mani_skill import PACKAGE_ASSET_DIR
 from sapien import physx
 
+from mskgrasp.core.panda_kinematics import top_down
+from mskgrasp.core.settings import Overhead, Physics
 from mskgrasp.parts import Part
-from mskgrasp.settings import Overhead, Physics
-from tasks.camera import FAR, NEAR
-from tasks.frames import sapien_camera_pose, to_world
-from tasks.kinematics import top_down
-from tasks.panda import ARM_DAMPING, ARM_STIFFNESS, ARM_TORQUE_LIMIT
-from tasks.part_actor import _visual
+from tasks.robot.panda import ARM_DAMPING, ARM_STIFFNESS, ARM_TORQUE_LIMIT
+from tasks.scene.camera import FAR, NEAR
+from tasks.scene.frames import sapien_camera_pose, to_world
+from tasks.scene.part_actor import _visual
 
 SETTLE_S, DESCEND_S, LIFT_S = 0.06, 0.4, 0.75
 """Long enough for every part; a script without feedback has to wait for the slowest."""

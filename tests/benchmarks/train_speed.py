@@ -19,10 +19,10 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from mskgrasp.config import read_config
-from mskgrasp.models import build_models
-from mskgrasp.samples import Samples
-from mskgrasp.training import LearningConfig, Stage, describe, split
+from mskgrasp.core.config import read_config
+from mskgrasp.learning.grasp_models import build_models
+from mskgrasp.learning.samples import Samples
+from mskgrasp.learning.trainer import LearningConfig, Stage, describe, split
 
 REPOSITORY = Path(__file__).parents[2]
 

@@ -18,8 +18,8 @@ from pathlib import Path
 import pytest
 
 from mskgrasp.collect import cluster
+from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.dataset import list_shards
-from mskgrasp.errors import BadPart, UsageError
 from mskgrasp.parts import find_part
 from mskgrasp.parts.store import pack_part, receive_part
 from tests.collecting import PARTS, REPOSITORY, assert_equal, command
@@ -289,7 +289,7 @@ def test_a_part_keeps_its_hash_on_the_way_and_takes_no_other_parts_place(tmp_pat
 
 def test_a_node_of_other_software_or_without_the_folder_is_refused(collected, monkeypatch):
     from mskgrasp.collect.config import CollectConfig
-    from mskgrasp.config import read_config
+    from mskgrasp.core.config import read_config
 
     monkeypatch.setattr(cluster, "_simulator", None)
     config = read_config(CollectConfig, collected / "config.yaml")

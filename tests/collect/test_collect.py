@@ -16,10 +16,10 @@ import pytest
 import yaml
 
 from mskgrasp.collect.__main__ import is_done, main
-from mskgrasp.collect.work import ShardTask
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.files import only_here
 from mskgrasp.dataset import list_shards, read_shard
-from mskgrasp.errors import BadDataset
-from mskgrasp.files import only_here
+from mskgrasp.simulation.versions import ShardTask
 from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, command
 from tests.programs import run_here
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import yaml
 
+from mskgrasp.core.errors import UsageError
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import FAILURES, pose_base_tcp
 from mskgrasp.dataset import read_shard
 from mskgrasp.dataset.check import check_dataset
-from mskgrasp.dataset.verbs import main
-from mskgrasp.errors import UsageError
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import FAILURES, pose_base_tcp
+from mskgrasp.dataset.commands.verbs import main
 from tests.collecting import REPOSITORY
 
 KEY, NUT = "parallel_key_a16x10x56", "hex_nut_m30"

@@ -14,11 +14,12 @@ from mani_skill.trajectory.utils import index_dict
 from mani_skill.utils.wrappers.record import RecordEpisode
 
 import tasks  # noqa: F401 (registers the task)
+from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.core.grasp import FAILURES
 from mskgrasp.dataset import Attempts, list_shards, read_shard, u16_to_depth
-from mskgrasp.dataset.export import export_maniskill, export_npz
-from mskgrasp.dataset.verbs import main
-from mskgrasp.errors import BadDataset, UsageError
-from mskgrasp.grasp import FAILURES
+from mskgrasp.dataset.commands.maniskill import export_maniskill
+from mskgrasp.dataset.commands.verbs import main
+from mskgrasp.dataset.export import export_npz
 from tests import synthetic
 from tests.programs import run_here
 

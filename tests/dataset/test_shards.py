@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from mskgrasp import dataset
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import object_displacement
 from mskgrasp.dataset import (
     Attempts,
     depth_to_u16,
@@ -15,9 +18,6 @@ from mskgrasp.dataset import (
     u16_to_depth,
     write_shard,
 )
-from mskgrasp.errors import BadDataset
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import object_displacement
 from tests import synthetic
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from hal.errors import MotionAborted, NeedsRecovery, OutOfWorkspace
-from mskgrasp.geometry import Pose
-from tests.replay.toy import DOWN, ToyArm
+from mskgrasp.core.geometry import Pose
+from tests.hal.replay.toy import DOWN, ToyArm
 
 TIMEOUT_S = 60.0
 

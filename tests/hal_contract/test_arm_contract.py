@@ -22,11 +22,11 @@ from hal.arm import JOINT_TOLERANCE, POSITION_TOLERANCE, ROTATION_TOLERANCE
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
 from hal.replay import ReplayArm, ReplayArmConfig, recorded_cell
 from hal.replay.recorder import RecordingArm
-from mskgrasp.geometry import Pose, pose_distance, quat_multiply
-from mskgrasp.grasp import pose_base_tcp
-from tests.franka.robots import robot_for, write_cell
+from mskgrasp.core.geometry import Pose, pose_distance, quat_multiply
+from mskgrasp.core.grasp import pose_base_tcp
+from tests.hal.franka.robots import robot_for, write_cell
+from tests.hal.replay.toy import toy_cell
 from tests.hal_contract.conftest import CELLS
-from tests.replay.toy import toy_cell
 
 STILL_RAD, STILL_M = 2e-3, 1e-3
 """An arm in MuJoCo creeps by this much when it stands."""

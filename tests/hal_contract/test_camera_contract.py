@@ -15,8 +15,8 @@ from hal.errors import NotConnected
 from hal.replay import RecordingWriter, ReplayCamera, ReplayCameraConfig
 from hal.replay.recorder import RecordingCamera
 from hal.sim import SapienCamera, SensorNoise
+from tests.hal.kinect2.bench import Bench
 from tests.hal_contract.conftest import CELLS
-from tests.kinect2.bench import Bench
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ import yaml
 
 from hal import cell_from_yaml
 from hal.franka import FrankaArm, PandaPyArmConfig
-from mskgrasp.config import check_config, read_yaml
-from mskgrasp.errors import BadConfig
+from mskgrasp.core.config import check_config, read_yaml
+from mskgrasp.core.errors import BadConfig
 from tests.hal_contract.conftest import CELLS
 
 GOOD: dict[str, Any] = {

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hal import cell_from_yaml
-from mskgrasp.errors import BadConfig
+from mskgrasp.core.errors import BadConfig
 
 
 @pytest.mark.parametrize(
@@ -43,7 +43,7 @@ def test_the_planner_needs_no_simulator():
     """A real cell's computer has neither SAPIEN nor ManiSkill."""
     code = (
         "import sys; sys.modules['sapien'] = sys.modules['mani_skill'] = None\n"
-        "import hal, mskgrasp.planner, mskgrasp.plan, mskgrasp.evaluate, mskgrasp.train"
+        "import hal, mskgrasp.planning.planner, mskgrasp.plan, mskgrasp.evaluate, mskgrasp.train"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -15,11 +15,11 @@ import torch
 
 from hal import Cell, cell_from_yaml, execute_grasp, go_home
 from hal.arm import POSITION_TOLERANCE, ROTATION_TOLERANCE, Arm
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import MAX_OPENING, pose_base_tcp
-from mskgrasp.models import PRETRAINED, load_models
-from mskgrasp.planner import Planner, PlannerConfig
-from tests.franka.robots import franky_sim, write_cell
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import MAX_OPENING, pose_base_tcp
+from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.planning.planner import Planner, PlannerConfig
+from tests.hal.franka.robots import franky_sim, write_cell
 from tests.hal_contract.conftest import CELLS
 
 PART, SEED = "hex_nut_m30", 5

@@ -10,8 +10,8 @@ import pytest
 
 from hal import Cell, execute_grasp, go_home, let_go, put_down
 from hal.errors import MotionAborted, NeedsRecovery, Stopped
-from mskgrasp.grasp import pose_base_tcp
-from mskgrasp.placing import place
+from mskgrasp.core.grasp import pose_base_tcp
+from mskgrasp.planning.placing import place
 
 
 @pytest.mark.parametrize("theta", [0.0, 1.2, -1.5])

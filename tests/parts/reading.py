@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from mskgrasp.errors import BadPart
-from mskgrasp.parts.mesh_files import MeshFile, read_mesh
+from mskgrasp.core.errors import BadPart
+from mskgrasp.parts.importing.mesh_files import MeshFile, read_mesh
 
 
 def read(name: str, content: bytes, unit=None) -> MeshFile:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mskgrasp.parts.families import bends
+from mskgrasp.parts.recipes.families import bends
 
 
 def mesh_of(name: str) -> trimesh.Trimesh:

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from mskgrasp.errors import BadPart, MskgraspError
+from mskgrasp.core.errors import BadPart, MskgraspError
 from mskgrasp.parts import build as build_module
 from mskgrasp.parts import build_part, load_part, starter_names
 from mskgrasp.parts.build import recipe_hash
-from mskgrasp.parts.building import build_parts
 from mskgrasp.parts.catalogue import Index, LeftOut, make_index, read_index, write_index
-from mskgrasp.parts.solid import Solid
-from mskgrasp.parts.verbs import main
+from mskgrasp.parts.commands.build_parts import build_parts
+from mskgrasp.parts.commands.verbs import main
+from mskgrasp.parts.solids.solid import Solid
 
 EMPTY = Index(parts={}, left_out={})
 NAMES = ("hex_nut_m20", "parallel_key_b20x12x80", "parallel_pin_12x60", "washer_m36")
@@ -106,7 +106,7 @@ def test_mistakes_are_told_in_one_line(arguments, exit_code):
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
-    code = "from mskgrasp.cli import run; from mskgrasp.parts.verbs import main; run(main)"
+    code = "from mskgrasp.runtime.cli import run; from mskgrasp.parts.commands.verbs import main; run(main)"
     build = subprocess.Popen(
         [sys.executable, "-c", code, "build", "--workers", "2"],
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # where the tests' own is ignored
@@ -129,7 +129,7 @@ def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
 
 
 def test_workers_of_a_killed_build_end_too(own_cache):
-    code = "from mskgrasp.cli import run; from mskgrasp.parts.verbs import main; run(main)"
+    code = "from mskgrasp.runtime.cli import run; from mskgrasp.parts.commands.verbs import main; run(main)"
     build = subprocess.Popen(
         [sys.executable, "-c", code, "build", "--workers", "2"],
         start_new_session=True, stdout=subprocess.DEVNULL,

@@ -9,11 +9,11 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from mskgrasp.geometry import quat_to_matrix
+from mskgrasp.core.geometry import quat_to_matrix
 from mskgrasp.parts import Part, starter_names
-from mskgrasp.parts.families import recipes
-from mskgrasp.parts.families.recipe import TABLES, table
-from mskgrasp.parts.measure import oblongness
+from mskgrasp.parts.recipes.families import recipes
+from mskgrasp.parts.recipes.recipe import TABLES, table
+from mskgrasp.parts.solids.measure import oblongness
 from mskgrasp.parts.store import read_record
 
 STEEL, BRONZE = 7850.0, 8800.0

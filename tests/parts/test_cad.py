@@ -8,11 +8,11 @@ import sys
 import numpy as np
 import pytest
 
-from mskgrasp.errors import BadPart
-from mskgrasp.parts import cad, families
-from mskgrasp.parts.cad import drawn, screws
-from mskgrasp.parts.families.recipe import Recipe
-from mskgrasp.parts.measure import hull_fit, oblongness
+from mskgrasp.core.errors import BadPart
+from mskgrasp.parts.recipes import cad, families
+from mskgrasp.parts.recipes.cad import drawn, screws
+from mskgrasp.parts.recipes.recipe import Recipe
+from mskgrasp.parts.solids.measure import hull_fit, oblongness
 
 needs_cad = pytest.mark.skipif(importlib.util.find_spec("bd_warehouse") is None, reason="needs [cad]")
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mskgrasp.errors import BadPart
+from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import builtin_names, chosen_names, starter_names
 from mskgrasp.parts.build import build_part, recipe_hash, recipe_of
 from mskgrasp.parts.catalogue import (

@@ -15,9 +15,9 @@ from scipy.spatial import ConvexHull
 
 from mskgrasp.parts import Part, builtin_names, load_part
 from mskgrasp.parts.build import recipe_of
-from mskgrasp.parts.building import build_parts
 from mskgrasp.parts.catalogue import Index
-from mskgrasp.parts.measure import oblongness
+from mskgrasp.parts.commands.build_parts import build_parts
+from mskgrasp.parts.solids.measure import oblongness
 
 ONCE_A_FAMILY = {recipe_of(name).family: name for name in reversed(builtin_names())}
 

@@ -10,12 +10,12 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
-from mskgrasp.errors import BadPart
-from mskgrasp.parts import decompose
-from mskgrasp.parts import shape as h
-from mskgrasp.parts import solid as s
-from mskgrasp.parts.decompose import MOST_HULLS, convex_pieces, fewest_hulls
-from mskgrasp.parts.measure import MeshSurface, hull_fit
+from mskgrasp.core.errors import BadPart
+from mskgrasp.parts.solids import decompose
+from mskgrasp.parts.solids import shape as h
+from mskgrasp.parts.solids import solid as s
+from mskgrasp.parts.solids.decompose import MOST_HULLS, convex_pieces, fewest_hulls
+from mskgrasp.parts.solids.measure import MeshSurface, hull_fit
 
 DIGEST = """
 import hashlib

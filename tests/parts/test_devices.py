@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mskgrasp.parts.families import recipes
-from mskgrasp.parts.families.recipe import table
+from mskgrasp.parts.recipes.families import recipes
+from mskgrasp.parts.recipes.recipe import table
 from tests.parts.turned import cylinder, extents, is_inside, made
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mskgrasp.parts.families import eyes
+from mskgrasp.parts.recipes.families import eyes
 
 
 def mesh_of(name: str) -> trimesh.Trimesh:

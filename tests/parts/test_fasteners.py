@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mskgrasp.parts.families import fasteners
+from mskgrasp.parts.recipes.families import fasteners
 
 
 def mesh_of(name: str) -> trimesh.Trimesh:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mskgrasp.parts.families import handles
+from mskgrasp.parts.recipes.families import handles
 
 
 def mesh_of(name: str) -> trimesh.Trimesh:

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from mskgrasp.errors import UsageError
+from mskgrasp.core.errors import UsageError
 from mskgrasp.parts import load_part
-from mskgrasp.parts.verb_import import Import, run_import
+from mskgrasp.parts.commands.import_ import Import, run_import
 
 
 def box(file: Path, *size: float, at=(0.0, 0.0, 0.0)) -> Path:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from mskgrasp.errors import BadPart
-from mskgrasp.parts.mesh_files import read_content
+from mskgrasp.core.errors import BadPart
+from mskgrasp.parts.importing.mesh_files import read_content
 from tests.parts.reading import read, refusal, volume
 
 BOX = trimesh.creation.box((40, 30, 20))

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from mskgrasp.parts.families.recipe import table
+from mskgrasp.parts.recipes.recipe import table
 from tests.parts.turned import cylinder, extents, family, is_inside, made
 
 

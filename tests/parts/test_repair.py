@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from mskgrasp.errors import BadPart
-from mskgrasp.parts.bodies import Mended, mend
-from mskgrasp.parts.surface import Surface
-from mskgrasp.parts.winding import miscounted_fraction, winding_number
+from mskgrasp.core.errors import BadPart
+from mskgrasp.parts.importing.bodies import Mended, mend
+from mskgrasp.parts.importing.winding import miscounted_fraction, winding_number
+from mskgrasp.parts.solids.surface import Surface
 
 
 def box(*size: float, at=(0.0, 0.0, 0.0), inward: bool = False) -> Surface:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from mskgrasp.geometry import quat_to_matrix
-from mskgrasp.parts.resting import stable_poses
+from mskgrasp.core.geometry import quat_to_matrix
+from mskgrasp.parts.solids.stable_poses import stable_poses
 
 
 def box_corners(x: float, y: float, z: float) -> np.ndarray:

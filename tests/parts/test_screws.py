@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mskgrasp.parts.families import screws
+from mskgrasp.parts.recipes.families import screws
 
 
 def mesh_of(name: str) -> trimesh.Trimesh:

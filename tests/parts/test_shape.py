@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from manifold3d import Manifold, OpType
 from scipy.spatial import ConvexHull
 
-from mskgrasp.parts import solid as s
-from mskgrasp.parts.pieces import convex_polygons, merge_hulls, split_by
-from mskgrasp.parts.shape import Shape, block, convex, cylinder, hexagon_bar, plate, swept, turned
+from mskgrasp.parts.solids import solid as s
+from mskgrasp.parts.solids.pieces import convex_polygons, merge_hulls, split_by
+from mskgrasp.parts.solids.shape import Shape, block, convex, cylinder, hexagon_bar, plate, swept, turned
 
 
 def union_volume(shape: Shape) -> float:

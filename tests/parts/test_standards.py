@@ -7,7 +7,7 @@ from importlib import resources
 
 import pytest
 
-from mskgrasp.parts.families.recipe import table
+from mskgrasp.parts.recipes.recipe import table
 
 # Our table, theirs, their standard, {our column: their column}, how much larger theirs may be, least count.
 COMPARED = [

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import mskgrasp.parts
-from mskgrasp.errors import BadPart
+from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import build_part, find_part, load_part, parts_folder
 
 FILES = ("mesh.ply", "hulls.glb", "part.json")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mskgrasp.parts.families.recipe import table
+from mskgrasp.parts.recipes.recipe import table
 from tests.parts.turned import cylinder, extents, family, is_inside, made
 
 

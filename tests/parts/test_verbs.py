@@ -5,7 +5,7 @@ import numpy as np
 import trimesh
 
 from mskgrasp.parts import parts_folder, starter_names
-from mskgrasp.parts.picture import resting_classes
+from mskgrasp.parts.figures.picture import resting_classes
 
 
 def test_build_list_and_show_work_one_after_the_other(program, tmp_path):

@@ -5,8 +5,8 @@ from functools import cache
 
 import numpy as np
 
-from mskgrasp.parts.families import recipes
-from mskgrasp.parts.solid import Solid
+from mskgrasp.parts.recipes.families import recipes
+from mskgrasp.parts.solids.solid import Solid
 
 
 @cache

@@ -8,9 +8,9 @@ from pathlib import Path
 import torch
 
 from hal import go_home, open_cell
-from mskgrasp.models import PRETRAINED, load_models
-from mskgrasp.planner import Planner, PlannerConfig
-from mskgrasp.trial import Trial, run_trial
+from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.planning.planner import Planner, PlannerConfig
+from mskgrasp.trials.trial import Trial, run_trial
 
 HERE = Path(__file__).parent
 RECORDED = HERE / "recorded.json"

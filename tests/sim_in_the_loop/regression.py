@@ -14,16 +14,16 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import binomtest
 
-from mskgrasp.cli import parse, run
-from mskgrasp.config import Config
-from mskgrasp.errors import BadDataset, UsageError
-from mskgrasp.files import write_whole
-from mskgrasp.geometry import wrap_angle
-from mskgrasp.metrics import bootstrap_interval
-from mskgrasp.models import PRETRAINED
-from mskgrasp.palletize import PalletizeConfig, palletize
-from mskgrasp.placements import Placement
-from mskgrasp.runs import TRIALS, file_digest, read
+from mskgrasp.core.config import Config
+from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.core.files import write_whole
+from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.core.metrics import bootstrap_interval
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.palletize.placements import Placement
+from mskgrasp.palletize.run import PalletizeConfig, palletize
+from mskgrasp.runtime.cli import parse, run
+from mskgrasp.runtime.run_folder import TRIALS, file_digest, read
 from tests.sim_in_the_loop.record import PARTS
 
 HERE = Path(__file__).parent

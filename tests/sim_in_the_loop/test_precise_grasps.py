@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mskgrasp.metrics import rotation_rmse, translation_rmse
-from mskgrasp.models import PRETRAINED, load_models
+from mskgrasp.core.metrics import rotation_rmse, translation_rmse
+from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from tests.sim_in_the_loop.record import PARTS, RECORDED, run_scenario
 
 

@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import torch
-
 import tasks.contacts
 import tasks.motion
-from mskgrasp.grasp import FAILURES
-from tasks.arrays import Arrays
-from tasks.kinematics import top_down
+import torch
+
+from mskgrasp.core.grasp import FAILURES
+from mskgrasp.core.panda_kinematics import top_down
+from tasks.scene.arrays import Arrays
 
 TENSORS = Arrays(torch.device("cpu"))
 ON_THE_FINGER = dict(grasp=(0.5, 0.0, 0.012, 0.0), at=(0.5, 0.045), part="kilo")
@@ -24,7 +24,7 @@ GRASPS = {
 def test_an_attempt_with_tensors_is_that_with_arrays(env, attempt, monkeypatch, reason):
     """A GPU has tensors, and PhysX needs one of its own: so what both share runs with tensors here, too."""
     with monkeypatch.context() as patch:
-        for module in (tasks.motion, tasks.contacts):
+        for module in (tasks.robot.motion, tasks.robot.contacts):
             patch.setattr(module, "arrays_for", lambda _: TENSORS)
         tensors = attempt(**GRASPS[reason])
         assert env.motion.arrays is TENSORS

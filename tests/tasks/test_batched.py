@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 import torch
 
-from mskgrasp.grasp import FAILURES
-from mskgrasp.settings import Physics
+from mskgrasp.core.grasp import FAILURES
+from mskgrasp.core.settings import Physics
 from tests.tasks.toy_engine import ToyScene, toy_attempt
 
 # Each row a sub-scene: the block, half the width that it stops the pads at, how it is carried, the force.

@@ -4,9 +4,9 @@ import gymnasium
 import numpy as np
 import pytest
 
-from mskgrasp.finding import view_part
-from mskgrasp.settings import TABLE_Z
-from tasks.renderer import render_backend
+from mskgrasp.core.settings import TABLE_Z
+from mskgrasp.perception.part_detection import view_part
+from tasks.scene.renderer import render_backend
 
 
 @pytest.fixture(scope="module")

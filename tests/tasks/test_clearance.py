@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import torch
 
-from mskgrasp.grasp import FINGER_HALF_WIDTH, FINGER_THICKNESS, PAD_REACH, PALM_HEIGHT
-from tasks.clearance import MARGIN, hand_clearance
-from tasks.kinematics import top_down
+from mskgrasp.core.grasp import FINGER_HALF_WIDTH, FINGER_THICKNESS, PAD_REACH, PALM_HEIGHT
+from mskgrasp.core.panda_kinematics import top_down
+from tasks.attempt.clearance import MARGIN, hand_clearance
 
 FIELDS = ("success", "failure", "displacement", "tilt")
 

@@ -11,12 +11,12 @@ import torch
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
-from mskgrasp.errors import BadConfig
-from mskgrasp.finding import view_part
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import FAILURES, lowest_grasp_z
-from mskgrasp.settings import REGION, TABLE_Z, ExecutionNoise
-from tasks.renderer import render_backend
+from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import FAILURES, lowest_grasp_z
+from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise
+from mskgrasp.perception.part_detection import view_part
+from tasks.scene.renderer import render_backend
 
 Z = 0.02
 EVERYTHING = ExecutionNoise(

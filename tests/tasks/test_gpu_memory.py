@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from mani_skill.utils.structs.types import GPUMemoryConfig
 
-from mskgrasp.parts import decompose
-from tasks.physics import CONTACTS_A_HULL, MOST_HULLS, PATCHES_A_HULL, gpu_memory
+from mskgrasp.parts.solids import decompose
+from tasks.scene.physics import CONTACTS_A_HULL, MOST_HULLS, PATCHES_A_HULL, gpu_memory
 
 
 def test_buffers_grow_with_the_hulls_and_are_never_smaller_than_usual():

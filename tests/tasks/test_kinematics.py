@@ -8,8 +8,8 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mskgrasp.grasp import pose_base_tcp
-from tasks.kinematics import HOME, forward, top_down, track
+from mskgrasp.core.grasp import pose_base_tcp
+from mskgrasp.core.panda_kinematics import HOME, forward, top_down, track
 
 coordinate = dict(allow_nan=False, allow_infinity=False)
 

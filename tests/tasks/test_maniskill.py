@@ -15,7 +15,7 @@ import pytest
 import torch
 from mani_skill.utils.wrappers import RecordEpisode
 
-from mskgrasp.errors import BadConfig, BadPart
+from mskgrasp.core.errors import BadConfig, BadPart
 from tasks import GraspDisplacementEnv
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from mskgrasp.grasp import TABLE_CLEARANCE, lowest_grasp_z
-from mskgrasp.settings import Physics
-from tasks.attempt import AHEAD
-from tasks.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration, run_up
+from mskgrasp.core.grasp import TABLE_CLEARANCE, lowest_grasp_z
+from mskgrasp.core.settings import Physics
+from tasks.attempt.attempt import AHEAD
+from tasks.robot.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration, run_up
 
 SOFT = {"finger_stiffness": 2000.0, "finger_damping": 50.0}
 

@@ -5,8 +5,8 @@ import dataclasses
 import pytest
 import torch
 
-from mskgrasp.grasp import FAILURES
-from tasks.outcome import Observed, judge
+from mskgrasp.core.grasp import FAILURES
+from tasks.attempt.outcome import Observed, judge
 
 HELD = Observed(
     settled=torch.tensor([True]),

@@ -8,8 +8,8 @@ import torch
 import trimesh
 from sapien.physx import PhysxRigidDynamicComponent
 
-from mskgrasp.geometry import Pose
-from mskgrasp.grasp import FAILURES, PAD_REACH, pose_base_grasp
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import FAILURES, PAD_REACH, pose_base_grasp
 from mskgrasp.parts import find_part
 
 PARTS = ("hex_bolt_m20x50", "hex_nut_m30", "l_bracket_60x40", "parallel_key_a16x10x56", "spur_gear_m3_z17")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mskgrasp.grasp import FAILURES
+from mskgrasp.core.grasp import FAILURES
 
 MM = 1e-3
 DEG = math.pi / 180

@@ -13,14 +13,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mskgrasp.geometry import quat_from_matrix
-from mskgrasp.settings import Physics
-from tasks.attempt import Attempt
-from tasks.contacts import HandContacts
-from tasks.frames import BASE_IN_WORLD
-from tasks.kinematics import HOME, forward
-from tasks.motion import PandaMotion
-from tasks.panda import HAND_LINKS
+from mskgrasp.core.geometry import quat_from_matrix
+from mskgrasp.core.panda_kinematics import HOME, forward
+from mskgrasp.core.settings import Physics
+from tasks.attempt.attempt import Attempt
+from tasks.robot.contacts import HandContacts
+from tasks.robot.motion import PandaMotion
+from tasks.robot.panda import HAND_LINKS
+from tasks.scene.frames import BASE_IN_WORLD
 
 SIZE = (0.04, 0.02, 0.03)
 GRIP_N = 20.0

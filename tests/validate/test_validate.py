@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mskgrasp.config import check_config, read_config
-from mskgrasp.errors import BadConfig
+from mskgrasp.core.config import check_config, read_config
+from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.settings import Physics
 from mskgrasp.parts import find_part
-from mskgrasp.settings import Physics
 from mskgrasp.validate.__main__ import main
-from mskgrasp.validate.by_hand import Check, run_checks
+from mskgrasp.validate.closed_form import Check, run_checks
 from mskgrasp.validate.compare import cheapest, compare, complaints
 from mskgrasp.validate.config import CELL_FLOOR, FLOOR, REFERENCE, Setting, ValidateConfig
 from mskgrasp.validate.convergence import Outcomes, draw_grasps, run_settings

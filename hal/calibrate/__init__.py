@@ -1,0 +1,1 @@
+"""Program: hand-eye calibration of a cell's camera. Run ``python -m hal.calibrate --help``."""

@@ -1,0 +1,6 @@
+"""``python -m hal.calibrate``."""
+
+from hal.calibrate.run import main
+from mskgrasp.runtime.cli import run
+
+run(main)

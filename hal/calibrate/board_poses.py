@@ -1,0 +1,113 @@
+"""Where the hand must go so that the camera sees a board in it from many sides. Pure functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from hal.charuco import Board, project
+from mskgrasp.core.geometry import Pose, straight_line
+
+TABLE_MARGIN = 0.04
+"""No corner of the board comes nearer to the table than this, metres."""
+_EDGE_PX = 6
+_SIZE_PX = 14.0
+_TRIES = 3000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sight:
+    """What is known beforehand of the camera: enough to bring the board before it.
+
+    Attributes:
+        T_base_camera: Where it hangs, to some centimetres.
+        intrinsics: (3, 3) pinhole matrix in pixels.
+        width: Columns of its image.
+        height: Rows.
+        nearest: The board stays at least this far from it, metres.
+    """
+
+    T_base_camera: Pose
+    intrinsics: np.ndarray
+    width: int
+    height: int
+    nearest: float
+
+
+def candidate_poses(
+    board: Board,
+    T_tcp_board: Pose,
+    sight: Sight,
+    table_z: float,
+    *,
+    tilt_rad: float,
+    rng: np.random.Generator,
+    possible: Callable[[Pose], bool],
+) -> Iterator[Pose]:
+    """``T_base_tcp`` with the board in the camera's sight, tilted to all sides, over the table.
+
+    Args:
+        board: What the hand holds.
+        T_tcp_board: How, to a centimetre or two.
+        sight: Where the camera is, about.
+        table_z: Height of the table, base frame, metres.
+        tilt_rad: Greatest tilt of the board against the camera's line of sight.
+        rng: The poses follow from it.
+        possible: Whether the arm can go there.
+    """
+    # Outermost markers may be cut off: what must be seen are the inner corners.
+    inner, outline = board.outline(-0.6 * board.square), board.outline(0.01)
+    # The farthest the board may be: there a square is still this many pixels wide.
+    farthest = float(sight.intrinsics[0, 0]) * board.square / _SIZE_PX
+    camera = sight.T_base_camera
+    to_table = float(camera.position[2]) - table_z
+    farthest = min(farthest, to_table - TABLE_MARGIN)
+    for k in range(_TRIES):
+        pixel = rng.uniform([0, 0], [sight.width - 1, sight.height - 1])
+        ray = np.linalg.solve(sight.intrinsics, np.array([*pixel, 1.0]))
+        centre = camera.apply(ray * rng.uniform(min(sight.nearest, farthest), farthest))
+        # Directions of the tilt go round, so that a small set has all of them; a third is tilted by less.
+        towards = 2 * np.pi * 0.381966 * k
+        lean = tilt_rad * rng.uniform(0.3, 1.0)
+        turn = Rotation.from_rotvec(lean * np.array([np.cos(towards), np.sin(towards), 0.0]))
+        T_base_board = Pose(
+            position=centre, quat_wxyz=(turn * _facing(rng.uniform(-1, 1))).as_quat(scalar_first=True)
+        )
+        if not in_sight(inner, T_base_board, sight):
+            continue
+        if _lowest(outline, T_base_board) < table_z + TABLE_MARGIN:
+            continue
+        T_base_tcp = T_base_board @ T_tcp_board.inverse()
+        if possible(T_base_tcp):
+            yield T_base_tcp
+
+
+def in_sight(outline: np.ndarray, T_base_board: Pose, sight: Sight) -> bool:
+    """Whether the camera sees an outline (k, 3) on the board, metres, and the printed side."""
+    T_camera_board = sight.T_base_camera.inverse() @ T_base_board
+    points = T_camera_board.apply(outline)
+    if (points[:, 2] < sight.nearest * 0.8).any():
+        return False
+    pixels = project(points, sight.intrinsics)
+    limit = np.array([sight.width - 1, sight.height - 1]) - _EDGE_PX
+    facing = T_camera_board.as_matrix()[:3, 2] @ T_camera_board.position
+    return bool(facing > 0 and (pixels > _EDGE_PX).all() and (pixels < limit).all())
+
+
+def way_is_clear(start: Pose, goal: Pose, T_tcp_board: Pose, board: Board, table_z: float) -> bool:
+    """Whether the board stays off the table while the hand moves straight from start to goal."""
+    line = straight_line(start, goal, np.linspace(0, 1, 9))
+    hands = (Pose(position=p, quat_wxyz=q) for p, q in zip(line.position, line.quat_wxyz, strict=True))
+    return all(_lowest(board.outline(), hand @ T_tcp_board) >= table_z + TABLE_MARGIN / 2 for hand in hands)
+
+
+def _lowest(outline: np.ndarray, T_base_board: Pose) -> float:
+    return float(T_base_board.apply(outline)[:, 2].min())
+
+
+def _facing(share: float) -> Rotation:
+    """The board face up, its x away from the base, turned by a share of 70 degrees to either side."""
+    return Rotation.from_euler("z", share * np.radians(70)) * Rotation.from_euler("x", np.pi)

@@ -1,0 +1,218 @@
+"""Pictures of the board in the hand: taken with an arm and a camera, kept in a folder, read again."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hal.arm import ArmState
+from hal.calibrate.board_poses import Sight, candidate_poses, way_is_clear
+from hal.calibrate.hand_eye import MIN_VIEWS, BadCalibrationSet, View
+from hal.camera import RgbdFrame
+from hal.cell import Cell
+from hal.charuco import MIN_CORNERS, Board, detect
+from hal.errors import MotionAborted, OutOfWorkspace
+from mskgrasp.core.errors import UsageError
+from mskgrasp.core.geometry import Pose, pose_distance
+
+_STILL_M = 3e-4
+_STILL_RAD = 1e-3
+_HOPELESS = 5
+_SPARE = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Picture:
+    """One frame and where the hand was.
+
+    Attributes:
+        colour: (h, w, 3) uint8, RGB.
+        depth: (h, w) float32, metres, NaN where invalid.
+        intrinsics: (3, 3) pixels.
+        T_base_camera: Where the camera was believed to be.
+        T_base_tcp: Where the hand was.
+        serial: The camera's.
+    """
+
+    colour: np.ndarray
+    depth: np.ndarray
+    intrinsics: np.ndarray
+    T_base_camera: Pose
+    T_base_tcp: Pose
+    serial: str
+
+    @classmethod
+    def of(cls, frame: RgbdFrame, state: ArmState) -> Picture:
+        """What a frame and a state say."""
+        return cls(
+            colour=frame.colour,
+            depth=frame.depth,
+            intrinsics=frame.intrinsics,
+            T_base_camera=frame.T_base_camera,
+            T_base_tcp=state.T_base_tcp,
+            serial=frame.serial,
+        )
+
+    def view(self, board: Board) -> View:
+        """What the board looks like in it."""
+        return View(
+            T_base_tcp=self.T_base_tcp, corners=detect(board, self.colour), intrinsics=self.intrinsics
+        )
+
+
+def take_pictures(
+    cell: Cell,
+    board: Board,
+    T_tcp_board: Pose,
+    *,
+    n: int,
+    tilt_rad: float,
+    nearest: float,
+    speed: float,
+    settle_s: float,
+    rng: np.random.Generator,
+    keep: Callable[[int, Picture, int], None],
+) -> int:
+    """Moves the board before the camera and takes pictures, then brings the hand back to where it was.
+
+    Args:
+        cell: Connected, the board in the hand.
+        board: What is in the hand.
+        T_tcp_board: How, to a centimetre or two.
+        n: Pictures in which the board is to be found.
+        tilt_rad: Greatest tilt of the board against the line of sight.
+        nearest: The board stays this far from the camera, metres.
+        speed: Of the hand, m/s.
+        settle_s: Rest before each picture, seconds.
+        rng: The poses follow from it.
+        keep: Called with the number of the picture, the picture, and how many corners were found in it.
+
+    Returns:
+        How many pictures were taken.
+
+    Raises:
+        BadCalibrationSet: The board is not found, or too few poses can be reached.
+        HalError: Arm or camera failed.
+    """
+    arm = cell.arm
+    start = arm.state().T_base_tcp
+    frame = cell.camera.capture()
+    sight = Sight(
+        T_base_camera=frame.T_base_camera,
+        intrinsics=frame.intrinsics,
+        width=frame.depth.shape[1],
+        height=frame.depth.shape[0],
+        nearest=nearest,
+    )
+    table_z = cell.workspace.table_z
+    targets = candidate_poses(
+        board, T_tcp_board, sight, table_z, tilt_rad=tilt_rad, rng=rng, possible=_possible(cell)
+    )
+    taken = found = 0
+    here = start
+    for target in targets:
+        if not way_is_clear(here, target, T_tcp_board, board, table_z):
+            continue
+        try:
+            arm.move_to_pose(target, speed=speed)
+        except OutOfWorkspace:
+            continue  # no straight way there: found out before anything moved
+        here = target
+        arm.wait(settle_s)
+        picture = _still_picture(cell)
+        n_corners = len(detect(board, picture.colour).ids)
+        keep(taken, picture, n_corners)
+        taken += 1
+        found += n_corners >= MIN_CORNERS
+        if found == 0 and taken == _HOPELESS:
+            arm.move_to_pose(start, speed=speed)
+            raise BadCalibrationSet(
+                f"the board was not found in any of the first {taken} pictures (look at them in the "
+                "folder); it must be this board, printed side up, held as --board-at says, and lit evenly"
+            )
+        if found == n or taken == _SPARE * n:
+            break
+    if taken == 0 or found < MIN_VIEWS:
+        raise BadCalibrationSet(
+            f"the arm could bring the board before the camera {taken} times and it was found {found} times, "
+            f"at least {MIN_VIEWS} are needed; check where the camera is said to be (--camera-at), the "
+            "workspace's box, --nearest and --board-at"
+        )
+    arm.move_to_pose(start, speed=speed)
+    return taken
+
+
+def _possible(cell: Cell) -> Callable[[Pose], bool]:
+    def possible(pose: Pose) -> bool:
+        try:
+            cell.arm.check_pose(pose)
+        except OutOfWorkspace:
+            return False
+        return True
+
+    return possible
+
+
+def _still_picture(cell: Cell) -> Picture:
+    """A frame during which the hand did not move."""
+    for _ in range(3):
+        before = cell.arm.state()
+        frame = cell.camera.capture()
+        after = cell.arm.state()
+        distance, angle = pose_distance(before.T_base_tcp, after.T_base_tcp)
+        if distance < _STILL_M and angle < _STILL_RAD:
+            return Picture.of(frame, after)
+        cell.arm.wait(0.5)
+    raise MotionAborted("the arm does not come to rest; raise --settle-s, and see what pushes it")
+
+
+# ---------------------------------------------------------------------- the folder
+
+
+def write_picture(path: Path, picture: Picture) -> None:
+    """Writes a picture; the file appears whole or not at all."""
+    unfinished = path.with_name(path.name + ".tmp")
+    with unfinished.open("wb") as file:
+        np.savez_compressed(
+            file,
+            colour=picture.colour,
+            depth=picture.depth,
+            intrinsics=picture.intrinsics,
+            T_base_camera=picture.T_base_camera.as_vector(),
+            T_base_tcp=picture.T_base_tcp.as_vector(),
+            serial=np.frombuffer(picture.serial.encode(), dtype=np.uint8),
+        )
+    unfinished.replace(path)
+
+
+def read_picture(path: Path) -> Picture:
+    """Reads a picture.
+
+    Raises:
+        UsageError: The file is missing, damaged, or no picture.
+    """
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
+            return Picture(
+                colour=arrays["colour"],
+                depth=arrays["depth"],
+                intrinsics=arrays["intrinsics"],
+                T_base_camera=Pose.from_vector(arrays["T_base_camera"]),
+                T_base_tcp=Pose.from_vector(arrays["T_base_tcp"]),
+                serial=arrays["serial"].tobytes().decode(),
+            )
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise UsageError(
+            f"{path} cannot be read as a picture ({type(error).__name__}); delete it, or take the "
+            "pictures again"
+        ) from error
+
+
+def picture_paths(folder: Path) -> list[Path]:
+    """The board's pictures in a folder, in the order in which they were taken."""
+    return sorted(folder.glob("pose-*.npz"))

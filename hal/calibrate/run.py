@@ -1,0 +1,282 @@
+"""Program: find out where the camera is. Run ``python -m hal.calibrate --help``."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+from pydantic import Field
+
+from hal.calibrate.board_print import print_board
+from hal.calibrate.board_views import Picture, picture_paths, read_picture, take_pictures, write_picture
+from hal.calibrate.hand_eye import MIN_VIEWS, BadCalibrationSet, solve_hand_eye
+from hal.calibrate.report import (
+    DepthOffset,
+    depth_offset,
+    describe,
+    describe_table,
+    draw_corners,
+    draw_residuals,
+)
+from hal.camera_calibration import Calibration, calibration_path, write_calibration
+from hal.cell import Cell, Workspace
+from hal.charuco import Board
+from hal.open_cell import cell_from_values, cell_from_yaml
+from hal.table import fit_table
+from mskgrasp.core.config import Config, read_config, read_yaml, write_config
+from mskgrasp.core.errors import UsageError
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import MAX_OPENING
+from mskgrasp.runtime.cli import make_folder, parse
+
+DESCRIPTION = """Finds out where the camera over the table is, with a ChArUco board held by the gripper.
+
+Print the board with --print-board board.pdf. The arm closes its fingers on the board, shows it to the camera
+from many sides, and brings it back; keep a hand on the emergency stop. Ctrl-C stops the arm, and the pictures
+taken so far can be solved with --from FOLDER. Writes calibration.yaml, corners.png, residuals.png and the
+pictures. See docs/calibration.md."""
+
+_MARGIN = 0.01
+"""White paper around the simulated board, metres."""
+_PLATE = 0.02
+"""Distance of the pads on the handle of the simulated board, metres."""
+LOOKING_DOWN = np.array([0.0, 1.0, -1.0, 0.0]) / np.sqrt(2)
+"""Quaternion wxyz of a camera that looks straight down, the top of its image away from the base."""
+
+
+class CalibrateConfig(Config):
+    """Settings of one calibration."""
+
+    cell: Path | None = None
+    """YAML file of the cell, for example configs/cells/panda_kinect2.yaml."""
+    out: Path = Path("out/calibration")
+    """Folder for the calibration and the pictures; one calibration, one folder."""
+    source: Annotated[Path | None, tyro.conf.arg(name="from")] = None
+    """Solve again from the pictures in this folder; no arm and no camera is needed."""
+    print_board: Path | None = None
+    """Only write the board for printing to this file, .pdf or .png, at its true size."""
+    board: Board = Board()
+    """The board, as it was printed and measured."""
+    poses: int = Field(default=24, ge=MIN_VIEWS, le=200)
+    """Pictures of the board to take."""
+    tilt_deg: float = Field(default=30.0, ge=10, le=50)
+    """Greatest tilt of the board against the camera's line of sight, degrees."""
+    board_at: tuple[float, float, float] = (0.16, 0.0, 0.0)
+    """Middle of the board in the tcp frame, m, to 1 cm: x across the thin side of the hand, z out of it."""
+    board_turn_deg: float = Field(default=0.0, ge=-180, le=180)
+    """Turn of the board about the hand's axis; 0: x as printed is the hand's x, print to the wrist."""
+    nearest: float = Field(default=0.5, ge=0.2, le=2)
+    """The board stays at least this far from the camera, m; a Kinect v2 sees nothing nearer than 0.5 m."""
+    speed: float = Field(default=0.1, gt=0, le=0.5)
+    """Of the hand, m/s; the cell file may allow less."""
+    settle_s: float = Field(default=0.5, ge=0, le=10)
+    """Rest before each picture, s."""
+    camera_at: tuple[float, float, float] | None = None
+    """Where the camera is, measured by tape, base frame, m: needed where there is no calibration file yet."""
+    seed: int = Field(default=0, ge=0)
+    """The poses follow from it."""
+
+    def T_tcp_board(self) -> Pose:
+        """How the board is held, about."""
+        half = np.radians(self.board_turn_deg) / 2
+        return Pose(
+            position=np.array(self.board_at), quat_wxyz=np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
+        )
+
+
+def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
+    """Takes the pictures into ``config.out``.
+
+    Returns:
+        The cell's workspace.
+
+    Raises:
+        UsageError, BadConfig: The folder is in use, or the cell file is not valid.
+        HalError: Arm or camera failed, or the board was not seen.
+    """
+    if picture_paths(config.out):
+        raise UsageError(
+            f"{config.out} holds the pictures of an earlier run; solve them with --from {config.out}, or "
+            "choose another --out"
+        )
+    values = read_yaml(cell_file)
+    cell = cell_from_values(_with_camera_at(values, config, cell_file), cell_file)
+    write_config(config.board, config.out / "board.yaml")
+
+    def keep(index: int, picture: Picture, n_corners: int) -> None:
+        write_picture(config.out / f"pose-{index:03d}.npz", picture)
+        print(f"picture {index:3d}: {n_corners} of {config.board.n_corners} corners", flush=True)
+
+    with cell.connected():
+        write_picture(config.out / "table.npz", Picture.of(cell.camera.capture(), cell.arm.state()))
+        _take_board(cell, config)
+        take_pictures(
+            cell,
+            config.board,
+            config.T_tcp_board(),
+            n=config.poses,
+            tilt_rad=np.radians(config.tilt_deg),
+            nearest=config.nearest,
+            speed=config.speed,
+            settle_s=config.settle_s,
+            rng=np.random.default_rng(config.seed),
+            keep=keep,
+        )
+        _give_board_back(cell)
+    return cell.workspace
+
+
+def solve(config: CalibrateConfig, folder: Path, board: Board, workspace: Workspace | None) -> list[str]:
+    """Solves from the pictures in a folder, writes calibration and pictures into ``config.out``.
+
+    Returns:
+        The result, line by line.
+
+    Raises:
+        BadCalibrationSet: The pictures do not determine where the camera is.
+        UsageError: There are no pictures, they are damaged, or from several cameras.
+    """
+    paths = picture_paths(folder)
+    if not paths:
+        raise UsageError(
+            f"{folder} holds no pictures (pose-*.npz); take them with --cell FILE --out {folder}"
+        )
+    pictures = [read_picture(path) for path in paths]
+    serials = sorted({picture.serial for picture in pictures})
+    if len(serials) > 1:
+        raise UsageError(
+            f"{folder} holds pictures of several cameras: {', '.join(serials)}; keep those of one"
+        )
+    views = [picture.view(board) for picture in pictures]
+    try:
+        found = solve_hand_eye(board, views)
+    except BadCalibrationSet:
+        draw_corners(board, pictures, views, None, config.out / "corners.png")
+        raise
+    offset = depth_offset(board, pictures, found)
+    calibration = Calibration(
+        serial=serials[0],
+        T_base_camera=found.T_base_camera,
+        intrinsics=pictures[0].intrinsics,
+        rms_translation_m=found.rms_translation_m,
+        rms_rotation_rad=found.rms_rotation_rad,
+        n_poses=len(found.used),
+        made=_now(),
+    )
+    write_calibration(config.out / "calibration.yaml", calibration)
+    draw_corners(board, pictures, views, found, config.out / "corners.png")
+    draw_residuals(views, found, config.out / "residuals.png")
+    lines = describe(found, views, pictures[0].T_base_camera, offset)
+    return lines + _describe_table(folder, found.T_base_camera, offset, workspace)
+
+
+def _describe_table(
+    folder: Path, T_base_camera: Pose, offset: DepthOffset | None, workspace: Workspace | None
+) -> list[str]:
+    path = folder / "table.npz"
+    if workspace is None or not path.is_file():
+        return []
+    picture = read_picture(path)
+    plane = fit_table(picture.depth, picture.intrinsics, T_base_camera, workspace.region, workspace.table_z)
+    return [describe_table(plane, offset, workspace.table_z)]
+
+
+def _with_camera_at(values: dict[str, Any], config: CalibrateConfig, cell_file: Path) -> dict[str, Any]:
+    """The cell's values with a camera measured by tape in place of a calibration file."""
+    camera = values.get("camera")
+    if not isinstance(camera, dict) or "calibration" not in camera:
+        if config.camera_at is None:
+            return values
+        cell_from_values(values, cell_file)  # what is wrong with the file itself is told first
+        raise UsageError(
+            f"--camera-at is for a camera with a calibration file; that of {cell_file} knows where it is"
+        )
+    if config.camera_at is None:
+        if not calibration_path(camera["calibration"], cell_file).is_file():
+            raise UsageError(
+                f"{cell_file}: there is no calibration file {camera['calibration']} yet; measure with a tape "
+                "where the camera is and give it as --camera-at X Y Z (base frame, m), good to 3 cm"
+            )
+        return values
+    by_hand = Calibration(
+        serial="any",
+        T_base_camera=Pose(position=np.array(config.camera_at), quat_wxyz=LOOKING_DOWN),
+        intrinsics=None,
+        rms_translation_m=0.03,
+        rms_rotation_rad=0.1,
+        n_poses=0,
+        made=_now(),
+    )
+    path = config.out.absolute() / "by_hand.yaml"
+    write_calibration(path, by_hand)
+    return {**values, "camera": {**camera, "calibration": str(path)}}
+
+
+def _take_board(cell: Cell, config: CalibrateConfig) -> None:
+    board, arm = config.board, cell.arm
+    if cell.board_holder is not None:
+        arm.move_gripper(_PLATE)
+        width, height = (edge + 2 * _MARGIN for edge in board.size)
+        cell.board_holder.hold_board(board.image(80, _MARGIN), (width, height), config.T_tcp_board())
+        return
+    _ask("Press Enter: the fingers open.")
+    arm.move_gripper(MAX_OPENING)
+    _ask("Hold the board's handle between the fingers, printed side up, and press Enter: the fingers close.")
+    if not arm.grasp(cell.workspace.grasp_force).holding:
+        raise BadCalibrationSet(
+            "the fingers closed on nothing; hold the board's handle between them, start again"
+        )
+    _ask("Step back, a hand on the emergency stop, and press Enter: the arm moves.")
+
+
+def _give_board_back(cell: Cell) -> None:
+    if cell.board_holder is None:
+        _ask("Take hold of the board and press Enter: the fingers open.")
+        cell.arm.move_gripper(MAX_OPENING)
+
+
+def _ask(prompt: str) -> None:
+    try:
+        input(prompt + " ")
+    except EOFError:
+        raise UsageError("somebody must put the board into the hand; run this in a terminal") from None
+
+
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+
+
+def main() -> int:
+    """Takes pictures, solves, reports."""
+    config = parse(CalibrateConfig, prog="python -m hal.calibrate", description=DESCRIPTION)
+    board, folder = config.board, config.out
+    if config.print_board is not None:
+        make_folder(config.print_board.parent)
+        paper = print_board(board, config.print_board)
+        print(
+            f"wrote {config.print_board} ({paper}); print it at 100 %, measure it, glue it on a stiff plate"
+        )
+        return 0
+    if config.cell is None and config.source is None:
+        raise UsageError(
+            "give --cell FILE (take pictures and solve), --from FOLDER (solve), or --print-board FILE"
+        )
+    make_folder(config.out)
+    if config.source is not None:
+        folder = config.source
+        if (folder / "board.yaml").is_file():
+            board = read_config(Board, folder / "board.yaml")
+        workspace = None if config.cell is None else cell_from_yaml(config.cell).workspace
+    else:
+        assert config.cell is not None
+        workspace = capture(config, config.cell)
+    for line in solve(config, folder, board, workspace):
+        print(line)
+    print(
+        f"wrote calibration.yaml, corners.png and residuals.png in {config.out}; look at both pictures, then"
+    )
+    print("copy calibration.yaml to where camera.calibration of the cell file points")
+    return 0

@@ -1,0 +1,1 @@
+"""Program: check a cell. Run ``python -m hal.doctor --help``."""

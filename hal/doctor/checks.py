@@ -1,0 +1,377 @@
+"""What can be wrong with a cell, each checked by one function that says how to mend it."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from hal.arm import JOINT_TOLERANCE, Arm
+from hal.camera import Camera, RgbdFrame
+from hal.camera_calibration import Calibration, calibration_path, read_calibration
+from hal.cell import Workspace
+from hal.charuco import project
+from hal.errors import HalError, OutOfWorkspace
+from hal.execute import APPROACH
+from hal.table import fit_table
+from mskgrasp.core.errors import BadConfig, MskgraspError
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import MAX_OPENING, lowest_grasp_z, pose_base_tcp
+
+Level = Literal["ok", "warn", "fail"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One line of the doctor's.
+
+    Attributes:
+        level: Whether the cell can be used like this.
+        subject: What was looked at.
+        text: What was found and, where it is not good, how to mend it.
+    """
+
+    level: Level
+    subject: str
+    text: str
+
+
+_PACKAGES = {
+    "franky": ("franky-control", "mskgrasp[franka]"),
+    "panda_py": ("panda-python", "mskgrasp[franka]"),
+    "kinect2": ("pylibfreenect2", "mskgrasp[kinect2]"),
+    "sapien": ("sapien", "mskgrasp"),
+}
+_LOW_DISK = 2e9
+_MAX_AGE_S = 0.5
+_GOOD_RATE = 5.0
+_GOOD_VALID = 0.9
+_LEAST_VALID = 0.5
+_TABLE_OK = 0.0025
+_TILT_OK = np.radians(0.5)
+_RMS_OK = (0.005, np.radians(3.0))  # of single pictures: a flat board seen alone turns by a degree or two
+_ENOUGH_POSES = 12
+_N_FRAMES = 10
+_STEP = 0.03
+"""How far a joint is moved to see whether it arrives, radians."""
+
+
+# ---------------------------------------------------------------------- without any device
+
+
+def check_drivers(values: dict[str, Any]) -> Iterator[Finding]:
+    """Whether the packages that the cell file names are installed, and which versions."""
+    drivers: dict[str, dict[str, Any]] = {"sapien": {}} if values.get("type") == "sapien" else {}
+    for section in ("arm", "camera"):
+        part = values.get(section)
+        if values.get("type") == "devices" and isinstance(part, dict):
+            drivers.setdefault(str(part.get("driver")), part)
+    for name, settings in drivers.items():
+        if name not in _PACKAGES:
+            continue  # a recording needs no package
+        package, install = _PACKAGES[name]
+        subject = f"driver {name}"
+        try:
+            version = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            first = " (after building libfreenect2, see docs/kinect2.md)" if name == "kinect2" else ""
+            yield Finding(
+                level="fail",
+                subject=subject,
+                text=f"{package} is not installed: pip install '{install}'{first}",
+            )
+            continue
+        yield _driver_fits(name, package, version, settings)
+
+
+def _driver_fits(name: str, package: str, version: str, settings: dict[str, Any]) -> Finding:
+    robot = settings.get("robot", "panda")
+    if name == "panda_py" and robot == "fr3":
+        return Finding(
+            level="warn",
+            subject="driver panda_py",
+            text=f"{package} {version} from PyPI speaks to a Panda only; for an FR3 set arm.driver to franky",
+        )
+    if name == "franky" and robot == "panda":
+        return Finding(
+            level="warn",
+            subject="driver franky",
+            text=f"{package} {version}: the wheel from PyPI speaks to an FR3 only; for a Panda install "
+            "franky's wheel for server version 5, or set arm.driver to panda_py",
+        )
+    return Finding(level="ok", subject=f"driver {name}", text=f"{package} {version}")
+
+
+def check_disk(folder: Path) -> Finding:
+    """Whether datasets and recordings find room."""
+    free = shutil.disk_usage(folder).free
+    if free < _LOW_DISK:
+        return Finding(
+            level="warn", subject="disk", text=f"{free / 1e9:.1f} GB free; make room for recordings"
+        )
+    return Finding(level="ok", subject="disk", text=f"{free / 1e9:.0f} GB free")
+
+
+def check_renderer() -> Finding:
+    """Whether the simulated camera can draw."""
+    from tasks.scene.renderer import NoRenderer, render_backend
+
+    try:
+        return Finding(level="ok", subject="Vulkan", text=f"renders on {render_backend()}")
+    except NoRenderer as error:
+        return Finding(level="fail", subject="Vulkan", text=str(error))
+
+
+def check_calibration(values: dict[str, Any], cell_file: Path, workspace: Workspace) -> Finding | None:
+    """Whether the calibration file is there, good and plausible; None where the camera needs none."""
+    camera = values.get("camera")
+    if not isinstance(camera, dict) or "calibration" not in camera:
+        return None
+    path = calibration_path(camera["calibration"], cell_file)
+    try:
+        calibration = read_calibration(path, serial=camera.get("serial"))
+    except BadConfig as error:
+        return Finding(level="fail", subject="calibration", text=str(error))
+    return judge_calibration(calibration, path, workspace)
+
+
+def judge_calibration(calibration: Calibration, path: Path, workspace: Workspace) -> Finding:
+    """Whether a calibration can be true."""
+    problem = implausible(calibration.T_base_camera, workspace)
+    if problem:
+        return Finding(
+            level="fail",
+            subject="calibration",
+            text=f"{path}: {problem}; calibrate again (python -m hal.calibrate)",
+        )
+    millimetres = calibration.rms_translation_m * 1e3
+    degrees = np.degrees(calibration.rms_rotation_rad)
+    said = (
+        f"{path}, camera {calibration.serial}, {calibration.n_poses} poses, residuals {millimetres:.2f} mm "
+        f"and {degrees:.2f} degrees, made {calibration.made}"
+    )
+    if calibration.by_hand:
+        return Finding(
+            level="warn",
+            subject="calibration",
+            text=f"{path} was measured by hand, good to centimetres: run python -m hal.calibrate",
+        )
+    if calibration.rms_translation_m > _RMS_OK[0] or calibration.rms_rotation_rad > _RMS_OK[1]:
+        return Finding(level="warn", subject="calibration", text=f"{said}: large residuals; calibrate again")
+    if calibration.n_poses < _ENOUGH_POSES:
+        return Finding(
+            level="warn", subject="calibration", text=f"{said}: few poses; calibrate again with --poses 24"
+        )
+    return Finding(level="ok", subject="calibration", text=said)
+
+
+def implausible(T_base_camera: Pose, workspace: Workspace) -> str:
+    """Why a camera over the table cannot be there; empty where it can."""
+    x, y, z = np.asarray(T_base_camera.position, dtype=np.float64)
+    height = z - workspace.table_z
+    if not 0.3 <= height <= 3.0:
+        return f"the camera would be {height:.2f} m over the table, not 0.3 .. 3 m"
+    axis = T_base_camera.as_matrix()[:3, 2]
+    if axis[2] > -0.5:
+        return "the camera would not look down (its z axis, seen from the base, must point to the table)"
+    seen = np.array([x, y]) + axis[:2] / -axis[2] * height
+    x_min, x_max, y_min, y_max = workspace.region
+    if not (x_min - 0.3 <= seen[0] <= x_max + 0.3 and y_min - 0.3 <= seen[1] <= y_max + 0.3):
+        return f"the camera would look at x {seen[0]:.2f} m, y {seen[1]:.2f} m, beside the region"
+    return ""
+
+
+# ---------------------------------------------------------------------- arm
+
+
+def check_arm(arm: Arm, connect_s: float) -> Iterator[Finding]:
+    """Whether the connected arm answers, and where it is."""
+    before = time.monotonic()
+    state = arm.state()
+    took = time.monotonic() - before
+    yield Finding(
+        level="ok",
+        subject="arm",
+        text=f"connected in {connect_s:.1f} s, state in {took * 1e3:.0f} ms, TCP at "
+        f"{np.round(state.T_base_tcp.position, 3).tolist()} m, pads {state.gripper_width * 1e3:.1f} mm apart",
+    )
+    outside = np.flatnonzero(
+        (state.joints < arm.limits.joint_lower) | (state.joints > arm.limits.joint_upper)
+    )
+    if len(outside):
+        i = int(outside[0])
+        yield Finding(
+            level="fail",
+            subject="arm joints",
+            text=f"joint {i + 1} is at {state.joints[i]:.3f} rad, outside {arm.limits.joint_lower[i]:.3f} .. "
+            f"{arm.limits.joint_upper[i]:.3f}; guide the arm by hand towards the middle",
+        )
+
+
+def check_reach(arm: Arm, workspace: Workspace) -> Finding:
+    """Whether every corner of the region can be grasped, lifted and approached."""
+    lowest = lowest_grasp_z(workspace.table_z)
+    x_min, x_max, y_min, y_max = workspace.region
+    for x, y in ((x_min, y_min), (x_min, y_max), (x_max, y_min), (x_max, y_max)):
+        for z in (lowest, lowest + workspace.lift_height, workspace.table_z + APPROACH):
+            for theta in (-np.pi / 2, 0.0, np.pi / 2):
+                try:
+                    arm.check_pose(pose_base_tcp(np.array([x, y, z, theta])))
+                except OutOfWorkspace as error:
+                    return Finding(
+                        level="fail", subject="workspace", text=f"{error}; make workspace.region smaller"
+                    )
+    return Finding(
+        level="ok", subject="workspace", text=f"region {list(workspace.region)} m: all of it within reach"
+    )
+
+
+def check_motion(arm: Arm) -> Iterator[Finding]:
+    """Moves every joint a little and back, and the fingers: does it arrive, and how exactly?"""
+    start = arm.state().joints
+    try:
+        target = start + _STEP
+        over = target > arm.limits.joint_upper
+        target[over] = start[over] - _STEP
+        arm.move_to_joints(target, speed=0.1)
+        there = np.abs(arm.state().joints - target).max()
+        arm.move_to_joints(start, speed=0.1)
+        back = np.abs(arm.state().joints - start).max()
+        worst = max(there, back)
+        yield Finding(
+            level="ok" if worst < JOINT_TOLERANCE / 2 else "warn",
+            subject="joint motion",
+            text=f"all joints by {_STEP} rad and back: within {worst * 1e3:.2f} mrad"
+            + (
+                ""
+                if worst < JOINT_TOLERANCE / 2
+                else "; see what loads the arm, and Desk's end effector mass"
+            ),
+        )
+    except HalError as error:
+        yield Finding(level="fail", subject="joint motion", text=str(error))
+        return
+    try:
+        reached = []
+        for width in (MAX_OPENING, 0.04, MAX_OPENING):
+            arm.move_gripper(width)
+            reached.append(abs(arm.state().gripper_width - width))
+        yield Finding(
+            level="ok",
+            subject="gripper",
+            text=f"80, 40 and 80 mm: within {max(reached) * 1e3:.2f} mm",
+        )
+    except HalError as error:
+        yield Finding(level="fail", subject="gripper", text=str(error))
+
+
+# ---------------------------------------------------------------------- camera
+
+
+def check_stream(camera: Camera, frames: list[RgbdFrame], *, timeout_s: float = 5.0) -> Iterator[Finding]:
+    """Takes frames, which are appended to ``frames``: how fast, how fresh, how complete?"""
+    ages = []
+    try:
+        camera.capture(timeout_s=timeout_s)  # the first may take its time
+        begin = time.monotonic()
+        for _ in range(_N_FRAMES):
+            frame = camera.capture(timeout_s=timeout_s)
+            ages.append(time.monotonic() - frame.timestamp_s)
+            frames.append(frame)
+    except HalError as error:
+        yield Finding(level="fail", subject="camera stream", text=str(error))
+        return
+    rate = _N_FRAMES / (time.monotonic() - begin)
+    stamps = np.array([frame.timestamp_s for frame in frames])
+    height, width = frames[0].depth.shape
+    said = f"{width} x {height} pixels, {rate:.1f} frames/s, {max(ages) * 1e3:.0f} ms old at most"
+    if (np.diff(stamps) <= 0).any():
+        yield Finding(
+            level="fail", subject="camera stream", text=f"{said}: the same exposure twice; open it again"
+        )
+    elif rate < _GOOD_RATE or max(ages) > _MAX_AGE_S:
+        yield Finding(
+            level="warn", subject="camera stream", text=f"{said}: slow; plug it into a USB 3 port of its own"
+        )
+    else:
+        yield Finding(level="ok", subject="camera stream", text=said)
+
+
+def check_view(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
+    """Whether the camera sees the region whole, up to the height of a lift."""
+    problem = implausible(frame.T_base_camera, workspace)
+    if problem:
+        yield Finding(
+            level="fail", subject="camera pose", text=f"{problem}; calibrate with python -m hal.calibrate"
+        )
+        return
+    x_min, x_max, y_min, y_max = workspace.region
+    corners = np.array([[x, y, workspace.table_z] for x in (x_min, x_max) for y in (y_min, y_max)])
+    pixels = project(frame.T_base_camera.inverse().apply(corners), frame.intrinsics)
+    limit = np.array(frame.depth.shape[::-1]) - 1
+    inside = ((pixels >= 0) & (pixels <= limit)).all()
+    margin = float(np.minimum(pixels, limit - pixels).min())
+    yield Finding(
+        level="ok" if inside else "fail",
+        subject="camera view",
+        text=f"region whole in the image, {margin:.0f} pixels from its edge"
+        if inside
+        else f"the region reaches {-margin:.0f} pixels out of the image; move the camera, or make "
+        "workspace.region smaller",
+    )
+
+
+def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
+    """Whether the table in the depth image is where the cell file says."""
+    plane = fit_table(frame.depth, frame.intrinsics, frame.T_base_camera, workspace.region, workspace.table_z)
+    if plane is None:
+        yield Finding(
+            level="fail",
+            subject="depth",
+            text="no table over the region; uncover it, avoid glossy or black surfaces and sunlight",
+        )
+        return
+    said = f"{plane.valid:.0%} of the region has a depth, {plane.share:.0%} of that is table"
+    level: Level = "ok" if plane.valid >= _GOOD_VALID else "warn" if plane.valid >= _LEAST_VALID else "fail"
+    remedy = "" if level == "ok" else "; avoid glossy or black surfaces and sunlight"
+    yield Finding(level=level, subject="depth", text=f"{said}, noise {plane.noise * 1e3:.1f} mm{remedy}")
+    off = plane.z - workspace.table_z
+    tilt_deg = np.degrees(plane.tilt_rad)
+    said = f"{off * 1e3:+.1f} mm from table_z {workspace.table_z:.4f} m, tilted by {tilt_deg:.2f} degrees"
+    if plane.tilt_rad > 2 * _TILT_OK:
+        yield Finding(
+            level="fail",
+            subject="table",
+            text=f"{said}; calibrate again (python -m hal.calibrate), or level it",
+        )
+    elif abs(off) >= workspace.min_height:
+        yield Finding(
+            level="fail",
+            subject="table",
+            text=f"{said}: no part is looked for where the table seems that far off; touch the table with "
+            f"closed fingers: if table_z holds, add {off:+.4f} to camera.depth_offset (the camera measures "
+            f"{'short' if off > 0 else 'too far'}), else correct table_z",
+        )
+    elif abs(off) > max(_TABLE_OK, workspace.min_height / 2) or plane.tilt_rad > _TILT_OK:
+        yield Finding(
+            level="warn",
+            subject="table",
+            text=f"{said}; let the camera warm up, then correct camera.depth_offset",
+        )
+    else:
+        yield Finding(level="ok", subject="table", text=said)
+
+
+def attempt(subject: str, action: Any) -> Finding | None:
+    """Runs something that may fail; the failure as a finding."""
+    try:
+        action()
+    except MskgraspError as error:
+        return Finding(level="fail", subject=subject, text=str(error))
+    return None

@@ -1,0 +1,1 @@
+"""Geometry, grasps, errors, configuration and settings: what every other room stands on."""

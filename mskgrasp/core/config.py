@@ -1,0 +1,105 @@
+"""Configuration files: YAML in, frozen and checked pydantic models out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.files import write_whole
+
+
+class Config(BaseModel):
+    """Base of every configuration: frozen, and an unknown key is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+ConfigT = TypeVar("ConfigT", bound=BaseModel)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Reads a YAML file that holds a mapping; an empty file is an empty one.
+
+    Raises:
+        BadConfig: The file is missing, no YAML, or no mapping.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadConfig(f"cannot read configuration {path}: {_reason(error)}") from error
+    try:
+        values = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"in line {mark.line + 1}, column {mark.column + 1}" if mark is not None else ""
+        problem = getattr(error, "problem", None) or "syntax error"
+        raise BadConfig(f"{path} is not valid YAML: {problem} {where}".strip()) from error
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise BadConfig(f"{path}: expected a mapping of keys to values, got {type(values).__name__}")
+    return values
+
+
+def read_config(model: type[ConfigT], path: Path) -> ConfigT:
+    """Reads a YAML file as a configuration.
+
+    Raises:
+        BadConfig: The file is missing, is no YAML mapping, or does not fit the model.
+    """
+    return check_config(model, read_yaml(path), str(path))
+
+
+def check_config(model: type[ConfigT], values: Any, source: str) -> ConfigT:
+    """Validates plain values as a configuration; ``source`` names their origin in messages.
+
+    Raises:
+        BadConfig: The values do not fit the model; the message names the key and the legal ones.
+    """
+    if not isinstance(values, dict):
+        raise BadConfig(f"{source}: expected a mapping of keys to values, got {type(values).__name__}")
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise BadConfig(f"{source}: {_explain(model, error)}") from error
+
+
+def write_config(config: BaseModel, path: Path) -> None:
+    """Writes the resolved configuration as YAML, so that a run can be repeated from its output."""
+    write_whole(path, yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False).encode())
+
+
+def _explain(model: type[BaseModel], error: ValidationError) -> str:
+    problems = []
+    for detail in error.errors():
+        key = ".".join(str(part) for part in detail["loc"]) or "(top level)"
+        if detail["type"] == "extra_forbidden":
+            legal = ", ".join(sorted(_fields_at(model, detail["loc"][:-1])))
+            problems.append(f"unknown key '{key}'" + (f"; legal keys here: {legal}" if legal else ""))
+        elif detail["type"] in ("union_tag_invalid", "union_tag_not_found"):
+            context = detail.get("ctx", {})
+            legal = context.get("expected_tags", "")
+            problems.append(f"'{key}': unknown type {context.get('tag', '(missing)')!s}; legal: {legal}")
+        else:
+            value = detail.get("input")
+            shown = "" if detail["type"] == "missing" or isinstance(value, dict) else f", got {value!r}"
+            problems.append(f"'{key}': {detail['msg'].lower()}{shown}")
+    return "; ".join(problems)
+
+
+def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> set[str]:
+    current: Any = model
+    for part in location:
+        field = getattr(current, "model_fields", {}).get(part)
+        if field is None:
+            return set()
+        current = field.annotation
+    return set(getattr(current, "model_fields", {}))
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)

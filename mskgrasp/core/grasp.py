@@ -1,0 +1,189 @@
+"""What a grasp is, and how the part's displacement in the hand is defined.
+
+A grasp is an array (..., 4) of x, y, z in metres and theta in radians, in the base frame, theta in
+[-pi/2, pi/2). At theta = 0 the fingers close along the base's y. Two frames share the point (x, y, z):
+
+* tcp, libfranka's end effector: z points out of the hand (down), y is the closing direction,
+* grasp: z up, turned by theta; displacements are given along its axes.
+
+All functions take numpy arrays and torch tensors and broadcast over leading axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from array_api_compat import array_namespace
+
+from mskgrasp.core.geometry import (
+    Array,
+    Pose,
+    components,
+    joined,
+    quat_about_z,
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate,
+    twist_and_swing,
+    wrap_angle,
+)
+
+PAD_REACH = 0.0095
+"""How far the finger pads reach below the TCP, metres (collision box of the Panda hand's pads)."""
+TABLE_CLEARANCE = 0.001
+"""Least distance between the pads and the table at the grasp, metres."""
+MAX_OPENING = 0.08
+"""Distance between the pads of the open hand, metres (Franka Hand datasheet)."""
+FINGER_HALF_WIDTH = 0.011
+"""Of the widest of a finger's collision boxes, along the pads, metres (Panda hand)."""
+FINGER_THICKNESS = 0.026
+"""From a pad's face to the back of the finger, metres."""
+PALM_HEIGHT = 0.0374
+"""Of the hand's collision hull over the TCP, metres."""
+MIN_GAP = 0.5e-3
+"""Pads closer than this hold nothing, metres."""
+MIN_RISE = 0.8
+"""Least share of the lift that a held part has risen."""
+HOLD_S = 0.2
+"""How long a lifted part is held before it is judged, seconds."""
+MAX_DISPLACEMENT = 0.05
+"""No grasp that holds a part lets it move farther than this in the hand: such a row is no label, metres."""
+EJECTED_DISTANCE = 0.05
+"""A part that ends this far from where it lay, and not in the hand, was ejected, metres."""
+FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled")
+"""Why an attempt failed, by code: a shard stores the index into this tuple."""
+
+
+def lowest_grasp_z(table_z: float) -> float:
+    """The lowest z of a grasp above a table at ``table_z``, metres: lower, the pads would hit it."""
+    return table_z + PAD_REACH + TABLE_CLEARANCE
+
+
+def pose_base_grasp(grasp: Array) -> Pose:
+    """``T_base_grasp`` of grasps (..., 4): z up, y the closing direction."""
+    return Pose(position=grasp[..., :3], quat_wxyz=quat_about_z(grasp[..., 3]))
+
+
+def pose_base_tcp(grasp: Array) -> Pose:
+    """``T_base_tcp = Trans(x, y, z) Rz(theta) Rx(pi)`` of grasps (..., 4)."""
+    xp = array_namespace(grasp)
+    half = grasp[..., 3] / 2
+    zero = xp.zeros_like(half)
+    # Rz(theta) Rx(pi), multiplied out: (cos, 0, 0, sin) * (0, 1, 0, 0).
+    quat_wxyz = joined([zero, xp.cos(half), xp.sin(half), zero])
+    return Pose(position=grasp[..., :3], quat_wxyz=quat_wxyz)
+
+
+def object_displacement(T_tcp_obj_before: Pose, T_tcp_obj_after: Pose) -> tuple[Array, Array]:
+    """How a part moved and turned in the hand between before and after the grasp.
+
+    Args:
+        T_tcp_obj_before: The part in the commanded TCP frame, at rest before the grasp.
+        T_tcp_obj_after: The part in the measured TCP frame, lifted and still.
+
+    Returns:
+        displacement: (..., 4) dx, dy, dz (metres, along the axes of the grasp frame) of the part's
+            origin and dtheta (radians in [-pi, pi)), the twist about the grasp frame's z.
+        tilt: (...) the swing that is left when the twist is taken out, radians.
+    """
+    before, after = (_tcp_to_grasp_frame(pose) for pose in (T_tcp_obj_before, T_tcp_obj_after))
+    xp = array_namespace(before.position)
+    rotation = quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz))
+    dtheta, tilt = twist_and_swing(rotation)
+    moved = after.position - before.position
+    return xp.concat([moved, dtheta[..., None]], axis=-1), tilt
+
+
+def _tcp_to_grasp_frame(T_tcp_obj: Pose) -> Pose:
+    """Turns a pose in the TCP frame (z down) by Rx(pi) into the grasp frame (z up)."""
+    x, y, z = components(T_tcp_obj.position)
+    qw, qx, qy, qz = components(T_tcp_obj.quat_wxyz)
+    # Multiplied out: (0, 1, 0, 0) * (qw, qx, qy, qz).
+    return Pose(position=joined([x, -y, -z]), quat_wxyz=joined([-qx, qw, -qz, qy]))
+
+
+def centre_in_grasp_frame(centre_base: Array, grasp: Array) -> Array:
+    """The object centre (..., 3), base frame, seen from the grasp frames of grasps (..., 4)."""
+    return pose_base_grasp(grasp).inverse().apply(centre_base)
+
+
+def to_grasp_displacement(displacement: Array, centre_grasp: Array) -> Array:
+    """Object displacement to grasp displacement: how the hand moved in the part's frame.
+
+    ``Delta-g = (c - Rz(-dtheta) (c + d), -dtheta)``, the inverse of `to_object_displacement`.
+
+    Args:
+        displacement: (..., 4) dx, dy, dz, dtheta of the part in the hand.
+        centre_grasp: (..., 3) c, the object centre in the grasp frame before the grasp, metres.
+
+    Returns:
+        (..., 4) metres and radians, along the axes of the planned grasp frame.
+    """
+    xp = array_namespace(displacement)
+    turn = -displacement[..., 3]
+    moved = centre_grasp - quat_rotate(quat_about_z(turn), centre_grasp + displacement[..., :3])
+    return xp.concat([moved, wrap_angle(turn)[..., None]], axis=-1)
+
+
+def to_object_displacement(grasp_displacement: Array, centre_grasp: Array) -> Array:
+    """Grasp displacement to object displacement; the inverse of `to_grasp_displacement`.
+
+    Args:
+        grasp_displacement: (..., 4), metres and radians.
+        centre_grasp: (..., 3) c, the object centre in the grasp frame before the grasp, metres.
+
+    Returns:
+        (..., 4) dx, dy, dz, dtheta of the part in the hand, along the axes of the grasp frame.
+    """
+    xp = array_namespace(grasp_displacement)
+    dtheta = -grasp_displacement[..., 3]
+    back = quat_rotate(quat_about_z(dtheta), centre_grasp - grasp_displacement[..., :3])
+    return xp.concat([back - centre_grasp, wrap_angle(dtheta)[..., None]], axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartView:
+    """What the depth image tells of the part: the only knowledge a network's input is made from.
+
+    Attributes:
+        centre_base: (3,) centre of the bounding box at mid height, base frame, metres.
+        T_base_box: The box's frame: origin at its centre on the table, axes x and y along the camera's
+            image axes, z up.
+        size: (3,) extent of the box along those axes, metres; size[2] is the part's height.
+        gyration_radius: RMS distance of the part's visible points from the centre seen from above, m.
+        table_z: Height of the table, base frame, metres.
+        table_offset: By how much a noisy camera sees the table above ``table_z``, metres; 0 if exact.
+    """
+
+    centre_base: np.ndarray
+    T_base_box: Pose
+    size: np.ndarray
+    gyration_radius: float
+    table_z: float
+    table_offset: float = 0.0
+
+
+def sample_grasps(view: PartView, n: int, rng: np.random.Generator) -> np.ndarray:
+    """Grasps uniform in the part's bounding box, z from the table clearance to the part's top.
+
+    A part lower than the lowest grasp is grasped at that height. theta is uniform in [-pi/2, pi/2).
+
+    Args:
+        view: Where the part is seen.
+        n: Number of grasps.
+        rng: Source of all that is random.
+
+    Returns:
+        (n, 4) float64, base frame, metres and radians.
+    """
+    unit = rng.random((n, 4))
+    on_table = np.zeros((n, 3))
+    on_table[:, :2] = (unit[:, :2] - 0.5) * view.size[:2]
+    grasps = np.empty((n, 4))
+    grasps[:, :3] = view.T_base_box.apply(on_table)
+    lowest = lowest_grasp_z(view.table_z)
+    highest = max(lowest, view.table_z + float(view.size[2]))
+    grasps[:, 2] = lowest + unit[:, 2] * (highest - lowest)
+    grasps[:, 3] = (unit[:, 3] - 0.5) * np.pi
+    return grasps

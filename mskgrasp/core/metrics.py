@@ -1,0 +1,189 @@
+"""How good predictions are: numbers with a definition each, over numpy arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy.stats import norm, rankdata
+
+from mskgrasp.core.geometry import wrap_angle
+
+
+def translation_rmse(predicted: np.ndarray, true: np.ndarray) -> float:
+    """sqrt(mean |predicted - true|^2) of the first three components, metres.
+
+    Args:
+        predicted: (n, 4) object displacements; the error is the distance, not its share an axis.
+        true: (n, 4).
+    """
+    error = np.asarray(predicted, dtype=np.float64)[:, :3] - np.asarray(true, dtype=np.float64)[:, :3]
+    return _root_mean((error**2).sum(axis=1))
+
+
+def rotation_rmse(predicted: np.ndarray, true: np.ndarray) -> float:
+    """sqrt(mean wrap(predicted - true)^2) of the angle, radians.
+
+    Args:
+        predicted: (n, 4) object displacements.
+        true: (n, 4).
+    """
+    error = np.asarray(predicted, dtype=np.float64)[:, 3] - np.asarray(true, dtype=np.float64)[:, 3]
+    return _root_mean(wrap_angle(error) ** 2)
+
+
+def _root_mean(squares: np.ndarray) -> float:
+    return float(np.sqrt(squares.mean())) if squares.size else float("nan")
+
+
+def standardised_error(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """(true - mean) / standard deviation, (n, 4), the angle's difference wrapped."""
+    error = np.asarray(true, dtype=np.float64) - np.asarray(mean, dtype=np.float64)
+    error[:, 3] = wrap_angle(error[:, 3])
+    return error / np.sqrt(np.asarray(variance, dtype=np.float64))
+
+
+def gaussian_nll(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> float:
+    """Mean negative log likelihood of true (n, 4) under independent Gaussians, nats, constant included.
+
+    Units are metres and radians, so that good predictions have negative values.
+    """
+    variance = np.asarray(variance, dtype=np.float64)
+    squared = standardised_error(mean, variance, true) ** 2
+    terms = np.log(2 * np.pi * variance) + squared
+    return float(terms.sum(axis=1).mean() / 2) if len(terms) else float("nan")
+
+
+def coverage(mean: np.ndarray, variance: np.ndarray, true: np.ndarray, level: float = 0.9) -> np.ndarray:
+    """Share of true values inside the central interval that should hold ``level`` of them, an axis (4,)."""
+    if not len(true):
+        return np.full(4, np.nan)
+    half_width = norm.ppf((1 + level) / 2)
+    return (np.abs(standardised_error(mean, variance, true)) <= half_width).mean(axis=0)
+
+
+def crps(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Continuous ranked probability score of Gaussians, an axis (4,), in the axes' units; 0 is perfect.
+
+    Gneiting and Raftery (2007), equation 21: sigma (z (2 Phi(z) - 1) + 2 phi(z) - 1 / sqrt(pi)).
+    """
+    z = standardised_error(mean, variance, true)
+    score = z * (2 * norm.cdf(z) - 1) + 2 * norm.pdf(z) - 1 / np.sqrt(np.pi)
+    return (np.sqrt(variance) * score).mean(axis=0) if len(z) else np.full(4, np.nan)
+
+
+def calibration_error(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Mean difference of level and coverage of the central intervals of 5, 10, ... 95 %, an axis (4,)."""
+    levels = np.linspace(0.05, 0.95, 19)
+    covered = np.stack([coverage(mean, variance, true, level) for level in levels])
+    return np.abs(covered - levels[:, None]).mean(axis=0)
+
+
+def sparsification(error: np.ndarray, uncertainty: np.ndarray, steps: int = 50) -> tuple[np.ndarray, ...]:
+    """RMSE of what is left when the most uncertain samples are dropped, beside dropping the worst ones.
+
+    Args:
+        error: (n,) not negative.
+        uncertainty: (n,) predicted; only its order matters.
+        steps: Shares that are dropped, from none to 1 - 1 / steps.
+
+    Returns:
+        Shares (steps,), RMSE by the prediction, RMSE by the oracle that knows the errors.
+    """
+    shares = np.arange(steps) / steps
+    squared = np.asarray(error, dtype=np.float64) ** 2
+    curves = []
+    for order in (np.argsort(uncertainty, kind="stable"), np.argsort(squared, kind="stable")):
+        kept = np.cumsum(squared[order]) / np.arange(1, len(squared) + 1)
+        last = np.maximum(1, np.round((1 - shares) * len(squared)).astype(int)) - 1
+        curves.append(np.sqrt(kept[last]))
+    return shares, curves[0], curves[1]
+
+
+def ause(error: np.ndarray, uncertainty: np.ndarray) -> float:
+    """Area between both curves of `sparsification` by that of dropping at random: 0 perfect, 1 of no use.
+
+    Ilg et al. 2018 (arXiv 1802.07095), divided by what an order that knows nothing has.
+    """
+    if len(error) < 2:
+        return float("nan")
+    _, predicted, oracle = sparsification(error, uncertainty)
+    at_random = np.full_like(predicted, predicted[0])
+    return float((predicted - oracle).sum() / (at_random - oracle).sum())
+
+
+def reliability(probability: np.ndarray, success: np.ndarray, bins: int = 10) -> np.ndarray:
+    """Rows (k, 3) of mean predicted probability, share of successes and count, of the bins that hold any."""
+    probability = np.asarray(probability, dtype=np.float64)
+    which = np.minimum((probability * bins).astype(int), bins - 1)
+    rows = [
+        (probability[which == k].mean(), np.asarray(success)[which == k].mean(), (which == k).sum())
+        for k in range(bins)
+        if (which == k).any()
+    ]
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+
+def bootstrap_interval(
+    values: Sequence[np.ndarray],
+    statistic: Callable[[np.ndarray], float],
+    *,
+    level: float = 0.95,
+    repeats: int = 1000,
+    seed: int = 0,
+) -> tuple[float, float]:
+    """Confidence interval of a statistic over objects: whole objects are drawn again, with replacement.
+
+    Grasps of one part resemble one another; drawing single grasps would make intervals too narrow.
+
+    Args:
+        values: One array (n_i, ...) of samples for each object.
+        statistic: Of the samples of the drawn objects together.
+        level: Of confidence.
+        repeats: Number of draws.
+        seed: Of the draws.
+    """
+    if not values:
+        return float("nan"), float("nan")
+    rng = np.random.default_rng(seed)
+    found = [
+        statistic(np.concatenate([values[i] for i in rng.integers(len(values), size=len(values))]))
+        for _ in range(repeats)
+    ]
+    low, high = np.nanquantile(found, [(1 - level) / 2, (1 + level) / 2])
+    return float(low), float(high)
+
+
+def brier(probability: np.ndarray, success: np.ndarray) -> float:
+    """Mean (probability - success)^2; always saying the base rate b scores b (1 - b)."""
+    return float(((np.asarray(probability, dtype=np.float64) - success) ** 2).mean())
+
+
+def balanced_accuracy(probability: np.ndarray, success: np.ndarray, threshold: float = 0.5) -> float:
+    """Mean of the shares of successes and of failures told right; NaN if either kind is missing."""
+    told = np.asarray(probability) > threshold
+    success = np.asarray(success, dtype=bool)
+    if success.all() or not success.any():
+        return float("nan")
+    return float((told[success].mean() + (~told[~success]).mean()) / 2)
+
+
+def auroc(score: np.ndarray, success: np.ndarray) -> float:
+    """Probability that a success scores above a failure, ties counted half; NaN if a kind is missing."""
+    success = np.asarray(success, dtype=bool)
+    n_success, n_failure = int(success.sum()), int((~success).sum())
+    if not n_success or not n_failure:
+        return float("nan")
+    ranks = rankdata(score)
+    return float((ranks[success].sum() - n_success * (n_success + 1) / 2) / (n_success * n_failure))
+
+
+def wilson_interval(n_success: int, n: int, level: float = 0.95) -> tuple[float, float]:
+    """Confidence interval of a share (Wilson 1927): sensible for few trials and for shares near 0 and 1."""
+    if n == 0:
+        return 0.0, 1.0
+    z = float(norm.ppf((1 + level) / 2))
+    share = n_success / n
+    middle = (share + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * float(np.sqrt(share * (1 - share) / n + z * z / (4 * n * n)))
+    return max(0.0, middle - half), min(1.0, middle + half)

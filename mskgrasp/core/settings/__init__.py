@@ -1,0 +1,11 @@
+"""What is simulated, as plain settings: known without the simulator, which takes seconds to load."""
+
+from mskgrasp.core.settings.execution import ExecutionError, ExecutionNoise
+from mskgrasp.core.settings.overhead import Overhead
+from mskgrasp.core.settings.physics import Physics
+from mskgrasp.core.settings.table import REGION, TABLE_Z, Region
+from mskgrasp.core.settings.tape import Tape
+
+__all__ = [
+    "REGION", "TABLE_Z", "ExecutionError", "ExecutionNoise", "Overhead", "Physics", "Region", "Tape",
+]  # fmt: skip

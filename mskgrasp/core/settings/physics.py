@@ -1,0 +1,99 @@
+"""The physics settings that make the labels true, in one place.
+
+Every default has its reason beside it; docs/physics.md tells the measurements.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field, model_validator
+
+from mskgrasp.core.config import Config
+from mskgrasp.core.grasp import HOLD_S
+
+LEAST_RATE_HZ = 250
+
+
+class Physics(Config):
+    """Settings of the simulated cell; SI units."""
+
+    rate_hz: int = Field(default=1000, ge=100)
+    """Simulation steps a second. At 500 Hz displacements are twice as far from those of finer simulation;
+    under 250 Hz light parts creep out of the fingers: data is not collected."""
+    coarse_rate_hz: int = Field(default=250, ge=100)
+    """The same, at most ``rate_hz``, for parts of ``coarse_mass`` and more, in lift and hold, and while one
+    that was not held comes to rest. The first 12 mm of the lift, in which the part leaves the table, and the
+    last 20 ms, before it is looked at in the hand, are fine. Of attempts alone: the simulated cell is never
+    coarse."""
+    coarse_mass: float = Field(default=0.04, gt=0)
+    """Lighter parts are simulated finely throughout, kg: the grip shakes them, the more the longer a step."""
+    position_iterations: int = Field(default=50, ge=4)
+    """Solver iterations a step. With 25 displacements are twice as far from those of finer simulation."""
+    contact_offset: float = Field(default=0.003, gt=0, le=0.02)
+    """Distance at which contacts are generated, m; ManiSkill's 20 mm costs two to four times the time."""
+    persistent_manifold: bool = False
+    """PhysX' cache of contact points (PCM); on a GPU it is always on. Points that are no longer there hold 2
+    of 100 blocks that spin between closing pads up to 1.4 degrees askew."""
+    friction_pad_part: float = Field(default=0.5, ge=0, le=2)
+    """Effective Coulomb coefficient between pads and part (rubber on dry steel: 0.4 to 0.7)."""
+    friction_table_part: float = Field(default=0.4, ge=0, le=2)
+    """Effective Coulomb coefficient between table and part."""
+    pad_patch_radius: float = Field(default=0.005, ge=0)
+    """Radius of the pad's contact patch, m, which resists turning about a single contact point."""
+    finger_speed: float = Field(default=0.1, gt=0)
+    """Closing speed of each finger, m/s (Franka Hand: 0.1 m/s at most)."""
+    finger_force: float = Field(default=20.0, gt=0, le=70)
+    """Force of each pad on the part, N."""
+    finger_stiffness: float = Field(default=8000.0, gt=0)
+    """Drive stiffness of a finger, N/m; with the force limit and the speed it says how soon a pad presses in
+    full: 12 ms after it was stopped."""
+    finger_damping: float = Field(default=100.0, ge=0)
+    """Drive damping of a finger, N s/m: critical, with the armature."""
+    finger_armature: float = Field(default=0.3, ge=0)
+    """Inertia of motor and spindle that a finger joint carries, kg."""
+    descend_speed: float = Field(default=0.25, gt=0)
+    """Peak speed of the straight descent, m/s."""
+    lift_speed: float = Field(default=0.25, gt=0)
+    """Peak speed of the straight lift, m/s."""
+    lift_height: float = Field(default=0.1, gt=0, le=0.3)
+    """How far a part is lifted, m."""
+    hold_s: float = Field(default=HOLD_S, ge=HOLD_S)
+    """How long the lifted part is held before it is judged, s."""
+    settle_s: float = Field(default=0.06, ge=0)
+    """How long a part may settle on the table before it is grasped, s."""
+    approach_clearance: float = Field(default=0.01, gt=0, le=0.1)
+    """Height of the pads over the part's top at which the straight descent begins, m."""
+    skip_air: bool = True
+    """Whether the hand is put where it gets through nothing but air, instead of being moved there."""
+    reflex_force: float = Field(default=20.0, gt=0)
+    """Contact force on the hand that ends a descent, N, as the robot's reflex would."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_coarser_than_told(cls, values: Any) -> Any:
+        # Who lowers the rate alone need not know of the other.
+        if isinstance(values, dict) and "coarse_rate_hz" not in values:
+            rate, usual = values.get("rate_hz"), cls.model_fields["coarse_rate_hz"].default
+            if isinstance(rate, int) and rate < usual:
+                return values | {"coarse_rate_hz": rate}
+        return values
+
+    @model_validator(mode="after")
+    def _check(self) -> Physics:
+        if self.friction_table < 0:
+            raise ValueError("friction_table_part must be at least half of friction_pad_part")
+        if self.coarse_rate_hz > self.rate_hz:
+            raise ValueError(
+                f"coarse_rate_hz is at most rate_hz, {self.rate_hz}, got {self.coarse_rate_hz}: lower it, too"
+            )
+        return self
+
+    def coarse_hz(self, mass: float) -> int:
+        """Simulation steps a second of a part of some mass, kg, where no finger closes."""
+        return self.rate_hz if mass < self.coarse_mass else self.coarse_rate_hz
+
+    @property
+    def friction_table(self) -> float:
+        """The table's own coefficient: PhysX averages both materials, and the part's is that of the pads."""
+        return 2 * self.friction_table_part - self.friction_pad_part

@@ -1,0 +1,33 @@
+"""Two squares of white tape on top of a part: what a camera can measure its motion by."""
+
+from __future__ import annotations
+
+from pydantic import Field, model_validator
+
+from mskgrasp.core.config import Config
+
+LEAST_RATIO = 1.25
+"""Squares nearer in size than this may be taken for each other."""
+
+
+class Tape(Config):
+    """How large the squares are, as measured on the part; their sizes tell them apart."""
+
+    large: float = Field(default=0.012, ge=0.006, le=0.04)
+    """Side of the larger square, m."""
+    small: float = Field(default=0.008, ge=0.004, le=0.03)
+    """Side of the smaller square, m."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Tape:
+        if self.large < LEAST_RATIO * self.small:
+            raise ValueError(
+                f"large {self.large:g} m must be at least {LEAST_RATIO:g} times small ({self.small:g} m), or "
+                "the squares are taken for each other"
+            )
+        return self
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Of the larger and the smaller square, metres."""
+        return self.large, self.small

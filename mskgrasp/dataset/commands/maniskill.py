@@ -1,0 +1,110 @@
+"""Export of datasets as ManiSkill trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import FAILURES, pose_base_tcp
+from mskgrasp.dataset.attempts import Attempts, ShardInfo, u16_to_depth
+from mskgrasp.dataset.export import Watch, check_export_path, renamed_at_the_end, same_settings
+from mskgrasp.dataset.shards import list_shards, read_columns, read_shard
+
+
+def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
+    """Writes a dataset as ManiSkill trajectories: ``out`` (.h5) and the .json file beside it.
+
+    An attempt is a trajectory of one step in control mode ``grasp`` of GraspDisplacement-v1; docs/dataset.md
+    has the mapping. The part's pose afterwards is known of successes alone: they hang in the lifted hand.
+
+    Returns:
+        How many attempts were written.
+
+    Raises:
+        BadDataset: A shard is damaged, or the shards do not belong together.
+        UsageError: A file exists, or cannot be made.
+    """
+    # The simulator's own conventions are its room's; this verb alone looks there.
+    from tasks.trajectories import Episode, write_trajectories
+
+    files = check_export_path(folder, out, ".h5")
+    paths = list_shards(folder)
+    _, info = read_columns(paths[0], ("success",))
+    size = read_columns(paths[0], ("depth",))[0]["depth"].shape[1:]
+
+    lift_height = info.physics.get("lift_height")
+    if not isinstance(lift_height, int | float):
+        raise BadDataset(
+            f"{paths[0]}: physics has no lift_height, without which the part's pose is not known"
+        )
+
+    def episodes() -> Iterator[Episode]:
+        for path in watch(paths):
+            attempts, own = read_shard(path)
+            same_settings(path, own, [info])
+            if attempts.depth.shape[1:] != size:
+                raise BadDataset(f"{path}: depth images of another size than {size}; collect it again")
+            # Where the arm errs, the hand was not where it was sent, and where it was is not stored.
+            after = _pose_after(attempts, np.nan if _arm_errs(own) else lift_height)
+            for row in range(len(attempts)):
+                won = bool(attempts.success[row])
+                yield Episode(
+                    part=own.part,
+                    grasp=attempts.grasp[row],
+                    depth=np.nan_to_num(u16_to_depth(attempts.depth[row])),
+                    T_base_obj=np.stack([attempts.pose_base_obj[row], after[row]]),
+                    success=won,
+                    info=_outcome(attempts, own, row),
+                )
+
+    height = float(info.T_base_camera.position[2]) - info.table_z
+    camera = dict(height=height, focal_px=float(info.intrinsics[0, 0]), n_pixels=int(size[0]))
+    with renamed_at_the_end(out.parent, files) as temporary:
+        return write_trajectories(
+            temporary / out.name,
+            episodes(),
+            env_kwargs=dict(
+                obs_mode="depth",
+                control_mode="grasp",
+                physics=_physics(info),
+                noise=dict(info.noise),
+                camera=camera,
+            ),
+            intrinsics=info.intrinsics,
+            T_base_camera=info.T_base_camera,
+            description="random grasps of mskgrasp.collect, one a trajectory",
+        )
+
+
+def _arm_errs(info: ShardInfo) -> bool:
+    return any(info.noise.get(name) for name in ("arm_position_std", "arm_angle_std"))
+
+
+def _pose_after(attempts: Attempts, lift_height: float) -> np.ndarray:
+    """(n, 7) the part after the lift, base frame; NaN where it failed: the hand's place is not stored."""
+    if not np.isfinite(lift_height):
+        return np.full((len(attempts), 7), np.nan)
+    lifted = attempts.grasp.astype(np.float64)
+    lifted[:, 2] += lift_height
+    after = pose_base_tcp(lifted) @ Pose.from_vector(attempts.pose_tcp_obj_after.astype(np.float64))
+    return np.where(attempts.success[:, None], after.as_vector(), np.nan)
+
+
+def _physics(info: ShardInfo) -> dict[str, Any]:
+    """The settings of a shard; one that knows of no coarse rate was simulated finely throughout."""
+    return dict(coarse_rate_hz=info.physics.get("rate_hz")) | info.physics
+
+
+def _outcome(attempts: Attempts, info: ShardInfo, row: int) -> dict[str, Any]:
+    known: dict[str, Any] = dict(part=info.part, family=info.family, part_hash=info.part_hash)
+    known["failure"] = FAILURES[attempts.failure[row]]
+    if attempts.success[row]:
+        known["displacement"] = [float(value) for value in attempts.displacement[row]]
+        known["tilt"] = float(attempts.tilt[row])
+        known["width_after"] = float(attempts.width_after[row])
+    return known

@@ -1,0 +1,156 @@
+"""What ``python -m mskgrasp.dataset`` can do: check, info, export."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal, assert_never
+
+import tyro
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from tqdm import tqdm
+
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.dataset.card import markdown, read_card, tables
+from mskgrasp.dataset.check import check_dataset, require_dataset
+from mskgrasp.dataset.commands.maniskill import export_maniskill
+from mskgrasp.dataset.export import export_npz
+
+PROG = "python -m mskgrasp.dataset"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """Read all of a dataset and name each shard that is bad, missing or foreign, with the reason.
+
+    Looked at: files that are truncated or damaged, types and shapes, values that contradict each other or
+    cannot be (a success that moved over 5 cm, depths beyond the table, a grasp outside the region), shards
+    that are missing or there twice, parts and settings that differ between shards. Nothing is changed.
+    Exit code 1 if anything is bad. Delete what is bad and collect again: only that is made.
+
+    Example: python -m mskgrasp.dataset check data/demo
+    """
+
+    folder: tyro.conf.Positional[Path]
+    """Folder of the dataset: the --out of mskgrasp.collect."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Info:
+    """Print a dataset's card: attempts, parts, success by family, failures, physics, versions, size.
+
+    Example: python -m mskgrasp.dataset info data/demo --markdown > card.md
+    """
+
+    folder: tyro.conf.Positional[Path]
+    """Folder of the dataset."""
+    markdown: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Print it as Markdown, for a page."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Export:
+    """Write a dataset for other tools: one .npz file, or ManiSkill trajectories (.h5 and .json).
+
+    docs/dataset.md has both layouts. An existing file is not overwritten.
+
+    Example: python -m mskgrasp.dataset export data/demo --format maniskill --out out/demo.h5
+    """
+
+    folder: tyro.conf.Positional[Path]
+    """Folder of the dataset."""
+    format: Literal["npz", "maniskill"]
+    """npz: all arrays in one file, for numpy. maniskill: a trajectory an attempt, for ManiSkill's loaders."""
+    out: Path
+    """The file to write, ending in .npz or .h5; with .h5 comes a .json file of the same name."""
+
+
+Verb = (
+    Annotated[Check, tyro.conf.subcommand("check")]
+    | Annotated[Info, tyro.conf.subcommand("info")]
+    | Annotated[Export, tyro.conf.subcommand("export")]
+)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one verb; returns the exit code."""
+    verb = tyro.cli(
+        Verb,  # pyright: ignore[reportArgumentType]
+        prog=PROG,
+        description="Datasets that mskgrasp.collect has made: are they sound, what they hold, and export.",
+        args=None if argv is None else list(argv),
+    )
+    match verb:
+        case Check():
+            return run_check(verb)
+        case Info():
+            return run_info(verb)
+        case Export():
+            return run_export(verb)
+        case _:
+            assert_never(verb)
+
+
+def run_check(verb: Check) -> int:
+    """Prints a line for each fault, and a last line with their number."""
+    report = check_dataset(verb.folder, _watched)
+    for note in report.notes:
+        print(f"note: {note}", file=sys.stderr)
+    for fault in report.faults:
+        print(f"{_within(fault.path, verb.folder)}: {fault.reason}")
+    read = f"{report.n_shards} shards, {report.n_attempts} attempts"
+    bad = {fault.path for fault in report.faults}
+    if bad:
+        print(f"{verb.folder}: {len(bad)} bad files; {read} read. Delete the bad ones and collect again")
+        return 1
+    print(f"{verb.folder}: sound, {read}")
+    return 0
+
+
+def run_info(verb: Info) -> int:
+    """Prints the card."""
+    require_dataset(verb.folder)
+    try:
+        card = read_card(verb.folder, _watched)
+    except BadDataset as error:
+        raise BadDataset(f"{error}; find all bad shards with: {PROG} check {verb.folder}") from error
+    if verb.markdown:
+        print(markdown(card), end="")
+        return 0
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=160)  # in a pipe nothing is to be cut off
+    for title, headers, rows in tables(card):
+        table = Table(box=None, pad_edge=False, header_style="bold", show_header=any(headers))
+        for header in headers:
+            table.add_column(header)
+        for row in rows:
+            table.add_row(*map(escape, row))
+        console.print(f"[bold]{title}[/bold]", highlight=False)
+        console.print(table)
+        console.print()
+    return 0
+
+
+def run_export(verb: Export) -> int:
+    """Writes the files and names them."""
+    require_dataset(verb.folder)
+    if verb.format == "npz":
+        n, files = export_npz(verb.folder, verb.out, _watched), [verb.out]
+    else:
+        n = export_maniskill(verb.folder, verb.out, _watched)
+        files = [verb.out, verb.out.with_suffix(".json")]
+    print(f"wrote {' and '.join(map(str, files))}: {n} attempts")
+    return 0
+
+
+def _watched(paths: Sequence[Path]) -> Iterable[Path]:
+    return tqdm(paths, unit="shard", delay=1.0, leave=False, dynamic_ncols=True, disable=None)
+
+
+def _within(path: Path, folder: Path) -> Path:
+    return path.relative_to(folder) if path.is_relative_to(folder) else path

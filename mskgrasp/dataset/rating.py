@@ -1,0 +1,171 @@
+"""How easily parts are grasped: success of random grasps by part, and an estimate for those not tried."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from rich.console import Console
+from rich.table import Table
+
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.metrics import wilson_interval
+from mskgrasp.dataset import list_shards, read_success
+from mskgrasp.parts.catalogue import Entry, Index, Rating
+
+NEIGHBOURS = 7
+_MOST_COLUMNS = 4
+_SAME_FAMILY = 0.35
+"""Added to the distance of parts of another family: as much as edges that differ by 40 %."""
+
+
+def rate_parts(folder: Path) -> dict[str, Rating]:
+    """The rating of every part in a dataset.
+
+    Raises:
+        BadDataset: The folder holds no dataset, or a part changed while it was collected.
+    """
+    tried: dict[str, list[np.ndarray]] = defaultdict(list)
+    hashes: dict[str, str] = {}
+    for path in list_shards(folder):
+        success, info = read_success(path)
+        if hashes.setdefault(info.part, info.part_hash) != info.part_hash:
+            raise BadDataset(f"{path}: part {info.part!r} changed while it was collected; collect it again")
+        tried[info.part].append(success)
+    ratings = {}
+    for name, pieces in sorted(tried.items()):
+        n, won = sum(map(len, pieces)), int(sum(piece.sum() for piece in pieces))
+        low, high = wilson_interval(won, n)
+        ratings[name] = Rating(
+            attempts=n,
+            successes=won,
+            interval=(float(low), float(high)),
+            part_hash=hashes[name],
+            dataset=str(folder),
+        )
+    return ratings
+
+
+def estimate(parts: Sequence[Entry], rated: Sequence[Entry], low: float, high: float) -> np.ndarray:
+    """Chance (n,) that the success of random grasps at parts lies between two bounds.
+
+    The share among the rated parts that are most alike: nearest in the logarithms of the three sorted edges,
+    the own family first, weighted by distance. A rated part is not its own neighbour, so that the estimate
+    can be held against what was measured.
+
+    Raises:
+        BadDataset: Fewer than two parts are rated.
+    """
+    if len(rated) < 2:
+        raise BadDataset("fewer than two parts are rated; collect a dataset of the catalogue first")
+    chances = np.empty(len(parts))
+    edges = np.log([entry.extents for entry in rated])
+    rates = np.array([entry.rating.rate if entry.rating else np.nan for entry in rated])
+    inside = (rates >= low) & (rates <= high)
+    for number, entry in enumerate(parts):
+        distance = np.linalg.norm(edges - np.log(entry.extents), axis=1)
+        distance += [0.0 if other.family == entry.family else _SAME_FAMILY for other in rated]
+        distance[[other.name == entry.name for other in rated]] = np.inf
+        nearest = np.argsort(distance, kind="stable")[:NEIGHBOURS]
+        weight = 1 / (0.05 + distance[nearest])
+        chances[number] = (weight * inside[nearest]).sum() / weight.sum()
+    return chances
+
+
+def passing(index: Index, low: float, high: float) -> tuple[int, float, float]:
+    """How many rated parts lie between the bounds, how many of all are expected to, and how sure that is.
+
+    Returns:
+        The number of rated parts inside, the expected number of all parts of the catalogue, and the standard
+        error of the latter: the spread of the estimate's error over the rated parts, scaled to the others.
+    """
+    rated = [entry for entry in index.parts.values() if entry.rating is not None]
+    others = [entry for entry in index.parts.values() if entry.rating is None]
+    inside = np.array([low <= entry.rating.rate <= high for entry in rated if entry.rating], dtype=float)
+    expected = float(inside.sum())
+    error = 0.0
+    if others:
+        missed = inside - estimate(rated, rated, low, high)
+        expected += float(estimate(others, rated, low, high).sum()) + len(others) * float(missed.mean())
+        error = len(others) * float(missed.std(ddof=1)) * np.sqrt(1 / len(rated) + 1 / len(others))
+    return int(inside.sum()), expected, error
+
+
+def report(index: Index, bounds: tuple[float, float]) -> None:
+    """Prints the rated families, and how many parts of the catalogue lie between the bounds."""
+    low, high = bounds
+    families: dict[str, list[Entry]] = defaultdict(list)
+    for entry in index.parts.values():
+        families[entry.family].append(entry)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("family", no_wrap=True)
+    for header in ("parts", "rated", "grasps", "success", "95 % interval", f"within {low:.0%} - {high:.0%}"):
+        table.add_column(header, justify="right")
+    for family, entries in sorted(families.items()):
+        rated = [entry.rating for entry in entries if entry.rating is not None]
+        if not rated:
+            continue
+        n, won = sum(r.attempts for r in rated), sum(r.successes for r in rated)
+        interval = wilson_interval(won, n)
+        table.add_row(
+            family, str(len(entries)), str(len(rated)), str(n), f"{won / max(n, 1):.0%}",
+            f"{interval[0]:.0%} - {interval[1]:.0%}",
+            f"{sum(low <= r.rate <= high for r in rated)} of {len(rated)}",
+        )  # fmt: skip
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=160)
+    console.print(table)
+    rated_parts = [entry for entry in index.parts.values() if entry.rating is not None]
+    if len(rated_parts) >= 2:
+        inside, expected, error = passing(index, low, high)
+        print(
+            f"{inside} of {len(rated_parts)} rated parts lie within {low:.0%} - {high:.0%}; of all "
+            f"{len(index.parts)} parts of the catalogue an estimated {expected:.0f} +- {2 * error:.0f} do"
+        )
+
+
+def draw_ratings(index: Index, bounds: tuple[float, float], path: Path) -> Path:
+    """Success of random grasps over the longest axis, a dot a part; below, the same by family."""
+    rated = [entry for entry in index.parts.values() if entry.rating is not None]
+    by_family: dict[str, list[float]] = defaultdict(list)
+    for entry in rated:
+        assert entry.rating is not None
+        by_family[entry.family].append(entry.rating.rate)
+    families = sorted(by_family, key=lambda family: float(np.mean(by_family[family])))
+    columns = max(1, min(_MOST_COLUMNS, len(families) // 15))
+    rows = -(-len(families) // columns)
+    figure = Figure(figsize=(13, 4.5 + 0.15 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(2, columns, height_ratios=(4.0, 0.15 * rows))
+    above = figure.add_subplot(grid[0, :])
+    low, high = bounds
+    above.axhspan(100 * low, 100 * high, color="#d9ead9", lw=0)
+    for entry in rated:
+        assert entry.rating is not None
+        rate, interval = entry.rating.rate, entry.rating.interval
+        colour = "#2f7d4f" if low <= rate <= high else "#8a94a0"
+        x = 1e3 * entry.longest_axis
+        above.plot([x, x], [100 * end for end in interval], color=colour, lw=0.6, alpha=0.5)
+        above.plot(x, 100 * rate, "o", ms=3.5, color=colour)
+    above.set(xlabel="longest axis, mm", ylabel="random grasps that lift the part, %", ylim=(-2, 102))
+    above.set_title(f"{len(rated)} rated parts, bars: 95 % intervals", loc="left", fontsize=11)
+    above.spines[["top", "right"]].set_visible(False)
+    for column in range(columns):
+        # The hardest families stand at the top of the first column.
+        shown = families[column * rows : (column + 1) * rows]
+        axes = figure.add_subplot(grid[1, column])
+        axes.axvspan(100 * low, 100 * high, color="#d9ead9", lw=0)
+        for row, family in enumerate(shown):
+            for rate in by_family[family]:
+                colour = "#2f7d4f" if low <= rate <= high else "#8a94a0"
+                axes.plot(100 * rate, row, "o", ms=3.5, color=colour, alpha=0.8)
+        axes.set_yticks(range(len(shown)), [family.replace("_", " ") for family in shown], fontsize=6.5)
+        axes.set(xlabel="success, %", xlim=(-3, 103), ylim=(rows - 0.5, -0.5))
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=130)
+    return path

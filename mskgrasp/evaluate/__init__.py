@@ -1,0 +1,1 @@
+"""Program: the paper's experiments on any cell. Run ``python -m mskgrasp.evaluate --help``."""

@@ -1,0 +1,302 @@
+"""Program: the paper's experiments on any cell. Run ``python -m mskgrasp.evaluate --help``."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+from pydantic import Field, field_validator
+from rich.console import Console
+from tqdm import tqdm
+
+from mskgrasp.core.config import Config
+from mskgrasp.core.errors import BadModel, UsageError
+from mskgrasp.core.files import only_here, write_whole
+from mskgrasp.evaluate.comparison import compare
+from mskgrasp.evaluate.experiments import (
+    Compared,
+    Experiment,
+    load_compared,
+    open_model,
+    scenes,
+    with_predictions,
+)
+from mskgrasp.evaluate.figures import draw_comparison, draw_errors, draw_success
+from mskgrasp.evaluate.replay_trial import describe_trial, draw_trial, find_trial, outcome_text
+from mskgrasp.evaluate.report import page, print_report
+from mskgrasp.evaluate.summary import farthest_off, summarise, worst_trials
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.parts import find_part
+from mskgrasp.parts.select_parts import part_names
+from mskgrasp.planning.for_cell import SIMULATED_CELL
+from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.planning.run_inputs import model_digests, part_digests
+from mskgrasp.reports.html import write_html
+from mskgrasp.runtime.cli import make_folder, parse
+from mskgrasp.runtime.run_folder import TRIALS, append, begin, read, rewrite
+from mskgrasp.simulation.versions import versions
+from mskgrasp.trials.cell_file import CellFile, Noise, read_cell
+from mskgrasp.trials.trial import Trial
+from mskgrasp.trials.trial_files import FOLDER
+from mskgrasp.trials.trial_runner import Setup, TrialTask, run_trials
+
+DESCRIPTION = """Plans and executes grasps on a cell and reports what came of them.
+
+--experiment success: how often the grasp of the best predicted quality lifts the part.
+--experiment displacement: how well models predict how the part moves in the hand, for grasps of the best
+quality and for those of low predicted variance among the best; --compare names the models, --lowess-data a
+dataset from which LOWESS predicts known parts. One grasp of the best quality serves all models.
+
+Every trial is stored at once, with what was seen: a stopped run goes on where it was, with more parts, trials
+or models if need be, and --replay OUT TRIAL draws one again. Simulated cells work in parallel; the number of
+them changes nothing. Another cell is another YAML file; a real one asks its operator to lay every part, and
+before the arm moves (--yes: it asks nothing)."""
+
+PARTS: dict[Experiment, tuple[str, ...]] = {
+    "success": ("validation",),
+    "displacement": ("train", "validation"),
+}
+
+
+class EvaluateConfig(Config):
+    """Settings of an evaluation."""
+
+    models: Path = PRETRAINED
+    """Folder with model.safetensors and model.json; by default the shipped one. Its qualities count."""
+    experiment: Experiment = "success"
+    """success: the policy of --planner.policy. displacement: both policies, known and novel parts apart."""
+    cell: Path = SIMULATED_CELL
+    """YAML file of the cell; by default the simulated one."""
+    noise: Noise | None = None
+    """How a simulated camera errs (iid: 3 mm a pixel), instead of what its cell's file says."""
+    measure: Literal["truth", "markers"] = "truth"
+    """truth: the cell's tracker tells the displacement. markers: two squares of tape do (docs/markers.md)."""
+    tape: tuple[float, float] | None = None
+    """Sides of both squares, m, the larger first; by default 0.012 0.008, or those of a simulated cell."""
+    out: Path = Path("out/eval")
+    """Folder for trials.jsonl, report.json and the pictures."""
+    parts: tuple[str, ...] = ()
+    """Names or folders of parts, or sets: train (those the model knows), validation and test (that it never
+    saw), starter, catalogue. By default validation, for displacement train and validation."""
+    n_parts: int = Field(default=0, ge=0)
+    """At most so many parts, evenly chosen, an equal share of every set; 0: all."""
+    trials: int = Field(default=5, ge=1)
+    """Trials a part."""
+    compare: tuple[str, ...] = ()
+    """Models of the displacement experiment, label=folder each; by default the one of --models."""
+    lowess_data: Path | None = None
+    """A collected dataset: LOWESS predicts the parts of which it holds grasps."""
+    workers: int = Field(default=0, ge=0)
+    """Simulated cells at work at once; 0: one a core."""
+    yes: bool = False
+    """Ask no operator: on a real cell, too, the arm moves as soon as a grasp is planned."""
+    seed: int = Field(default=0, ge=0)
+    """Places, turns and candidates follow from it."""
+    planner: PlannerConfig = PlannerConfig(policy="quality")
+    """How grasps are chosen."""
+    replay: tuple[Path, str] | None = None
+    """Draw a stored trial again and do nothing else: the folder of a run, and the trial's name."""
+
+    @field_validator("compare", mode="before")
+    @classmethod
+    def _from_mapping(cls, value: Any) -> Any:
+        return [f"{label}={folder}" for label, folder in value.items()] if isinstance(value, dict) else value
+
+
+MAY_CHANGE = ("out", "trials", "parts", "n_parts", "compare", "lowess_data", "workers", "yes", "replay")
+
+
+def main() -> int:
+    """Runs the trials and reports."""
+    argv = sys.argv[1:]
+    config = parse(EvaluateConfig, prog="python -m mskgrasp.evaluate", description=DESCRIPTION, argv=argv)
+    if config.replay is not None:
+        return replay(*config.replay)
+    report = evaluate(config)
+    print_report(report, config.out, Console(width=None if sys.stdout.isatty() else 150))
+    pictures = "success.png, errors.png" if config.experiment == "success" else "displacement.png"
+    print(f"wrote {config.out}/report.html, report.json, {pictures}; any trial: --replay {config.out} TRIAL")
+    return 0
+
+
+def replay(out: Path, key: str) -> int:
+    """Draws a stored trial of a run and says what came of it."""
+    trial = find_trial(out, key)
+    picture = out / "replay" / f"{trial.key}.png"
+    draw_trial(out, trial, picture)
+    print(describe_trial(trial))
+    print(f"wrote {picture}")
+    return 0
+
+
+def evaluate(config: EvaluateConfig) -> dict[str, Any]:
+    """Executes the trials that are missing and sums them up.
+
+    Raises:
+        UsageError: The folder holds a run with other settings, another model or another cell.
+        MskgraspError: A model, a part or the cell cannot be used.
+    """
+    _check(config)
+    models = open_model(config.models)
+    words = config.parts or PARTS[config.experiment]
+    parts = _parts(part_names(words, models.meta.training, config.n_parts))
+    if config.planner.policy == "low_variance" and not models.meta.network.variance:
+        raise BadModel(
+            f"{config.models} predicts no variance; use --planner.policy quality, or another model"
+        )
+    cell = read_cell(config.cell, noise=config.noise, measure=config.measure, tape=config.tape)
+    if config.workers > 1 and not cell.simulated:
+        raise UsageError(f"--workers {config.workers}: there is one cell of {config.cell}; leave it away")
+    compared = None
+    if config.experiment == "displacement":
+        chunk = config.planner.chunk_size
+        compared = load_compared(config.compare, config.models, config.lowess_data, list(parts), chunk)
+    inputs = {"cell": cell.digest} | model_digests(config.models) | part_digests(parts.values())
+    inputs |= compared.inputs if compared is not None else {}
+    begin(config, config.out, inputs, may_change=MAY_CHANGE)
+    with only_here(config.out) as alone:
+        if not alone:
+            raise UsageError(
+                f"another evaluation writes into {config.out}; wait for it, or choose another --out"
+            )
+        tasks = scenes(parts, config.trials, config.seed, config.planner, compared)
+        trials = _make_trials(config, cell, compared, tasks)
+        if compared is not None:
+            trials = _with_predictions(config, trials, compared)
+        return _report(config, cell, compared, [trials[task.key] for scene in tasks for task in scene])
+
+
+def _check(config: EvaluateConfig) -> None:
+    if config.experiment == "success" and (config.compare or config.lowess_data):
+        raise UsageError("--compare and --lowess-data are for --experiment displacement: add that")
+    if config.experiment == "displacement" and config.planner.policy != "quality":
+        raise UsageError("--experiment displacement runs both policies: leave --planner.policy away")
+    if config.experiment == "displacement" and config.planner.searches:
+        raise UsageError(
+            "--experiment displacement shows all models the same candidates: leave --planner.refinements and "
+            "--planner.check-fingers away"
+        )
+
+
+def _parts(words: Sequence[str]) -> dict[str, str]:
+    """What the user called each part, by its name."""
+    parts: dict[str, str] = {}
+    for word in words:
+        name = find_part(word).name
+        if name in parts:
+            raise UsageError(f"--parts: {parts[name]} and {word} are both called {name!r}; leave one away")
+        parts[name] = word
+    if not parts:
+        raise UsageError("--parts names no part that the model was not trained on; name another set or parts")
+    return parts
+
+
+def _make_trials(
+    config: EvaluateConfig, cell: CellFile, compared: Compared | None, tasks: Sequence[tuple[TrialTask, ...]]
+) -> dict[str, Trial]:
+    """All trials of the folder by key, those that were missing made now."""
+    make_folder(config.out / FOLDER)
+    for leftover in (config.out / FOLDER).glob("*.tmp"):
+        leftover.unlink()
+    trials = {trial.key: trial for trial in read(config.out / TRIALS, Trial.from_json)}
+    missing = [tuple(task for task in scene if task.key not in trials) for scene in tasks]
+    missing = [scene for scene in missing if scene]
+    if not missing:
+        return trials
+    setup = Setup(
+        cell=cell.write(config.out),
+        models=config.models,
+        planner=config.planner,
+        out=config.out,
+        choosers=compared.choosers if compared is not None else {},
+        lowess=compared.lowess.fits if compared is not None and compared.lowess is not None else {},
+        tape=cell.tape,
+        must_measure=compared is not None,
+        yes=config.yes,
+    )
+    n = sum(map(len, missing))
+    done = sum(map(len, tasks)) - n
+    bar = tqdm(
+        total=n + done, initial=done, unit="trial", file=sys.stderr, smoothing=0.05, dynamic_ncols=True,
+        mininterval=0.5 if sys.stderr.isatty() else 15.0,
+    )  # fmt: skip
+    n_lifted = 0
+    with _made(config, cell, setup, missing) as made, bar:
+        for k, trial in enumerate(made, 1):
+            append(config.out / TRIALS, trial.to_json())
+            trials[trial.key] = trial
+            n_lifted += trial.success
+            bar.set_postfix_str(f"lifted {n_lifted / k:.0%}", refresh=False)
+            bar.update()
+    # In the order of their names, whoever was first.
+    rewrite(config.out / TRIALS, (trials[key].to_json() for key in sorted(trials)))
+    return trials
+
+
+@contextmanager
+def _made(
+    config: EvaluateConfig, cell: CellFile, setup: Setup, missing: Sequence[tuple[TrialTask, ...]]
+) -> Iterator[Iterator[Trial]]:
+    """The missing trials, in this process or, of simulated cells, in several."""
+    n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
+    n_threads = torch.get_num_threads()
+    if cell.simulated:
+        torch.set_num_threads(1)  # as in a process of its own: the same sums
+    made = run_trials(setup, missing, n_workers)
+    try:
+        yield made
+    finally:
+        made.close()
+        torch.set_num_threads(n_threads)
+
+
+def _with_predictions(
+    config: EvaluateConfig, trials: dict[str, Trial], compared: Compared
+) -> dict[str, Trial]:
+    """Adds what each model expects of the grasps of best quality, where that is not known yet."""
+    bar = tqdm(trials.items(), desc="predictions", leave=False, delay=5, file=sys.stderr)
+    more = {key: with_predictions(trial, config.out, compared.predictors) for key, trial in bar}
+    if more != trials:
+        rewrite(config.out / TRIALS, (more[key].to_json() for key in sorted(more)))
+    return more
+
+
+def _report(
+    config: EvaluateConfig, cell: CellFile, compared: Compared | None, trials: Sequence[Trial]
+) -> dict[str, Any]:
+    """Writes the report and its pictures."""
+    body = summarise(trials) if compared is None else compare(trials, compared.predictors)
+    worst = worst_trials(trials) if compared is None else farthest_off(trials)
+    pictures = {trial.key: f"worst/{trial.key}.png" for trial in worst}
+    settings = config.model_dump(mode="json", exclude={"replay"}) | dict(
+        parts=sorted({trial.part for trial in trials}),
+        noise=cell.noise or None,
+    )
+    report = dict(
+        experiment=config.experiment,
+        **body,
+        trials=[dict(trial=trial.key, outcome=outcome_text(trial)) for trial in trials],
+        worst=[[pictures[trial.key], f"{trial.key}: {outcome_text(trial)}"] for trial in worst],
+        settings=settings,
+        versions=versions(),
+    )
+    for earlier in (config.out / "worst").glob("*.png"):
+        earlier.unlink()
+    for trial in worst:
+        draw_trial(config.out, trial, config.out / pictures[trial.key])
+    if compared is None:
+        draw_success(report, config.out / "success.png")
+        draw_errors(trials, config.out / "errors.png")
+    else:
+        draw_comparison(report, config.out / "displacement.png")
+    text = json.dumps(report, indent=1, allow_nan=False)
+    write_whole(config.out / "report.json", (text + "\n").encode())
+    title = {"success": "Success of planned grasps", "displacement": "Displacement in the hand"}
+    write_html(config.out / "report.html", title=title[config.experiment], sections=page(report, config.out))
+    return report

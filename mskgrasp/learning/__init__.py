@@ -1,0 +1,1 @@
+"""Networks, their training samples, training, metrics and stored models."""

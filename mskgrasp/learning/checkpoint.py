@@ -1,0 +1,104 @@
+"""What a training run needs to go on where it was stopped, in one file without pickle."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor, nn
+
+from mskgrasp.core.errors import BadModel
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checkpoint:
+    """State after a finished epoch.
+
+    Attributes:
+        fingerprint: Of the data; training does not go on with other data.
+        stage: Network that was being trained.
+        epoch: Epochs of that stage that are finished.
+        history: One row an epoch of all stages so far.
+        weights: Of both networks.
+        best: Of the stage's network, where its validation loss was lowest.
+        optimiser: State of the stage's optimiser.
+    """
+
+    fingerprint: str
+    stage: str
+    epoch: int
+    history: list[dict[str, Any]]
+    weights: dict[str, Tensor]
+    best: dict[str, Tensor]
+    optimiser: dict[str, Tensor]
+
+
+_GROUPS = ("weights", "best", "optimiser")
+
+
+def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
+    """Replaces the checkpoint at ``path``, so that a kill at any moment leaves the old or the new one."""
+    tensors = {
+        f"{group}/{name}": value.detach().cpu().contiguous().clone()
+        for group in _GROUPS
+        for name, value in getattr(checkpoint, group).items()
+    }
+    about = {name: getattr(checkpoint, name) for name in ("fingerprint", "stage", "epoch", "history")}
+    temporary = path.with_name(path.name + ".tmp")
+    save_file(tensors, temporary, metadata={"progress": json.dumps(about)})
+    temporary.chmod(0o644)  # safetensors makes it readable for its owner alone
+    os.replace(temporary, path)
+
+
+def read_checkpoint(path: Path) -> Checkpoint:
+    """Reads a checkpoint.
+
+    Raises:
+        BadModel: It is damaged.
+    """
+    try:
+        with safe_open(path, framework="pt") as file:
+            about: dict[str, Any] = json.loads(file.metadata()["progress"])
+            groups: dict[str, dict[str, Tensor]] = {group: {} for group in _GROUPS}
+            for key in file.keys():  # noqa: SIM118 - not a dict
+                group, name = key.split("/", 1)
+                groups[group][name] = file.get_tensor(key)
+        values: dict[str, Any] = about | groups
+        return Checkpoint(**values)
+    except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
+        raise BadModel(f"{path} is damaged ({error}); delete it to train from the beginning") from error
+
+
+def optimiser_tensors(optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
+    """An optimiser's state as named tensors."""
+    state = optimiser.state_dict()["state"]
+    return {f"{index}/{name}": value for index, values in state.items() for name, value in values.items()}
+
+
+def restore(checkpoint: Checkpoint, networks: dict[str, nn.Module], optimiser: torch.optim.Optimizer) -> None:
+    """Puts a checkpoint's weights and optimiser state back, in place.
+
+    Raises:
+        BadModel: They do not fit the networks.
+    """
+    try:
+        for name, network in networks.items():
+            prefix = f"{name}."
+            network.load_state_dict(
+                {k.removeprefix(prefix): v for k, v in checkpoint.weights.items() if k.startswith(prefix)}
+            )
+        values = optimiser.state_dict()
+        values["state"] = {}
+        for key, value in checkpoint.optimiser.items():
+            index, name = key.split("/", 1)
+            values["state"].setdefault(int(index), {})[name] = value
+        optimiser.load_state_dict(values)
+    except (RuntimeError, ValueError) as error:
+        problem = str(error).splitlines()[0]
+        raise BadModel(f"the checkpoint does not fit ({problem}); delete it to start again") from error

@@ -1,0 +1,215 @@
+"""A trained pair of networks: what is stored of it, and what it predicts."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from pydantic import Field, ValidationError
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from mskgrasp.core.config import Config
+from mskgrasp.core.errors import BadModel
+from mskgrasp.learning.networks import (
+    GraspDisplacementNetwork,
+    GraspQualityNetwork,
+    NetworkConfig,
+    Normalisation,
+)
+from mskgrasp.learning.symmetry import views
+
+PRETRAINED = Path(__file__).parent / "pretrained"
+"""The model that ships."""
+
+SCHEMA_VERSION = 1
+WEIGHTS = "model.safetensors"
+DESCRIPTION = "model.json"
+
+
+class Calibration(Config):
+    """Corrections measured on parts that training never saw; the defaults change nothing."""
+
+    quality_slope: float = Field(default=1.0, gt=0.0)
+    quality_offset: float = 0.0
+    """Of the quality's log odds (Platt 1999): slope * odds + offset."""
+    variance_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    """Factor of each variance, so that the central 90 % interval holds 90 %."""
+
+
+class ModelMeta(Config):
+    """What ``model.json`` says about the weights beside it."""
+
+    schema_version: int = SCHEMA_VERSION
+    network: NetworkConfig
+    normalisation: Normalisation
+    calibration: Calibration = Calibration()
+    training: dict[str, Any] = {}
+    metrics: dict[str, Any] = {}
+
+
+@dataclass(frozen=True)
+class Models:
+    """A trained pair of networks, in evaluation mode, with their description."""
+
+    gqn: GraspQualityNetwork
+    gdn: GraspDisplacementNetwork
+    meta: ModelMeta
+
+    @property
+    def device(self) -> torch.device:
+        """Where the weights lie."""
+        return next(self.gqn.parameters()).device
+
+    @torch.inference_mode()
+    def quality(self, patches: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:
+        """Probability of success (n,) of grasps.
+
+        Args:
+            patches: (n, 1, r, c) metres above the table, around the grasps and turned with them, of the
+                network's ``quality_shape``.
+            centre_grasp: (n, 3) object centre in the grasp frame, metres.
+            height: (n,) of the grasps above the table, metres.
+        """
+        self._check(patches, self.meta.network.quality_shape)
+        return self._probability(self.gqn(patches, centre_grasp.to(patches.dtype), height.to(patches.dtype)))
+
+    @torch.inference_mode()
+    def grasp_displacement(
+        self, patches: Tensor, centre_grasp: Tensor, height: Tensor, theta: Tensor | None = None
+    ) -> tuple[Tensor, Tensor | None]:
+        """Mean and variance (n, 4) of the grasp displacement, of patches (n, 1, r, c) in metres.
+
+        Args:
+            patches: Around the grasps and turned with them; around the part and not turned where the network
+                has ``image: object``.
+            centre_grasp: (n, 3) object centre in the grasp frame, metres.
+            height: (n,) of the grasps above the table, metres.
+            theta: (n,) the grasps' angles, for ``image: object``.
+        """
+        self._check(patches, self.meta.network.patch_shape)
+        centre_grasp, height = (values.to(patches.dtype) for values in (centre_grasp, height))
+        if not self.meta.network.symmetric_views:
+            return self._calibrated(*self.gdn(patches, centre_grasp, height, theta))
+        means, variances = [], []
+        for seen, centre, signs in views(patches, centre_grasp):
+            mean, variance = self.gdn(seen, centre, height)
+            means.append(signs * mean)
+            variances.append(variance)
+        said = torch.stack(means)
+        mean = said.mean(0)
+        if variances[0] is None:
+            return mean, None
+        return self._calibrated(mean, torch.stack(variances).mean(0) + (said - mean).square().mean(0))
+
+    def _probability(self, logits: Tensor) -> Tensor:
+        found = self.meta.calibration
+        odds = torch.logit(self.gqn.quality(logits).double(), eps=1e-12)
+        return torch.sigmoid(found.quality_slope * odds + found.quality_offset).to(logits.dtype)
+
+    def _calibrated(self, mean: Tensor, variance: Tensor | None) -> tuple[Tensor, Tensor | None]:
+        scale = mean.new_tensor(self.meta.calibration.variance_scale)
+        return mean, None if variance is None else variance * scale
+
+    def _check(self, patches: Tensor, shape: tuple[int, int]) -> None:
+        rows, columns = shape
+        if tuple(patches.shape[1:]) != (1, rows, columns):
+            raise BadModel(
+                f"patches have shape {tuple(patches.shape)}, this model takes (n, 1, {rows}, {columns})"
+            )
+
+
+def build_models(meta: ModelMeta, device: torch.device | str = "cpu") -> Models:
+    """Networks with fresh weights, in evaluation mode."""
+    gqn = GraspQualityNetwork(meta.network, meta.normalisation)
+    gdn = GraspDisplacementNetwork(meta.network, meta.normalisation)
+    for network in (gqn, gdn):
+        network.to(device=device, memory_format=torch.channels_last).eval()  # pyright: ignore
+    return Models(gqn, gdn, meta)
+
+
+def save_model(folder: Path, models: Models) -> None:
+    """Writes ``model.safetensors`` and ``model.json``, each whole or not at all.
+
+    Raises:
+        BadModel: A weight is not finite.
+    """
+    weights = _weights(models)
+    _check_finite(weights, "the trained networks", "train again with a lower learning rate")
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    temporary = folder / (WEIGHTS + ".tmp")
+    save_file({name: value.contiguous().cpu() for name, value in weights.items()}, temporary)
+    temporary.chmod(0o644)  # safetensors makes it readable for its owner alone
+    os.replace(temporary, folder / WEIGHTS)
+    temporary = folder / (DESCRIPTION + ".tmp")
+    temporary.write_text(json.dumps(models.meta.model_dump(mode="json"), indent=2) + "\n", encoding="utf-8")
+    os.replace(temporary, folder / DESCRIPTION)
+
+
+def load_models(folder: Path, device: torch.device | str = "cpu") -> Models:
+    """Reads a model folder.
+
+    Raises:
+        BadModel: It is missing, damaged, of another schema, or the weights do not fit the description.
+    """
+    folder = Path(folder)
+    for name in (DESCRIPTION, WEIGHTS):
+        if not (folder / name).is_file():
+            raise BadModel(f"no {name} in {folder}; train a model: python -m mskgrasp.train --out {folder}")
+    meta = _read_meta(folder / DESCRIPTION)
+    path = folder / WEIGHTS
+    try:
+        weights = load_file(path)
+    except (SafetensorError, OSError) as error:
+        raise BadModel(f"{path} is damaged ({error}); copy it again or train again") from error
+    models = build_models(meta)
+    expected = _weights(models)
+    for name in sorted(expected.keys() ^ weights.keys()):
+        state = "lacks" if name in expected else "has the unknown"
+        raise BadModel(f"{path} {state} weight {name}; it does not belong to the {DESCRIPTION} beside it")
+    for name, value in expected.items():
+        if weights[name].shape != value.shape:
+            raise BadModel(
+                f"{path}: {name} has shape {tuple(weights[name].shape)}, {DESCRIPTION} (patches of "
+                f"{meta.network.patch_pixels} pixels) needs {tuple(value.shape)}; use the pair that was saved"
+            )
+    _check_finite(weights, str(path), "train again")
+    with torch.no_grad():
+        for name, value in expected.items():
+            value.copy_(weights[name])
+    models.gqn.to(device)
+    models.gdn.to(device)
+    return models
+
+
+def _read_meta(path: Path) -> ModelMeta:
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BadModel(f"{path} is damaged ({error}); copy it again or train again") from error
+    version = values.get("schema_version") if isinstance(values, dict) else None
+    if version != SCHEMA_VERSION:
+        raise BadModel(f"{path} has schema version {version}, legal: {SCHEMA_VERSION}; train again")
+    try:
+        return ModelMeta.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise BadModel(f"{path}: '{key}': {first['msg'].lower()}; copy it again or train again") from error
+
+
+def _weights(models: Models) -> dict[str, Tensor]:
+    pairs = (("gqn", models.gqn), ("gdn", models.gdn))
+    return {f"{name}.{key}": value for name, net in pairs for key, value in net.state_dict().items()}
+
+
+def _check_finite(weights: dict[str, Tensor], source: str, remedy: str) -> None:
+    for name, value in weights.items():
+        if not torch.isfinite(value).all():
+            raise BadModel(f"{source}: weight {name} is not finite; {remedy}")

@@ -1,0 +1,221 @@
+"""How good trained networks are on parts they never saw, beside predictors that learned nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from scipy.optimize import minimize
+from scipy.special import logit
+from scipy.stats import norm
+
+from mskgrasp.core import metrics
+from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.core.grasp import to_object_displacement
+from mskgrasp.learning.grasp_models import Calibration, Models
+from mskgrasp.learning.samples import Samples
+
+_CHUNK = 64
+AXES = ("x", "y", "z", "theta")
+_REPEATS = 200
+"""Draws of parts for an interval of scores that take a sort each."""
+_RADIUS = 0.03
+"""Radius of gyration of a typical part, metres, where a variance score is taken without a picture."""
+_LEAST_TO_SCALE = 50
+"""Successes under which a 90 % quantile is chance."""
+
+
+def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.ndarray:
+    """Predicted probabilities of success (n,)."""
+    pieces = [
+        models.quality(
+            samples.quality_patches_of(r, models.device, models.meta.network),
+            samples.centre_grasp[r].to(models.device),
+            samples.height[r].to(models.device),
+        )
+        for r in rows.split(_CHUNK)
+    ]
+    return torch.cat(pieces).cpu().double().numpy()
+
+
+def predict_grasp_displacement(
+    models: Models, samples: Samples, rows: torch.Tensor
+) -> tuple[np.ndarray, np.ndarray]:
+    """Predicted mean and variance (n, 4) of the grasp displacement; NaN variance where none is predicted."""
+    means, variances = [], []
+    for r in rows.split(_CHUNK):
+        mean, variance = models.grasp_displacement(
+            samples.displacement_patches_of(r, models.device),
+            samples.centre_grasp[r].to(models.device),
+            samples.height[r].to(models.device),
+            samples.theta[r].to(models.device),
+        )
+        means.append(mean)
+        variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
+    return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
+
+
+def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> Calibration:
+    """Corrections that make probabilities and 90 % intervals true of these rows.
+
+    The quality's log odds are stretched and shifted (Platt 1999); each variance is scaled by
+    (q / 1.645)^2, q the 90 % quantile of |error| / deviation, so that heavy tails do not widen the whole.
+    """
+    quality = predict_quality(models, samples, rows)
+    slope, offset = _platt(logit(np.clip(quality, 1e-9, 1 - 1e-9)), samples.success[rows].numpy())
+    scale = (1.0, 1.0, 1.0, 1.0)
+    held = rows[samples.success[rows]]
+    mean, variance = predict_grasp_displacement(models, samples, held)
+    if np.isfinite(variance).all() and len(held) >= _LEAST_TO_SCALE:
+        target = samples.grasp_displacement[held].double().numpy()
+        off = np.quantile(np.abs(metrics.standardised_error(mean, variance, target)), 0.9, axis=0)
+        scale = tuple(np.maximum((off / norm.ppf(0.95)) ** 2, 1e-6))
+    return Calibration(quality_slope=slope, quality_offset=offset, variance_scale=scale)
+
+
+def _platt(odds: np.ndarray, success: np.ndarray) -> tuple[float, float]:
+    """Slope and offset of the log odds, of greatest likelihood; Platt's targets keep away from 0 and 1."""
+    n_success, n_failure = int(success.sum()), int((~success).sum())
+    target = np.where(success, (n_success + 1) / (n_success + 2), 1 / (n_failure + 2))
+
+    def loss(values: np.ndarray) -> float:
+        z = np.exp(values[0]) * odds + values[1]
+        return float((np.logaddexp(0.0, z) - target * z).mean())
+
+    found = minimize(loss, np.zeros(2), method="Nelder-Mead").x
+    return float(np.exp(found[0])), float(found[1])
+
+
+def report(
+    models: Models, samples: Samples, training_rows: torch.Tensor, rows: torch.Tensor
+) -> dict[str, Any]:
+    """All metrics of both networks on some rows."""
+    return {
+        "gqn": quality_metrics(models, samples, rows),
+        "gdn": displacement_metrics(models, samples, training_rows, rows),
+    }
+
+
+def quality_metrics(models: Models, samples: Samples, rows: torch.Tensor) -> dict[str, Any]:
+    """Balanced accuracy, AUROC and Brier score of the GQN, and the Brier score of saying the base rate.
+
+    A grasp counts as told to succeed where its probability exceeds the training data's base rate: with
+    balanced data, that is one half. Intervals are of 95 %, over parts.
+    """
+    success = samples.success[rows].numpy()
+    probability = predict_quality(models, samples, rows)
+    base_rate = models.meta.normalisation.base_rate
+    each = _by_part(samples, rows, np.column_stack([probability, success]))
+    intervals = {
+        "balanced_accuracy": lambda v: metrics.balanced_accuracy(v[:, 0], v[:, 1], base_rate),
+        "auroc": lambda v: metrics.auroc(v[:, 0], v[:, 1]),
+        "brier": lambda v: metrics.brier(v[:, 0], v[:, 1]),
+    }
+    return {
+        "intervals": {
+            name: metrics.bootstrap_interval(each, statistic, repeats=_REPEATS)
+            for name, statistic in intervals.items()
+        },
+        "reliability": metrics.reliability(probability, success).tolist(),
+        "n": len(success),
+        "base_rate": float(success.mean()),
+        "balanced_accuracy": metrics.balanced_accuracy(probability, success, base_rate),
+        "auroc": metrics.auroc(probability, success),
+        "brier": metrics.brier(probability, success),
+        "brier_of_base_rate": metrics.brier(np.full(len(success), base_rate), success),
+    }
+
+
+def displacement_metrics(
+    models: Models, samples: Samples, training_rows: torch.Tensor, rows: torch.Tensor
+) -> dict[str, Any]:
+    """Errors of the GDN on successful grasps, and of predicting zero and the training data's mean.
+
+    RMSE is over the object displacement, likelihood and coverage over the grasp displacement.
+    """
+    training_rows = training_rows[samples.success[training_rows]]
+    rows = rows[samples.success[rows]]
+    mean, variance = predict_grasp_displacement(models, samples, rows)
+    seen = samples.grasp_displacement[training_rows].double().numpy()
+    floor = 1e-12
+    constants = {
+        "zero_displacement": (np.zeros(4), np.maximum((seen**2).mean(axis=0), floor)),
+        "training_mean": (seen.mean(axis=0), np.maximum(seen.var(axis=0), floor)),
+    }
+    report: dict[str, Any] = {"n": len(rows)} | displacement_errors(samples, rows, mean, variance)
+    report |= _spread(samples, rows, mean, variance)
+    for name, (constant, spread) in constants.items():
+        repeated = np.tile(constant, (len(rows), 1))
+        report[name] = displacement_errors(samples, rows, repeated, np.tile(spread, (len(rows), 1)))
+    return report
+
+
+def _spread(samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray) -> dict[str, Any]:
+    """Intervals of the errors over parts, and whether the predicted deviations can be believed."""
+    centre_grasp = samples.centre_grasp[rows].double().numpy()
+    displacement = samples.displacement[rows].double().numpy()
+    predicted = to_object_displacement(mean, centre_grasp)
+    shift = np.linalg.norm(predicted[:, :3] - displacement[:, :3], axis=1)
+    turn = np.abs(wrap_angle(predicted[:, 3] - displacement[:, 3]))
+    report: dict[str, Any] = {
+        "intervals": {
+            f"{name}_rmse": metrics.bootstrap_interval(_by_part(samples, rows, error**2), _root_mean)
+            for name, error in (("translation", shift), ("rotation", turn))
+        }
+    }
+    if not np.isfinite(variance).all() or not len(rows):
+        return report
+    target = samples.grasp_displacement[rows].double().numpy()
+    axes = {
+        "crps": metrics.crps(mean, variance, target),
+        "calibration_error": metrics.calibration_error(mean, variance, target),
+        "sharpness": np.sqrt(variance).mean(axis=0),
+        "rmse": np.sqrt((metrics.standardised_error(mean, variance, target) ** 2 * variance).mean(axis=0)),
+    } | {
+        f"coverage_{level}": metrics.coverage(mean, variance, target, level / 100)
+        for level in (50, 80, 90, 95)
+    }
+    return report | {
+        "axes": {name: dict(zip(AXES, map(float, values), strict=True)) for name, values in axes.items()},
+        "ause_translation": metrics.ause(shift, variance[:, :3].sum(axis=1)),
+        "ause_rotation": metrics.ause(turn, variance[:, 3]),
+        "least_uncertain": {
+            f"{share:.0%}": _errors_of_least(shift, turn, variance, share) for share in (0.03, 0.1, 0.3)
+        },
+    }
+
+
+def _errors_of_least(shift: np.ndarray, turn: np.ndarray, variance: np.ndarray, share: float) -> list[float]:
+    """RMSE of translation and rotation over the share of samples that the network is surest of."""
+    score = variance[:, :3].sum(axis=1) + _RADIUS**2 * variance[:, 3]
+    kept = np.argsort(score, kind="stable")[: max(1, round(share * len(score)))]
+    return [_root_mean(values[kept] ** 2) for values in (shift, turn)]
+
+
+def _root_mean(squared: np.ndarray) -> float:
+    return float(np.sqrt(squared.mean()))
+
+
+def _by_part(samples: Samples, rows: torch.Tensor, values: np.ndarray) -> list[np.ndarray]:
+    """The values of each part's rows."""
+    part = samples.part[rows].numpy()
+    return [values[part == number] for number in np.unique(part)]
+
+
+def displacement_errors(
+    samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
+) -> dict[str, Any]:
+    """RMSE over the object displacement; likelihood and coverage over the grasp displacement."""
+    centre_grasp = samples.centre_grasp[rows].double().numpy()
+    predicted = to_object_displacement(mean, centre_grasp)
+    displacement = samples.displacement[rows].double().numpy()
+    target = samples.grasp_displacement[rows].double().numpy()
+    covered = metrics.coverage(mean, variance, target)
+    known = bool(np.isfinite(variance).all())
+    return {
+        "translation_rmse": metrics.translation_rmse(predicted, displacement),
+        "rotation_rmse": metrics.rotation_rmse(predicted, displacement),
+        "nll": metrics.gaussian_nll(mean, variance, target) if known else None,
+        "coverage_90": dict(zip(AXES, covered.tolist(), strict=True)) if known else None,
+    }

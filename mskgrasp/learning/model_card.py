@@ -1,0 +1,129 @@
+"""What a model was made of and how far it can be trusted, as a page beside its weights."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from mskgrasp.learning.grasp_models import ModelMeta
+
+_LIMITS = """\
+- Made for a Franka Hand with its standard pads (80 mm opening) that comes down from above on a part that lies
+  alone on a flat table, seen by a depth camera from above. Another gripper, slanted grasps or clutter are
+  another task.
+- Labels are simulated: rigid parts, uniform density, one friction for all. Soft, wet or magnetic ones behave
+  differently.
+- The displacement is that of grasps that succeed. What happens when a grasp fails is not predicted.
+- Large displacements, above all of round parts that roll between the pads, are predicted as what they are:
+  uncertain. Choose by the predicted deviation, not by the mean.
+"""
+
+
+def model_card(meta: ModelMeta) -> str:
+    """Markdown: data, network, metrics on parts never seen, limits.
+
+    Args:
+        meta: Of a trained model.
+    """
+    known = meta.training
+    report = meta.metrics.get("test", meta.metrics)
+    side = "test" if "test" in meta.metrics else "validation"
+    settings = known.get("settings", {})
+    sides = [len(known.get(f"{name}_parts", ())) for name in ("training", "validation", "test")]
+    lines = [
+        "# Model card",
+        "",
+        "Predicts, for grasps of a parallel jaw from above, the probability that they lift the part, and a",
+        "Gaussian over its displacement in the hand. Read by `mskgrasp.plan`, `evaluate` and `palletize`.",
+        "",
+        "## Data",
+        "",
+        f"- {known.get('attempts', 0)} simulated attempts to learn from, "
+        f"{known.get('successes', 0)} of them successes",
+        f"- {sides[0]} parts to learn from, {sides[1]} to stop and calibrate by, {sides[2]} to test on",
+        f"- digest of grasps and outcomes: `{str(known.get('data_fingerprint', ''))[:16]}`",
+        "",
+        "## Settings",
+        "",
+        *(f"- {name}: {_words(settings[name])}" for name in sorted(settings)),
+        "",
+        f"## On {side} parts, never seen",
+        "",
+        *_table(_quality_rows(report["gqn"])),
+        "",
+        *_table(_displacement_rows(report["gdn"])),
+        "",
+        *_table(_axis_rows(report["gdn"])),
+        "",
+        "Intervals are of 95 %, by drawing whole parts again. RMSE is over all random grasps that succeeded;",
+        "a planner takes those that the network is surest of.",
+        "",
+        "## Limits",
+        "",
+        _LIMITS,
+    ]
+    return "\n".join(lines)
+
+
+def _quality_rows(gqn: dict[str, Any]) -> list[tuple[str, ...]]:
+    between = gqn.get("intervals", {})
+    accuracy = _range(between.get("balanced_accuracy"), 100, " %")
+    base_rate = f"Brier score (always the base rate: {gqn['brier_of_base_rate']:.3f})"
+    return [
+        ("quality", "value", "95 % interval"),
+        ("grasps", str(gqn["n"]), ""),
+        ("accuracy on balanced data", f"{gqn['balanced_accuracy']:.1%}", accuracy),
+        ("AUROC", f"{gqn['auroc']:.3f}", _range(between.get("auroc"))),
+        (base_rate, f"{gqn['brier']:.3f}", _range(between.get("brier"))),
+    ]
+
+
+def _displacement_rows(gdn: dict[str, Any]) -> list[tuple[str, ...]]:
+    head = (f"displacement of {gdn['n']} successes", "translation RMSE, mm", "rotation RMSE, degrees")
+    units = {"translation_rmse": 1e3, "rotation_rmse": math.degrees(1)}
+    between = gdn.get("intervals", {})
+    network = [f"{factor * gdn[key]:.2f} {_range(between.get(key), factor)}" for key, factor in units.items()]
+    rows = [head, ("network, and 95 % interval", *network)]
+    for name in ("zero_displacement", "training_mean"):
+        values = (f"{factor * gdn[name][key]:.2f}" for key, factor in units.items())
+        rows.append((f"predicting {name.replace('_', ' ')}", *values))
+    for share, errors in gdn.get("least_uncertain", {}).items():
+        values = (f"{factor * error:.2f}" for factor, error in zip(units.values(), errors, strict=True))
+        rows.append((f"the surest {share}", *values))
+    return rows
+
+
+def _axis_rows(gdn: dict[str, Any]) -> list[tuple[str, ...]]:
+    axes = gdn.get("axes")
+    if not axes:
+        return []
+    names = ("x", "y", "z", "theta")
+    rows: list[tuple[str, ...]] = [
+        ("by axis of the grasp displacement", "x, mm", "y, mm", "z, mm", "turn, degrees")
+    ]
+    for key, label in (("rmse", "RMSE"), ("crps", "CRPS"), ("sharpness", "mean predicted deviation")):
+        factors = (1e3, 1e3, 1e3, math.degrees(1))
+        rows.append((label, *(f"{f * axes[key][name]:.2f}" for f, name in zip(factors, names, strict=True))))
+    for level in (50, 80, 90, 95):
+        rows.append(
+            (f"inside the {level} % interval", *(f"{axes[f'coverage_{level}'][name]:.1%}" for name in names))
+        )
+    ause = f"AUSE of random's: translation {gdn['ause_translation']:.2f}, rotation {gdn['ause_rotation']:.2f}"
+    return [*rows, (ause, "", "", "", "")]
+
+
+def _table(rows: list[tuple[str, ...]]) -> list[str]:
+    if not rows:
+        return []
+    head, *body = ("| " + " | ".join(row) + " |" for row in rows)
+    return [head, "|" + "---|" * len(rows[0]), *body]
+
+
+def _range(ends: Any, factor: float = 1.0, unit: str = "") -> str:
+    return f"({factor * ends[0]:.3g} - {factor * ends[1]:.3g}{unit})" if ends else ""
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_words(item)}" for name, item in value.items())
+    return " x ".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -1,0 +1,227 @@
+"""The two networks: how likely a grasp lifts the part, and how the part shifts when it does."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.learning.hand_features import HandFeatures, learning_in_bfloat16
+from mskgrasp.learning.network_config import NetworkConfig, Normalisation
+
+STANDARDISE_EPSILON = 1e-4
+"""Metres added to a patch's standard deviation: the resolution of a stored depth."""
+_LOG_VARIANCE_LIMIT = 12.0
+"""Bounds of the log variance in normalised units: a deviation of 0.25 % to 400 times the data's own."""
+
+
+def with_noise(patches: Tensor, std: float, generator: torch.Generator) -> Tensor:
+    """Patches (n, 1, p, p) with uncorrelated noise of a standard deviation in their unit, for training."""
+    return patches + torch.empty_like(patches).normal_(0.0, std, generator=generator)
+
+
+def standardise(patches: Tensor) -> Tensor:
+    """Each patch (n, 1, p, p) with zero mean and about unit standard deviation (paper, section 4.2)."""
+    centred = patches - patches.mean(dim=(1, 2, 3), keepdim=True)
+    return centred / (centred.square().mean(dim=(1, 2, 3), keepdim=True).sqrt() + STANDARDISE_EPSILON)
+
+
+class PatchFeatures(nn.Module):
+    """The paper's (figure 3): a patch and an action become one vector."""
+
+    def __init__(self, config: NetworkConfig, normalisation: Normalisation, n_action: int = 3):
+        super().__init__()
+        width = config.channels
+        self.convolutions = nn.Sequential(
+            nn.Conv2d(1, width, 5),
+            nn.ReLU(),
+            nn.Conv2d(width, width, 5),
+            nn.ReLU(),
+            nn.MaxPool2d(2),
+            nn.Conv2d(width, width, 5),
+            nn.ReLU(),
+            nn.Conv2d(width, width, 5),
+            nn.ReLU(),
+            nn.MaxPool2d(2),
+        )
+        left = ((config.patch_pixels - 8) // 2 - 8) // 2
+        dropout = nn.Dropout(config.dropout)
+        self.image = nn.Sequential(
+            nn.Flatten(), nn.Linear(width * left * left, config.trunk_width), nn.ReLU(), dropout
+        )
+        self.action = nn.Sequential(nn.Linear(n_action, config.action_width), nn.ReLU(), dropout)
+        self.n_features = config.trunk_width + config.action_width
+        self.mixed_precision = False
+        self.action_scale: Tensor
+        scale = (*normalisation.action_scale, torch.pi / 2)
+        self.register_buffer("action_scale", torch.tensor(scale[:n_action]), persistent=False)
+
+    def prepare(self, patches: Tensor, height: Tensor) -> Tensor:  # noqa: ARG002
+        """What the network takes of patches (n, 1, p, p) in metres above the table, whatever the height."""
+        return standardise(patches)
+
+    def forward(self, prepared: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:  # noqa: ARG002
+        """Features (n, f) of prepared patches (n, 1, p, p) and object centres (n, 3), metres."""
+        with learning_in_bfloat16(self):
+            image = self.image(self.convolutions(prepared))
+        return torch.cat([image.float(), self.action(centre_grasp / self.action_scale)], dim=-1)
+
+
+def make_features(
+    config: NetworkConfig, normalisation: Normalisation, *, quality: bool
+) -> PatchFeatures | HandFeatures:
+    """The first part of the quality network, or of the displacement network."""
+    if config.architecture == "patch":
+        n_action = 4 if config.image == "object" and not quality else 3
+        return PatchFeatures(config, normalisation, n_action)
+    if quality:
+        return HandFeatures(config, normalisation, config.layers, config.quality_shape)
+    return HandFeatures(config, normalisation, config.displacement_layers, config.patch_shape)
+
+
+def _head(n_features: int, config: NetworkConfig, n_outputs: int) -> nn.Sequential:
+    hidden = nn.Linear(n_features, config.head_width)
+    return nn.Sequential(
+        hidden, nn.ReLU(), nn.Dropout(config.dropout), nn.Linear(config.head_width, n_outputs)
+    )
+
+
+class GraspQualityNetwork(nn.Module):
+    """GQN: the probability that a grasp lifts the part (paper, section 3.4)."""
+
+    def __init__(self, config: NetworkConfig, normalisation: Normalisation):
+        super().__init__()
+        self.features = make_features(config, normalisation, quality=True)
+        self.head = _head(self.features.n_features, config, 2)
+        odds = normalisation.base_rate / (1 - normalisation.base_rate)
+        self.log_prior_odds: Tensor
+        self.register_buffer("log_prior_odds", torch.tensor(odds).log(), persistent=False)
+
+    def forward(self, patches: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:
+        """Logits (n, 2) of failure and success among balanced data.
+
+        Args:
+            patches: (n, 1, r, c) metres above the table, turned to the grasps.
+            centre_grasp: (n, 3) object centre in the grasp frame, metres.
+            height: (n,) of the grasps above the table, metres.
+        """
+        return self.head(self.features(_prepared(self.features, patches, height), centre_grasp, height))
+
+    def quality(self, logits: Tensor) -> Tensor:
+        """Probabilities (n,) of success, corrected from balanced data to the true share of successes."""
+        return torch.sigmoid(logits[:, 1] - logits[:, 0] + self.log_prior_odds)
+
+
+class GraspDisplacementNetwork(nn.Module):
+    """GDN: a Gaussian over the grasp displacement of a successful grasp (paper, section 3.4)."""
+
+    def __init__(self, config: NetworkConfig, normalisation: Normalisation):
+        super().__init__()
+        self.sees_object = config.image == "object"
+        self.features = make_features(config, normalisation, quality=False)
+        self.mean_head = _head(self.features.n_features, config, 4)
+        self.variance_head = _head(self.features.n_features, config, 4) if config.variance else None
+        self.target_mean: Tensor
+        self.target_std: Tensor
+        self.register_buffer("target_mean", torch.tensor(normalisation.target_mean), persistent=False)
+        self.register_buffer("target_std", torch.tensor(normalisation.target_std), persistent=False)
+        metres, radians = config.least_std
+        self.least_variance: Tensor
+        floor = torch.tensor([metres, metres, metres, radians]).square()
+        self.register_buffer("least_variance", floor, persistent=False)
+
+    def forward(
+        self,
+        patches: Tensor,
+        centre_grasp: Tensor,
+        height: Tensor,
+        theta: Tensor | None = None,
+    ) -> tuple[Tensor, Tensor | None]:
+        """Mean (n, 4) and variance (n, 4) of the grasp displacement, in metres and radians (squared).
+
+        A network that predicts the mean alone gives None for the variance.
+
+        Args:
+            patches: (n, 1, r, c) metres above the table, turned to the grasps.
+            centre_grasp: (n, 3) object centre in the grasp frame, metres.
+            height: (n,) of the grasps above the table, metres.
+            theta: (n,) the grasps' angles, for ``image: object``, whose patches are not turned.
+        """
+        prepared = _prepared(self.features, patches, height)
+        if not self.sees_object:
+            return self.outputs(self.features(prepared, centre_grasp, height))
+        assert theta is not None, "a picture that is not turned needs the grasps' angles"
+        # Within, all is along the picture's axes.
+        centre = torch.cat([_turned(centre_grasp, theta), theta[:, None]], dim=-1)
+        mean, variance = self.outputs(self.features(prepared, centre, height))
+        mean = torch.cat([_turned(mean[:, :3], -theta), mean[:, 3:]], dim=-1)
+        if variance is None:
+            return mean, None
+        cos, sin = theta.cos().square(), theta.sin().square()
+        x, y = variance[:, 0], variance[:, 1]
+        along = torch.stack([cos * x + sin * y, sin * x + cos * y], dim=-1)
+        return mean, torch.cat([along, variance[:, 2:]], dim=-1)
+
+    def outputs(self, features: Tensor) -> tuple[Tensor, Tensor | None]:
+        """The same from the features (n, f)."""
+        mean = self.target_mean + self.target_std * self.mean_head(features)
+        if self.variance_head is None:
+            return mean, None
+        # The bound keeps one odd batch from driving the exponential to infinity or to zero.
+        log_variance = self.variance_head(features).clamp(-_LOG_VARIANCE_LIMIT, _LOG_VARIANCE_LIMIT)
+        return mean, self.target_std.square() * log_variance.exp() + self.least_variance
+
+    def start_from(self, gqn: GraspQualityNetwork) -> None:
+        """Copies the convolutions' weights of a trained GQN (paper, figure 3)."""
+        if self.sees_object:
+            return  # other pictures: the paper starts these at random
+        if isinstance(self.features, HandFeatures):
+            return  # its layers and pixels are others
+        self.features.convolutions.load_state_dict(gqn.features.convolutions.state_dict())
+
+
+def _prepared(features: PatchFeatures | HandFeatures, patches: Tensor, height: Tensor) -> Tensor:
+    prepared = features.prepare(patches, height)
+    if isinstance(features, HandFeatures):
+        return prepared
+    # Measured on a CPU: with its many channels, channels last takes about 40 % off the convolutions' time.
+    return prepared.contiguous(memory_format=torch.channels_last)
+
+
+def _turned(vectors: Tensor, angle: Tensor) -> Tensor:
+    """Vectors (n, 3) turned about z by angles (n,)."""
+    cos, sin = angle.cos(), angle.sin()
+    x, y = vectors[:, 0], vectors[:, 1]
+    return torch.stack([cos * x - sin * y, sin * x + cos * y, vectors[:, 2]], dim=-1)
+
+
+def displacement_error(mean: Tensor, target: Tensor) -> Tensor:
+    """Target minus mean (n, 4), the angle wrapped."""
+    error = target - mean
+    return torch.cat([error[..., :3], wrap_angle(error[..., 3:])], dim=-1)
+
+
+def displacement_loss(
+    mean: Tensor, variance: Tensor | None, target: Tensor, target_std: Tensor, *, beta: float = 0.0
+) -> Tensor:
+    """Equation 5 of the paper, averaged over the batch: sum of log variance + squared error / variance.
+
+    Both are taken in normalised units (a constant apart, the same), so that a loss near 4 means "no
+    better than the training mean". Without variances it is the squared error.
+
+    Args:
+        mean: (n, 4) predicted grasp displacement.
+        variance: (n, 4) or None.
+        target: (n, 4).
+        target_std: (4,) the training data's deviation.
+        beta: 0 is the paper's loss; 0.5 weighs each term by its variance's square root, which fits the
+            mean better where it is hard (Seitzer et al. 2022, arXiv 2203.09168).
+    """
+    squared = (displacement_error(mean, target) / target_std).square()
+    if variance is None:
+        return squared.sum(dim=-1).mean()
+    variance = variance / target_std.square()
+    terms = variance.log() + squared / variance
+    if beta > 0:
+        terms = terms * variance.detach().pow(beta)
+    return terms.sum(dim=-1).mean()

@@ -1,0 +1,311 @@
+"""A dataset as the networks see it: one patch and one action an attempt, split by parts."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from mskgrasp.core.errors import BadDataset, NoPartFound
+from mskgrasp.core.grasp import centre_in_grasp_frame, to_grasp_displacement
+from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard, u16_to_depth
+from mskgrasp.learning.network_config import NetworkConfig
+from mskgrasp.parts.catalogue import Split, read_index
+from mskgrasp.perception.height_patches import crop_patches, height_image
+from mskgrasp.perception.part_detection import view_part
+from mskgrasp.runtime.worker_pool import Work, results
+
+HEIGHT_STEP = 1e-4
+"""Metres; what depth is stored in."""
+SHARDS_A_WORKER = 100
+"""Fewer are read before a process more has started: a shard of 40 attempts takes 60 ms, a start 4 s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Samples:
+    """n attempts.
+
+    Attributes:
+        patches: (n, 1, r, c) int16, 0.1 mm above the table, each turned to its grasp.
+        object_patches: (n, 1, r, c) int16, around the part and not turned; None where no network sees them.
+        theta: (n,) float32 angle of the grasp.
+        centre_grasp: (n, 3) float32 object centre, estimated from the image, in the grasp frame, metres.
+        height: (n,) float32 of the grasp above the table, metres.
+        success: (n,) bool.
+        displacement: (n, 4) float32 true object displacement, NaN where the grasp failed.
+        grasp_displacement: (n, 4) float32, the same as grasp displacement: what is learned.
+        part: (n,) int64, index into ``parts``.
+        parts: Names of the parts.
+        skipped: Why and how many attempts could not be used: at run time, too, the planner would find
+            no part in them.
+        fingerprint: Hex digest of grasps and outcomes: two equal ones are the same data.
+    """
+
+    patches: Tensor
+    object_patches: Tensor | None
+    theta: Tensor
+    centre_grasp: Tensor
+    height: Tensor
+    success: Tensor
+    displacement: Tensor
+    grasp_displacement: Tensor
+    part: Tensor
+    parts: tuple[str, ...]
+    skipped: dict[str, int]
+    fingerprint: str
+
+    def __len__(self) -> int:
+        return len(self.success)
+
+    def patches_of(self, rows: Tensor, device: torch.device | str) -> Tensor:
+        """Patches (n, 1, r, c) of some rows in metres on a device."""
+        return self.patches[rows].to(device).float() * HEIGHT_STEP
+
+    def quality_patches_of(self, rows: Tensor, device: torch.device | str, network: NetworkConfig) -> Tensor:
+        """What the quality network sees of some rows, (n, 1, r, c) metres."""
+        stride, columns = network.quality_stride, network.quality_shape[1]
+        spare = (-(-self.patches.shape[-1] // stride) - columns) // 2
+        coarse = self.patches[rows, :, ::stride, spare * stride :: stride][..., :columns]
+        return coarse.to(device).float() * HEIGHT_STEP
+
+    def displacement_patches_of(self, rows: Tensor, device: torch.device | str) -> Tensor:
+        """What the displacement network sees of some rows, (n, 1, r, c) metres."""
+        if self.object_patches is None:
+            return self.patches_of(rows, device)
+        return self.object_patches[rows].to(device).float() * HEIGHT_STEP
+
+    def of_parts_between(self, low: float, high: float) -> Samples:
+        """The samples of the parts of which a share in [low, high] of the grasps succeeded.
+
+        Raises:
+            BadDataset: No part is left.
+        """
+        rates = [float(self.success[self.part == i].float().mean()) for i in range(len(self.parts))]
+        kept = [i for i, rate in enumerate(rates) if low <= rate <= high]
+        if not kept:
+            found = ", ".join(f"{rate:.0%}" for rate in sorted(rates))
+            raise BadDataset(
+                f"no part's success lies in {low:g}..{high:g} (found {found}); widen success_range"
+            )
+        rows = torch.isin(self.part, torch.tensor(kept, device=self.part.device))
+        return replace(
+            self,
+            patches=self.patches[rows],
+            object_patches=None if self.object_patches is None else self.object_patches[rows],
+            theta=self.theta[rows],
+            centre_grasp=self.centre_grasp[rows],
+            height=self.height[rows],
+            success=self.success[rows],
+            displacement=self.displacement[rows],
+            grasp_displacement=self.grasp_displacement[rows],
+            part=torch.searchsorted(torch.tensor(kept, device=self.part.device), self.part[rows]),
+            parts=tuple(self.parts[i] for i in kept),
+        )
+
+
+def read_samples(
+    folder: Path,
+    network: NetworkConfig,
+    *,
+    advance: Callable[[int, int], None] = lambda done, total: None,
+    workers: int | None = None,
+) -> Samples:
+    """Reads all shards of a dataset and crops every attempt's patch.
+
+    Only the patches stay in memory (8 kB an attempt of 64 pixels), never the images of more shards than there
+    are processes: many shards are read by several, and make the same samples.
+
+    Args:
+        folder: The dataset.
+        network: What will learn from them: it decides the patches' size.
+        advance: Called with the shards done and their number.
+        workers: Processes; None: one a core, where there are shards enough.
+
+    Raises:
+        BadDataset: A shard cannot be read, or no attempt shows a part.
+    """
+    paths = list_shards(folder)
+    if workers is None:
+        workers = min(os.cpu_count() or 1, max(1, len(paths) // SHARDS_A_WORKER))
+    work = Work(_reader, network, name=lambda job: f"reading {job[1]}")
+    pieces: dict[int, _Piece] = {}
+    advance(0, len(paths))
+    with contextlib.closing(results(work, list(enumerate(paths)), workers)) as found:
+        for index, piece in found:
+            if isinstance(piece, BadDataset):
+                raise piece
+            pieces[index] = piece
+            advance(len(pieces), len(paths))
+    return _joined([pieces[index] for index in range(len(paths))], folder, network)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Piece:
+    """What a shard gives; plain arrays, as processes send them to each other.
+
+    Attributes:
+        part: Its part.
+        raw: The bytes that make the fingerprint.
+        arrays: By the names of the samples' attributes; empty where no attempt shows a part.
+        skipped: Why and how many attempts could not be used.
+    """
+
+    part: str
+    raw: bytes
+    arrays: dict[str, np.ndarray]
+    skipped: dict[str, int]
+
+
+@contextlib.contextmanager
+def _reader(
+    network: NetworkConfig,
+) -> Iterator[Callable[[tuple[int, Path]], Iterator[tuple[int, _Piece | BadDataset]]]]:
+    """Reads a shard; what is wrong with it is an answer, so that it stays the error that it is."""
+
+    def read(job: tuple[int, Path]) -> Iterator[tuple[int, _Piece | BadDataset]]:
+        index, path = job
+        try:
+            attempts, info = read_shard(path)
+        except BadDataset as error:
+            yield index, error
+            return
+        told = (attempts.grasp, attempts.success, attempts.displacement)
+        arrays, skipped = _shard_samples(attempts, info, network)
+        yield (
+            index,
+            _Piece(
+                part=info.part,
+                raw=b"".join(np.ascontiguousarray(array).tobytes() for array in told),
+                arrays=arrays,
+                skipped=dict(skipped),
+            ),
+        )
+
+    yield read
+
+
+def _joined(pieces: list[_Piece], folder: Path, network: NetworkConfig) -> Samples:
+    skipped: Counter[str] = Counter()
+    for piece in pieces:
+        skipped.update(piece.skipped)
+    parts = tuple(dict.fromkeys(piece.part for piece in pieces))
+    digest = hashlib.sha256(b"".join(piece.raw for piece in pieces)).hexdigest()
+    seen = [piece for piece in pieces if piece.arrays]
+    if not seen:
+        reason = f": {skipped.most_common(1)[0][0]}" if skipped else ""
+        raise BadDataset(f"no usable attempt in {folder}{reason}; collect again")
+    number = {name: index for index, name in enumerate(parts)}
+    arrays = {
+        name: torch.from_numpy(np.concatenate([piece.arrays[name] for piece in seen]))
+        for name in seen[0].arrays
+    }
+    around = arrays.pop("object_patches")
+    return Samples(
+        **arrays,
+        object_patches=around if network.image == "object" else None,
+        part=torch.cat([torch.full((len(piece.arrays["success"]),), number[piece.part]) for piece in seen]),
+        parts=parts,
+        skipped=dict(skipped),
+        fingerprint=digest,
+    )
+
+
+def _shard_samples(
+    attempts: Attempts, info: ShardInfo, network: NetworkConfig
+) -> tuple[dict[str, np.ndarray], Counter[str]]:
+    skipped: Counter[str] = Counter()
+    depth = u16_to_depth(attempts.depth)
+    rows, centres, offsets = [], [], []
+    for row, image in enumerate(depth):
+        try:
+            view = view_part(
+                image, info.intrinsics, info.T_base_camera, table_z=info.table_z, region=info.region
+            )
+        except NoPartFound as error:
+            # The message without its numbers: what is counted is the reason.
+            skipped[str(error).split(" (")[0]] += 1
+            continue
+        rows.append(row)
+        centres.append(view.centre_base)
+        offsets.append(view.table_offset)
+    if not rows:
+        return {}, skipped
+    grasp = attempts.grasp[rows].astype(np.float64)
+    displacement = attempts.displacement[rows].astype(np.float64)
+    centre_grasp = centre_in_grasp_frame(np.array(centres), grasp)
+    table_z = info.table_z + np.array(offsets)
+    heights = height_image(torch.from_numpy(depth[rows]), info.intrinsics, info.T_base_camera, table_z)
+
+    def crop(planes: np.ndarray) -> np.ndarray:
+        patches = crop_patches(
+            heights,
+            torch.from_numpy(planes),
+            info.intrinsics,
+            info.T_base_camera,
+            n_pixels=network.patch_pixels,
+            side=network.patch_side,
+            n_columns=network.patch_columns,
+        )
+        return (patches / HEIGHT_STEP).round().clamp(-32768, 32767).to(torch.int16).numpy()
+
+    around = np.column_stack([np.array(centres), np.zeros(len(rows))])
+    return {
+        "patches": crop(grasp),
+        "object_patches": crop(around) if network.image == "object" else np.zeros((len(rows), 0)),
+        "theta": grasp[:, 3].astype(np.float32),
+        "centre_grasp": centre_grasp.astype(np.float32),
+        "height": (grasp[:, 2] - info.table_z).astype(np.float32),
+        "success": attempts.success[rows],
+        "displacement": displacement.astype(np.float32),
+        "grasp_displacement": to_grasp_displacement(displacement, centre_grasp).astype(np.float32),
+    }, skipped
+
+
+def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "catalogue"]) -> dict[str, Split]:
+    """The side of each part: training, validation, or test.
+
+    A part stays on its side when other parts join the dataset. By name, at least one part is on either side.
+
+    Args:
+        parts: Names.
+        fraction: Share of the validation parts, by name.
+        by: A hash of the name; or the catalogue, which keeps near-duplicates together. Parts that are not in
+            it are then split by name.
+
+    Raises:
+        BadDataset: There are fewer than two parts, or no catalogue.
+    """
+    if len(parts) < 2:
+        raise BadDataset(
+            f"the dataset has one part ({', '.join(parts)}), validation needs another that training never "
+            "sees; collect at least 2 parts"
+        )
+    sides: dict[str, Split] = {
+        name: "validation" if _name_hash(name) < fraction else "train" for name in parts
+    }
+    if by == "catalogue":
+        index = read_index().parts
+        if not index:
+            raise BadDataset(
+                "sides: catalogue needs the catalogue: python -m mskgrasp.parts build --catalogue"
+            )
+        sides |= {name: index[name].split for name in parts if name in index}
+    order = sorted(parts, key=_name_hash)
+    if "validation" not in sides.values():
+        sides[order[0]] = "validation"
+    if "train" not in sides.values():
+        sides[order[-1]] = "train"
+    return sides
+
+
+def _name_hash(name: str) -> float:
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big") / 2**64

@@ -1,0 +1,395 @@
+"""Trains the GQN, then the GDN; goes on to the bit where it was stopped."""
+
+from __future__ import annotations
+
+import math
+import time
+import zlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+from pydantic import Field, model_validator
+from torch import Tensor, nn
+
+from mskgrasp.core import metrics
+from mskgrasp.core.config import Config
+from mskgrasp.core.errors import BadDataset, MskgraspError, UsageError
+from mskgrasp.learning import held_out as validation
+from mskgrasp.learning.checkpoint import (
+    Checkpoint,
+    optimiser_tensors,
+    read_checkpoint,
+    restore,
+    write_checkpoint,
+)
+from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models
+from mskgrasp.learning.networks import NetworkConfig, Normalisation, displacement_loss, with_noise
+from mskgrasp.learning.samples import Samples, part_sides
+from mskgrasp.learning.symmetry import mirror_and_turn
+
+_LEAST_TARGET_STD = (1e-4, 1e-4, 1e-4, 1e-3)
+"""Metres and radians: what varies less (parts that never rise in the hand) is noise of the simulation."""
+
+
+class TrainingDiverged(MskgraspError):
+    """The loss is no number any more."""
+
+
+class StageConfig(Config):
+    """How one network is optimised."""
+
+    optimiser: Literal["adam", "rmsprop"] = "adam"
+    learning_rate: float = Field(default=1e-3, gt=0.0)
+    decay: float = Field(default=0.0, ge=0.0)
+    """Keras's decay: step k uses learning_rate / (1 + decay * k)."""
+    schedule: Literal["constant", "cosine"] = "cosine"
+    """cosine: the rate falls to zero at the end, after a linear rise over the first 5 % of the steps."""
+    epochs: int = Field(default=15, ge=1)
+    batch_size: int = Field(default=32, ge=1)
+
+
+class LearningConfig(Config):
+    """What is learned and how; the same settings, data and device type give the same model."""
+
+    seed: int = Field(default=0, ge=0)
+    sides: Literal["name", "catalogue"] = "name"
+    """How parts are split: by a hash of their name, or as the catalogue says (near-duplicates on one side,
+    and test parts beside those of validation)."""
+    validation_fraction: float = Field(default=0.2, gt=0.0, lt=1.0)
+    """Share of the parts that training never sees, where they are split by name."""
+    calibrate: bool = True
+    """Correct quality and variances on the validation parts, at the end."""
+    success_range: tuple[float, float] = (0.0, 1.0)
+    """Parts whose share of successful random grasps lies outside are left out (paper: 0.05 to 0.40)."""
+    network: NetworkConfig = NetworkConfig()
+    noise_std: float = Field(default=0.003, ge=0.0)
+    """Noise on each pixel of a training patch, metres."""
+    symmetric: bool = True
+    """Half of the samples are turned by half a turn, half are mirrored: the physics does not care."""
+    mixed_precision: bool = False
+    """What looks at the picture learns in bfloat16, all else in float32: faster on a CPU that knows AMX."""
+    beta: float = Field(default=0.0, ge=0.0, le=1.0)
+    """0: the paper's likelihood; 0.5: beta-NLL."""
+    keep_best: bool = True
+    """Keep the epoch of lowest validation loss instead of the last."""
+    gqn: StageConfig = StageConfig()
+    gdn: StageConfig = StageConfig()
+
+    @model_validator(mode="after")
+    def _check(self) -> LearningConfig:
+        if self.symmetric and self.network.image == "object":
+            raise ValueError("symmetric: true turns patches with their grasp; image: object has none")
+        if self.network.symmetric_views and not self.symmetric:
+            raise ValueError("network.symmetric_views shows views that only symmetric: true teaches")
+        return self
+
+
+class Reporter:
+    """Is told how training goes; this one tells nobody."""
+
+    def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:
+        """A network's training begins, or goes on after ``done`` batches."""
+
+    def batch(self, loss: float) -> None:
+        """A batch was learned."""
+
+    def epoch(self, history: list[dict[str, Any]]) -> None:
+        """An epoch is finished and saved; its row is the last."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sides:
+    """Rows of a dataset's samples, no part on two sides.
+
+    Attributes:
+        training: What is learned from.
+        validation: Decides when to stop, and calibrates.
+        test: Never looked at before the end; empty where parts are split by name.
+    """
+
+    training: Tensor
+    validation: Tensor
+    test: Tensor
+
+
+def split(samples: Samples, config: LearningConfig) -> Sides:
+    """Splits the samples by their parts.
+
+    Raises:
+        BadDataset: Training or validation lacks successes or failures.
+    """
+    sides = part_sides(samples.parts, config.validation_fraction, config.sides)
+    rows = [
+        torch.nonzero(torch.isin(samples.part, torch.tensor(numbers, dtype=torch.int64)))[:, 0]
+        for numbers in (
+            [number for number, name in enumerate(samples.parts) if sides[name] == side]
+            for side in ("train", "validation", "test")
+        )
+    ]
+    for name, side in zip(("training", "validation"), rows, strict=False):
+        n, n_success = len(side), int(samples.success[side].sum())
+        if n_success in (0, n):
+            kind = "success" if n_success == 0 else "failure"
+            raise BadDataset(f"no {kind} among the {n} attempts at the {name} parts; collect more attempts")
+    return Sides(training=rows[0], validation=rows[1], test=rows[2])
+
+
+def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) -> ModelMeta:
+    """The networks' description, its normalisation measured on the training parts."""
+    success = samples.success[training_rows]
+    target = samples.grasp_displacement[training_rows[success]].double()
+    scale = samples.centre_grasp[training_rows].abs().amax(dim=0).clamp(min=1e-3)
+    std = target.std(dim=0, correction=0).clamp(min=torch.tensor(_LEAST_TARGET_STD).double())
+    mean = target.mean(dim=0)
+    if config.symmetric:
+        # Turned and mirrored copies make all but z symmetric about zero.
+        std = target.square().mean(dim=0).sqrt().clamp(min=torch.tensor(_LEAST_TARGET_STD).double())
+        std[2] = target[:, 2].std(correction=0).clamp(min=_LEAST_TARGET_STD[2])
+        mean = mean * torch.tensor([0.0, 0.0, 1.0, 0.0])
+    sides = part_sides(samples.parts, config.validation_fraction, config.sides)
+    return ModelMeta(
+        network=config.network,
+        normalisation=Normalisation(
+            action_scale=tuple(scale.tolist()),
+            target_mean=tuple(mean.tolist()),
+            target_std=tuple(std.tolist()),
+            base_rate=float(success.double().mean()),
+        ),
+        training={
+            "attempts": len(training_rows),
+            "successes": int(success.sum()),
+            "training_parts": [name for name in samples.parts if sides[name] == "train"],
+            "validation_parts": [name for name in samples.parts if sides[name] == "validation"],
+            "test_parts": [name for name in samples.parts if sides[name] == "test"],
+            "skipped": samples.skipped,
+            "data_fingerprint": samples.fingerprint,
+            # Where the data lay and the model went is nobody's business.
+            "settings": config.model_dump(mode="json", include=set(LearningConfig.model_fields)),
+        },
+    )
+
+
+class Stage:
+    """The training of one of the two networks."""
+
+    def __init__(
+        self,
+        name: str,
+        models: Models,
+        samples: Samples,
+        sides: Sides,
+        config: LearningConfig,
+    ):
+        self.name = name
+        self.models, self.samples, self.config = models, samples, config
+        self.training_rows, self.rows = sides.training, sides.validation
+        network = models.gqn if name == "gqn" else models.gdn
+        network.features.mixed_precision = config.mixed_precision
+        self.network: nn.Module = network
+        self.settings = config.gqn if name == "gqn" else config.gdn
+        n_success = int(samples.success[self.training_rows].sum())
+        n_failure = len(self.training_rows) - n_success
+        self.n_each = min(n_success, n_failure)
+        self.n_samples = 2 * self.n_each if name == "gqn" else n_success
+        self.batches = math.ceil(self.n_samples / self.settings.batch_size)
+        parameters, rate = self.network.parameters(), self.settings.learning_rate
+        self.optimiser: torch.optim.Optimizer
+        if self.settings.optimiser == "adam":
+            self.optimiser = torch.optim.Adam(parameters, lr=rate)
+        else:
+            # Keras's constants: the paper's learning rate was chosen for them.
+            self.optimiser = torch.optim.RMSprop(parameters, lr=rate, alpha=0.9, eps=1e-7)
+
+    def learning_rate(self, step: int) -> float:
+        """The rate of a step, counted from the first of the first epoch."""
+        s = self.settings
+        rate = s.learning_rate / (1 + s.decay * step)
+        if s.schedule == "cosine":
+            total = s.epochs * self.batches
+            warm = max(1, total // 20)
+            rate *= min(1.0, (step + 1) / warm) * 0.5 * (1 + math.cos(math.pi * step / total))
+        return rate
+
+    def epoch(self, number: int, reporter: Reporter) -> dict[str, Any]:
+        """Learns every training sample once (the GQN: as many failures as successes) and validates."""
+        started = time.perf_counter()
+        device = self.models.device
+        # Every epoch has random numbers of its own, so that nothing but its number must be remembered.
+        seed = zlib.crc32(f"{self.config.seed} {self.name} {number}".encode())
+        order = torch.Generator().manual_seed(seed)
+        noise = torch.Generator(device).manual_seed(seed)
+        losses = []
+        with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
+            torch.manual_seed(seed)  # dropout takes no generator
+            self.network.train()
+            for index, rows in enumerate(self.order(order).split(self.settings.batch_size)):
+                for group in self.optimiser.param_groups:
+                    group["lr"] = self.learning_rate(number * self.batches + index)
+                losses.append(self.learn(rows, noise))
+                if not math.isfinite(losses[-1]):
+                    raise TrainingDiverged(
+                        f"the {self.name}'s loss became {losses[-1]} in epoch {number + 1}; train into "
+                        f"another --out with {self.name}.learning_rate below {self.settings.learning_rate:g}"
+                    )
+                reporter.batch(losses[-1])
+            self.network.eval()
+        row = {"stage": self.name, "epoch": number + 1, "train_loss": sum(losses) / len(losses)}
+        return row | self._validate() | {"seconds": round(time.perf_counter() - started, 2)}
+
+    def order(self, generator: torch.Generator) -> Tensor:
+        """The rows of an epoch in random order; the GQN sees as many failures as successes."""
+        success = self.samples.success[self.training_rows]
+        kinds = (self.training_rows[success], self.training_rows[~success])
+        if self.name == "gqn":
+            kinds = tuple(
+                rows[torch.randperm(len(rows), generator=generator)][: self.n_each] for rows in kinds
+            )
+            rows = torch.cat(kinds)
+        else:
+            rows = kinds[0]
+        return rows[torch.randperm(len(rows), generator=generator)]
+
+    def batch(self, rows: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Patches, object centres, displacements and successes of some rows.
+
+        Turned, mirrored and with noise, all at once on the networks' device.
+        """
+        s, device = self.samples, self.models.device
+        if self.name == "gqn":
+            patches = s.quality_patches_of(rows, device, self.config.network)
+        else:
+            patches = s.displacement_patches_of(rows, device)
+        centre = s.centre_grasp[rows].to(device)
+        target = s.grasp_displacement[rows].to(device)
+        if self.config.symmetric:
+            patches, centre, target = mirror_and_turn(patches, centre, target, generator)
+        if self.config.noise_std > 0:
+            patches = with_noise(patches, self.config.noise_std, generator)
+        return patches, centre, target, s.success[rows].to(device)
+
+    def learn(self, rows: Tensor, generator: torch.Generator) -> float:
+        """One step of the optimiser; the loss before it."""
+        patches, centre, target, success = self.batch(rows, generator)
+        height, theta = (
+            values[rows].to(patches.device) for values in (self.samples.height, self.samples.theta)
+        )
+        if self.name == "gqn":
+            loss = nn.functional.cross_entropy(self.models.gqn(patches, centre, height), success.long())
+        else:
+            gdn = self.models.gdn
+            mean, variance = gdn(patches, centre, height, theta)
+            loss = displacement_loss(mean, variance, target, gdn.target_std, beta=self.config.beta)
+        self.optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        self.optimiser.step()
+        return float(loss.detach())
+
+    def _validate(self) -> dict[str, float]:
+        if self.name == "gqn":
+            success = self.samples.success[self.rows].double()
+            quality = torch.from_numpy(validation.predict_quality(self.models, self.samples, self.rows))
+            # The loss of balanced data: the correction to the base rate is taken out again.
+            logit = torch.logit(quality, eps=1e-12) - self.models.gqn.log_prior_odds.cpu()
+            each = nn.functional.binary_cross_entropy_with_logits(logit, success, reduction="none")
+            balanced = (each[success > 0].mean() + each[success == 0].mean()) / 2
+            return {
+                "validation_loss": float(balanced),
+                "auroc": metrics.auroc(quality.numpy(), success.numpy() > 0),
+            }
+        rows = self.rows[self.samples.success[self.rows]]
+        mean, variance = validation.predict_grasp_displacement(self.models, self.samples, rows)
+        known = torch.from_numpy(variance) if self.config.network.variance else None
+        std = self.models.gdn.target_std.cpu().double()
+        target = self.samples.grasp_displacement[rows].double()
+        loss = displacement_loss(torch.from_numpy(mean), known, target, std)
+        errors = validation.displacement_errors(self.samples, rows, mean, variance)
+        return {"validation_loss": float(loss)} | {
+            name: errors[name] for name in ("translation_rmse", "rotation_rmse")
+        }
+
+
+def train(
+    samples: Samples,
+    config: LearningConfig,
+    *,
+    checkpoint_path: Path,
+    device: torch.device | str = "cpu",
+    reporter: Reporter | None = None,
+    sides: Sides | None = None,
+) -> tuple[Models, list[dict[str, Any]]]:
+    """Trains both networks, from a checkpoint where there is one.
+
+    Args:
+        samples: The dataset.
+        config: Settings.
+        checkpoint_path: Replaced after every epoch.
+        device: Where the networks run.
+        reporter: Is told how it goes.
+        sides: Of the samples; None: as the settings say.
+
+    Returns:
+        The networks with their metrics on the parts never seen, and one row an epoch.
+
+    Raises:
+        BadDataset: The data cannot be split, or lack successes or failures.
+        UsageError: The checkpoint was made from other data.
+        TrainingDiverged: The loss is no number any more.
+    """
+    reporter = reporter or Reporter()
+    sides = sides or split(samples, config)
+    meta = describe(samples, sides.training, config)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(config.seed)
+        models = build_models(meta)
+    models.gqn.to(device)
+    models.gdn.to(device)
+    networks: dict[str, nn.Module] = {"gqn": models.gqn, "gdn": models.gdn}
+    saved = read_checkpoint(checkpoint_path) if checkpoint_path.exists() else None
+    if saved is not None and saved.fingerprint != samples.fingerprint:
+        raise UsageError(f"{checkpoint_path} was made from other data; choose another --out or delete it")
+
+    history: list[dict[str, Any]] = list(saved.history) if saved else []
+    for name, network in networks.items():
+        if saved is not None and saved.stage == "gdn" and name == "gqn":
+            continue
+        stage = Stage(name, models, samples, sides, config)
+        best: dict[str, Tensor] = {}
+        done = 0
+        if saved is not None and saved.stage == name:
+            restore(saved, networks, stage.optimiser)
+            best, done = saved.best, saved.epoch
+        elif name == "gdn":
+            models.gdn.start_from(models.gqn)
+        reporter.stage(name, epochs=stage.settings.epochs, batches=stage.batches, done=done * stage.batches)
+        for number in range(done, stage.settings.epochs):
+            row = stage.epoch(number, reporter)
+            earlier = [r["validation_loss"] for r in history if r["stage"] == name]
+            history.append(row)
+            if not config.keep_best or row["validation_loss"] <= min(earlier, default=math.inf):
+                best = {key: value.detach().clone() for key, value in network.state_dict().items()}
+            write_checkpoint(
+                checkpoint_path,
+                Checkpoint(
+                    fingerprint=samples.fingerprint,
+                    stage=name,
+                    epoch=number + 1,
+                    history=history,
+                    weights={
+                        f"{n}.{k}": v for n, net in networks.items() for k, v in net.state_dict().items()
+                    },
+                    best=best,
+                    optimiser=optimiser_tensors(stage.optimiser),
+                ),
+            )
+            reporter.epoch(history)
+        network.load_state_dict(best)
+
+    if config.calibrate:
+        found = validation.calibrate(models, samples, sides.validation)
+        models = replace(models, meta=meta.model_copy(update={"calibration": found}))
+    report = validation.report(models, samples, sides.training, sides.validation)
+    if len(sides.test):
+        report["test"] = validation.report(models, samples, sides.training, sides.test)
+    return replace(models, meta=models.meta.model_copy(update={"metrics": report})), history

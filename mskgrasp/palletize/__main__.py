@@ -1,0 +1,6 @@
+"""``python -m mskgrasp.palletize``."""
+
+from mskgrasp.palletize.run import main
+from mskgrasp.runtime.cli import run
+
+run(main)

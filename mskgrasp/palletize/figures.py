@@ -1,0 +1,267 @@
+"""Pictures of parts that were put down: where each shall lie, and where it lies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from hal.camera import RgbdFrame
+from mskgrasp.core.geometry import quat_to_matrix
+from mskgrasp.core.grasp import MAX_OPENING
+from mskgrasp.palletize.placements import CORRECTIONS, Correction, Placement, compared, corrections_of
+from mskgrasp.palletize.slots import Slot
+from mskgrasp.palletize.views import Views
+
+COLOURS: dict[Correction, str] = {"none": "#8b909a", "predicted": "#1f6feb", "truth": "#2b8a3e"}
+TITLES: dict[Correction, str] = {
+    "none": "no correction", "predicted": "corrected by the prediction", "truth": "by the truth",
+}  # fmt: skip
+_INK, _TARGET, _JAW, _MISS = "#22252b", "#2b8a3e", "#1f6feb", "#e8590c"
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans", "font.size": 10, "axes.titlesize": 10, "axes.titlelocation": "left",
+    "axes.spines.top": False, "axes.spines.right": False, "savefig.dpi": 130,
+}  # fmt: skip
+_MM = 1e3
+_CUT = 0.004
+"""Outlines are those of what is higher than half of this, m."""
+
+
+def draw_placement(views: Views, placement: Placement, path: Path) -> None:
+    """Draws one placement: the grasp, the target, where the part came to lie; millimetres from the target."""
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(9.2, 4.9), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        _show_before(left, views)
+        left.set(title="before, with the grasp", xlabel="mm along base x", ylabel="mm along base y")
+        _show_after(right, views)
+        right.set(title=f"after, {TITLES[placement.correction]}", xlabel="mm from the target, along base x")
+        figure.suptitle(f"{placement.part}: {outcome_text(placement)}", x=0.01, ha="left", fontsize=11)
+        figure.savefig(path)
+
+
+def outcome_text(placement: Placement) -> str:
+    """What came of it, in words."""
+    if not placement.placed:
+        return f"not placed ({placement.reason})"
+    if placement.translation_error is None or placement.rotation_error is None:
+        return "placed, not measured"
+    return f"{placement.translation_error * _MM:.1f} mm, {np.degrees(placement.rotation_error):.1f}° off"
+
+
+def _axes(axes: Axes, views: Views, heights: np.ndarray) -> None:
+    half = views.side / 2 * _MM
+    top = max(views.top, 1e-3)
+    axes.imshow(heights, extent=(-half, half, -half, half), cmap="Greys", vmin=-0.15 * top, vmax=1.5 * top)
+    axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
+    axes.tick_params(length=2, labelsize=8)
+
+
+def _show_before(axes: Axes, views: Views) -> None:
+    _axes(axes, views, views.before)
+    _outline(axes, views, 0.0, _INK, "-")
+    origin, theta = views.grasp[:2] * _MM, float(views.grasp[2])
+    closing = np.array([-np.sin(theta), np.cos(theta)])
+    reach = MAX_OPENING / 2 * _MM
+    axes.plot(*np.stack([origin - reach * closing, origin + reach * closing]).T, color=_JAW, lw=1.2, ls="--")
+    for start in (reach, -reach - 8.0):
+        corner = origin + start * closing - 10.0 * np.array([np.cos(theta), np.sin(theta)])
+        pad = Rectangle(tuple(corner), 20.0, 8.0, angle=np.degrees(theta), fc=_JAW, ec="white", lw=0.8)
+        axes.add_patch(pad)
+
+
+def _show_after(axes: Axes, views: Views) -> None:
+    if not views.after.size:
+        axes.text(0.5, 0.5, "not placed", transform=axes.transAxes, ha="center", color=_MISS)
+        axes.set(xticks=[], yticks=[])
+        return
+    _axes(axes, views, views.after)
+    _outline(axes, views, views.turn, _TARGET, "--")
+    _cross(axes, np.zeros(2), views.theta, 0.42 * views.side * _MM)
+
+
+def _cross(axes: Axes, at: np.ndarray, theta: float, length: float) -> None:
+    """The target as in the paper: its centre, and the orientation as the longer arm."""
+    for angle, share, width in ((theta, 1.0, 1.6), (theta + np.pi / 2, 0.4, 1.0)):
+        arm = share * length * np.array([np.cos(angle), np.sin(angle)])
+        axes.plot(*np.stack([at - arm, at + arm]).T, color=_TARGET, lw=width, alpha=0.9, zorder=6)
+
+
+def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> None:
+    """The part's outline as it lay, turned about its centre."""
+    n = len(views.before)
+    pitch = views.side * _MM / n
+    steps = (np.arange(n) - (n - 1) / 2) * pitch
+    x, y = np.meshgrid(steps, -steps)
+    # Cut low, a thin plate counts as much as a high wall. A camera pixel is several of these: without the
+    # blur the outline shows its stairs.
+    low = np.ascontiguousarray(np.minimum(views.before, min(_CUT, views.top)))
+    smooth = cv2.GaussianBlur(low, (0, 0), 1.5 / pitch)
+    level = [0.5 * max(float(smooth.max()), 1e-4)]
+    cos, sin = np.cos(turn), np.sin(turn)
+    axes.contour(
+        cos * x - sin * y, sin * x + cos * y, smooth, levels=level, colors=[colour], linewidths=1.3,
+        linestyles=line, zorder=5,
+    )  # fmt: skip
+
+
+def draw_comparison(
+    rows: Sequence[tuple[Placement, dict[Correction, Views], dict[Correction, Placement]]], path: Path
+) -> None:
+    """Draws parts before and after, a row each: target in green, and a column for each correction.
+
+    Args:
+        rows: A placement of the row (any), the views and the placements by correction.
+        path: The picture, PNG.
+    """
+    names: list[Correction] = [name for name in CORRECTIONS if rows and name in rows[0][1]]
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(
+            figsize=(2.45 * (1 + len(names)), 2.6 * max(1, len(rows)) + 0.2), layout="constrained"
+        )
+        grid = figure.subplots(max(1, len(rows)), 1 + len(names), squeeze=False)
+        for line, (first, views, placements) in zip(grid, rows, strict=False):
+            _show_before(line[0], next(iter(views.values())))
+            line[0].set_ylabel(first.part, fontsize=8)
+            for axes, name in zip(line[1:], names, strict=True):
+                _show_after(axes, views[name])
+                axes.set_xlabel(outcome_text(placements[name]), fontsize=9, color=COLOURS[name])
+            for axes in line:
+                axes.set(xticks=[], yticks=[])
+                axes.spines[:].set_visible(False)
+        for axes, title in zip(grid[0], ["before", *(TITLES[name] for name in names)], strict=True):
+            axes.set_title(title, fontsize=9)
+        figure.savefig(path)
+
+
+def draw_errors(placements: Sequence[Placement], path: Path) -> None:
+    """Draws how many placements err by no more than so much, and the medians of parts beside each other."""
+    groups = compared(placements)
+    names = corrections_of(placements)
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(11.5, 4.3), layout="constrained")
+        shift, turn, parts = figure.subplots(1, 3)
+        for axes, error, scale, unit in (
+            (shift, "translation", _MM, "mm"),
+            (turn, "rotation", 57.2958, "degrees"),
+        ):
+            for name in names:
+                values = np.sort([getattr(group[name], f"{error}_error") * scale for group in groups])
+                if len(values):
+                    shares = np.arange(1, len(values) + 1) / len(values)
+                    label = f"{TITLES[name]}: median {np.median(values):.1f}"
+                    axes.step(
+                        [0, *values], [0, *shares], where="post", color=COLOURS[name], lw=1.8, label=label
+                    )
+            axes.set(xlabel=f"{error} error, {unit}", ylim=(0, 1.02), xlim=(0, None))
+            if groups:
+                axes.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+        shift.set_ylabel("share of placements")
+        _draw_parts(parts, groups)
+        if not groups:
+            shift.text(0.5, 0.5, "no placement was measured", transform=shift.transAxes, ha="center")
+        figure.savefig(path)
+
+
+def _draw_parts(axes: Axes, groups: list[dict[Correction, Placement]]) -> None:
+    if not groups or not {"none", "predicted"} <= set(groups[0]):
+        axes.axis("off")
+        return
+    names = sorted({group["none"].part for group in groups})
+    medians = np.array(
+        [
+            [
+                np.median([g[c].translation_error or 0.0 for g in groups if g[c].part == part]) * _MM
+                for c in ("none", "predicted")
+            ]
+            for part in names
+        ]
+    )
+    most = 1.1 * float(medians.max()) + 0.1
+    axes.plot([0, most], [0, most], color="#c5c9d0", lw=1)
+    axes.plot([0, most], [0, most / 2], color=_TARGET, lw=1, ls="--", label="half the error")
+    axes.plot(*medians.T, "o", color=COLOURS["predicted"], ms=5, alpha=0.8)
+    axes.set(xlim=(0, most), ylim=(0, most), aspect="equal", title="a part's median error, mm")
+    axes.set(xlabel="no correction", ylabel="corrected by the prediction")
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
+
+
+def pallet_image(
+    frame: RgbdFrame, slots: Sequence[Slot], table_z: float, tops: Mapping[int, float]
+) -> np.ndarray:
+    """(h, w, 3) uint8 RGB of the slots from above, base x up and y to the left; 1 mm a pixel.
+
+    Args:
+        frame: Of the pallet, the arm out of sight.
+        slots: Of which some hold a part.
+        table_z: Height of the table, metres.
+        tops: Height of the part in a slot, metres. What stands on a table leans away from the middle of the
+            picture; within a slot of known size this is undone for the part's top.
+    """
+    bounds = pallet_bounds(slots)
+    image = _seen_at(frame, bounds, table_z)
+    for index, top in tops.items():
+        size = slots[index].size
+        if size is not None:
+            half = np.array(size) / 2
+            low, high = (np.array([slots[index].x, slots[index].y]) + sign * half for sign in (-1, 1))
+            # Rows count from the greatest x, columns from the greatest y.
+            rows = slice(*np.rint((bounds[1] - np.array([high[0], low[0]])) * _MM).astype(int))
+            columns = slice(*np.rint((bounds[3] - np.array([high[1], low[1]])) * _MM).astype(int))
+            image[rows, columns] = _seen_at(frame, bounds, table_z + top)[rows, columns]
+    return image
+
+
+def _seen_at(frame: RgbdFrame, bounds: tuple[float, float, float, float], z: float) -> np.ndarray:
+    """What a frame shows of a rectangle at a height, as if it all lay in that plane."""
+    x_min, x_max, y_min, y_max = bounds
+    colour = frame.colour if frame.fine_colour is None else frame.fine_colour
+    scale = colour.shape[0] / frame.depth.shape[0]
+    corners = np.array([[x_max, y_max], [x_max, y_min], [x_min, y_min], [x_min, y_max]])
+    rotation = quat_to_matrix(np.asarray(frame.T_base_camera.quat_wxyz))
+    points = (np.column_stack([corners, np.full(4, z)]) - frame.T_base_camera.position) @ rotation
+    seen = points @ np.asarray(frame.intrinsics).T
+    pixels = ((seen[:, :2] / seen[:, 2:] + 0.5) * scale - 0.5).astype(np.float32)
+    w, h = round((y_max - y_min) * _MM), round((x_max - x_min) * _MM)
+    square = np.array([[0, 0], [w, 0], [w, h], [0, h]], dtype=np.float32)
+    return cv2.warpPerspective(colour, cv2.getPerspectiveTransform(pixels, square), (w, h))
+
+
+def pallet_bounds(slots: Sequence[Slot]) -> tuple[float, float, float, float]:
+    """x_min, x_max, y_min, y_max around the slots, metres."""
+    half = [np.array(slot.size or (0.1, 0.1)) / 2 + 0.01 for slot in slots]
+    low = np.min([[s.x, s.y] - h for s, h in zip(slots, half, strict=True)], axis=0)
+    high = np.max([[s.x, s.y] + h for s, h in zip(slots, half, strict=True)], axis=0)
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def draw_pallets(images: dict[Correction, np.ndarray], slots: Sequence[Slot], title: str, path: Path) -> None:
+    """Draws a pallet under each correction, with the targets in green and the slots' outlines."""
+    x_min, x_max, y_min, y_max = pallet_bounds(slots)
+    height = 4.2 * (x_max - x_min) / max(y_max - y_min, 1e-6)
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(4.2 * len(images), height + 0.9), layout="constrained")
+        for axes, (name, image) in zip(
+            figure.subplots(1, len(images), squeeze=False)[0], images.items(), strict=True
+        ):
+            # Right is -y and up is +x: as somebody sees it who stands behind the robot.
+            axes.imshow(image, extent=(-y_max * _MM, -y_min * _MM, x_min * _MM, x_max * _MM))
+            for slot in slots:
+                at = np.array([-slot.y, slot.x]) * _MM
+                length = 0.42 * (max(slot.size) if slot.size else 0.08) * _MM
+                _cross(axes, at, slot.theta + np.pi / 2, length)
+                if slot.size is not None:
+                    w, h = slot.size[1] * _MM, slot.size[0] * _MM
+                    axes.add_patch(
+                        Rectangle((at[0] - w / 2, at[1] - h / 2), w, h, fill=False, ec="white", lw=1.0)
+                    )
+            axes.set(title=TITLES[name], xticks=[], yticks=[], aspect="equal")
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+        figure.savefig(path)

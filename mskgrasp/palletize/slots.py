@@ -1,0 +1,212 @@
+"""Where parts shall be put: a target on the command line, or the slots of a pallet in a YAML file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from hal import Cell
+from hal.errors import OutOfWorkspace
+from mskgrasp.core.config import Config, read_config
+from mskgrasp.core.errors import UsageError
+from mskgrasp.core.geometry import wrap_half_turn
+from mskgrasp.parts import Part
+from mskgrasp.perception.footprint import Footprint, usual_footprint
+from mskgrasp.planning.placing import Target, check_place
+
+SEEN_TOLERANCE = 0.003
+"""A depth image tells a part's sides to about a pixel, m."""
+_ANGLES = np.radians([-90.0, -45.0, 0.0, 45.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slot:
+    """A place for one part.
+
+    Attributes:
+        x: Of the part's centre, base frame, metres.
+        y: The same.
+        theta: Direction of the part's longer side seen from above, radians from base x; which way round it
+            lies a depth image does not tell, and a half turn more is the same.
+        size: How much room there is along base x and y, metres; None where it does not matter.
+    """
+
+    x: float
+    y: float
+    theta: float
+    size: tuple[float, float] | None = None
+
+    def targets(self, footprint: Footprint) -> tuple[Target, Target]:
+        """Both ways round for a part that lies so; first the lesser turn, in which less moves in the hand."""
+        turn = float(wrap_half_turn(np.asarray(self.theta - footprint.theta)))
+        other = turn - float(np.copysign(np.pi, turn))
+        return Target(x=self.x, y=self.y, theta=turn), Target(x=self.x, y=self.y, theta=other)
+
+    def fits(self, footprint: Footprint, tolerance: float = 0.0) -> bool:
+        """Whether a part has room in it, turned as it shall lie."""
+        if self.size is None:
+            return True
+        room = footprint.extent(self.theta)
+        return bool(np.all(room <= np.array(self.size) + tolerance))
+
+
+_Length = Annotated[float, Field(gt=0.0, le=1.0)]
+_Coordinate = Annotated[float, Field(allow_inf_nan=False)]
+_Count = Annotated[int, Field(ge=1, le=100)]
+
+
+class SlotEntry(Config):
+    """A slot in a file."""
+
+    x: _Coordinate
+    y: _Coordinate
+    """Of the part's centre, base frame, m."""
+    theta_deg: float = Field(default=0.0, allow_inf_nan=False)
+    """Direction of its longer side, degrees from base x."""
+    size: tuple[_Length, _Length] | None = None
+    """Room along base x and y, m; null: not checked."""
+
+    def slot(self) -> Slot:
+        """The slot."""
+        return Slot(x=self.x, y=self.y, theta=math.radians(self.theta_deg), size=self.size)
+
+
+class Grid(Config):
+    """Slots in rows and columns."""
+
+    first: tuple[_Coordinate, _Coordinate]
+    """x and y of the slot nearest to the base's origin, m."""
+    pitch: tuple[_Length, _Length]
+    """From slot to slot along x and y, m."""
+    n: tuple[_Count, _Count]
+    """Slots along x and y."""
+    theta_deg: float = Field(default=0.0, allow_inf_nan=False)
+    """Direction of the parts' longer side, degrees from base x."""
+    size: tuple[_Length, _Length] | None = None
+    """Room in each along x and y, m; null: the pitch."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Grid:
+        size = self.size or self.pitch
+        for axis in (0, 1):
+            if self.n[axis] > 1 and size[axis] > self.pitch[axis]:
+                raise ValueError(f"slots of size {list(size)} overlap at a pitch of {list(self.pitch)} m")
+        return self
+
+
+class Pallet(Config):
+    """A file of slots: a grid, or a list, or both."""
+
+    grid: Grid | None = None
+    slots: tuple[SlotEntry, ...] = ()
+
+    def all_slots(self) -> list[Slot]:
+        """Those of the grid, along x first, then those of the list."""
+        found = []
+        if self.grid is not None:
+            grid = self.grid
+            found = [
+                SlotEntry(
+                    x=grid.first[0] + column * grid.pitch[0],
+                    y=grid.first[1] + row * grid.pitch[1],
+                    theta_deg=grid.theta_deg,
+                    size=grid.size or grid.pitch,
+                )
+                for row in range(grid.n[1])
+                for column in range(grid.n[0])
+            ]
+        return [entry.slot() for entry in [*found, *self.slots]]
+
+
+def parse_target(text: str) -> Slot:
+    """``x,y,theta`` in metres and degrees.
+
+    Raises:
+        ValueError: It is something else.
+    """
+    try:
+        x, y, theta = (float(word) for word in text.split(","))
+    except ValueError:
+        raise ValueError("target must be x,y,theta in metres and degrees") from None
+    if not all(math.isfinite(value) for value in (x, y, theta)):
+        raise ValueError("target must be finite")
+    return Slot(x=x, y=y, theta=math.radians(theta))
+
+
+def read_slots(path: Path) -> list[Slot]:
+    """The slots of a file such as ``configs/palletize/grid.yaml``.
+
+    Raises:
+        BadConfig: It cannot be read, or says something else.
+        UsageError: It holds no slot.
+    """
+    slots = read_config(Pallet, path).all_slots()
+    if not slots:
+        raise UsageError(f"{path} holds no slot; give a grid, or a list of slots such as {{x: 0.5, y: 0.05}}")
+    return slots
+
+
+def check_reach(cell: Cell, slots: Sequence[Slot]) -> None:
+    """Refuses slots where the arm cannot put a part that it holds at any angle, before anything moves.
+
+    Raises:
+        UsageError: Says which, and what is legal.
+    """
+    for number, slot in enumerate(slots, 1):
+        for theta in _ANGLES:
+            ways = [
+                np.array([slot.x, slot.y, cell.workspace.table_z + 0.02, theta + turn])
+                for turn in (0.0, np.pi)
+            ]
+            try:
+                first_reachable(cell, ways)
+            except OutOfWorkspace as error:
+                name = "the target" if len(slots) == 1 else f"slot {number}"
+                raise UsageError(
+                    f"{name} at ({slot.x:g}, {slot.y:g}) m cannot be used: {error}; move it"
+                ) from error
+
+
+def first_reachable(cell: Cell, poses: Sequence[np.ndarray]) -> int:
+    """Index of the first of some poses (4,) of the hand at which the arm can let go of a part.
+
+    Raises:
+        OutOfWorkspace: It reaches none; why not the first.
+    """
+    refused = []
+    for index, pose in enumerate(poses):
+        try:
+            check_place(cell, pose)
+            return index
+        except OutOfWorkspace as error:
+            refused.append(error)
+    raise refused[0]
+
+
+def check_room(pairs: Iterable[tuple[Part, Slot]]) -> None:
+    """Refuses parts that do not fit into their slot as they come to lie most often.
+
+    Raises:
+        UsageError: Says which, how large they are, and the remedy.
+    """
+    too_large: dict[str, str] = {}
+    room = ""
+    for part, slot in pairs:
+        if slot.size is None or part.name in too_large:
+            continue
+        footprint = usual_footprint(part)
+        if not slot.fits(footprint):
+            long, short = 1e3 * footprint.sides
+            too_large[part.name] = f"{part.name} ({long:.0f} x {short:.0f} mm)"
+            room = f"{1e3 * slot.size[0]:g} x {1e3 * slot.size[1]:g} mm"
+    if too_large:
+        raise UsageError(
+            f"a slot of {room} is smaller than {', '.join(too_large.values())}; give the slots more room, "
+            "turn them (theta_deg), or choose other --parts"
+        )

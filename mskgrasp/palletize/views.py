@@ -1,0 +1,104 @@
+"""A placement seen from above, before and after, as it is stored and drawn."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from hal.camera import RgbdFrame
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.files import write_whole
+from mskgrasp.perception.footprint import pixel_pitch, seen_points
+from mskgrasp.planning.placing import Target
+from mskgrasp.planning.planner import GraspPlan
+
+_N = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class Views:
+    """A placement seen from above, before and after; squares with the base's axes, metres.
+
+    Attributes:
+        before: (n, n) heights over the table around the part as it lay, its centre in the middle.
+        after: (n, n) the same around the target; empty where the part was not placed.
+        side: Length of a side of both.
+        top: Height of the part.
+        grasp: (3,) x, y from the part's centre, and theta.
+        turn: By how much the part shall be turned, radians.
+        theta: Direction of its longer side at the target, radians.
+    """
+
+    before: np.ndarray
+    after: np.ndarray
+    side: float
+    top: float
+    grasp: np.ndarray
+    turn: float
+    theta: float
+
+
+def take_views(
+    before: RgbdFrame, after: RgbdFrame | None, plan: GraspPlan, target: Target, theta: float
+) -> Views:
+    """The views of a placement from its frames."""
+    view = plan.view
+    side = max(0.1, 1.6 * float(np.hypot(*view.size[:2])))
+    return Views(
+        before=_heights(before, view.centre_base[:2], side, view.table_z),
+        after=np.empty((0, 0))
+        if after is None
+        else _heights(after, np.array([target.x, target.y]), side, view.table_z),
+        side=side,
+        top=float(view.size[2]),
+        grasp=np.array([*(plan.grasp[:2] - view.centre_base[:2]), plan.grasp[3]]),
+        turn=target.theta,
+        theta=theta,
+    )
+
+
+def write_views(views: Views, path: Path) -> None:
+    """Writes views as a compressed file, whole or not at all."""
+    values: dict[str, Any] = {name: np.asarray(value) for name, value in asdict(views).items()}
+    for name in ("before", "after"):
+        values[name] = values[name].astype(np.float32)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **values)
+    write_whole(path, buffer.getvalue())
+
+
+def read_views(path: Path) -> Views:
+    """What `write_views` wrote.
+
+    Raises:
+        BadDataset: It is not there, or damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            values = {name: file[name] for name in file.files}
+        numbers = {name: float(values[name]) for name in ("side", "top", "turn", "theta")}
+        return Views(
+            before=values["before"], after=values["after"], grasp=values["grasp"].reshape(3), **numbers
+        )
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise BadDataset(f"{path} is missing or damaged; start again in another --out") from error
+
+
+def _heights(frame: RgbdFrame, centre: np.ndarray, side: float, table_z: float) -> np.ndarray:
+    """(n, n) heights as seen from straight above, whatever the place in the frame: no parallax."""
+    points = seen_points(frame)
+    cell = side / _N
+    from_corner = (points[:, :2] - centre) * [1, -1] + side / 2
+    inside = ((from_corner >= 0) & (from_corner < side)).all(axis=1)
+    columns, rows = np.floor(from_corner[inside] / cell).astype(int).T
+    heights = np.zeros((_N, _N), dtype=np.float32)
+    np.maximum.at(heights, (rows, columns), (points[inside, 2] - table_z).astype(np.float32))
+    # A pixel of the camera covers several cells, and the point is in the middle of it.
+    width = 2 * round(pixel_pitch(frame) / cell / 2) + 1
+    return cv2.dilate(heights, cv2.getStructuringElement(cv2.MORPH_RECT, (width, width)))

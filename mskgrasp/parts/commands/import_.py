@@ -1,0 +1,239 @@
+"""The verb ``import``: files of a user's CAD become parts."""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from mskgrasp.core.errors import BadPart, MskgraspError, UsageError
+from mskgrasp.parts import store
+from mskgrasp.parts.commands.progress import progress_bar
+from mskgrasp.parts.part import Part
+
+if TYPE_CHECKING:
+    from mskgrasp.parts.importing.import_file import Imported
+
+_FLAG = tyro.conf.FlagCreatePairsOff
+
+_TABLE_WIDTH = 130
+_COLOURS = {"imported": "green", "repaired": "yellow", "refused": "red", "unchanged": "dim"}
+
+PAYLOAD_KG = 3.0
+"""What a Panda carries (Franka Emika, Panda datasheet)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Import:
+    """Make parts of CAD files: STL, OBJ, PLY, GLB, 3MF, STEP.
+
+    Takes files, folders and quoted patterns such as 'cad/**/*.stl'. What can be mended safely is mended, the
+    rest is refused in one line, and the other files are imported all the same; a table at the end says what
+    became of each. The convex hulls take from a second to a minute a part.
+    Example: python -m mskgrasp.parts import clamp.stl cad/ --density 2700
+    """
+
+    files: tyro.conf.Positional[tuple[Path, ...]]
+    """Files (.stl .obj .ply .glb .3mf .step .stp), folders, quoted patterns."""
+    unit: Literal["mm", "m", "in"] | None = None
+    """Unit of STL, OBJ and PLY (else mm), and of a GLB not in metres; 3MF and STEP say it themselves."""
+    density: float = 7850.0
+    """kg/m^3: steel 7850, aluminium 2700, brass 8500, ABS 1050."""
+    split: Annotated[bool, _FLAG] = False
+    """Make a part of each body of a file: NAME-1, NAME-2, ... by decreasing volume."""
+    union: Annotated[bool, _FLAG] = False
+    """Join the bodies of a file that touch or overlap into one part."""
+    name: str | None = None
+    """Name of the part; by default the file's name in lower case. Only with a single file."""
+    family: str = "imported"
+    """Kind of part, for grouping in reports."""
+    licence: str = "NOASSERTION"
+    """SPDX identifier of the files' licence, for example CC-BY-4.0."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Row:
+    file: str
+    result: str
+    parts: tuple[Part, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+def run_import(verb: Import) -> int:
+    """Imports the files one by one; returns the exit code: 0, or 1 where a file was refused.
+
+    Raises:
+        UsageError: There is nothing to import, or the options contradict each other.
+    """
+    # CoACD and the readers are loaded here alone, so that the other verbs start without them.
+    from mskgrasp.parts.importing.import_file import check_density
+    from mskgrasp.parts.importing.select_files import select_files
+
+    if verb.split and verb.union:
+        raise UsageError("--split and --union exclude each other: choose one")
+    try:
+        check_density(verb.density)
+    except BadPart as error:
+        raise UsageError(f"--density: {error}") from error
+    selected = select_files(verb.files)
+    if not selected.files and all(path in verb.files for path, _ in selected.refused):
+        reason = selected.refused[0][1] if selected.refused else "no file given"
+        raise UsageError(f"{reason} (python -m mskgrasp.parts import FILE, FOLDER or 'PATTERN')")
+    if verb.name is not None and len(selected.files) > 1:
+        raise UsageError(
+            f"--name {verb.name} with {len(selected.files)} files: import them one by one to name them"
+        )
+    rows: list[_Row] = []
+    for path, why in selected.refused:
+        rows.append(_Row(file=str(path), result="refused", remarks=(_without(why, path),)))
+        print(f"error: {why}", file=sys.stderr)
+    try:
+        _import_all(verb, selected.files, rows)
+    finally:  # also when stopped: what was done is told
+        if rows:
+            _print_table(rows)
+    if selected.passed_over:
+        print(f"passed over {_listed(selected.passed_over)}: no CAD by the suffix", file=sys.stderr)
+    good = sum(row.result != "refused" for row in rows)
+    print(f"{good} of {len(rows)} files are parts now, in {store.parts_folder()}")
+    return 0 if good == len(rows) else 1
+
+
+def _import_all(verb: Import, files: Sequence[Path], rows: list[_Row]) -> None:
+    """Imports the files; adds a row for each."""
+    from mskgrasp.parts.importing.import_file import import_file, legal_name
+
+    taken: dict[str, Path] = {}
+    with progress_bar() as progress:
+        task = progress.add_task("", total=len(files))
+        for path in files:
+            progress.update(task, description=path.name)
+            try:
+                name = legal_name(path.stem if verb.name is None else verb.name)
+                there = (store.parts_folder() / name).is_dir()
+                imported = import_file(
+                    path,
+                    name=name,
+                    family=verb.family,
+                    unit=verb.unit,
+                    density=verb.density,
+                    licence=verb.licence,
+                    bodies="split" if verb.split else "union" if verb.union else "one",
+                    may_take=partial(_refuse_taken, taken, path),
+                )
+                taken |= {part.name: path for part in imported.parts}
+                for part in imported.parts:
+                    for warning in _warnings(part, imported.unit):
+                        print(f"warning: {warning}", file=sys.stderr)
+                rows.append(_row(path, imported, replaced=there))
+            except MskgraspError as error:
+                rows.append(_Row(file=str(path), result="refused", remarks=(_without(str(error), path),)))
+                print(f"error: {error}", file=sys.stderr)
+            progress.advance(task)
+
+
+def _refuse_taken(taken: dict[str, Path], path: Path, name: str) -> None:
+    if name in taken:
+        raise BadPart(f"{path} would replace the part {name!r} of {taken[name]}: import it with --name")
+
+
+def _row(path: Path, imported: Imported, *, replaced: bool) -> _Row:
+    if imported.unchanged:
+        return _Row(file=str(path), result="unchanged", parts=imported.parts, remarks=("there already",))
+    remarks = imported.told
+    if replaced:
+        remarks = (*remarks, "replaces the part of that name")
+    return _Row(
+        file=str(path),
+        result="repaired" if imported.told else "imported",
+        parts=imported.parts,
+        remarks=remarks,
+    )
+
+
+def _without(message: str, path: Path) -> str:
+    """A refusal without the file's name, which stands in the first column."""
+    return message.removeprefix(str(path)).removeprefix(":").strip()
+
+
+def _warnings(part: Part, unit: str) -> list[str]:
+    from mskgrasp.parts.importing.mesh_files import MILLIMETRES, USUAL_SIZE_MM, size_hint
+
+    found = []
+    longest = 1e3 * part.longest_axis
+    if not USUAL_SIZE_MM[0] <= longest <= USUAL_SIZE_MM[1]:
+        hint = f" ({size_hint(longest, unit, MILLIMETRES[unit])})" if unit in MILLIMETRES else ""
+        found.append(
+            f"{part.name} is {longest:.4g} mm long; the cell is made for parts of "
+            f"{USUAL_SIZE_MM[0]:.0f} to {USUAL_SIZE_MM[1]:.0f} mm: is the unit right?{hint}"
+        )
+    if part.mass > PAYLOAD_KG:
+        found.append(
+            f"{part.name} weighs {part.mass:.3g} kg, the arm carries {PAYLOAD_KG:g} kg: is --density right?"
+        )
+    return found
+
+
+def _print_table(rows: Sequence[_Row]) -> None:
+    console = Console()
+    if console.is_terminal and console.width < _TABLE_WIDTH:
+        for row in rows:
+            _print_lines(console, row)
+        return
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for header in ("file", "part", "result"):
+        table.add_column(header, overflow="fold")
+    for header in ("size mm", "mass g", "hulls", "error p95 mm", "max mm"):
+        table.add_column(header, justify="right", no_wrap=True)
+    table.add_column("what was done, or why not", overflow="fold")
+    for row in rows:
+        remarks = "; ".join(row.remarks)
+        first = [Text(row.file), "", Text(row.result, style=_COLOURS[row.result]), *5 * [""], Text(remarks)]
+        for number, part in enumerate(row.parts):
+            line = first if number == 0 else ["", "", "", *5 * [""], ""]
+            table.add_row(line[0], part.name, line[2], *_figures(part), line[8])
+        if not row.parts:
+            table.add_row(*first)
+    if console.is_terminal:
+        console.print(table)
+        return
+    wide = Console(width=10_000, file=io.StringIO(), no_color=True)  # in a pipe nothing is to be cut off
+    with wide.capture() as capture:
+        wide.print(table)
+    print("\n".join(line.rstrip() for line in capture.get().splitlines()))
+
+
+def _print_lines(console: Console, row: _Row) -> None:
+    """What the table says, for terminals too narrow for it."""
+    head = Text.assemble((row.file, "bold"), ": ", (row.result, _COLOURS[row.result]))
+    console.print(head.append("".join(f"; {remark}" for remark in row.remarks)))
+    for part in row.parts:
+        size, mass, hulls, p95, largest = _figures(part)
+        console.print(
+            Text(f"  {part.name}: {size} mm, {mass} g, hulls {hulls}, error p95 {p95} mm, max {largest} mm")
+        )
+
+
+def _figures(part: Part) -> tuple[str, ...]:
+    p95 = float(store.read_record(part.folder).get("hull_error_p95", float("nan")))
+    return (
+        " x ".join(f"{1e3 * size:.1f}" for size in part.extents),
+        f"{1e3 * part.mass:.3g}",
+        str(part.n_hulls),
+        f"{1e3 * p95:.2f}",
+        f"{1e3 * part.hull_error:.2f}",
+    )
+
+
+def _listed(paths: Sequence[Path]) -> str:
+    names = ", ".join(path.name for path in paths[:3])
+    return names + (f" and {len(paths) - 3} more" if len(paths) > 3 else "")

@@ -1,0 +1,187 @@
+"""The verb ``list``: parts and their numbers."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from mskgrasp.core.errors import BadPart, UsageError
+from mskgrasp.parts import store
+from mskgrasp.parts.build import imported_names, is_built, starter_names
+from mskgrasp.parts.catalogue import SPLITS, THIN, Entry, Index, read_index
+
+
+@dataclass(frozen=True, kw_only=True)
+class List:
+    """List parts: the starter set and imported ones, with size, mass and quality of the hulls.
+
+    With --catalogue: the families of the whole catalogue in numbers; with --family NAME: each part of one.
+    """
+
+    catalogue: bool = False
+    """Count the catalogue's parts by family."""
+    family: str | None = None
+    """List each part of this family of the catalogue."""
+    csv: Path | None = None
+    """Write the catalogue, a row a part, to this file."""
+
+
+def run_list(verb: List) -> int:
+    """Prints a table, and the number of parts in the last line."""
+    if verb.csv is not None:
+        write_csv(_built_index(), verb.csv)
+        print(verb.csv)
+    if verb.family is not None:
+        index = _built_index()
+        entries = [entry for entry in index.parts.values() if entry.family == verb.family]
+        if not entries:
+            raise UsageError(f"no family {verb.family!r}; there are {', '.join(sorted(index.families()))}")
+        _print(_entry_table(entries))
+        print(f"{len(entries)} parts")
+    elif verb.catalogue or verb.csv is not None:
+        index = _built_index()
+        _print(_family_table(index))
+        _print_spread(index)
+        print(f"{len(index.parts)} parts")
+    else:
+        names = sorted((*starter_names(), *imported_names()))
+        table = _table(
+            ("name", "family", "source"),
+            ("longest axis mm", "mass g", "hulls", "hull error mm", "poses"),
+        )
+        for name in names:
+            table.add_row(name, *_row(name))
+        _print(table)
+        print(f"{len(names)} parts")
+    return 0
+
+
+def write_csv(index: Index, path: Path) -> None:
+    """Writes the catalogue as a table, a row a part, in the order of their names."""
+    columns = (
+        "name", "family", "source", "licence", "split", "group", "longest_axis_mm", "edge_1_mm", "edge_2_mm",
+        "edge_3_mm", "volume_cm3", "mass_g", "hulls", "hull_error_p95_mm", "hull_error_largest_mm",
+        "hull_volume_ratio", "attempts", "successes",
+    )  # fmt: skip
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        for name, e in sorted(index.parts.items()):
+            writer.writerow([
+                name, e.family, e.source, e.licence, e.split, e.group,
+                *(f"{1e3 * length:.2f}" for length in (e.longest_axis, *e.extents)),
+                f"{1e6 * e.volume:.3f}", f"{1e3 * e.mass:.1f}", e.n_hulls, f"{1e3 * e.hull_error_p95:.2f}",
+                f"{1e3 * e.hull_error:.2f}", f"{e.hull_volume_ratio:.3f}",
+                *((e.rating.attempts, e.rating.successes) if e.rating else ("", "")),
+            ])  # fmt: skip
+
+
+def _built_index() -> Index:
+    index = read_index()
+    if not index.parts:
+        raise BadPart("the catalogue is not built yet: python -m mskgrasp.parts build --catalogue")
+    return index
+
+
+def _row(name: str) -> tuple[str, ...]:
+    if name in starter_names() and not is_built(name):
+        return ("(not built yet)",)
+    try:
+        part = store.load_part(store.parts_folder() / name)
+    except BadPart:
+        return ("(damaged: import it again)",)
+    return (
+        part.family,
+        part.source,
+        f"{1e3 * part.longest_axis:.1f}",
+        f"{1e3 * part.mass:.3g}",
+        str(part.n_hulls),
+        f"{1e3 * part.hull_error:.2f}",
+        str(len(part.resting_probability)),
+    )
+
+
+def _entry_table(entries: Iterable[Entry]) -> Table:
+    table = _table(
+        ("name", "source", "split"),
+        ("edges mm", "mass g", "hulls", "hull error mm, 95 %", "largest", "volume", "random grasps"),
+    )
+    for entry in entries:
+        rating = entry.rating
+        low, high = rating.interval if rating else (0.0, 1.0)
+        table.add_row(
+            entry.name,
+            entry.source,
+            entry.split,
+            " x ".join(f"{1e3 * edge:.4g}" for edge in entry.extents[::-1]),
+            f"{1e3 * entry.mass:.3g}",
+            str(entry.n_hulls),
+            f"{1e3 * entry.hull_error_p95:.2f}",
+            f"{1e3 * entry.hull_error:.2f}",
+            f"{100 * entry.hull_volume_ratio - 100:+.1f} %",
+            f"{rating.rate:.0%} ({low:.0%} - {high:.0%})" if rating else "not rated",
+        )
+    return table
+
+
+def _family_table(index: Index) -> Table:
+    table = _table(
+        ("family",),
+        ("parts", "longest axis mm", "hulls median", "hull error mm, 95 %", *SPLITS, "random grasps"),
+    )
+    for family in sorted(index.families()):
+        entries = [entry for entry in index.parts.values() if entry.family == family]
+        length = [1e3 * entry.longest_axis for entry in entries]
+        sides = Counter(entry.split for entry in entries)
+        rated = [entry.rating for entry in entries if entry.rating is not None]
+        rate = sum(r.successes for r in rated) / max(1, sum(r.attempts for r in rated))
+        table.add_row(
+            family,
+            str(len(entries)),
+            f"{min(length):.0f} - {max(length):.0f}",
+            f"{np.median([entry.n_hulls for entry in entries]):.0f}",
+            f"up to {1e3 * max(entry.hull_error_p95 for entry in entries):.2f}",
+            *(str(sides[side]) for side in SPLITS),
+            f"{rate:.0%} ({len(rated)} rated)" if rated else "not rated",
+        )
+    return table
+
+
+def _print_spread(index: Index) -> None:
+    entries = list(index.parts.values())
+    length = np.array([1e3 * entry.longest_axis for entry in entries])
+    edges = np.array([20, 40, 60, 80, 100, 120, 150.001])
+    counts, _ = np.histogram(length, edges)
+    spread = ", ".join(f"{a:.0f}-{b:.0f} mm {n}" for a, b, n in zip(edges, edges[1:], counts, strict=False))
+    print(f"longest axis: {spread}")
+    sides = Counter(entry.split for entry in entries)
+    print("split: " + ", ".join(f"{side} {sides[side]}" for side in SPLITS))
+    family, most = index.families().most_common(1)[0]
+    thin = sum(entry.extents[0] < THIN for entry in entries)
+    print(
+        f"largest family: {family}, {most / len(entries):.1%}; thinner than {1e3 * THIN:.0f} mm: "
+        f"{thin / len(entries):.1%}; left out: {len(index.left_out)}"
+    )
+
+
+def _table(texts: tuple[str, ...], numbers: tuple[str, ...]) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for header in texts:
+        table.add_column(header, no_wrap=header in ("name", "family"))
+    for header in numbers:
+        table.add_column(header, justify="right")
+    return table
+
+
+def _print(table: Table) -> None:
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=160)  # in a pipe nothing is to be cut off
+    console.print(table)

@@ -1,0 +1,87 @@
+"""The verbs that draw: ``show`` one part, ``sheet`` of the whole catalogue."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from mskgrasp.core.errors import BadPart, UsageError
+from mskgrasp.parts.build import find_part
+from mskgrasp.parts.catalogue import read_index
+from mskgrasp.parts.commands.progress import progress_bar
+
+PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Show:
+    """Draw a part: its mesh, its collision hulls moved apart, and how it comes to rest on a table.
+
+    Example: python -m mskgrasp.parts show spur_gear_m2_z18 --out gear.png
+    """
+
+    name: tyro.conf.Positional[str]
+    """A part's name, or the path of a part folder."""
+    out: Path | None = None
+    """Picture to write, .png, .svg or .pdf; by default NAME.png in the current folder."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sheet:
+    """Draw a contact sheet of the catalogue: some parts of every family, coloured by material.
+
+    Example: python -m mskgrasp.parts sheet --out sheet.png
+    """
+
+    out: Path = Path("sheet.png")
+    """Picture to write, .png, .svg or .pdf."""
+    parts: int = 192
+    """About how many parts to draw; every family is there at least once."""
+
+
+def run_show(verb: Show) -> int:
+    """Writes the picture of a part."""
+    # Matplotlib takes a second to load; the other verbs do without it.
+    from mskgrasp.parts.figures.picture import draw_part
+
+    part = find_part(verb.name)
+    out = verb.out or Path(f"{part.name}.png")
+    _check(out)
+    draw_part(part, out)
+    print(out)
+    return 0
+
+
+def run_sheet(verb: Sheet) -> int:
+    """Writes the contact sheet."""
+    from mskgrasp.parts.figures.sheet import draw_sheet
+
+    _check(verb.out)
+    if verb.parts < 1:
+        raise UsageError(f"--parts {verb.parts}: draw at least one")
+    index = read_index()
+    if not index.parts:
+        raise BadPart("the catalogue is not built yet: python -m mskgrasp.parts build --catalogue")
+    with progress_bar() as progress:
+        task = progress.add_task("sheet", total=None)
+        draw_sheet(
+            index,
+            verb.out,
+            verb.parts,
+            lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    print(verb.out)
+    return 0
+
+
+def _check(out: Path) -> None:
+    if out.suffix.lower() not in PICTURE_SUFFIXES:
+        raise UsageError(f"--out {out}: the picture's name must end in {', '.join(PICTURE_SUFFIXES)}")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"--out {out}: cannot make folder {out.parent} ({error.strerror}): choose another"
+        ) from error

@@ -1,0 +1,49 @@
+"""Wavefront OBJ: vertices and faces; materials and all else are passed over."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mskgrasp.parts.importing.formats import Loaded, Unreadable
+from mskgrasp.parts.importing.formats.polygons import triangulated
+from mskgrasp.parts.solids.surface import Surface
+
+
+def load_obj(content: bytes) -> Loaded:
+    """Reads an OBJ; its unit is unknown. Polygons are cut into triangles.
+
+    Raises:
+        Unreadable: A line is damaged, or there are no vertices.
+    """
+    vertices: list[list[bytes]] = []
+    faces: list[tuple[int, int, int]] = []
+    polygons: list[list[int]] = []
+    # Names may be in any encoding; what counts is ASCII.
+    lines = content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines()
+    for number, line in enumerate(lines, start=1):
+        words = line.split()
+        if not words or words[0] not in (b"v", b"f"):
+            continue
+        try:
+            if words[0] == b"v":
+                x, y, z = words[1:4]
+                vertices.append([x, y, z])
+                continue
+            corners = [int(word.split(b"/", 1)[0]) for word in words[1:]]
+        except ValueError as error:
+            text = line.decode("ascii", "replace").strip()[:40]
+            raise Unreadable(
+                f"is no readable OBJ (line {number}: {text!r}): export it again from the CAD program"
+            ) from error
+        # Counted from 1, or backwards from the vertex read last.
+        corners = [corner - 1 if corner > 0 else len(vertices) + corner for corner in corners]
+        if len(corners) == 3:
+            faces.append((corners[0], corners[1], corners[2]))
+        elif len(corners) > 3:
+            polygons.append(corners)
+    if not vertices:
+        raise Unreadable("holds no vertices (text of another kind?): export it again as OBJ")
+    points = np.array(vertices, dtype="S").astype(np.float64)
+    pieces = [np.array(faces, dtype=np.int64).reshape(-1, 3)]
+    pieces += [triangulated(points, np.array(corners)) for corners in polygons]
+    return Loaded(objects=(Surface(vertices=points, faces=np.concatenate(pieces)),))

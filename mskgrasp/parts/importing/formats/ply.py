@@ -1,0 +1,38 @@
+"""PLY, binary and text."""
+
+from __future__ import annotations
+
+import io
+import warnings
+
+import numpy as np
+import trimesh
+
+from mskgrasp.parts.importing.formats import Loaded, Unreadable
+from mskgrasp.parts.solids.surface import Surface
+
+
+def load_ply(content: bytes) -> Loaded:
+    """Reads a PLY; its unit is unknown.
+
+    Raises:
+        Unreadable: It is damaged or holds points alone.
+    """
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            # From memory and without a resolver, so that the file cannot make the reader open others.
+            mesh = trimesh.load(io.BytesIO(content), file_type="ply", process=False)
+    except Exception as error:  # the reader raises whatever it stumbles over
+        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise Unreadable(f"is no readable PLY ({reason[:80]}): export or copy it again") from error
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise Unreadable("holds no triangles (a cloud of points?): export it from the CAD program as a mesh")
+    return Loaded(
+        objects=(
+            Surface(
+                vertices=np.asarray(mesh.vertices, dtype=np.float64),
+                faces=np.asarray(mesh.faces, dtype=np.int64),
+            ),
+        )
+    )

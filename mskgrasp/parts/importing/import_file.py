@@ -1,0 +1,184 @@
+"""Files of a user's CAD made into parts; what cannot be simulated truly is refused."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import unicodedata
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from mskgrasp.core.errors import BadPart
+from mskgrasp.parts import store
+from mskgrasp.parts.build import LEGAL_NAME, builtin_names, write_solid
+from mskgrasp.parts.importing.bodies import Bodies, mend
+from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, MeshFile, Unit, read_content, read_mesh
+from mskgrasp.parts.part import Part
+from mskgrasp.parts.solids.decompose import convex_pieces
+from mskgrasp.parts.solids.simplify import for_collision
+from mskgrasp.parts.solids.solid import Solid
+from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION, stamp
+
+USUAL_DENSITY = (10.0, 25_000.0)
+"""Foam and osmium, kg/m^3."""
+
+_SPELLED = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "å": "aa", "æ": "ae"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imported:
+    """What became of one file.
+
+    Attributes:
+        parts: One, or with ``bodies="split"`` one a body.
+        unchanged: They were there already, made of the same file in the same way.
+        unit: That the file was read in; empty where it did not need to be read.
+        told: What was mended, one sentence each.
+    """
+
+    parts: tuple[Part, ...]
+    unchanged: bool
+    unit: str
+    told: tuple[str, ...]
+
+
+def import_file(
+    path: Path,
+    *,
+    name: str | None = None,
+    family: str = "imported",
+    unit: Unit | None = None,
+    density: float = 7850.0,
+    licence: str = "NOASSERTION",
+    bodies: Bodies = "one",
+    may_take: Callable[[str], None] = lambda name: None,
+) -> Imported:
+    """Makes a part of a file, replacing an imported part of the same name.
+
+    Args:
+        path: STL, OBJ, PLY, GLB, 3MF or STEP.
+        name: The part's name; by default the file's, made legal.
+        family: Kind of part.
+        unit: Of the file's coordinates; None takes what the format says, and mm where it says nothing.
+        density: kg/m^3.
+        licence: SPDX identifier of the mesh's licence.
+        bodies: Several bodies in the file are refused, split into parts ``NAME-1``, ``NAME-2``, ... by
+            decreasing volume, or joined into one.
+        may_take: Called with each name before its part is written; raises BadPart to keep it free.
+
+    Raises:
+        BadPart: The file cannot be made a part, or the name is a built-in part's; the message says why.
+    """
+    check_density(density)
+    name = legal_name(path.stem if name is None else name)
+    content = read_content(path)
+    versions = stamp("part", PART_VERSION), stamp("import", IMPORT_VERSION)
+    recipe = [family, unit, float(density), licence, bodies, path.name, *versions]
+    digest = hashlib.sha256(json.dumps(recipe).encode() + hashlib.sha256(content).digest()).hexdigest()
+
+    if bodies != "split":
+        _check_name(name, may_take)
+        known = _known(name, digest)
+        if known is not None:
+            return Imported(parts=(known,), unchanged=True, unit="", told=())
+    file = read_mesh(path, content, unit)
+    del content  # up to a gigabyte, and mending needs room
+    try:
+        mended = mend(file.objects, bodies=bodies)
+    except BadPart as error:
+        raise BadPart(f"{path} {error}") from error
+    count = len(mended.bodies)
+    names = [name] if count == 1 else [f"{name[: 79 - len(str(count))]}-{i + 1}" for i in range(count)]
+    for each, mesh in zip(names, mended.bodies, strict=True):
+        _check_name(each, may_take)
+        longest = float(np.max(mesh.extents))
+        if longest < POSSIBLE_SIZE_MM[0]:
+            raise BadPart(
+                f"{path}: the body {each} is {longest:.3g} mm long, the least is {POSSIBLE_SIZE_MM[0]:g} mm: "
+                "remove it in the CAD program"
+            )
+    parts, unchanged = [], True
+    for number, (each, mesh) in enumerate(zip(names, mended.bodies, strict=True)):
+        recipe_hash = digest if count == 1 else f"{digest[:56]}-{number + 1:07d}"
+        known = _known(each, recipe_hash)
+        if known is None:
+            unchanged = False
+            known = _make(mesh, path, file, each, family, density, licence, recipe_hash)
+        parts.append(known)
+    return Imported(parts=tuple(parts), unchanged=unchanged, unit=file.unit, told=(*file.told, *mended.told))
+
+
+def import_part(path: Path, **options: object) -> Part:
+    """The part of a file that holds one; the options are those of import_file."""
+    return import_file(path, **options).parts[0]  # pyright: ignore[reportArgumentType]
+
+
+def check_density(density: float) -> None:
+    """Refuses what no material has.
+
+    Raises:
+        BadPart: The density is not that of any solid.
+    """
+    if not USUAL_DENSITY[0] <= density <= USUAL_DENSITY[1]:
+        grams = "; in kg/m^3, not g/cm^3" if 0 < density < USUAL_DENSITY[0] else ""
+        raise BadPart(
+            f"density {density:g} kg/m^3 is not between {USUAL_DENSITY[0]:g} and {USUAL_DENSITY[1]:g}: "
+            f"steel has 7850, aluminium 2700, ABS 1050{grams}"
+        )
+
+
+def legal_name(text: str) -> str:
+    """A part's name made of any text: lower case letters, digits, - and _.
+
+    Raises:
+        BadPart: Nothing legal is left.
+    """
+    plain = unicodedata.normalize("NFC", text).lower().translate(_SPELLED)
+    plain = unicodedata.normalize("NFKD", plain).encode("ascii", "ignore").decode()
+    name = re.sub(r"[^a-z0-9_-]+", "-", plain).strip("-_")[:80].rstrip("-_")
+    if not LEGAL_NAME.fullmatch(name):
+        raise BadPart(f"no part name can be made of {text!r}: give one with --name (a-z, 0-9, - and _)")
+    return name
+
+
+def _check_name(name: str, may_take: Callable[[str], None]) -> None:
+    if name in builtin_names():
+        raise BadPart(f"the name {name!r} belongs to a built-in part: choose another with --name")
+    may_take(name)
+
+
+def _known(name: str, recipe_hash: str) -> Part | None:
+    folder = store.parts_folder() / name
+    return store.load_part(folder) if store.recipe_hash(folder) == recipe_hash else None
+
+
+def _make(
+    mesh: trimesh.Trimesh,
+    path: Path,
+    file: MeshFile,
+    name: str,
+    family: str,
+    density: float,
+    licence: str,
+    recipe_hash: str,
+) -> Part:
+    try:
+        return write_solid(
+            Solid(mesh=mesh, hulls=convex_pieces(for_collision(mesh))),
+            name=name,
+            family=family,
+            source=f"imported from {path.name}",
+            licence=licence,
+            density=density,
+            dimensions={
+                f"extent_{axis}": float(size) / 1000 for axis, size in zip("xyz", mesh.extents, strict=True)
+            },
+            recipe_hash=recipe_hash,
+        )
+    except BadPart as error:
+        raise BadPart(f"{path}: {error}") from error

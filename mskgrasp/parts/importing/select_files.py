@@ -1,0 +1,82 @@
+"""Which files a user means by names, folders and patterns."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mskgrasp.parts.importing.mesh_files import LOADERS
+
+
+@dataclass(frozen=True, kw_only=True)
+class Selected:
+    """What is to be imported, and what is not.
+
+    Attributes:
+        files: In the order of the arguments, those of a folder or pattern by name; none twice.
+        refused: Path as the user knows it, and the sentence that says why.
+        passed_over: Files in folders that are no CAD by their suffix.
+    """
+
+    files: tuple[Path, ...]
+    refused: tuple[tuple[Path, str], ...]
+    passed_over: tuple[Path, ...]
+
+
+def select_files(arguments: Sequence[Path]) -> Selected:
+    """Resolves files, folders (their files, not their subfolders') and quoted patterns (``**`` descends).
+
+    A file may be a link where the user names it; in a folder or pattern a link that leads out is refused, for
+    nobody has asked for what lies there.
+    """
+    files: dict[str, Path] = {}
+    refused: list[tuple[Path, str]] = []
+    passed_over: list[Path] = []
+    for argument in arguments:
+        if argument.is_dir():
+            found, root = sorted(argument.iterdir()), argument
+        elif glob.has_magic(str(argument)) and not argument.exists():
+            found = sorted(Path(name) for name in glob.glob(str(argument), recursive=True))
+            root = _fixed(argument)
+            if not found:
+                refused.append((argument, f"no file matches {argument}: check the path and the quotes"))
+                continue
+        else:
+            files.setdefault(os.path.abspath(argument), argument)
+            continue
+        before = len(files) + len(refused)
+        for path in found:
+            if path.suffix.lower() not in LOADERS or path.is_dir():
+                passed_over += [path] if not path.is_dir() else []
+            elif path.is_symlink() and not path.exists():
+                refused.append(
+                    (path, f"{path} is a link to {os.readlink(path)}, which is not there: mend it")
+                )
+            elif not path.resolve().is_relative_to(root.resolve()):
+                refused.append(
+                    (
+                        path,
+                        f"{path} leads out of {root} to {path.resolve()}: name that file itself to import it",
+                    )
+                )
+            else:
+                files.setdefault(os.path.abspath(path), path)
+        if len(files) + len(refused) == before and not any(os.path.abspath(path) in files for path in found):
+            where = f"the folder {argument}" if argument.is_dir() else f"what matches {argument}"
+            refused.append(
+                (argument, f"{where} holds no CAD file ({', '.join(LOADERS)}): choose another, or use '**'")
+            )
+    return Selected(files=tuple(files.values()), refused=tuple(refused), passed_over=tuple(passed_over))
+
+
+def _fixed(pattern: Path) -> Path:
+    """The folders of a pattern before its first wildcard."""
+    parts = []
+    for part in pattern.parts[:-1]:
+        if glob.has_magic(part):
+            break
+        parts.append(part)
+    return Path(*parts)

@@ -1,0 +1,64 @@
+"""Parts selected by names, folders and sets."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from mskgrasp.parts.build import find_part, starter_names
+from mskgrasp.parts.catalogue import chosen_names
+
+
+def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int = 0) -> list[str]:
+    """Names or folders of parts from a user's words.
+
+    ``train``, ``validation`` and ``test``: the model's, where it was trained with any such; else the
+    catalogue's, for the last two without what the model was trained on. ``all``: every part of the starter
+    set. Other words as `mskgrasp.parts.chosen_names`.
+
+    Args:
+        words: Of the user.
+        training: What a model says of its training.
+        n_parts: Over 0, at most so many, an equal share of each word's, evenly chosen from their names in
+            order; more of them include the fewer.
+
+    Raises:
+        BadPart: A part is unknown.
+    """
+    sets = []
+    for word in words:
+        known = training.get("training_parts") or ()
+        if word == "train" and known:
+            sets.append(list(known))
+        elif word in ("validation", "test"):
+            unseen = training.get(f"{word}_parts")
+            sets.append(unseen or [name for name in chosen_names((word,)) if name not in known])
+        else:
+            sets.append(starter_names() if word == "all" else chosen_names((word,)))
+    if n_parts:
+        sets = [evenly(list(one), share) for one, share in zip(sets, _shares(sets, n_parts), strict=True)]
+    names = list(dict.fromkeys(name for one in sets for name in one))
+    for name in names:
+        find_part(name)
+    return names
+
+
+def evenly(names: Sequence[str], n: int) -> list[str]:
+    """At most n of some names, spread evenly over their sorted order; a larger n adds to a smaller one's."""
+    in_order = sorted(names)
+    # The golden ratio's multiples fill an interval evenly, however many there are.
+    places = (k * 0.6180339887498949 % 1.0 for k in itertools.count())
+    chosen: dict[int, None] = {}
+    while len(chosen) < min(n, len(in_order)):
+        chosen[int(next(places) * len(in_order))] = None
+    return [in_order[i] for i in sorted(chosen)]
+
+
+def _shares(sets: Sequence[Sequence[str]], n: int) -> list[int]:
+    """How many of each set, n in all where there are so many; what a small one lacks the others give."""
+    shares = [0] * len(sets)
+    while sum(shares) < min(n, sum(map(len, sets))):
+        open_ = [i for i, one in enumerate(sets) if shares[i] < len(one)]
+        shares[min(open_, key=lambda i: shares[i])] += 1
+    return shares

@@ -1,0 +1,1 @@
+"""Solids: meshes, convex pieces, measurements and stable poses."""

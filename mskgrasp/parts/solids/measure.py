@@ -1,0 +1,264 @@
+"""What is measured on a shape: mass, inertia, size, and how well the hulls stand for the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from manifold3d import Manifold, Mesh64, OpType
+from scipy.spatial import ConvexHull, KDTree
+
+from mskgrasp.core.geometry import quat_from_matrix
+
+MOST_SAMPLES = 12_000
+"""Points per surface at which hulls and mesh are compared."""
+
+MOST_OBLONG = 50.0
+"""PhysX on a GPU drops hulls whose length is about 64 times their thickness."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MassProperties:
+    """Of a uniform body.
+
+    Attributes:
+        volume: Cubic metres.
+        mass: kg.
+        centroid: (3,) metres, in the frame of the given mesh.
+        inertia: (3, 3) about the centroid, kg m^2.
+        principal_inertia: (3,) kg m^2.
+        quat_principal: (4,) wxyz, the principal axes in the mesh's axes.
+    """
+
+    volume: float
+    mass: float
+    centroid: np.ndarray
+    inertia: np.ndarray
+    principal_inertia: np.ndarray
+    quat_principal: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class HullFit:
+    """How well the union of the hulls stands for the mesh; lengths in millimetres.
+
+    Attributes:
+        largest: Largest distance found between the two surfaces, either way.
+        p95: 95th percentile of the distance over both surfaces.
+        volume_ratio: Volume of the union by that of the mesh.
+        outward_largest: Largest distance from the hulls' surface to the mesh.
+        outward_p95: 95th percentile of the same.
+        inward_largest: Largest distance from the mesh to the hulls' surface.
+        inward_p95: 95th percentile of the same.
+    """
+
+    largest: float
+    p95: float
+    volume_ratio: float
+    outward_largest: float
+    outward_p95: float
+    inward_largest: float
+    inward_p95: float
+
+
+def mass_properties(mesh_mm: trimesh.Trimesh, density: float) -> MassProperties:
+    """Integrates over a watertight mesh in millimetres; density in kg/m^3."""
+    # In millimetres and scaled afterwards: the integrals of small parts in metres vanish beside tolerances.
+    found = trimesh.triangles.mass_properties(mesh_mm.triangles, density=1.0, skip_inertia=False)
+    inertia = np.asarray(found.inertia, dtype=float) * density * 1e-15
+    inertia = (inertia + inertia.T) / 2
+    principal, axes = _principal_axes(inertia)
+    volume = float(found.volume) * 1e-9
+    return MassProperties(
+        volume=volume,
+        mass=volume * density,
+        centroid=np.asarray(found.center_mass, dtype=float) / 1000,
+        inertia=inertia,
+        principal_inertia=principal,
+        quat_principal=quat_from_matrix(axes),
+    )
+
+
+def _principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Principal moments (3,) and right-handed axes as columns (3, 3)."""
+    diagonal = np.diag(inertia)
+    if np.abs(inertia - np.diag(diagonal)).max() < 1e-6 * diagonal.max():
+        # The mesh's own axes are principal; a symmetric part must not get arbitrary ones from rounding.
+        return diagonal.copy(), np.eye(3)
+    moments, axes = np.linalg.eigh(inertia)
+    largest = np.abs(axes).argmax(axis=0)
+    axes = axes * np.sign(axes[largest, range(3)])
+    if np.linalg.det(axes) < 0:
+        axes[:, 2] *= -1
+    return moments, axes
+
+
+def longest_axis(mesh: trimesh.Trimesh) -> float:
+    """Longest edge of the oriented box of least volume, in the mesh's unit."""
+    _, extents = trimesh.bounds.oriented_bounds(mesh)
+    # For round parts the least volume leaves room for turned boxes; none is needed where axes fit as well.
+    if np.prod(mesh.extents) <= np.prod(extents) * 1.0001:
+        extents = mesh.extents
+    return float(np.max(extents))
+
+
+def hull_fit(mesh_mm: trimesh.Trimesh, hulls_mm: Sequence[np.ndarray]) -> HullFit:
+    """Compares the surface of the union of the hulls with that of the mesh."""
+    return MeshSurface(mesh_mm).fit(hulls_mm)
+
+
+class MeshSurface:
+    """A mesh prepared for comparing one set of hulls after the other with it."""
+
+    def __init__(self, mesh_mm: trimesh.Trimesh) -> None:
+        """Cuts the surface finely and sorts it for searching."""
+        # Copies: manifold3d takes neither a read-only array nor a view with strides.
+        body = Manifold(Mesh64(np.array(mesh_mm.vertices, np.float64), np.array(mesh_mm.faces, np.uint64)))
+        self._step = float(np.max(mesh_mm.extents)) / 40
+        self._volume = float(mesh_mm.volume)
+        self._surface = _Surface(_triangles(body.refine_to_length(self._step)))
+        self._samples, self._areas = _samples(self._surface.triangles)
+
+    def fit(self, hulls_mm: Sequence[np.ndarray]) -> HullFit:
+        """Compares the surface of the union of the hulls with that of the mesh."""
+        return self._fit(_Union(hulls_mm, self._step))
+
+    def fit_within(
+        self,
+        hulls_mm: Sequence[np.ndarray],
+        most_p95: float,
+        most_ratio: float,
+        most_outward: float = np.inf,
+    ) -> HullFit | None:
+        """The same where it keeps the bounds, else None, as soon as that is certain.
+
+        Args:
+            hulls_mm: Corners (n, 3) of each hull.
+            most_p95: 95th percentile of the distance, either way.
+            most_ratio: Volume of the union by the mesh's, or the mesh's by the union's.
+            most_outward: Largest distance from the hulls' surface to the mesh.
+        """
+        union = _Union(hulls_mm, self._step)
+        if not 1 / most_ratio <= union.volume / self._volume <= most_ratio:
+            return None
+        outward = self._surface.distance_to(union.samples)
+        # The 95th percentile is certain where more than 5 % of both surfaces lies beyond it already.
+        beyond = float(union.areas[outward > most_p95].sum())
+        both = float(union.areas.sum() + self._areas.sum())
+        if outward.max() > most_outward or beyond > 0.0501 * both:
+            return None
+        fit = self._fit(union, outward)
+        return fit if fit.p95 <= most_p95 else None
+
+    def outward_largest(self, hulls_mm: Sequence[np.ndarray]) -> float:
+        """Largest distance from the surface of the union of the hulls to the mesh."""
+        return float(self._surface.distance_to(_Union(hulls_mm, self._step).samples).max())
+
+    def _fit(self, union: _Union, outward: np.ndarray | None = None) -> HullFit:
+        if outward is None:
+            outward = self._surface.distance_to(union.samples)
+        inward = _Surface(union.triangles).distance_to(self._samples)
+        return HullFit(
+            largest=float(max(outward.max(), inward.max())),
+            p95=_p95(np.concatenate([outward, inward]), np.concatenate([union.areas, self._areas])),
+            volume_ratio=float(union.volume / self._volume),
+            outward_largest=float(outward.max()),
+            outward_p95=_p95(outward, union.areas),
+            inward_largest=float(inward.max()),
+            inward_p95=_p95(inward, self._areas),
+        )
+
+
+class _Union:
+    """The outer surface of several hulls together, finely cut."""
+
+    def __init__(self, hulls_mm: Sequence[np.ndarray], step: float) -> None:
+        body = Manifold.batch_boolean(
+            [Manifold.hull_points(np.asarray(points, dtype=np.float64)) for points in hulls_mm], OpType.Add
+        )
+        self.volume = float(body.volume())
+        self.triangles = _outer_triangles(_triangles(body.refine_to_length(step)), hulls_mm)
+        self.samples, self.areas = _samples(self.triangles)
+
+
+class _Surface:
+    """A finely cut surface, sorted by the centres of its triangles (n, 3, 3)."""
+
+    def __init__(self, triangles: np.ndarray) -> None:
+        self.triangles = triangles
+        self._tree = KDTree(triangles.mean(axis=1))
+
+    def distance_to(self, points: np.ndarray) -> np.ndarray:
+        """Distance of points (n, 3)."""
+        distance = self._by_nearest(points, 8)
+        # Among slivers eight centres may all be of farther triangles: large distances are looked at again.
+        doubtful = np.flatnonzero(distance > max(float(np.quantile(distance, 0.9)), 0.01))
+        if len(doubtful):
+            distance[doubtful] = self._by_nearest(points[doubtful], 64)
+        return distance
+
+    def _by_nearest(self, points: np.ndarray, count: int) -> np.ndarray:
+        """Distance to the triangles whose centres are nearest."""
+        count = min(count, len(self.triangles))
+        nearest = np.reshape(self._tree.query(points, k=count)[1], (len(points), count))
+        best = np.full(len(points), np.inf)
+        for column in nearest.T:
+            closest = trimesh.triangles.closest_point(self.triangles[column], points)
+            best = np.minimum(best, np.linalg.norm(closest - points, axis=1))
+        return best
+
+
+def _p95(distance: np.ndarray, area: np.ndarray) -> float:
+    """The distance that 95 % of the area keeps."""
+    order = np.argsort(distance)
+    covered = np.cumsum(area[order]) / area.sum()
+    return float(distance[order][min(int(np.searchsorted(covered, 0.95)), len(distance) - 1)])
+
+
+def oblongness(points: np.ndarray) -> float:
+    """Length of a convex body by its least thickness."""
+    hull = ConvexHull(points)
+    corners = points[hull.vertices]
+    heights = corners @ hull.equations[:, :3].T
+    thickness = (heights.max(axis=0) - heights.min(axis=0)).min()
+    length = np.linalg.norm(corners[:, None] - corners[None], axis=-1).max()
+    return float(length / thickness)
+
+
+def _triangles(body: Manifold) -> np.ndarray:
+    data = body.to_mesh64()
+    return np.asarray(data.vert_properties)[:, :3][np.asarray(data.tri_verts)]
+
+
+def _outer_triangles(triangles: np.ndarray, hulls: Sequence[np.ndarray]) -> np.ndarray:
+    """Those triangles that have no hull in front of them.
+
+    Hulls that share a face differ by rounding, so their union keeps both sides of it as an inner wall.
+    """
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    # Coordinates first: numpy reduces many rows of three numbers slowly.
+    in_front = np.ascontiguousarray((triangles.mean(axis=1) + 0.01 * normal).T)
+    covered = np.zeros(len(triangles), dtype=bool)
+    for points in hulls:
+        planes = ConvexHull(points).equations
+        # Most triangles are not even in the hull's box, and those that are need not be tried twice.
+        low, high = points.min(axis=0) - 1e-6, points.max(axis=0) + 1e-6
+        in_box = ((in_front >= low[:, None]) & (in_front <= high[:, None])).all(axis=0)
+        near = np.flatnonzero(in_box & ~covered)
+        heights = planes[:, :3] @ in_front[:, near] + planes[:, 3:]
+        covered[near] = (heights < 0).all(axis=0)
+    return triangles[~covered]
+
+
+def _samples(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points on the surface (centres, and corners without weight) and the area each one stands for."""
+    area = np.linalg.norm(
+        np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1
+    )
+    stride = -(-len(triangles) // (MOST_SAMPLES // 2))
+    chosen = triangles[::stride]
+    points = np.concatenate([chosen.mean(axis=1), chosen[:, 0]])
+    return points, np.concatenate([area[::stride], np.zeros(len(chosen))])

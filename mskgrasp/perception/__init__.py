@@ -1,0 +1,1 @@
+"""Parts, heights and markers in depth and colour images."""

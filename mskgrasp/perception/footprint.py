@@ -1,0 +1,90 @@
+"""The rectangle that a part fills on the table: seen in a depth image, or known from its CAD file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import trimesh
+
+from hal.camera import RgbdFrame
+from mskgrasp.core.geometry import quat_rotate, wrap_half_turn
+from mskgrasp.parts import Part
+from mskgrasp.perception.part_detection import find_part_pixels
+
+
+@dataclass(frozen=True, kw_only=True)
+class Footprint:
+    """The smallest rectangle around a part seen from above.
+
+    Attributes:
+        sides: (2,) the longer and the shorter one, metres.
+        theta: Direction of the longer side from base x, radians in [-pi/2, pi/2).
+    """
+
+    sides: np.ndarray
+    theta: float
+
+    def extent(self, theta: float) -> np.ndarray:
+        """(2,) how far it reaches along base x and y with the longer side at ``theta``, metres."""
+        cos, sin = abs(np.cos(theta)), abs(np.sin(theta))
+        long, short = self.sides
+        return np.array([cos * long + sin * short, sin * long + cos * short])
+
+
+def footprint_of(points: np.ndarray) -> Footprint:
+    """The footprint of points (n, 2), base frame, metres."""
+    # OpenCV's rectangle is exact for points of some size, not for metres in single precision.
+    _, (width, height), angle = cv2.minAreaRect((np.asarray(points) * 1e3).astype(np.float32))
+    long, short = max(width, height), min(width, height)
+    theta = np.radians(angle + (0.0 if width >= height else 90.0))
+    return Footprint(sides=np.array([long, short]) * 1e-3, theta=float(wrap_half_turn(np.asarray(theta))))
+
+
+def seen_points(frame: RgbdFrame) -> np.ndarray:
+    """(h * w, 3) what a frame's pixels show, base frame, metres; NaN where they show nothing."""
+    depth = np.asarray(frame.depth, dtype=np.float64)
+    rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
+    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(frame.intrinsics).T
+    return frame.T_base_camera.apply((rays * depth[..., None]).reshape(-1, 3))
+
+
+def pixel_pitch(frame: RgbdFrame) -> float:
+    """How far apart neighbouring pixels look, at the median of the frame's depth, metres."""
+    return float(np.nanmedian(frame.depth)) / float(frame.intrinsics[0][0])
+
+
+def seen_footprint(
+    frame: RgbdFrame, *, table_z: float, region: tuple[float, float, float, float], min_height: float
+) -> Footprint:
+    """The footprint of the part that a frame shows.
+
+    Args:
+        frame: Of the part on the table.
+        table_z: Height of the table, base frame, metres.
+        region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
+        min_height: What rises less above the table is table, metres.
+
+    Raises:
+        NoPartFound: The frame shows none.
+    """
+    found = find_part_pixels(
+        frame.depth,
+        frame.intrinsics,
+        frame.T_base_camera,
+        table_z=table_z,
+        region=region,
+        min_height=min_height,
+    )
+    inner = footprint_of(found.points_base[:2, found.mask].T)
+    # An edge is, on average, half a pixel further out than the last pixel on it.
+    return Footprint(sides=inner.sides + pixel_pitch(frame), theta=inner.theta)
+
+
+def usual_footprint(part: Part) -> Footprint:
+    """The footprint of a part on the side on which it comes to lie most often; theta is 0."""
+    mesh = trimesh.load_mesh(part.mesh_path)
+    quat_wxyz = part.resting.quat_wxyz[int(np.argmax(part.resting_probability))]
+    found = footprint_of(quat_rotate(quat_wxyz, np.asarray(mesh.vertices))[:, :2])
+    return Footprint(sides=found.sides, theta=0.0)

@@ -1,0 +1,109 @@
+"""How a part has moved, from its tape squares in two pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mskgrasp.core.errors import MarkersNotFound
+from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.core.grasp import MAX_OPENING
+from mskgrasp.perception.markers.find import Markers
+
+DISTANCE_CHANGE = 0.001
+"""Both squares keep their distance to this, m, or they are not those on the part before."""
+SIDE_CHANGE = 0.0006
+"""A square keeps each of its sides to this, m, or something covers it, or the part lies tilted."""
+HEIGHT_CHANGE = 0.004
+"""A square keeps its height to this, m, or the part lies on another of its sides; a Kinect errs by 1 mm."""
+
+
+PAD_PLAY = 0.002
+"""A part moves across the pads by this more than they do, m: pads and surfaces are not quite parallel."""
+
+
+def planar_displacement(
+    before: Markers, after: Markers, grasp: np.ndarray, centre_base: np.ndarray
+) -> np.ndarray:
+    """How the part was displaced in the hand, from its squares before the grasp and after it was put down.
+
+    The hand has put the part down where it grasped it, so that the part moved on the table as it moved in the
+    hand. The squares tell that motion of the plane: a turn dtheta about the middle m of both, and where m
+    went. The part's origin c follows it: c' = m' + Rz(dtheta) (c - m). An error e of c costs
+    2 sin(dtheta / 2) |e|, 0.17 mm for 2 mm and 5 degrees.
+
+    Args:
+        before: The squares with the part at rest, before the grasp.
+        after: The same with the part put down again and the hand gone.
+        grasp: (4,) x, y, z, theta as commanded, base frame.
+        centre_base: (2,) or (3,) where the part's origin was before, base frame, metres: known, or estimated
+            (`mskgrasp.perception.part_detection.view_part`).
+
+    Returns:
+        (3,) dx, dy, dtheta of the object displacement, axes of the grasp frame, metres and radians in
+        [-pi, pi).
+
+    Raises:
+        MarkersNotFound: The squares of both pictures cannot be those of one rigid part flat on the table.
+    """
+    _check_same_part(before, after)
+    first, second = (markers.points_base[:, :2] for markers in (before, after))
+    old, new = first[1] - first[0], second[1] - second[0]
+    dtheta = np.arctan2(old[0] * new[1] - old[1] * new[0], old @ new)
+    from_middle = np.asarray(centre_base, dtype=np.float64)[:2] - first.mean(axis=0)
+    moved = second.mean(axis=0) - first.mean(axis=0) + _turn(dtheta) @ from_middle - from_middle
+    return np.array([*(_turn(-float(grasp[3])) @ moved), wrap_angle(dtheta)])
+
+
+def check_between_pads(displacement: np.ndarray, centre_grasp: np.ndarray, width: float) -> None:
+    """Refuses a displacement that no jaw makes: what was dragged along as the hand let go and rose.
+
+    What is between the pads has moved across them no farther than the pad that pushed it.
+
+    Args:
+        displacement: (3,) dx, dy, dtheta as `planar_displacement` gives it, metres and radians.
+        centre_grasp: (2,) or (3,) the part's origin before, in the grasp frame, metres.
+        width: Distance of the pads as they held the part, metres.
+
+    Raises:
+        MarkersNotFound: It is one.
+    """
+    centre = np.asarray(centre_grasp, dtype=np.float64)[:2]
+    # The point of the part that is at the TCP now, where it was before.
+    before = centre - _turn(-float(displacement[2])) @ (centre + displacement[:2])
+    moved, most = abs(float(before[1])), (MAX_OPENING - width) / 2
+    if not moved <= most + PAD_PLAY:
+        raise MarkersNotFound(
+            f"mismatch: between the pads the part seems to have moved by {1e3 * moved:.1f} mm, but they only "
+            f"by {1e3 * most:.1f} mm: it was dragged along as the hand let go; leave this trial out"
+        )
+
+
+def _turn(angle: float) -> np.ndarray:
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def _check_same_part(before: Markers, after: Markers) -> None:
+    old, new = (
+        1e3 * float(np.linalg.norm(np.diff(markers.points_base[:, :2], axis=0)))
+        for markers in (before, after)
+    )
+    if not abs(new - old) <= 1e3 * DISTANCE_CHANGE:
+        raise MarkersNotFound(
+            f"mismatch: the squares were {old:.1f} mm apart before and {new:.1f} mm after, at most "
+            f"{1e3 * DISTANCE_CHANGE:g} mm of difference is noise: a square came off, or the part lies "
+            "tilted; stick both on again, or leave this trial out"
+        )
+    risen = 1e3 * (after.points_base[:, 2] - before.points_base[:, 2])
+    if not np.abs(risen).max() <= 1e3 * HEIGHT_CHANGE:
+        raise MarkersNotFound(
+            f"mismatch: the squares lie {risen[0]:+.1f} and {risen[1]:+.1f} mm higher than before, at most "
+            f"{1e3 * HEIGHT_CHANGE:g} mm is noise: the part fell over, or lies on something; leave this "
+            "trial out"
+        )
+    change = 1e3 * np.abs(after.sides - before.sides).max(axis=1)
+    if not change.max() <= 1e3 * SIDE_CHANGE:
+        raise MarkersNotFound(
+            f"mismatch: a side of the {('larger', 'smaller')[int(change.argmax())]} square has changed by "
+            f"{change.max():.1f} mm, at most {1e3 * SIDE_CHANGE:g} mm is noise: something covers it, or the "
+            "part lies tilted; clear the sight, or leave this trial out"
+        )

@@ -1,0 +1,322 @@
+"""Where a part lies in a depth image, found by its height over the table alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+import torch
+
+from mskgrasp.core.errors import NoPartFound
+from mskgrasp.core.geometry import Array, Pose, quat_to_matrix
+from mskgrasp.core.grasp import PartView
+
+REGION_MARGIN = 0.05
+"""How far a part that lies in the region may reach beyond it, metres."""
+MOST_RAISED = 0.4
+"""Share of the region's pixels that a part may cover: 15 cm of 34 cm, squared, are 20 %."""
+ALONE = 0.2
+"""Share of the part's pixels from which on something else in the region is another part."""
+MIN_PIXELS = 5
+"""Smaller groups of pixels are specks: an M3 nut covers 6 pixels of 2.2 mm."""
+QUIET = 0.0003
+"""Deviation of the heights from which on an image is noisy, metres; one stored in 0.1 mm has up to 0.03."""
+_PLAUSIBLE_DEPTH = 20.0
+"""Metres; a camera above a table never is that far away, but a depth in millimetres always is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundPart:
+    """The pixels that show the part.
+
+    Attributes:
+        depth: (h, w) metres, NaN where invalid.
+        mask: (h, w) bool.
+        points_base: (3, h, w) x, y, z of what every pixel sees, base frame, metres, NaN where invalid.
+        heights: (h, w) above the table as it is seen, metres, NaN where invalid; of a noisy image the median
+            of 3 x 3 pixels, twice.
+        table_offset: By how much the table is seen higher than ``table_z``, metres; 0 in an exact image.
+        n_other: How many pixels the next largest thing in the region has.
+    """
+
+    depth: np.ndarray
+    mask: np.ndarray
+    points_base: np.ndarray
+    heights: np.ndarray
+    table_offset: float
+    n_other: int
+
+
+def find_part_pixels(
+    depth: Array,
+    intrinsics: np.ndarray,
+    T_base_camera: Pose,
+    *,
+    table_z: float,
+    region: tuple[float, float, float, float],
+    min_height: float = 0.002,
+) -> FoundPart:
+    """The largest connected group of pixels higher than ``min_height``; an exact image is taken as it is.
+
+    Where the image is noisy, a pixel is as high as its surroundings on average (Gaussian, 1 pixel), all
+    clipped to twice ``min_height``: so an edge of what is higher stays where it is. Heights count from where
+    the table is seen: what a camera measures too far everywhere must not swallow a flat part. Groups up to
+    four pixels apart are one, because noise breaks what is narrow. ``min_height`` is at least the deviation
+    of a pixel's noise.
+
+    Args:
+        depth: (h, w) metres, NaN where invalid.
+        intrinsics: (3, 3) pinhole matrix.
+        T_base_camera: Pose of the camera's optical frame in the base; it need not look straight down.
+        table_z: Height of the table, base frame, metres.
+        region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
+        min_height: What rises less above the table is table, metres.
+
+    Raises:
+        NoPartFound: Nothing rises above the table there, a noisy camera sees the table more than
+            ``min_height`` from ``table_z``, or the image is no depth in metres.
+    """
+    depth = _checked(np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth))
+    points = _points_base(depth, intrinsics, T_base_camera)
+    x, y, z = points
+    tops = heights = z - table_z
+    x_min, x_max, y_min, y_max = region
+    near = (x > x_min - REGION_MARGIN) & (x < x_max + REGION_MARGIN)
+    near &= (y > y_min - REGION_MARGIN) & (y < y_max + REGION_MARGIN)
+    table_offset, reach = 0.0, 1
+    noise = _noise(heights, near)
+    if noise > QUIET:
+        min_height, reach = max(min_height, noise), 5
+        tops = _median(heights)
+        table_offset = _offset(tops[near], min_height)
+        if abs(table_offset) > min_height:
+            raise NoPartFound(
+                f"the table is seen {1e3 * table_offset:+.1f} mm from table_z {table_z:g}, at most "
+                f"{min_height * 1e3:g} mm are forgiven: the camera's pose or table_z is wrong; calibrate anew"
+            )
+        tops = tops - table_offset
+        heights = _mean(heights - table_offset, 2 * min_height)
+    raised = near & (heights > min_height)
+    if raised.sum() > MOST_RAISED * max(near.sum(), 1):
+        raise NoPartFound(
+            f"{raised.sum() / near.sum():.0%} of the region rise more than {min_height * 1e3:g} mm above the "
+            f"table (median {np.median(tops[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
+            f"{table_z:g} or the camera's pose is wrong; calibrate the camera anew"
+        )
+    mask, n_other = _largest_group(raised, reach)
+    if mask is None:
+        highest = tops[near].max() if near.any() else np.nan
+        raise NoPartFound(
+            f"nothing rises more than {min_height * 1e3:g} mm above the table in the region (highest point "
+            f"{highest * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the camera's pose"
+        )
+    return FoundPart(
+        depth=depth, mask=mask, points_base=points, heights=tops, table_offset=table_offset, n_other=n_other
+    )
+
+
+def view_part(
+    depth: Array,
+    intrinsics: np.ndarray,
+    T_base_camera: Pose,
+    *,
+    table_z: float,
+    region: tuple[float, float, float, float],
+    min_height: float = 0.002,
+    alone: bool = False,
+) -> PartView:
+    """Where the part lies on the table: the box around the pixels that show it (`find_part_pixels`).
+
+    The box lies along the image's axes: a side wall that is seen bounds it directly, an edge of the top
+    half a pixel further out than its last pixel. Its top is the height that 2 % of its pixels exceed, so
+    that a flying pixel does not raise it.
+
+    Args:
+        depth: (h, w) metres, NaN where invalid.
+        intrinsics: (3, 3) pinhole matrix.
+        T_base_camera: Pose of the camera's optical frame in the base; it need not look straight down.
+        table_z: Height of the table, base frame, metres.
+        region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
+        min_height: What rises less above the table is table, metres.
+        alone: Refuse a second part; in a noisy image one that is more than four pixels away.
+
+    Raises:
+        NoPartFound: Nothing rises above the table there, it is cut off, not alone, or lies elsewhere; or
+            the image is no depth in metres.
+    """
+    found = find_part_pixels(
+        depth, intrinsics, T_base_camera, table_z=table_z, region=region, min_height=min_height
+    )
+    mask, (x, y, _) = found.mask, found.points_base
+    x_min, x_max, y_min, y_max = region
+    if mask[[0, -1]].any() or mask[:, [0, -1]].any():
+        raise NoPartFound("the part is cut off by the border of the image; move it towards the middle")
+    quat_wxyz, cos, sin = _box_axes(_plain(T_base_camera.quat_wxyz))
+    pitch = float(np.median(found.depth[mask])) / np.array([intrinsics[0][0], intrinsics[1][1]])
+    around = _bounds(mask)
+    x_around, y_around, mask_around = x[around], y[around], mask[around]
+    along_x = _extent(cos * x_around + sin * y_around, mask_around, float(pitch[0]))
+    along_y = _extent((cos * y_around - sin * x_around).T, mask_around.T, float(pitch[1]))
+    top = _robust_top(found.heights[mask])
+    along, across = sum(along_x) / 2, sum(along_y) / 2
+    centre_x, centre_y = cos * along - sin * across, sin * along + cos * across
+    if not (x_min <= centre_x <= x_max and y_min <= centre_y <= y_max):
+        raise NoPartFound(
+            f"the part lies outside the region (centre at {centre_x:.3f}, {centre_y:.3f}, region "
+            f"x {x_min:g}..{x_max:g}, y {y_min:g}..{y_max:g}); move it, or clear away what else is there"
+        )
+    if alone and found.n_other > ALONE * mask.sum():
+        raise NoPartFound(
+            f"two things lie in the region, of {mask.sum()} and {found.n_other} pixels; take one away"
+        )
+    spread = np.stack([x[mask] - centre_x, y[mask] - centre_y], axis=-1)
+    return PartView(
+        centre_base=np.array([centre_x, centre_y, table_z + top / 2]),
+        T_base_box=Pose(position=np.array([centre_x, centre_y, table_z]), quat_wxyz=np.array(quat_wxyz)),
+        size=np.array([along_x[1] - along_x[0], along_y[1] - along_y[0], top]),
+        gyration_radius=float(np.sqrt((spread**2).sum(axis=1).mean())),
+        table_z=float(table_z),
+        table_offset=found.table_offset,
+    )
+
+
+def _points_base(depth: np.ndarray, intrinsics: np.ndarray, T_base_camera: Pose) -> np.ndarray:
+    """(3, h, w) x, y, z of what every pixel sees, base frame."""
+    points = _rays(depth.shape, _plain(intrinsics), _plain(T_base_camera.quat_wxyz)) * depth
+    points += np.asarray(T_base_camera.position)[:, None, None]
+    return points
+
+
+@lru_cache(maxsize=4)  # a camera stays where it is
+def _rays(shape: tuple[int, int], intrinsics: tuple[float, ...], quat_wxyz: tuple[float, ...]) -> np.ndarray:
+    """(3, h, w) where the rays of a camera end at depth 1, seen from it along the axes of the base."""
+    rotation = quat_to_matrix(np.array(quat_wxyz))
+    # That is linear in the pixel.
+    along_u, along_v, first = (rotation @ np.linalg.inv(np.reshape(intrinsics, (3, 3)))).T[..., None, None]
+    rays = along_u * np.arange(shape[1]) + (along_v * np.arange(shape[0])[:, None] + first)
+    rays.flags.writeable = False
+    return rays
+
+
+def _checked(depth: np.ndarray) -> np.ndarray:
+    """A depth image with NaN for all that is not finite."""
+    floating = np.issubdtype(depth.dtype, np.floating)
+    valid = np.isfinite(depth) if floating else depth > 0
+    n_valid = np.count_nonzero(valid)
+    if not n_valid:
+        raise NoPartFound("the depth image has no valid pixel; check the camera, its range and its exposure")
+    # Counting tells on which side of a bound the median is, in a tenth of its time.
+    if not floating or 2 * np.count_nonzero(valid & (depth > _PLAUSIBLE_DEPTH)) > n_valid:
+        raise NoPartFound(
+            f"depth is {depth.dtype} with a median of {np.median(depth[valid]):g}, expected floating metres; "
+            "convert it from millimetres first"
+        )
+    return depth if n_valid == depth.size else np.where(valid, depth, np.nan)
+
+
+def _noise(heights: np.ndarray, near: np.ndarray) -> float:
+    """Standard deviation of a pixel's noise, from the steps between neighbours: most are on the table.
+
+    0 where it is less than `QUIET`.
+    """
+    # The median step is 0.6745 deviations of a step, which is sqrt(2) those of a pixel.
+    deviations = 0.6745 * math.sqrt(2)
+    few, fewer = _steps(heights[::4], near[::4])
+    if 4 * np.count_nonzero((few > QUIET * deviations) & fewer) < np.count_nonzero(fewer):
+        return 0.0  # far from half of them: so the others say, too
+    steps, both = _steps(heights, near)
+    noise = float(np.median(steps[both])) / deviations if both.any() else 0.0
+    return noise if noise > QUIET else 0.0
+
+
+def _steps(heights: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(h, w - 1) between neighbours of a row, and whether both are near."""
+    return np.abs(np.diff(heights, axis=1)), near[:, 1:] & near[:, :-1]
+
+
+def _median(heights: np.ndarray) -> np.ndarray:
+    """Of 3 x 3 pixels, twice; NaN where nothing is seen."""
+    seen = np.isfinite(heights)
+    median = np.where(seen, heights, 0.0).astype(np.float32)
+    for _ in range(2):
+        median = cv2.medianBlur(median, 3)
+    return np.where(seen, median, np.nan)
+
+
+def _offset(heights: np.ndarray, least: float) -> float:
+    """The table's height among (n,) heights, most of which are the table's."""
+    first = np.median(heights)
+    return float(np.median(heights[np.abs(heights - first) < least]))
+
+
+def _mean(heights: np.ndarray, most: float) -> np.ndarray:
+    """Of what is seen around a pixel, clipped; NaN where nothing is seen."""
+    seen = np.isfinite(heights)
+    total, weight = (
+        np.asarray(cv2.GaussianBlur(values, (0, 0), 1.0))
+        for values in (np.where(seen, heights, 0.0).clip(-most, most), seen.astype(np.float64))
+    )
+    return np.where(seen, total / np.maximum(weight, 1e-9), np.nan)
+
+
+def _largest_group(mask: np.ndarray, reach: int) -> tuple[np.ndarray | None, int]:
+    """The largest group of pixels, and how many the second largest has.
+
+    Pixels are of one group where discs of ``reach`` pixels around them meet; 1: neighbours.
+    """
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
+    _, labels = cv2.connectedComponents(cv2.dilate(mask.astype(np.uint8), disc), connectivity=8)
+    sizes = np.bincount(labels[mask], minlength=3)  # 0 is the background
+    if sizes.max() < MIN_PIXELS:
+        return None, 0
+    return mask & (labels == int(np.argmax(sizes))), int(np.sort(sizes)[-2])
+
+
+@lru_cache(maxsize=4)
+def _box_axes(quat_wxyz: tuple[float, ...]) -> tuple[tuple[float, ...], float, float]:
+    """Axes with z up and x along the rows of a camera's image as seen from above.
+
+    Returns:
+        Their quaternion in the base, and cosine and sine of their turn.
+    """
+    right = quat_to_matrix(np.array(quat_wxyz))[:2, 0]
+    half = math.atan2(right[1], right[0]) / 2
+    axes = (math.cos(half), 0.0, 0.0, math.sin(half))
+    cos, sin = quat_to_matrix(np.array(axes))[:2, 0].tolist()
+    return axes, cos, sin
+
+
+def _plain(values: Array) -> tuple[float, ...]:
+    return tuple(np.asarray(values, dtype=np.float64).ravel().tolist())
+
+
+def _bounds(mask: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns of a mask that ends before the border, with one more on every side."""
+    found = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
+    rows, columns = (slice(int(one[0]) - 1, int(one[-1]) + 2) for one in found)
+    return rows, columns
+
+
+def _extent(along: np.ndarray, mask: np.ndarray, pitch: float) -> tuple[float, float]:
+    """Bounds of the masked points in a coordinate (h, w) that runs along the image's rows.
+
+    The mask ends before the border.
+    """
+    bounds = []
+    for sign in (-1.0, 1.0):
+        outward = np.where(mask, sign * along, -np.inf)
+        row, column = np.unravel_index(int(np.argmax(outward)), mask.shape)
+        neighbours = outward[row, column - 1], outward[row, column + 1]
+        # On a wall two neighbouring pixels have the same coordinate: its place is known exactly. On a
+        # flat top they are a pixel apart, and the edge is, on average, half of that further out.
+        step = outward[row, column] - max(neighbours)
+        bounds.append(sign * float(outward[row, column] + min(step, pitch) / 2))
+    return bounds[0], bounds[1]
+
+
+def _robust_top(heights: np.ndarray) -> float:
+    k = max(2, int(np.ceil(0.02 * heights.size)))
+    return float(np.partition(heights, -k)[-k])

@@ -1,0 +1,1 @@
+"""Program: plan one grasp. Run ``python -m mskgrasp.plan --help``."""

@@ -1,0 +1,57 @@
+"""A planner for a cell, and the part that it plans for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import torch
+
+from hal.cell import Cell
+from hal.errors import HalError
+from mskgrasp.learning.grasp_models import load_models
+from mskgrasp.parts.importing.mesh_files import Unit
+from mskgrasp.planning.planner import Planner, PlannerConfig
+
+SIMULATED_CELL = Path(__file__).resolve().parents[2] / "configs" / "cells" / "sapien.yaml"
+
+
+def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
+    """The planner for a cell: its networks, and the cell's table.
+
+    Raises:
+        BadModel: The model cannot be used.
+    """
+    device = "cuda" if torch.cuda.is_available() else "cpu"
+    workspace = cell.workspace
+    return Planner(
+        load_models(models, device),
+        config,
+        table_z=workspace.table_z,
+        region=workspace.region,
+        min_height=workspace.min_height,
+    )
+
+
+def present(cell: Cell, part: str, seed: int) -> None:
+    """Has the cell's feeder lay a part on the table.
+
+    Raises:
+        HalError: The cell has none.
+    """
+    if cell.feeder is None:
+        raise HalError("this cell has no feeder; put the part there by hand and leave --part away")
+    cell.feeder.present(part, seed)
+
+
+def part_name(text: str, unit: Unit | None = None) -> str:
+    """The name of a part, or its folder, from what a user says; a CAD file is made a part first.
+
+    Raises:
+        BadPart: The file cannot be made one part.
+    """
+    path = Path(text)
+    if not path.is_file():
+        return text
+    from mskgrasp.parts.importing.import_file import import_part  # most parts need no decomposition
+
+    return import_part(path, unit=unit).name

@@ -1,0 +1,135 @@
+"""Where the hand must go so that a part ends where it shall, given how the part moved in the hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hal import Cell
+from hal.errors import MotionAborted
+from hal.execute import PUT_DOWN, above_grasp, let_go
+from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing, wrap_angle
+from mskgrasp.core.grasp import centre_in_grasp_frame, lowest_grasp_z, pose_base_tcp
+
+EARLY = 0.007
+"""How far above its place a part may meet the table and count as put down, m."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target:
+    """Where a part shall be put.
+
+    Attributes:
+        x: Of the part's centre, base frame, metres.
+        y: The same.
+        theta: By how much the part shall be turned about the vertical from how it lay, radians.
+    """
+
+    x: float
+    y: float
+    theta: float
+
+
+def place_pose(
+    grasp: np.ndarray, displacement: np.ndarray, centre_base: np.ndarray, target: Target, table_z: float
+) -> np.ndarray:
+    """The pose of the hand, as a grasp, at which the part that it holds is at the target.
+
+    In the grasp frame the part's centre is at c + d and is turned by dtheta, where c is the centre before the
+    grasp and (d, dtheta) the displacement. The hand at (p, phi) has the centre at p + R(phi) (c + d) and the
+    part turned by phi - theta + dtheta from how it lay; both are solved for p and phi.
+
+    Args:
+        grasp: (4,) x, y, z, theta at which the part was grasped, base frame.
+        displacement: (4,) of the centre, in the grasp frame; zeros place without correction.
+        centre_base: (3,) the part's centre before the grasp, base frame, metres.
+        target: Where the part shall be.
+        table_z: Height of the table, metres.
+
+    Returns:
+        (4,) x, y, z, theta, base frame; theta is not wrapped to half a turn, as a part is in the hand.
+    """
+    grasp, displacement = np.asarray(grasp, dtype=np.float64), np.asarray(displacement, dtype=np.float64)
+    held = centre_in_grasp_frame(np.asarray(centre_base, dtype=np.float64), grasp)[:2] + displacement[:2]
+    theta = wrap_angle(grasp[3] + target.theta - displacement[3])
+    cos, sin = np.cos(theta), np.sin(theta)
+    x = target.x - (cos * held[0] - sin * held[1])
+    y = target.y - (sin * held[0] + cos * held[1])
+    # A part that has sunk in the hand is let go higher, one that has risen lower.
+    z = max(grasp[2] - displacement[2] + PUT_DOWN, lowest_grasp_z(table_z))
+    return np.array([x, y, z, theta])
+
+
+def place_error(before: Pose, after: Pose, centre_offset: np.ndarray, target: Target) -> tuple[float, float]:
+    """How far a placed part is from its target, metres and radians.
+
+    Args:
+        before: ``T_base_obj`` where it lay.
+        after: ``T_base_obj`` where it was put.
+        centre_offset: (2,) the part's centre as it was seen, from the origin of obj, base axes, metres: it is
+            this point that shall be at the target.
+        target: Where it shall be.
+    """
+    turn = float(twist_and_swing(quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz)))[0])
+    cos, sin = np.cos(turn), np.sin(turn)
+    x, y = centre_offset
+    centre = after.position[:2] + [cos * x - sin * y, sin * x + cos * y]
+    missed = float(np.hypot(*(centre - [target.x, target.y])))
+    return missed, turned_by(turn, target)
+
+
+def turned_by(turn: float, target: Target) -> float:
+    """By how much a part that made a turn missed the one it was asked for, radians, not negative."""
+    return float(abs(wrap_angle(turn - target.theta)))
+
+
+def displacement_of_point(displacement: np.ndarray, origin: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """The displacement (4,) of another point of a part, both in the grasp frame before the grasp.
+
+    Args:
+        displacement: (4,) of the origin.
+        origin: (3,) metres.
+        point: (3,) metres; the part's tilt is left out.
+    """
+    cos, sin = np.cos(displacement[3]), np.sin(displacement[3])
+    x, y, _ = np.asarray(point) - origin
+    swept = np.array([cos * x - sin * y - x, sin * x + cos * y - y, 0.0, 0.0])
+    return np.asarray(displacement, dtype=np.float64) + swept
+
+
+def check_place(cell: Cell, pose: np.ndarray) -> None:
+    """Refuses a place that the arm cannot reach, before anything moves.
+
+    Raises:
+        OutOfWorkspace: It cannot.
+    """
+    cell.arm.check_pose(pose_base_tcp(pose))
+    cell.arm.check_pose(above_grasp(cell, pose))
+
+
+def place(cell: Cell, pose: np.ndarray, recover: Callable[[MotionAborted], None]) -> None:
+    """Carries what the hand holds to a pose, lets it go and rises.
+
+    The fingers open no farther than they must: what lies beside the place stays there. A part that hangs
+    askew meets the table early and ends the motion; it stands then, and is let go there.
+
+    Args:
+        cell: The arm has lifted the part.
+        pose: (4,) as `place_pose` gives it.
+        recover: Lets the arm move again after that contact, or refuses by an error.
+
+    Raises:
+        OutOfWorkspace: The pose is refused before anything moves.
+        MotionAborted: The part met something on its way, more than `EARLY` above the pose.
+    """
+    check_place(cell, pose)
+    cell.arm.move_to_pose(above_grasp(cell, pose), speed=0.25)
+    try:
+        cell.arm.move_to_pose(pose_base_tcp(pose), speed=0.1)
+    except MotionAborted as error:
+        if cell.arm.state().T_base_tcp.position[2] > pose[2] + EARLY:
+            raise
+        recover(error)
+    let_go(cell, pose, opening=0.0)

@@ -1,0 +1,344 @@
+"""Plans a grasp that is likely to hold and whose displacement is best known (paper, section 3.4)."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hal.camera import RgbdFrame
+from mskgrasp.core.config import Config
+from mskgrasp.core.errors import BadModel, NoGraspFound
+from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.core.grasp import PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
+from mskgrasp.learning.grasp_models import Models
+from mskgrasp.perception.part_detection import view_part
+from mskgrasp.planning.refine import fingers_free, grasps_near
+from mskgrasp.planning.scoring import Scene, displacements, qualities
+
+
+class PlannerConfig(Config):
+    """How a grasp is searched and chosen; the defaults are the paper's."""
+
+    n_candidates: int = Field(default=3200, ge=1)
+    top_fraction: float = Field(default=0.03, gt=0.0, le=1.0)
+    """Share of the candidates, best quality first, among which the displacement decides."""
+    policy: Literal["low_variance", "quality"] = "low_variance"
+    """quality: take the best quality, whatever its variance (the paper's experiment 1)."""
+    min_quality: float = Field(default=0.0, ge=0.0, le=1.0)
+    """A grasp whose predicted quality is lower is not taken."""
+    check_fingers: bool = False
+    """Leave out grasps whose open fingers the depth image shows something in the way of."""
+    refinements: int = Field(default=0, ge=0, le=20)
+    """Rounds of the cross-entropy method: grasps are drawn near the best ones and judged in turn."""
+    chunk_size: int = Field(default=640, ge=1)
+    """Grasps a network sees at once: many more do not fit a CPU's cache, few take long to prepare. (The
+    paper's network, with patches seven times larger, is fastest with 32.)"""
+
+    @property
+    def searches(self) -> bool:
+        """Whether more is asked for than the best of the candidates."""
+        return self.check_fingers or self.refinements > 0
+
+
+@dataclass(frozen=True)
+class Shortlist:
+    """Candidates by row (k,), best quality first, with their mean and variance (k, 4) and scores (k,)."""
+
+    rows: np.ndarray
+    mean: np.ndarray
+    variance: np.ndarray
+    scores: np.ndarray
+
+    def joined(self, other: Shortlist, found: np.ndarray) -> Shortlist:
+        """Both, by the qualities of all candidates."""
+        names = ("rows", "mean", "variance", "scores")
+        arrays = [np.append(getattr(self, name), getattr(other, name), axis=0) for name in names]
+        order = np.argsort(-found[arrays[0]], kind="stable")
+        return Shortlist(*(array[order] for array in arrays))
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraspPlan:
+    """The chosen grasp, what is expected of it, and what it was chosen from.
+
+    Attributes:
+        grasp: (4,) base frame, metres and radians.
+        quality: Predicted probability of success.
+        displacement: (4,) expected object displacement, axes of the grasp frame, metres and radians.
+        displacement_cov: (4, 4) its covariance, to first order.
+        grasp_displacement: (4,) expected grasp displacement, as the network predicts it.
+        grasp_displacement_var: (4,) its variances; NaN if the network predicts none.
+        score: Variance score of the grasp, square metres; NaN if the network predicts no variance.
+        view: Where the part was seen.
+        candidates: (n, 4) all grasps considered.
+        qualities: (n,) theirs.
+        shortlist: (k,) indices of the candidates of best quality, best first.
+        shortlist_scores: (k,) their variance scores, square metres.
+        seconds: Time spent in each stage.
+    """
+
+    grasp: np.ndarray
+    quality: float
+    displacement: np.ndarray
+    displacement_cov: np.ndarray
+    grasp_displacement: np.ndarray
+    grasp_displacement_var: np.ndarray
+    score: float
+    view: PartView
+    candidates: np.ndarray
+    qualities: np.ndarray
+    shortlist: np.ndarray
+    shortlist_scores: np.ndarray
+    seconds: dict[str, float]
+
+    @classmethod
+    def of(
+        cls,
+        view: PartView,
+        candidates: np.ndarray,
+        qualities: np.ndarray,
+        best: Shortlist,
+        chosen: int,
+        *,
+        centre: np.ndarray,
+        seconds: dict[str, float],
+    ) -> GraspPlan:
+        """The plan of the shortlist's grasp ``chosen``, for a part whose centre is at (3,), base frame."""
+        row, mean, variance = best.rows[chosen], best.mean[chosen], best.variance[chosen]
+        centre_grasp = centre_in_grasp_frame(centre, candidates[row])
+        return cls(
+            grasp=candidates[row],
+            quality=float(qualities[row]),
+            displacement=to_object_displacement(mean, centre_grasp),
+            displacement_cov=object_displacement_covariance(mean, variance, centre_grasp),
+            grasp_displacement=mean,
+            grasp_displacement_var=variance,
+            score=float(best.scores[chosen]),
+            view=view,
+            candidates=candidates,
+            qualities=qualities,
+            shortlist=best.rows,
+            shortlist_scores=best.scores,
+            seconds=seconds,
+        )
+
+    @property
+    def summary(self) -> str:
+        """The grasp in a line, for whoever is asked about it."""
+        x, y, z, theta = self.grasp
+        place = f"x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees"
+        return f"grasp at {place}, quality {self.quality:.2f}"
+
+    @property
+    def displacement_std(self) -> np.ndarray:
+        """(4,) standard deviations of the object displacement, metres and radians."""
+        return np.sqrt(np.diag(self.displacement_cov))
+
+    def to_json(self) -> dict[str, Any]:
+        """The plan without its candidates, as plain values; what is unknown (NaN) is None."""
+        return {
+            "grasp": _plain(self.grasp),
+            "quality": float(self.quality),
+            "displacement": _plain(self.displacement),
+            "displacement_std": _plain(self.displacement_std),
+            "displacement_cov": _plain(self.displacement_cov),
+            "grasp_displacement": _plain(self.grasp_displacement),
+            "grasp_displacement_var": _plain(self.grasp_displacement_var),
+            "score": _plain(np.asarray(self.score)),
+            "part": {
+                "centre_base": _plain(self.view.centre_base),
+                "size": _plain(self.view.size),
+                "gyration_radius": float(self.view.gyration_radius),
+            },
+            "n_candidates": len(self.candidates),
+            "n_shortlist": len(self.shortlist),
+            "seconds": {stage: round(value, 4) for stage, value in self.seconds.items()},
+        }
+
+
+def _plain(values: np.ndarray) -> Any:
+    if values.ndim:
+        return [_plain(np.asarray(value)) for value in values]
+    return float(values) if np.isfinite(values) else None
+
+
+class Planner:
+    """Samples grasps over the part, scores them with the networks, and selects one."""
+
+    def __init__(
+        self,
+        models: Models,
+        config: PlannerConfig,
+        *,
+        table_z: float,
+        region: tuple[float, float, float, float],
+        min_height: float = 0.002,
+    ):
+        """Takes the workspace: table height, region (x_min, x_max, y_min, y_max), least height of a part.
+
+        All in metres, base frame.
+
+        Raises:
+            BadModel: The policy needs variances and the model predicts none.
+        """
+        if config.policy == "low_variance" and not models.meta.network.variance:
+            raise BadModel(
+                "this model predicts no variance; use policy: quality, or train with variance: true"
+            )
+        self.models = models
+        self.config = config
+        self.table_z = table_z
+        self.region = region
+        self.min_height = min_height
+
+    def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
+        """Plans a grasp of the part that a frame shows.
+
+        Raises:
+            NoPartFound: The frame shows none.
+            NoGraspFound: No candidate is of the demanded quality.
+        """
+        started = time.perf_counter()
+        view, candidates = self.sample(frame, rng)
+        scene = Scene.of(frame, view, self.table_z, self.models.device)
+        sampled = time.perf_counter()
+        found = qualities(self.models, scene, candidates, self.config.chunk_size)
+        scored = time.perf_counter()
+        best = self._judged(scene, candidates, self._shortlist(scene, candidates, found))
+        if self.config.refinements:
+            candidates, found, best = self._refined(scene, candidates, found, best, rng)
+        chosen = select(found[best.rows], best.scores, self.config)
+        selected = time.perf_counter()
+        seconds = {
+            "sample": sampled - started,
+            "score": scored - sampled,
+            "select": selected - scored,
+            "total": selected - started,
+        }
+        return GraspPlan.of(view, candidates, found, best, chosen, centre=view.centre_base, seconds=seconds)
+
+    def _shortlist(self, scene: Scene, candidates: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """Indices of the best candidates; of those whose fingers are free where that is asked for.
+
+        Raises:
+            NoGraspFound: Something is in the way of all fingers.
+        """
+        if not self.config.check_fingers:
+            return shortlist(found, self.config.top_fraction)
+        n = len(shortlist(found, self.config.top_fraction))
+        order, free = shortlist(found, 1.0), np.zeros(0, dtype=np.int64)
+        for rows in np.array_split(order, max(1, len(order) // (4 * n))):
+            free = np.append(free, rows[fingers_free(scene, candidates[rows])])
+            if len(free) >= n:
+                break
+        if not len(free):
+            raise NoGraspFound(
+                "something is in the way of the open fingers of every candidate; clear the table around the "
+                "part, or switch check_fingers off"
+            )
+        return free[:n]
+
+    def _judged(self, scene: Scene, candidates: np.ndarray, rows: np.ndarray) -> Shortlist:
+        mean, variance = displacements(self.models, scene, candidates[rows], self.config.chunk_size)
+        return Shortlist(rows, mean, variance, variance_score(variance, scene.view.gyration_radius))
+
+    def _refined(
+        self,
+        scene: Scene,
+        candidates: np.ndarray,
+        found: np.ndarray,
+        best: Shortlist,
+        rng: np.random.Generator,
+    ) -> tuple[np.ndarray, np.ndarray, Shortlist]:
+        """Candidates, qualities and shortlist after some rounds near the best grasps.
+
+        What is sought is what is chosen by: the least variance score at a quality that the first shortlist
+        had, or the best quality.
+        """
+        n_best, least = len(best.rows), float(found[best.rows].min())
+        for number in range(self.config.refinements):
+            loss = -found[best.rows] if self.config.policy == "quality" else best.scores
+            elite = candidates[best.rows[np.argsort(loss, kind="stable")[: max(1, n_best // 4)]]]
+            drawn = grasps_near(elite, 4 * n_best, scene.view, rng, width=0.5 ** (number + 1))
+            if self.config.check_fingers:
+                drawn = drawn[fingers_free(scene, drawn)]
+            quality = qualities(self.models, scene, drawn, self.config.chunk_size)
+            kept = np.argsort(-quality, kind="stable")[:n_best]
+            kept = kept[quality[kept] >= least]
+            rows = len(candidates) + np.arange(len(kept))
+            candidates, found = np.append(candidates, drawn[kept], axis=0), np.append(found, quality[kept])
+            best = best.joined(self._judged(scene, candidates, rows), found)
+        return candidates, found, best
+
+    def sample(self, frame: RgbdFrame, rng: np.random.Generator) -> tuple[PartView, np.ndarray]:
+        """Finds the part and draws candidates (n, 4) over it."""
+        view = view_part(
+            frame.depth,
+            frame.intrinsics,
+            frame.T_base_camera,
+            table_z=self.table_z,
+            region=self.region,
+            min_height=self.min_height,
+            alone=True,
+        )
+        return view, sample_grasps(view, self.config.n_candidates, rng)
+
+
+def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:
+    """Indices of the best qualities, best first: ``top_fraction`` of them, at least one."""
+    n = max(1, int(round(top_fraction * len(qualities))))
+    return np.argsort(-qualities, kind="stable")[:n]
+
+
+def variance_score(variance: np.ndarray, gyration_radius: float) -> np.ndarray:
+    """One number for four variances (..., 4): var_x + var_y + var_z + r^2 var_theta, square metres.
+
+    With r the part's radius of gyration it is the mean squared distance by which the part's points miss
+    their predicted places.
+    """
+    return variance[..., :3].sum(axis=-1) + gyration_radius**2 * variance[..., 3]
+
+
+def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> int:
+    """Which of the shortlisted grasps, best quality first, is taken.
+
+    Raises:
+        NoGraspFound: None has the demanded quality.
+    """
+    good = np.flatnonzero(qualities >= config.min_quality)
+    if not len(good):
+        raise NoGraspFound(
+            f"the best of the candidates has quality {qualities.max():.2f}, min_quality is "
+            f"{config.min_quality:g}; move the part, or lower min_quality"
+        )
+    return int(good[0] if config.policy == "quality" else good[np.argmin(scores[good])])
+
+
+def object_displacement_covariance(
+    grasp_displacement: np.ndarray, variance: np.ndarray, centre_grasp: np.ndarray
+) -> np.ndarray:
+    """Covariance of the object displacement, to first order in the grasp displacement's deviations.
+
+    Args:
+        grasp_displacement: (..., 4) mean.
+        variance: (..., 4) of independent components.
+        centre_grasp: (..., 3) object centre in the grasp frame before the grasp, metres.
+
+    Returns:
+        (..., 4, 4) J diag(variance) J', J the derivative of `grasp.to_object_displacement`.
+    """
+    turn = -wrap_angle(grasp_displacement[..., 3])
+    cos, sin = np.cos(turn), np.sin(turn)
+    arm = centre_grasp - grasp_displacement[..., :3]
+    jacobian = np.zeros(grasp_displacement.shape[:-1] + (4, 4))
+    jacobian[..., 0, 0], jacobian[..., 0, 1] = -cos, sin
+    jacobian[..., 1, 0], jacobian[..., 1, 1] = -sin, -cos
+    jacobian[..., 2, 2] = -1.0
+    jacobian[..., 0, 3] = sin * arm[..., 0] + cos * arm[..., 1]
+    jacobian[..., 1, 3] = -cos * arm[..., 0] + sin * arm[..., 1]
+    jacobian[..., 3, 3] = -1.0
+    return jacobian * variance[..., None, :] @ np.swapaxes(jacobian, -1, -2)

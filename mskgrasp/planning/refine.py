@@ -1,0 +1,64 @@
+"""Refinements of the planner's search: fingers that would hit something, and grasps near the best ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from mskgrasp.core.geometry import wrap_half_turn
+from mskgrasp.core.grasp import (
+    FINGER_HALF_WIDTH,
+    FINGER_THICKNESS,
+    MAX_OPENING,
+    PAD_REACH,
+    PartView,
+    lowest_grasp_z,
+)
+from mskgrasp.planning.scoring import Scene
+
+_STEP = 0.002
+_LEAST_SPREAD = np.array([0.0005, 0.0005, 0.0005, 0.01])
+"""Metres and radians: the elite may be one grasp."""
+
+
+def fingers_free(scene: Scene, grasps: np.ndarray) -> np.ndarray:
+    """Whether nothing is seen where the open fingers of grasps (n, 4) go (n,).
+
+    What is not seen is taken for table. A pixel higher than the finger tips within a finger's footprint is in
+    its way.
+    """
+    reach = MAX_OPENING / 2 + FINGER_THICKNESS
+    rows, columns = 2 * int(np.ceil(reach / _STEP)) + 1, 2 * int(np.ceil(FINGER_HALF_WIDTH / _STEP)) + 1
+    along = np.abs((np.arange(rows) - (rows - 1) / 2) * _STEP)
+    fingers = (along >= MAX_OPENING / 2) & (along <= reach)
+    heights = scene.crop_of(grasps, (rows, columns), _STEP)[:, 0, torch.from_numpy(fingers)]
+    tips = grasps[:, 2] - scene.table_z - PAD_REACH
+    return heights.amax(dim=(1, 2)).cpu().double().numpy() <= tips
+
+
+def grasps_near(
+    elite: np.ndarray, n: int, view: PartView, rng: np.random.Generator, *, width: float
+) -> np.ndarray:
+    """Grasps (n, 4), each an elite one moved at random: a round of the cross-entropy method.
+
+    The density is a Gaussian around every elite grasp, so that a part with two good places keeps both.
+
+    Args:
+        elite: (k, 4).
+        n: How many.
+        view: Its box holds all grasps.
+        rng: Source of all that is random.
+        width: Deviations by those of the elite.
+    """
+    local = elite.copy()
+    local[:, :3] = view.T_base_box.inverse().apply(elite[:, :3])
+    # The angles' spread about the first one: a jaw is the same after half a turn.
+    turned = wrap_half_turn(local[:, 3] - local[0, 3])
+    spread = np.maximum(np.column_stack([local[:, :3], turned]).std(axis=0), _LEAST_SPREAD)
+    found = local[rng.integers(len(local), size=n)] + width * spread * rng.standard_normal((n, 4))
+    found[:, :2] = np.clip(found[:, :2], -view.size[:2] / 2, view.size[:2] / 2)
+    found[:, :3] = view.T_base_box.apply(found[:, :3])
+    lowest = lowest_grasp_z(view.table_z)
+    found[:, 2] = np.clip(found[:, 2], lowest, max(lowest, view.table_z + float(view.size[2])))
+    found[:, 3] = wrap_half_turn(found[:, 3])
+    return found

@@ -1,0 +1,26 @@
+"""Digests of what the results of a run depend on: cell, model, parts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from mskgrasp.parts import find_part
+from mskgrasp.runtime.run_folder import file_digest
+
+
+def inputs_of(cell: Path, models: Path, parts: Iterable[str]) -> dict[str, str]:
+    """Digests of a cell's file, a model and parts."""
+    return {"cell": file_digest(cell)} | model_digests(models) | part_digests(parts)
+
+
+def model_digests(models: Path, label: str = "") -> dict[str, str]:
+    """Digests of a model's files; the label tells models apart."""
+    return {
+        f"{label} {name}".strip(): file_digest(models / name) for name in ("model.json", "model.safetensors")
+    }
+
+
+def part_digests(parts: Iterable[str]) -> dict[str, str]:
+    """Digests of parts, by name or folder."""
+    return {f"part {name}": find_part(name).content_hash for name in parts}

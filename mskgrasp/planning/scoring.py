@@ -1,0 +1,109 @@
+"""What the networks say of many grasps in one image."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from hal.camera import RgbdFrame
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import PartView, centre_in_grasp_frame
+from mskgrasp.learning.grasp_models import Models
+from mskgrasp.learning.network_config import NetworkConfig
+from mskgrasp.perception.height_patches import crop_patches, height_image
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """An image in which grasps are looked at.
+
+    Attributes:
+        heights: (h, w) metres above the table, on the networks' device.
+        intrinsics: (3, 3).
+        T_base_camera: Pose of the camera.
+        table_z: Height of the table, base frame, metres.
+        view: The part in it.
+    """
+
+    heights: Tensor
+    intrinsics: np.ndarray
+    T_base_camera: Pose
+    table_z: float
+    view: PartView
+
+    @classmethod
+    def of(cls, frame: RgbdFrame, view: PartView, table_z: float, device: torch.device) -> Scene:
+        """The scene of a frame."""
+        depth = torch.as_tensor(np.asarray(frame.depth, dtype=np.float32), device=device)
+        return cls(
+            heights=height_image(depth, frame.intrinsics, frame.T_base_camera, table_z + view.table_offset),
+            intrinsics=frame.intrinsics,
+            T_base_camera=frame.T_base_camera,
+            table_z=table_z,
+            view=view,
+        )
+
+    def crop(self, grasps: np.ndarray, network: NetworkConfig) -> Tensor:
+        """Patches (n, 1, r, c) around grasps (n, 4), as the displacement network takes them."""
+        return self.crop_of(grasps, network.patch_shape, network.pixel)
+
+    def crop_for_quality(self, grasps: np.ndarray, network: NetworkConfig) -> Tensor:
+        """The same for the quality network: what is not looked at is not cropped."""
+        return self.crop_of(grasps, network.quality_shape, network.pixel * network.quality_stride)
+
+    def crop_of(self, grasps: np.ndarray, shape: tuple[int, int], pixel: float) -> Tensor:
+        """Patches of any rows and columns, their pixels some metres apart: `images.crop_patches`."""
+        return crop_patches(
+            self.heights,
+            torch.as_tensor(grasps),
+            self.intrinsics,
+            self.T_base_camera,
+            n_pixels=shape[0],
+            side=shape[0] * pixel,
+            n_columns=shape[1],
+        )
+
+
+def qualities(models: Models, scene: Scene, grasps: np.ndarray, chunk: int) -> np.ndarray:
+    """Predicted probabilities of success (n,) of grasps (n, 4)."""
+    found = [
+        models.quality(scene.crop_for_quality(grasps[rows], models.meta.network), centre, height)
+        for rows, centre, height, _ in _chunks(models, scene, grasps, chunk)
+    ]
+    return torch.cat(found).cpu().double().numpy() if found else np.zeros(0)
+
+
+def displacements(
+    models: Models, scene: Scene, grasps: np.ndarray, chunk: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and variance (n, 4) of the grasps' displacement; NaN variance where the model knows none."""
+    network = models.meta.network
+    whole = None
+    if network.image == "object":
+        whole = scene.crop(np.append(scene.view.centre_base, 0.0)[None], network)
+    means, variances = [], []
+    for rows, centre, height, theta in _chunks(models, scene, grasps, chunk):
+        patches = scene.crop(grasps[rows], network) if whole is None else whole.expand(len(theta), -1, -1, -1)
+        mean, variance = models.grasp_displacement(patches, centre, height, theta)
+        means.append(mean)
+        variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
+    if not means:
+        return np.zeros((0, 4)), np.zeros((0, 4))
+    return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
+
+
+def _chunks(
+    models: Models, scene: Scene, grasps: np.ndarray, size: int
+) -> Iterator[tuple[slice, Tensor, Tensor, Tensor]]:
+    """Object centres (k, 3) in the grasp frame, heights (k,) above the table and angles (k,) of some rows."""
+    values = np.column_stack(
+        [centre_in_grasp_frame(scene.view.centre_base, grasps), grasps[:, 2] - scene.table_z, grasps[:, 3]]
+    )
+    known = torch.as_tensor(values, dtype=torch.float32, device=models.device)
+    for start in range(0, len(grasps), size):
+        rows = slice(start, start + size)
+        yield rows, known[rows, :3], known[rows, 3], known[rows, 4]

@@ -1,0 +1,1 @@
+"""Figures of grasps and HTML reports."""

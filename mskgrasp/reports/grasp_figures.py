@@ -1,0 +1,352 @@
+"""Pictures for people: a planned grasp, a sheet of attempts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import matplotlib
+import numpy as np
+import torch
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse, Rectangle
+
+from hal.camera import RgbdFrame
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import FAILURES, MAX_OPENING, centre_in_grasp_frame
+from mskgrasp.dataset import Attempts, ShardInfo, u16_to_depth
+from mskgrasp.perception.height_patches import crop_patches, height_image
+from mskgrasp.planning.planner import GraspPlan
+
+INK, FAINT = "#22252b", "#8b909a"
+_JAW, _SHIFT, _GOOD, _BAD = "#1f6feb", "#e8590c", "#2b8a3e", "#c92a2a"
+STYLE: dict[Any, Any] = {
+    "font.size": 10,
+    "font.family": "DejaVu Sans",
+    "text.color": INK,
+    "axes.edgecolor": FAINT,
+    "axes.labelcolor": INK,
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "savefig.dpi": 150,
+}
+_PAD_WIDTH, _PAD_THICKNESS = 0.020, 0.008  # drawn size of a finger pad seen from above, metres
+_MM = 1e3
+
+
+def make_figure(width: float, height: float) -> Figure:
+    """A figure of inches, its panels set so that nothing overlaps."""
+    return Figure(figsize=(width, height), layout="constrained")  # no pyplot: nothing global, no window
+
+
+def _from_above(
+    depth: np.ndarray,
+    intrinsics: np.ndarray,
+    T_base_camera: Pose,
+    table_z: float,
+    square: np.ndarray,
+    side: float,
+) -> np.ndarray:
+    """Heights in mm of a square (x, y, z, theta) seen from above, its y up."""
+    heights = height_image(torch.from_numpy(depth), intrinsics, T_base_camera, table_z)
+    patch = crop_patches(
+        heights, torch.from_numpy(square[None]), intrinsics, T_base_camera, n_pixels=240, side=side
+    )
+    return patch[0, 0].numpy() * _MM
+
+
+def _show_heights(
+    axes: Axes, heights: np.ndarray, centre: np.ndarray | tuple[float, float], side: float, top: float
+) -> Any:
+    half = side / 2 * _MM
+    x, y = centre[0] * _MM, centre[1] * _MM
+    image = axes.imshow(
+        heights,
+        extent=(x - half, x + half, y - half, y + half),
+        cmap="Greys",
+        vmin=-0.15 * top,
+        vmax=1.5 * top,
+    )
+    axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
+    axes.tick_params(length=2, labelsize=8)
+    return image
+
+
+def _jaw(
+    axes: Axes, origin: np.ndarray, theta: float, opening: float = MAX_OPENING, scale: float = 1.0
+) -> None:
+    """The open hand seen from above: two pads and the line along which they close, to scale (mm)."""
+    closing = np.array([-np.sin(theta), np.cos(theta)])
+    origin = np.asarray(origin[:2]) * _MM
+    reach = opening / 2 * _MM
+    ends = np.stack([origin - reach * closing, origin + reach * closing])
+    axes.plot(*ends.T, color=_JAW, lw=1.4 * scale, ls=(0, (4, 2)), zorder=6)
+    axes.plot(*origin, "o", color=_JAW, ms=3.5 * scale, zorder=7)
+    width, thickness = _PAD_WIDTH * _MM, _PAD_THICKNESS * _MM
+    for start in (reach, -reach - thickness):
+        corner = origin + start * closing - width / 2 * np.array([np.cos(theta), np.sin(theta)])
+        axes.add_patch(
+            Rectangle(
+                tuple(corner),
+                width,
+                thickness,
+                angle=np.degrees(theta),
+                fc=_JAW,
+                ec="white",
+                lw=0.8,
+                zorder=7,
+            )
+        )
+
+
+def _arrow(axes: Axes, start: np.ndarray, shift: np.ndarray, width: float = 1.8, head: float = 11) -> None:
+    # An annotation, because its head keeps its size on paper whatever the length.
+    axes.annotate(
+        "",
+        xy=tuple(start + shift),
+        xytext=tuple(start),
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": _SHIFT,
+            "lw": width,
+            "mutation_scale": head,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        },
+        zorder=9,
+    )
+
+
+def _ellipse(axes: Axes, centre: np.ndarray, covariance: np.ndarray, n_sigma: float = 2.0) -> None:
+    values, vectors = np.linalg.eigh(covariance)
+    diameters = 2 * n_sigma * np.sqrt(np.maximum(values, 0.0)) * _MM
+    angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
+    axes.add_patch(
+        Ellipse(
+            tuple(centre), diameters[1], diameters[0], angle=angle, fc=_SHIFT, ec=_SHIFT, alpha=0.28, zorder=8
+        )
+    )
+
+
+def draw_plan(
+    frame: RgbdFrame, plan: GraspPlan, path: Path, *, measured: np.ndarray | None = None, note: str = ""
+) -> None:
+    """Draws a plan: candidates by quality over the part, and the chosen grasp with the expected shift.
+
+    Left, the base frame from above, right, the grasp frame; both in millimetres and to scale.
+
+    Args:
+        frame: What was seen.
+        plan: What was planned in it.
+        path: Of the picture.
+        measured: (4,) object displacement that came of it, drawn beside the expected one.
+        note: A line under that of the plan.
+    """
+    with matplotlib.rc_context(STYLE):
+        figure = make_figure(11.5, 5.7 + 0.25 * bool(note))
+        left, right = figure.subplots(1, 2)
+        _draw_candidates(figure, left, frame, plan)
+        _draw_chosen(right, frame, plan, measured)
+        text = _plan_text(plan) + (f"\n{note}" if note else "")
+        figure.suptitle(text, fontsize=11, x=0.01, ha="left")
+        figure.savefig(path)
+
+
+def _plan_text(plan: GraspPlan) -> str:
+    shift, std = plan.displacement * _MM, plan.displacement_std * _MM
+    names = "xyz"
+    known = np.isfinite(std).all()
+    parts = [
+        f"{name} {shift[i]:+.1f}" + (f" ± {std[i]:.1f}" if known else "") + " mm"
+        for i, name in enumerate(names)
+    ]
+    turn = np.degrees(plan.displacement[3])
+    spread = f" ± {np.degrees(plan.displacement_std[3]):.1f}" if known else ""
+    return (
+        f"quality {plan.quality:.2f}     expected shift in the hand: {',  '.join(parts)},  "
+        f"turn {turn:+.1f}{spread}°     planned in {plan.seconds['total']:.1f} s"
+    )
+
+
+def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
+    view = plan.view
+    off = np.abs(plan.grasp[:2] - view.centre_base[:2]).max()
+    fingers = off + np.hypot(MAX_OPENING / 2 + _PAD_THICKNESS, _PAD_WIDTH / 2)
+    side = max(0.14, 1.5 * float(np.hypot(*view.size[:2])), 2.05 * float(fingers))
+    # The plane of the part's top: there the picture is free of parallax.
+    square = np.array([*view.centre_base[:2], view.table_z + view.size[2], 0.0])
+    heights = _from_above(frame.depth, frame.intrinsics, frame.T_base_camera, view.table_z, square, side)
+    _show_heights(axes, heights, view.centre_base[:2], side, float(view.size[2]) * _MM)
+    order = np.argsort(plan.qualities)
+    grasps = plan.candidates[order]
+    closing = 0.0035 * np.stack([-np.sin(grasps[:, 3]), np.cos(grasps[:, 3])], axis=-1)
+    ends = np.stack([grasps[:, :2] - closing, grasps[:, :2] + closing], axis=1) * _MM
+    lines = LineCollection(list(ends), cmap="viridis", linewidths=0.9, zorder=4)
+    lines.set_array(plan.qualities[order])
+    # What is not worth considering must not hide the part.
+    lines.set_alpha(list(0.15 + 0.75 * plan.qualities[order].clip(0.0, 1.0)))
+    lines.set_clim(0.0, 1.0)
+    axes.add_collection(lines)
+    opaque = ScalarMappable(norm=Normalize(0.0, 1.0), cmap="viridis")
+    bar = figure.colorbar(opaque, ax=axes, shrink=0.8, pad=0.02)
+    bar.set_label("predicted quality")
+    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    best = plan.candidates[plan.shortlist]
+    axes.plot(*(best[:, :2] * _MM).T, "o", ms=3.2, mfc="none", mec=INK, mew=0.6, zorder=5, label="shortlist")
+    _jaw(axes, plan.grasp, float(plan.grasp[3]))
+    axes.legend(loc="lower left", frameon=False, fontsize=8)
+    axes.set(xlabel="base x, mm", ylabel="base y, mm", title=f"{len(plan.candidates)} candidates")
+
+
+def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.ndarray | None) -> None:
+    side = 0.128
+    heights = _from_above(
+        frame.depth, frame.intrinsics, frame.T_base_camera, plan.view.table_z, plan.grasp, side
+    )
+    top = float(plan.view.size[2]) * _MM
+    _show_heights(axes, heights, (0.0, 0.0), side, top)
+    _jaw(axes, np.zeros(2), 0.0)
+    centre = centre_in_grasp_frame(plan.view.centre_base, plan.grasp)[:2] * _MM
+    shift, turn = plan.displacement[:2] * _MM, float(plan.displacement[3])
+    _outlines(axes, heights, np.zeros(2), side, centre, shift, turn)
+    axes.plot([], [], color=INK, lw=0.9, label="part before")
+    axes.plot([], [], color=_SHIFT, lw=1.3, ls="--", label="part expected in the hand")
+    if measured is not None:
+        _outlines(axes, heights, np.zeros(2), side, centre, measured[:2] * _MM, float(measured[3]), _GOOD)
+        axes.plot([], [], color=_GOOD, lw=1.3, ls="--", label="part measured in the hand")
+    axes.legend(loc="upper left", frameon=False, fontsize=8)
+    axes.plot(*centre, "+", color=_SHIFT, ms=8, mew=1.5, zorder=9)
+    known = bool(np.isfinite(plan.displacement_cov).all())
+    covariance = plan.displacement_cov[:2, :2] if known else np.zeros((2, 2))
+    axes.set(
+        xlabel="grasp x, mm",
+        ylabel="grasp y (closing direction), mm",
+        title="The chosen grasp, in its own frame",
+    )
+    _draw_shift(axes, centre, shift, covariance)
+    reach = float(np.hypot(*shift)) + 2 * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])) * _MM
+    came = None if measured is None else measured[:2] * _MM
+    if came is not None:
+        axes.plot(*(centre + came), "x", color=_GOOD, ms=7, mew=1.8, zorder=10)
+        reach = max(reach, float(np.hypot(*came)))
+    if reach < 20.0:
+        _inset(axes, shift, covariance, max(1.4 * reach, 1.0), right=bool(centre[0] < 0), measured=came)
+
+
+def _draw_shift(axes: Axes, start: np.ndarray, shift: np.ndarray, covariance: np.ndarray) -> None:
+    _ellipse(axes, start + shift, covariance)
+    _arrow(axes, start, shift)
+
+
+def _outlines(
+    axes: Axes,
+    heights: np.ndarray,
+    origin: np.ndarray,
+    side: float,
+    centre: np.ndarray,
+    shift: np.ndarray,
+    turn: float,
+    colour: str = _SHIFT,
+) -> None:
+    """The part's outline, and dashed where it ends up, turned about its centre and shifted (mm)."""
+    n = heights.shape[0]
+    pixel = (np.arange(n) - (n - 1) / 2) * (side * _MM / n)
+    x, y = np.meshgrid(origin[0] + pixel, origin[1] - pixel)
+    # A camera pixel is several of these: without the blur the outline shows its stairs.
+    smooth = cv2.GaussianBlur(heights, (0, 0), 0.0015 / (side / n))
+    level = [0.5 * max(float(heights.max()), 0.1)]
+    cos, sin = np.cos(turn), np.sin(turn)
+    dx, dy = x - centre[0], y - centre[1]
+    moved_x = centre[0] + shift[0] + cos * dx - sin * dy
+    moved_y = centre[1] + shift[1] + sin * dx + cos * dy
+    axes.contour(x, y, smooth, levels=level, colors=[INK], linewidths=0.9, zorder=5)
+    axes.contour(
+        moved_x, moved_y, smooth, levels=level, colors=[colour], linewidths=1.3, linestyles="--", zorder=6
+    )
+
+
+def _inset(
+    axes: Axes,
+    shift: np.ndarray,
+    covariance: np.ndarray,
+    half: float,
+    *,
+    right: bool,
+    measured: np.ndarray | None,
+) -> None:
+    inset = axes.inset_axes((0.70 if right else 0.02, 0.02, 0.28, 0.28))
+    inset.set(xlim=(-half, half), ylim=(-half, half), xticks=[], yticks=[], aspect="equal")
+    inset.set_facecolor("white")
+    for spine in inset.spines.values():
+        spine.set_color(FAINT)
+    inset.axhline(0, color=FAINT, lw=0.5)
+    inset.axvline(0, color=FAINT, lw=0.5)
+    _draw_shift(inset, np.zeros(2), shift, covariance)
+    if measured is not None:
+        inset.plot(*measured, "x", color=_GOOD, ms=7, mew=1.8, zorder=10)
+    bar = next(step for step in (10, 5, 2, 1, 0.5) if step <= 0.8 * half or step == 0.5)
+    inset.plot([-0.9 * half, -0.9 * half + bar], [-0.85 * half] * 2, color=INK, lw=2)
+    inset.text(-0.9 * half, -0.8 * half, f"{bar:g} mm", fontsize=7, va="bottom")
+    inset.set_title("shift and 2σ", fontsize=8, fontweight="normal", loc="center", pad=3)
+
+
+def draw_contact_sheet(
+    rows: Sequence[tuple[Attempts, ShardInfo, int]], path: Path, *, title: str = "Grasp attempts"
+) -> None:
+    """Draws attempts from above: the hand, and where a held part's centre went.
+
+    Args:
+        rows: Attempts, what their shard tells of them, and which row of them to draw.
+        path: The picture, PNG.
+        title: Stands above it.
+    """
+    columns = min(6, max(1, len(rows)))
+    lines = max(1, -(-len(rows) // columns))
+    with matplotlib.rc_context(STYLE):
+        figure = make_figure(2.1 * columns, 2.45 * lines + 0.5)
+        grid = np.atleast_1d(figure.subplots(lines, columns, squeeze=False)).ravel()
+        for axes in grid[len(rows) :]:
+            axes.axis("off")
+        for axes, (attempts, info, row) in zip(grid, rows, strict=False):
+            _draw_attempt(axes, attempts, info, row)
+            axes.set_xlabel(info.part, fontsize=8, labelpad=3)
+        figure.suptitle(title, fontsize=12, fontweight="bold")
+        figure.savefig(path)
+
+
+def _draw_attempt(axes: Axes, attempts: Attempts, info: ShardInfo, row: int) -> None:
+    side = 0.15
+    grasp = attempts.grasp[row].astype(np.float64)
+    centre = attempts.pose_base_obj[row, :3].astype(np.float64)
+    square = np.array([*centre[:2], centre[2], 0.0])
+    depth = u16_to_depth(attempts.depth[row])
+    heights = _from_above(depth, info.intrinsics, info.T_base_camera, info.table_z, square, side)
+    _show_heights(axes, heights, centre[:2], side, max(float(heights.max()), 1.0))
+    axes.set(xticks=[], yticks=[])
+    success = bool(attempts.success[row])
+    _jaw(axes, grasp, float(grasp[3]), scale=0.6)
+    if success:
+        displacement = attempts.displacement[row].astype(np.float64)
+        cos, sin = np.cos(grasp[3]), np.sin(grasp[3])
+        shift = np.array([[cos, -sin], [sin, cos]]) @ displacement[:2] * _MM
+        turn = float(displacement[3])
+        _outlines(axes, heights, centre[:2] * _MM, side, centre[:2] * _MM, shift, turn)
+        _arrow(axes, centre[:2] * _MM, shift, width=1.3, head=7)
+        distance = float(np.linalg.norm(displacement[:3])) * _MM
+        caption = f"{distance:.1f} mm, {np.degrees(displacement[3]):+.0f}°"
+    else:
+        caption = FAILURES[int(attempts.failure[row])]
+    axes.set_title(
+        caption, color=_GOOD if success else _BAD, fontsize=9, loc="center", fontweight="normal", pad=3
+    )
+    for spine in axes.spines.values():
+        spine.set(color=_GOOD if success else _BAD, linewidth=1.2)

@@ -1,0 +1,98 @@
+"""A run of trials in a folder: begun with certain inputs, every trial stored at once, gone on with later."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Collection, Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from mskgrasp.core.config import Config, read_config, write_config
+from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.core.files import write_whole
+from mskgrasp.runtime.cli import make_folder
+
+Record = TypeVar("Record")
+SETTINGS = "config.yaml"
+INPUTS = "inputs.json"
+TRIALS = "trials.jsonl"
+
+
+def begin(config: Config, out: Path, inputs: Mapping[str, str], *, may_change: Collection[str]) -> None:
+    """Opens the folder of a run: new, or begun with the same settings and inputs.
+
+    Args:
+        config: Of the run.
+        out: The folder.
+        inputs: Digest of each file and part that the results depend on, by a name for messages.
+        may_change: Settings that a run goes on with, whatever they were.
+
+    Raises:
+        UsageError: It holds something else.
+    """
+    settings, fingerprint = out / SETTINGS, out / INPUTS
+    if settings.exists() and fingerprint.exists():
+        before = read_config(type(config), settings)
+        changed = [
+            name
+            for name in type(config).model_fields
+            if name not in may_change and getattr(before, name) != getattr(config, name)
+        ]
+        known = json.loads(fingerprint.read_text(encoding="utf-8"))
+        changed += [name for name, value in inputs.items() if known.get(name, value) != value]
+        if changed:
+            raise UsageError(
+                f"{out} was begun with other inputs ({', '.join(changed)} differ); choose another --out"
+            )
+        inputs = known | dict(inputs)
+    elif out.is_dir() and any(out.iterdir()):
+        raise UsageError(f"--out {out} holds other files; choose a new folder")
+    make_folder(out)
+    write_config(config, settings)
+    fingerprint.write_text(json.dumps(dict(inputs), indent=1) + "\n", encoding="utf-8")
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file.
+
+    Raises:
+        UsageError: It cannot be read.
+    """
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror}") from error
+
+
+def append(path: Path, values: Mapping[str, Any]) -> None:
+    """Adds a line to a file of trials; NaN is no JSON and refused."""
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(values, allow_nan=False) + "\n")
+
+
+def rewrite(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
+    """Writes a file of trials anew, whole or not at all."""
+    write_whole(path, "".join(json.dumps(one, allow_nan=False) + "\n" for one in lines).encode())
+
+
+def read(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
+    """Trials already done, in order; a last line cut short by a kill is dropped from the file.
+
+    Raises:
+        BadDataset: The file holds something else.
+    """
+    if not path.exists():
+        return []
+    lines = path.read_text(encoding="utf-8").split("\n")
+    found = []
+    for i, line in enumerate(lines[:-1]):
+        try:
+            found.append(make(json.loads(line)))
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            raise BadDataset(
+                f"{path}: line {i + 1} is no trial; delete it or choose another --out"
+            ) from error
+    if lines[-1]:
+        path.write_text("\n".join(lines[:-1]) + ("\n" if len(lines) > 1 else ""), encoding="utf-8")
+    return found

@@ -1,0 +1,1 @@
+"""Simulated grasp attempts and the versions of what makes them."""

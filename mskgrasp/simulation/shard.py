@@ -1,0 +1,172 @@
+"""One shard: some attempts on one part, all of them determined by the seed."""
+
+from __future__ import annotations
+
+import gc
+import zlib
+from collections import Counter
+from collections.abc import Generator, Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+
+from mskgrasp.core.errors import NoPartFound
+from mskgrasp.core.grasp import MAX_DISPLACEMENT, sample_grasps
+from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
+from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, u16_to_depth, write_shard
+from mskgrasp.perception.part_detection import view_part
+from mskgrasp.simulation.versions import ShardTask, versions
+from tasks import GraspDisplacementEnv
+from tasks.attempt.outcome import MAX_PENETRATION, MAX_SPEED
+from tasks.scene.renderer import render_backend
+
+FIELDS = (
+    "success", "failure", "displacement", "tilt", "width_after",
+    "pose_base_obj", "pose_tcp_obj_before", "pose_tcp_obj_after",
+)  # fmt: skip
+
+
+class Simulator:
+    """The environment of one worker, built once and refilled with part after part."""
+
+    def __init__(self, physics: Physics, camera: Overhead, noise: ExecutionNoise):
+        self._physics = physics
+        self._camera = camera
+        self._noise = noise
+        self._env: gymnasium.Env | None = None
+
+    def load(self, folder: str) -> GraspDisplacementEnv:
+        """A fresh scene with the part: what earlier shards left behind in PhysX must not matter."""
+        if self._env is None:
+            self._env = gymnasium.make(
+                "GraspDisplacement-v1",
+                parts=[folder],
+                obs_mode="none",
+                physics=self._physics.model_dump(),
+                camera=self._camera.model_dump(),
+                noise=self._noise.model_dump(),
+                render_backend=render_backend(),
+            )
+            # ManiSkill collects garbage at every new scene; what is loaded by now is none.
+            gc.collect()
+            gc.freeze()
+        else:
+            self._env.reset(seed=0, options=dict(parts=[folder], reconfigure=True))
+        env = self._env.unwrapped
+        assert isinstance(env, GraspDisplacementEnv)
+        return env
+
+    def write(self, task: ShardTask, dataset: Path) -> Iterator[int]:
+        """Makes a shard and writes it into a dataset's folder; yields as `run`."""
+        attempts, info = yield from self.run(task)
+        write_shard(shard_path(dataset, task.part, task.index), attempts, info)
+
+    def run(self, task: ShardTask) -> Generator[int, None, tuple[Attempts, ShardInfo]]:
+        """Makes the attempts of a shard and returns them.
+
+        Yields:
+            After each 1 for a success, 0 for a failure and -1 for a discarded one.
+        """
+        env = self.load(task.folder)
+        part = env.parts[0]
+        rows: list[dict[str, np.ndarray]] = []
+        discarded: Counter[str] = Counter()
+        for attempt in range(task.first, task.first + task.n):
+            depth, grasp = draw_attempt(env, task.part, task.seed, attempt)
+            if grasp is None:
+                discarded["part_not_seen"] += 1
+                yield -1
+                continue
+            outcome = env.try_grasp(torch.as_tensor(grasp, device=env.device))
+            row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
+            reason = impossible(outcome, row)
+            if reason:
+                discarded[reason] += 1
+                yield -1
+                continue
+            rows.append(dict(row, depth=depth, grasp=grasp[0]))
+            yield int(row["success"])
+        attempts = _stack(rows, (self._camera.n_pixels, self._camera.n_pixels))
+        info = ShardInfo(
+            part=part.name,
+            part_hash=part.content_hash,
+            family=part.family,
+            index=task.index,
+            seed=task.seed,
+            intrinsics=env.intrinsics,
+            T_base_camera=env.T_base_camera,
+            table_z=TABLE_Z,
+            region=REGION,
+            physics=self._physics.model_dump(),
+            noise=self._noise.model_dump(mode="json"),
+            versions=versions(),
+            discarded=dict(discarded),
+        )
+        return attempts, info
+
+    def close(self) -> None:
+        """Frees the simulation."""
+        if self._env is not None:
+            self._env.close()
+
+
+def draw_attempt(
+    env: GraspDisplacementEnv, part: str, seed: int, attempt: int
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Lays the part as a seed and a number say, looks at it and draws a grasp.
+
+    Returns:
+        The depth image (h, w), uint16 in 0.1 mm, and the grasp (1, 4), float32, base frame; None where the
+        camera does not see the part.
+    """
+    sequence = np.random.SeedSequence([seed, zlib.crc32(part.encode()), attempt])
+    episode_seed, grasp_seed = sequence.generate_state(2) >> 1
+    env.lay(int(episode_seed))
+    depth = depth_to_u16(env.capture_depth()[0].cpu().numpy())
+    try:
+        view = view_part(
+            u16_to_depth(depth),
+            env.intrinsics,
+            env.T_base_camera,
+            table_z=TABLE_Z,
+            region=REGION,
+        )
+    except NoPartFound:
+        return depth, None
+    return depth, sample_grasps(view, 1, np.random.default_rng(grasp_seed)).astype(np.float32)
+
+
+def impossible(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> str:
+    """Why an attempt cannot have happened; empty where it can."""
+    if not all(np.isfinite(row[name]).all() for name in FIELDS if name.startswith("pose")):
+        return "not_finite"
+    if float(outcome["penetration"][0]) > MAX_PENETRATION:
+        return "penetrated"
+    if float(outcome["fastest"][0]) > MAX_SPEED:
+        return "too_fast"
+    if row["success"] and np.linalg.norm(row["displacement"][:3]) > MAX_DISPLACEMENT:
+        return "moved_too_far"
+    return ""
+
+
+def _stack(rows: list[dict[str, np.ndarray]], shape: tuple[int, int]) -> Attempts:
+    empty: dict[str, Any] = dict(
+        depth=np.zeros((0, *shape), np.uint16),
+        grasp=np.zeros((0, 4), np.float32),
+        success=np.zeros(0, bool),
+        failure=np.zeros(0, np.uint8),
+        displacement=np.zeros((0, 4), np.float32),
+        tilt=np.zeros(0, np.float32),
+        width_after=np.zeros(0, np.float32),
+        pose_base_obj=np.zeros((0, 7), np.float32),
+        pose_tcp_obj_before=np.zeros((0, 7), np.float32),
+        pose_tcp_obj_after=np.zeros((0, 7), np.float32),
+    )
+    if not rows:
+        return Attempts(**empty)
+    return Attempts(
+        **{name: np.stack([row[name] for row in rows]).astype(kind.dtype) for name, kind in empty.items()}
+    )

@@ -1,0 +1,1 @@
+"""Program: train the networks. Run ``python -m mskgrasp.train --help``."""

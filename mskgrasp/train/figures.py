@@ -1,0 +1,161 @@
+"""How a training went, and whether the model knows what it does not know, to look at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import torch
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from mskgrasp.core import metrics
+from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.core.grasp import to_object_displacement
+from mskgrasp.learning.grasp_models import Models
+from mskgrasp.learning.held_out import AXES, predict_grasp_displacement, predict_quality
+from mskgrasp.learning.samples import Samples
+from mskgrasp.reports.grasp_figures import FAINT, INK, STYLE, make_figure
+
+_COLOURS = ("#1f6feb", "#e8590c", "#8b909a", "#2b8a3e")
+_BINS = 12
+_MM = 1e3
+
+
+def draw_uncertainty(models: Models, samples: Samples, rows: torch.Tensor, path: Path) -> None:
+    """Draws reliability, coverage, sparsification and error over deviation, on some rows.
+
+    Args:
+        models: With variances.
+        samples: The dataset.
+        rows: At parts that training never saw, successes among them.
+        path: Where the picture goes.
+    """
+    held = rows[samples.success[rows]]
+    mean, variance = predict_grasp_displacement(models, samples, held)
+    target = samples.grasp_displacement[held].double().numpy()
+    with matplotlib.rc_context({**STYLE, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = make_figure(11.5, 9.0)
+        panels = figure.subplots(2, 2)
+        _reliability(panels[0, 0], predict_quality(models, samples, rows), samples.success[rows].numpy())
+        _coverage(panels[0, 1], mean, variance, target)
+        predicted = to_object_displacement(mean, samples.centre_grasp[held].double().numpy())
+        error = samples.displacement[held].double().numpy() - predicted
+        shift, turn = np.linalg.norm(error[:, :3], axis=1), np.abs(wrap_angle(error[:, 3]))
+        _sparsification(panels[1, 0], shift, variance[:, :3].sum(axis=1))
+        _error_over_deviation(panels[1, 1], shift, np.sqrt(variance[:, :3].sum(axis=1)), turn, variance)
+        figure.savefig(path)
+
+
+def _reliability(axes: Axes, probability: np.ndarray, success: np.ndarray) -> None:
+    rows = metrics.reliability(probability, success)
+    axes.plot([0, 1], [0, 1], color=FAINT, lw=1, ls="--")
+    axes.scatter(rows[:, 0], rows[:, 1], s=8 + 200 * rows[:, 2] / rows[:, 2].sum(), color=_COLOURS[0])
+    axes.plot(rows[:, 0], rows[:, 1], color=_COLOURS[0], lw=1.5)
+    axes.set(xlabel="predicted probability of success", ylabel="share that succeeded", aspect="equal")
+    axes.set_title("Quality: does it happen as often as predicted?")
+
+
+def _coverage(axes: Axes, mean: np.ndarray, variance: np.ndarray, target: np.ndarray) -> None:
+    levels = np.linspace(0.05, 0.95, 19)
+    covered = np.stack([metrics.coverage(mean, variance, target, level) for level in levels])
+    axes.plot([0, 1], [0, 1], color=FAINT, lw=1, ls="--")
+    for k, name in enumerate(AXES):
+        axes.plot(levels, covered[:, k], color=_COLOURS[k], lw=1.5, label=name)
+    axes.set(xlabel="central interval of the prediction", ylabel="share of truth inside", aspect="equal")
+    axes.set_title("Displacement: do intervals hold what they say?")
+    axes.legend(frameon=False)
+
+
+def _sparsification(axes: Axes, error: np.ndarray, uncertainty: np.ndarray) -> None:
+    shares, predicted, oracle = metrics.sparsification(error, uncertainty)
+    axes.plot(100 * shares, 1e3 * predicted, color=_COLOURS[0], lw=1.8, label="dropped by predicted variance")
+    axes.plot(100 * shares, 1e3 * oracle, color=_COLOURS[3], lw=1.5, label="dropped by the true error")
+    axes.axhline(1e3 * predicted[0], color=FAINT, lw=1, ls="--", label="dropped at random")
+    axes.set(xlabel="grasps dropped, %", ylabel="RMSE of the rest, mm", ylim=(0, None))
+    axes.set_title(f"Translation: AUSE {metrics.ause(error, uncertainty):.2f} of random's")
+    axes.legend(frameon=False, fontsize=8)
+
+
+def _error_over_deviation(
+    axes: Axes, shift: np.ndarray, shift_std: np.ndarray, turn: np.ndarray, variance: np.ndarray
+) -> None:
+    """RMSE in bins of equal number over the RMS predicted deviation: a line through the origin is perfect."""
+    turn_std = np.sqrt(variance[:, 3])
+    for error, std, factor, colour, label in (
+        (shift, shift_std, 1e3, _COLOURS[0], "translation, mm"),
+        (turn, turn_std, 180 / np.pi, _COLOURS[1], "rotation, degrees"),
+    ):
+        bins = [piece for piece in np.array_split(np.argsort(std), _BINS) if len(piece)]
+        x = [factor * np.sqrt((std[piece] ** 2).mean()) for piece in bins]
+        y = [factor * np.sqrt((error[piece] ** 2).mean()) for piece in bins]
+        axes.plot(x, y, color=colour, lw=1.2, marker="o", ms=4, label=label)
+    low, high = (f(*axes.get_xlim(), *axes.get_ylim()) for f in (min, max))
+    low = max(low, 0.3)
+    axes.plot([low, high], [low, high], color=FAINT, lw=1, ls="--")
+    axes.set(
+        xscale="log", yscale="log", xlabel="predicted deviation", ylabel="RMSE in a twelfth of the grasps"
+    )
+    axes.set_title("Displacement: is a small deviation a small error?")
+    axes.legend(frameon=False)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.label.set_color(INK)
+
+
+def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Path) -> None:
+    """Draws losses and validation metrics by epoch, beside predictors that learned nothing.
+
+    Args:
+        history: One row an epoch, as `mskgrasp.learning.trainer.train` returns them.
+        report: The final metrics, with the trivial predictors' errors.
+        path: Where the picture goes.
+    """
+    with matplotlib.rc_context({**STYLE, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = make_figure(11.5, 6.0)
+        panels = figure.subplots(2, 3)
+        for line, name in zip(panels, ("gqn", "gdn"), strict=True):
+            rows = [row for row in history if row["stage"] == name]
+            _curve(line[0], rows, "train_loss", "training (with noise and dropout)", FAINT)
+            _curve(line[0], rows, "validation_loss", "parts never seen", _COLOURS[0])
+            line[0].set(title=f"{name.upper()} loss", xlabel="epoch")
+            line[0].legend(frameon=False, fontsize=8)
+        gqn, gdn = report["gqn"], report["gdn"]
+        rows = [row for row in history if row["stage"] == "gqn"]
+        _curve(panels[0, 1], rows, "auroc", "parts never seen", _COLOURS[0])
+        panels[0, 1].axhline(0.5, color=FAINT, lw=1, ls="--", label="guessing")
+        panels[0, 1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.3, 1.02))
+        panels[0, 1].legend(frameon=False, fontsize=8, loc="lower right")
+        bars = {
+            "network": (gqn["brier"], _COLOURS[0]),
+            "base rate": (gqn["brier_of_base_rate"], FAINT),
+        }
+        panels[0, 2].bar(
+            list(bars), [v for v, _ in bars.values()], color=[c for _, c in bars.values()], width=0.5
+        )
+        panels[0, 2].set(title="Success: Brier score, less is better")
+        for place, (value, _) in enumerate(bars.values()):
+            panels[0, 2].text(place, value, f"{value:.3f}", ha="center", va="bottom")
+        rows = [row for row in history if row["stage"] == "gdn"]
+        for axes, key, unit, factor in (
+            (panels[1, 1], "translation_rmse", "mm", _MM),
+            (panels[1, 2], "rotation_rmse", "degrees", float(np.degrees(1.0))),
+        ):
+            _curve(axes, rows, key, "parts never seen", _COLOURS[0], factor)
+            for style, other in (("--", "zero_displacement"), (":", "training_mean")):
+                axes.axhline(
+                    gdn[other][key] * factor, color=FAINT, lw=1.2, ls=style, label=other.replace("_", " ")
+                )
+            axes.set(title=f"{key.split('_')[0].capitalize()} RMSE, {unit}", xlabel="epoch")
+            axes.set_ylim(bottom=0)
+            axes.legend(frameon=False, fontsize=8)
+        figure.savefig(path)
+
+
+def _curve(
+    axes: Axes, rows: list[dict[str, Any]], key: str, label: str, colour: str, factor: float = 1.0
+) -> None:
+    values = [row[key] * factor for row in rows]
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.plot([row["epoch"] for row in rows], values, color=colour, lw=1.8, label=label, marker="o", ms=3)

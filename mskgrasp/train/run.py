@@ -1,0 +1,211 @@
+"""Trains the networks on a dataset: ``python -m mskgrasp.train --data DIR --out DIR``."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+from pydantic import Field
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from mskgrasp.core.config import read_config, write_config
+from mskgrasp.core.errors import UsageError
+from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, save_model
+from mskgrasp.learning.model_card import model_card
+from mskgrasp.learning.samples import Samples, read_samples
+from mskgrasp.learning.trainer import LearningConfig, Reporter, split, train
+from mskgrasp.runtime import cli
+from mskgrasp.train.figures import draw_curves, draw_uncertainty
+
+DEFAULT_CONFIG = Path(__file__).resolve().parents[2] / "configs" / "train" / "default.yaml"
+CHECKPOINT = "checkpoint.safetensors"
+
+
+class TrainConfig(LearningConfig):
+    """Settings of a training run."""
+
+    data: Path | None = None
+    """The dataset folder."""
+    out: Path | None = None
+    """Where the model goes. A run that was stopped goes on when it is started again in the same way."""
+    epochs: int | None = Field(default=None, ge=1)
+    """Of each network, in place of gqn.epochs and gdn.epochs."""
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    """auto: a CUDA device where there is one."""
+
+
+class _Bar(Reporter):
+    """A progress bar with the loss and the time left, and a line and a row in the log for every epoch."""
+
+    def __init__(self, progress: Progress, log: Path):
+        self._progress, self._log = progress, log
+        self._task = progress.add_task("", total=None, loss="")
+        self._name, self._epochs = "", 0
+
+    def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:
+        self._name, self._epochs = name, epochs
+        self._progress.remove_task(self._task)
+        self._task = self._progress.add_task(
+            f"train {name.upper()}", total=epochs * batches, completed=done, loss=""
+        )
+
+    def batch(self, loss: float) -> None:
+        self._progress.update(self._task, advance=1, loss=f"loss {loss:.3f}")
+
+    def epoch(self, history: list[dict[str, Any]]) -> None:
+        row = history[-1]
+        _write(self._log, _table(history))
+        self._progress.console.print(f"{self._name} {row['epoch']:3d}/{self._epochs}  {_line(row)}")
+
+
+def _line(row: dict[str, Any]) -> str:
+    shown = [f"loss {row['train_loss']:.3f}", f"validation {row['validation_loss']:.3f}"]
+    if "auroc" in row:
+        shown.append(f"AUROC {row['auroc']:.3f}")
+    else:
+        shown.append(f"RMSE {row['translation_rmse'] * 1e3:.2f} mm")
+        shown.append(f"{math.degrees(row['rotation_rmse']):.2f} deg")
+    return "  ".join([*shown, f"{row['seconds']:.0f} s"])
+
+
+def run(config: TrainConfig) -> int:
+    """Trains, and writes the model, its metrics, the log and the curves into ``config.out``."""
+    if config.epochs is not None:
+        gqn, gdn = (stage.model_copy(update={"epochs": config.epochs}) for stage in (config.gqn, config.gdn))
+        config = config.model_copy(update={"epochs": None, "gqn": gqn, "gdn": gdn})
+    if config.data is None or config.out is None:
+        missing = "--data" if config.data is None else "--out"
+        raise UsageError(f"{missing} is needed: python -m mskgrasp.train --data DATASET --out MODEL")
+    out = config.out
+    _check_out(config, out)
+    console = Console()
+    if (out / DESCRIPTION).exists() and (out / WEIGHTS).exists():
+        console.print(f"{out} is trained already; choose another --out to train again")
+        return 0
+    device = _device(config.device)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, TextColumn("{task.fields[loss]}"), console=console) as progress:
+        samples = _read(config, config.data, progress)
+        sides = split(samples, config)
+        console.print(
+            f"{len(sides.training)} attempts to learn from, "
+            f"{len(sides.validation) + len(sides.test)} at parts never seen; "
+            f"{float(samples.success.double().mean()):.0%} succeed; on {device}"
+        )
+        if samples.skipped:
+            skipped = ", ".join(f"{n} ({why})" for why, n in samples.skipped.items())
+            console.print(f"left out: {skipped}")
+        cli.make_folder(out)
+        write_config(config, out / "config.yaml")
+        models, history = train(
+            samples,
+            config,
+            checkpoint_path=out / CHECKPOINT,
+            device=device,
+            reporter=_Bar(progress, out / "log.csv"),
+        )
+    draw_curves(history, models.meta.metrics, out / "curves.png")
+    if config.network.variance:
+        draw_uncertainty(
+            models, samples, sides.test if len(sides.test) else sides.validation, out / "uncertainty.png"
+        )
+    _write(out / "metrics.json", json.dumps(_finite(models.meta.metrics), indent=2, allow_nan=False) + "\n")
+    save_model(out, models)
+    _write(out / "card.md", model_card(models.meta))
+    (out / CHECKPOINT).unlink(missing_ok=True)
+    _summarise(console, models.meta.metrics, out)
+    return 0
+
+
+def _check_out(config: TrainConfig, out: Path) -> None:
+    """Refuses a folder that holds anything but a run of the same settings."""
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return
+    if not (out / "config.yaml").is_file():
+        raise UsageError(f"{out} exists and holds no training run; choose another --out")
+    here = {"data", "out", "device"}
+    before = read_config(TrainConfig, out / "config.yaml").model_dump(exclude=here)
+    now = config.model_dump(exclude=here)
+    differing = sorted(key for key in now if now[key] != before[key])
+    if differing:
+        raise UsageError(
+            f"{out} holds a run of other settings ({', '.join(differing)}); choose another --out, or repeat "
+            f"its settings (--config {out / 'config.yaml'}) to go on"
+        )
+
+
+def _device(name: str) -> torch.device:
+    available = torch.cuda.is_available()
+    if name == "cuda" and not available:
+        raise UsageError("--device cuda: no CUDA device is available; legal here: auto, cpu")
+    if name == "cpu" or not available:
+        return torch.device("cpu")
+    torch.backends.cudnn.deterministic = True  # the same seed gives the same weights
+    return torch.device("cuda", 0)
+
+
+def _read(config: TrainConfig, data: Path, progress: Progress) -> Samples:
+    task = progress.add_task("read shards", total=None, loss="")
+    samples = read_samples(
+        data,
+        config.network,
+        advance=lambda done, total: progress.update(task, completed=done, total=total),
+    )
+    progress.remove_task(task)
+    return samples.of_parts_between(*config.success_range)
+
+
+def _table(history: list[dict[str, Any]]) -> str:
+    columns = list(dict.fromkeys(key for row in history for key in row if key != "seconds")) + ["seconds"]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(history)
+    return text.getvalue()
+
+
+def _write(path: Path, text: str) -> None:
+    temporary = path.with_name(path.name + ".tmp")
+    temporary.write_text(text, encoding="utf-8")
+    os.replace(temporary, path)
+
+
+def _finite(value: Any) -> Any:
+    """JSON knows no NaN: what is undefined becomes null."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _summarise(console: Console, report: dict[str, Any], out: Path) -> None:
+    gqn, gdn = (report.get("test", report)[name] for name in ("gqn", "gdn"))
+    console.print(
+        f"quality on parts never seen: AUROC {gqn['auroc']:.3f}, "
+        f"balanced accuracy {gqn['balanced_accuracy']:.1%}, "
+        f"Brier {gqn['brier']:.3f} (always the base rate: {gqn['brier_of_base_rate']:.3f})"
+    )
+    for name, values in (("network", gdn), *((k, gdn[k]) for k in ("zero_displacement", "training_mean"))):
+        console.print(
+            f"displacement, {name.replace('_', ' ')}: {values['translation_rmse'] * 1e3:.2f} mm, "
+            f"{math.degrees(values['rotation_rmse']):.2f} deg"
+        )
+    console.print(f"saved in {out}")
+
+
+def main() -> int:
+    """Reads the command line and runs."""
+    return run(
+        cli.parse(
+            TrainConfig,
+            prog="python -m mskgrasp.train",
+            description="Trains the grasp quality and displacement networks on a dataset.",
+            default_config=DEFAULT_CONFIG,
+        )
+    )

@@ -1,0 +1,1 @@
+"""Trials on a cell: looking, planning, grasping, measuring."""

@@ -1,0 +1,103 @@
+"""The cell of a run: a YAML file, and for a simulated one what the command line says otherwise."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+
+from hal.open_cell import cell_from_values
+from mskgrasp.core.config import check_config, read_yaml
+from mskgrasp.core.errors import UsageError
+from mskgrasp.core.files import write_whole
+from mskgrasp.core.settings import Tape
+
+# As in hal.sim.noise, which brings the simulator along.
+Noise = Literal["off", "iid", "kinect2"]
+SIMULATED = "sapien"
+FINE = 3
+"""Pixels of colour along one of depth, as a Kinect v2 has them, where tape is measured."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellFile:
+    """A cell's settings.
+
+    Attributes:
+        path: Of the user's file.
+        values: What is in it, and what the command line says otherwise.
+        tape: Sizes of the squares to measure by; None where a tracker measures.
+    """
+
+    path: Path
+    values: dict[str, Any]
+    tape: Tape | None
+
+    @property
+    def simulated(self) -> bool:
+        """Whether there may be as many of these cells as one likes."""
+        return self.values.get("type") == SIMULATED
+
+    @property
+    def noise(self) -> str:
+        """How a simulated camera errs; empty for another cell."""
+        noise = self.values.get("noise", "off") or "off"
+        return "" if not self.simulated else noise if isinstance(noise, str) else noise.get("model", "off")
+
+    @property
+    def digest(self) -> str:
+        """Of the values."""
+        return hashlib.sha256(self._text().encode()).hexdigest()
+
+    def write(self, folder: Path) -> Path:
+        """The file to open: a simulated cell's values in the folder, else the user's own.
+
+        Files that another cell's file names lie beside it: it stays where it is.
+        """
+        if not self.simulated:
+            return self.path
+        write_whole(folder / "cell.yaml", self._text().encode())
+        return folder / "cell.yaml"
+
+    def _text(self) -> str:
+        return yaml.safe_dump(self.values, sort_keys=False)
+
+
+def read_cell(
+    path: Path, *, noise: Noise | None, measure: Literal["truth", "markers"], tape: tuple[float, float] | None
+) -> CellFile:
+    """Reads a cell's file and what is to be other.
+
+    Args:
+        path: Of the file.
+        noise: Of a simulated camera, instead of the file's.
+        measure: Markers need tape, and colour finer than depth; a simulated cell gets both.
+        tape: Sides of the larger and the smaller square, metres; None: the file's, or 12 and 8 mm.
+
+    Raises:
+        BadConfig: The file or a value is not valid.
+        UsageError: Something is asked for that is not for this cell.
+    """
+    values = read_yaml(path)
+    simulated = values.get("type") == SIMULATED
+    if tape is not None and measure != "markers":
+        raise UsageError("--tape is how large the squares are that --measure markers looks for; add that")
+    if noise is not None:
+        if not simulated:
+            raise UsageError(
+                f"--noise is for a simulated cell; {path} is of type {values.get('type')!r}: leave it away"
+            )
+        kept = values.get("noise")
+        values["noise"] = (kept if isinstance(kept, dict) else {}) | {"model": noise}
+    squares = None
+    if measure == "markers":
+        squares = dict(zip(("large", "small"), tape, strict=True)) if tape else {}
+        if simulated:
+            squares = squares or values.get("tape") or {}
+            values |= {"tape": squares, "colour_scale": max(FINE, values.get("colour_scale", 1))}
+        squares = check_config(Tape, squares, "--tape" if tape else f"{path}: tape")
+    cell_from_values(values, path)  # a wrong file is told here, not by a worker
+    return CellFile(path=path, values=values, tape=squares)

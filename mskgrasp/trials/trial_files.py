@@ -1,0 +1,140 @@
+"""A trial on disk: the frame that was seen, what was planned in it, and the frame afterwards, if any."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hal.camera import RgbdFrame
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.files import write_whole
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import PartView
+from mskgrasp.dataset import depth_to_u16, u16_to_depth
+from mskgrasp.planning.planner import GraspPlan
+
+SCHEMA_VERSION = 1
+FOLDER = "trials"
+_ARRAYS = (
+    "grasp", "displacement", "displacement_cov", "grasp_displacement", "grasp_displacement_var", "qualities",
+    "shortlist", "shortlist_scores",
+)  # fmt: skip
+_NUMBERS = ("quality", "score")
+
+
+def trial_file(run: Path, key: str) -> Path:
+    """Where the trial of a key lies."""
+    return run / FOLDER / f"{key}.npz"
+
+
+def write_trial(path: Path, frame: RgbdFrame, plan: GraspPlan | None, after: RgbdFrame | None) -> None:
+    """Writes a trial, whole or not at all; the fine colour is kept where there is a frame afterwards.
+
+    Raises:
+        OSError: The disk is full or not writable.
+    """
+    arrays: dict[str, Any] = {"schema_version": SCHEMA_VERSION}
+    arrays |= _frame_arrays("before", frame, fine=after is not None)
+    if after is not None:
+        arrays |= _frame_arrays("after", after, fine=True)
+    if plan is not None:
+        arrays |= {f"plan_{name}": getattr(plan, name) for name in (*_ARRAYS, *_NUMBERS)}
+        arrays["plan_candidates"] = plan.candidates.astype(np.float32)
+        view = plan.view
+        arrays |= {
+            "view_centre_base": view.centre_base,
+            "view_T_base_box": np.asarray(view.T_base_box.as_vector()),
+            "view_size": view.size,
+            "view_gyration_radius": view.gyration_radius,
+            "view_table_z": view.table_z,
+            "view_table_offset": view.table_offset,
+        }
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, buffer.getvalue())
+
+
+def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | None]:
+    """Reads what `write_trial` wrote; of the candidates, metres and radians to six digits.
+
+    Raises:
+        BadDataset: The file is missing, damaged, or of another schema.
+    """
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        if int(arrays["schema_version"]) != SCHEMA_VERSION:
+            raise BadDataset(
+                f"{path} has schema version {int(arrays['schema_version'])}, legal: {SCHEMA_VERSION}"
+            )
+        plan = _plan(arrays) if "plan_grasp" in arrays else None
+        after = _frame("after", arrays) if "after_depth_u16_dmm" in arrays else None
+        return _frame("before", arrays), plan, after
+    except FileNotFoundError as error:
+        raise BadDataset(f"no {path}: the trial's file was removed; run it again in another --out") from error
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        EOFError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        raise BadDataset(f"{path} is damaged ({' '.join(str(error).split())}); copy it again") from error
+
+
+def _frame_arrays(name: str, frame: RgbdFrame, *, fine: bool) -> dict[str, Any]:
+    arrays = {
+        f"{name}_depth_u16_dmm": depth_to_u16(frame.depth),
+        f"{name}_colour": frame.colour,
+        f"{name}_intrinsics": np.asarray(frame.intrinsics, dtype=np.float64),
+        f"{name}_T_base_camera": np.asarray(frame.T_base_camera.as_vector(), dtype=np.float64),
+        f"{name}_timestamp_s": frame.timestamp_s,
+        f"{name}_serial": frame.serial,
+    }
+    if fine and frame.fine_colour is not None:
+        arrays[f"{name}_fine_colour"] = frame.fine_colour
+    return arrays
+
+
+def _frame(name: str, arrays: dict[str, np.ndarray]) -> RgbdFrame:
+    depth, colour = arrays[f"{name}_depth_u16_dmm"], arrays[f"{name}_colour"]
+    if depth.dtype != np.uint16 or depth.ndim != 2 or colour.shape != (*depth.shape, 3):
+        raise ValueError(
+            f"depth of shape {depth.shape} and type {depth.dtype}, colour of shape {colour.shape}"
+        )
+    return RgbdFrame(
+        colour=colour,
+        depth=u16_to_depth(depth),
+        intrinsics=arrays[f"{name}_intrinsics"].reshape(3, 3),
+        T_base_camera=Pose.from_vector(arrays[f"{name}_T_base_camera"].reshape(7)),
+        timestamp_s=float(arrays[f"{name}_timestamp_s"]),
+        serial=str(arrays[f"{name}_serial"]),
+        fine_colour=arrays.get(f"{name}_fine_colour"),
+    )
+
+
+def _plan(arrays: dict[str, np.ndarray]) -> GraspPlan:
+    rest: dict[str, Any] = {name: arrays[f"plan_{name}"] for name in _ARRAYS}
+    rest |= {name: float(arrays[f"plan_{name}"]) for name in _NUMBERS}
+    return GraspPlan(
+        view=PartView(
+            centre_base=arrays["view_centre_base"].reshape(3),
+            T_base_box=Pose.from_vector(arrays["view_T_base_box"].reshape(7)),
+            size=arrays["view_size"].reshape(3),
+            gyration_radius=float(arrays["view_gyration_radius"]),
+            table_z=float(arrays["view_table_z"]),
+            table_offset=float(arrays.get("view_table_offset", 0.0)),
+        ),
+        candidates=arrays["plan_candidates"].astype(np.float64).reshape(-1, 4),
+        seconds={},
+        **rest,
+    )

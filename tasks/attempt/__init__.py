@@ -1,0 +1,1 @@
+"""One grasp attempt: motion, clearance, outcome."""

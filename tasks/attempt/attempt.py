@@ -1,0 +1,380 @@
+"""One grasp attempt from pre-grasp to hold, in every sub-scene at once."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import torch
+from array_api_compat import array_namespace
+from mani_skill.utils.structs.actor import Actor
+from torch import Tensor
+
+from mskgrasp.core.geometry import Array, Pose
+from mskgrasp.core.grasp import (
+    MAX_OPENING,
+    MIN_GAP,
+    MIN_RISE,
+    lowest_grasp_z,
+    object_displacement,
+    pose_base_grasp,
+    pose_base_tcp,
+)
+from mskgrasp.core.panda_kinematics import top_down
+from mskgrasp.core.settings import TABLE_Z, Physics
+from tasks.attempt.clearance import Clearance, hand_clearance
+from tasks.attempt.outcome import MAX_DRIFT, MAX_TURN, MIN_PAD_FORCE, Observed, judge
+from tasks.attempt.speed_watch import SpeedWatch
+from tasks.robot.contacts import HandContacts
+from tasks.robot.motion import PEAK_ACCELERATION, PandaMotion, ease_at, ease_duration, finger_lag, run_up
+from tasks.robot.panda import GraspPanda
+from tasks.scene.frames import own_pose
+
+SPEED_WINDOW_S = 0.02
+"""The last part of the hold, over which the part's speed in the hand is measured, s."""
+AFTERMATH_S = 0.3
+"""How long a part that was not lifted may fall, roll and come to rest before it is judged, s."""
+REST_WINDOW_S = 0.06
+"""A part that did not move for so long has come to rest, s."""
+AHEAD = 0.003
+"""Least distance from the part, m, at which fingers begin that have only air before them: more than a part
+moves that settles and yet counts as at rest."""
+TAKE_OFF = 0.012
+"""The first part of the lift, m, which is as fine as the closing: what turns in the hand does so while the
+table lets go of it, within the first centimetre."""
+REFLEX_S = 0.008
+"""Time between two looks at the force on a hand that descends, s."""
+ARRIVAL_S = 0.024
+"""How long a hand that has descended may take to come to a stop, s."""
+LEFT_BEHIND = 0.02
+"""The hand this much farther from the part than a success may be has lost it, m."""
+
+
+class Attempt:
+    """Executes grasps and measures what they did to the parts.
+
+    Args:
+        agent: The Panda of n sub-scenes.
+        part: The part of each.
+        hulls: For each sub-scene the corners (k, 3) of each hull of its part, obj frame, metres.
+        motion: Moves arm and fingers.
+        contacts: What touches the hand.
+        physics: Speeds, forces and times of the attempt.
+    """
+
+    def __init__(
+        self,
+        agent: GraspPanda,
+        part: Actor,
+        hulls: list[list[np.ndarray]],
+        motion: PandaMotion,
+        contacts: HandContacts,
+        physics: Physics,
+    ):
+        self._agent = agent
+        self._part = part
+        self._corners = [np.concatenate(own) for own in hulls]
+        self._spans = [_spans(own) for own in hulls]
+        self._motion = motion
+        self._contacts = contacts
+        self._physics = physics
+        self._run_up = run_up(physics)
+        self._arrays = motion.arrays
+        self._speed = SpeedWatch(part, motion.arrays)
+        motion.watch = self._speed.look
+
+    def run(self, commanded: Tensor, executed: Tensor | None = None) -> dict[str, Tensor]:
+        """Executes one grasp in every sub-scene; all of them wait for the slowest.
+
+        Args:
+            commanded: (n, 4) x, y, z, theta, base frame.
+            executed: (n, 4) where the hand truly goes; as commanded by default.
+
+        Returns:
+            success (n) bool; failure (n) uint8; displacement (n, 4) and tilt (n), NaN where not
+            successful; width_after (n) m; pose_base_obj, pose_tcp_obj_before, pose_tcp_obj_after (n, 7);
+            penetration (n) m, NaN where unknown; fastest (n), greatest speed of the part, m/s; seconds (n) of
+            simulated time.
+
+        Raises:
+            ValueError: A grasp is too low or out of the arm's reach.
+        """
+        wanted = self._arrays.of(commanded)
+        outcome = self._run(wanted, wanted if executed is None else self._arrays.of(executed))
+        return {name: torch.as_tensor(values) for name, values in outcome.items()}
+
+    def _run(self, commanded: Array, grasp: Array) -> dict[str, Array]:
+        physics, motion, xp = self._physics, self._motion, self._arrays.xp
+        start, free, reach = self._approach(grasp)
+        lifted = _raised(grasp, physics.lift_height)
+        check_grasps(xp.concat([grasp, start, lifted]))
+        began = motion.seconds
+        empty = free & (reach == 0)
+        # Fingers that would have only air to close through, and room for their run-up, begin near the part.
+        room = max(self._run_up, AHEAD + physics.finger_speed / motion.rate_hz)
+        running = free & ~empty & (reach + room <= MAX_OPENING / 2)
+        width = xp.where(running, 2 * self._beginning(reach), xp.full_like(reach, MAX_OPENING))
+        down = None if bool(free.all()) else self._line(start, grasp, physics.descend_speed)
+        motion.place(top_down(_double(grasp))[0] if down is None else down[0], width)
+        self._speed.start(motion.seconds)
+        laid = self._part_pose()
+        # Finely: a part lies some micrometres deep in the table, and how many depends on the step.
+        motion.step(motion.n_steps(physics.settle_s))
+        rest = self._part_pose()
+        settled = at_rest(laid, rest)
+        collided, touched = xp.zeros_like(settled), xp.zeros_like(settled)
+
+        def reflex(_: int) -> bool:
+            force = self._contacts.hand_force()
+            collided[:] = collided | (force > physics.reflex_force)
+            touched[:] = touched | (force > 0)
+            return bool((collided | ~settled | free).all())
+
+        if down is not None:
+            look = motion.n_steps(REFLEX_S)
+            if motion.follow(down, check=reflex, check_every=look, frozen=collided):
+                for _ in range(round(ARRIVAL_S / REFLEX_S)):
+                    motion.step(look)
+                    reflex(0)
+            # A hand that rests on something yields: it is not where it was sent.
+            motion.arrive(frozen=collided | ~settled | (self._contacts.hand_force() > 0))
+        # A part that moved although nothing touched it was still toppling.
+        settled = settled & (touched | at_rest(rest, self._part_pose()))
+        held, penetration = xp.zeros_like(settled), xp.zeros_like(reach)
+        alive = settled & ~collided & ~empty
+        if bool(alive.any()):
+            apart = collided | empty
+
+            def all_met() -> bool:
+                return bool((apart | (motion.gap() <= MIN_GAP)).all())
+
+            motion.run_fingers(running & ~apart)
+            motion.move_fingers(-MAX_OPENING / 2, frozen=apart, check=all_met)
+            held, penetration = self.grip()
+        carried = bool((alive & held).any())
+        if carried:
+            carried, deepest = self._lift(grasp, lifted, alive & held, collided | ~settled)
+            penetration = xp.maximum(penetration, deepest)
+        if not carried and bool(alive.any()):
+            with motion.coarsely():
+                self._wait_for_rest()
+        return self._outcome(commanded, rest, settled, collided, held, penetration, began)
+
+    def _part_pose(self) -> Pose:
+        return own_pose(self._part, self._arrays)
+
+    def _hand_pose(self) -> Pose:
+        return own_pose(self._agent.tcp, self._arrays)
+
+    def _approach(self, grasp: Array) -> tuple[Array, Array, Array]:
+        """Where the descent begins (n, 4), whether it meets nothing (n,), and what stands between the pads.
+
+        Returns:
+            start: The grasp itself where the hand can be put there; else over it, pads clear of the part's
+                top by the approach clearance.
+            free: (n,) bool.
+            reach: (n,) greatest distance from the middle of what stands between the pads, m.
+        """
+        above, free, reach = [], [], []
+        grasps = self._arrays.numpy(grasp)
+        poses = self._arrays.numpy(self._part_pose().as_vector())
+        for i, (corners, spans) in enumerate(zip(self._corners, self._spans, strict=True)):
+            corners = (pose_base_grasp(grasps[i]).inverse() @ Pose.from_vector(poses[i])).apply(corners)
+            clearance = Clearance(free=False, reach=0.0)
+            if self._physics.skip_air:
+                clearance = hand_clearance([corners[span] for span in spans])
+            free.append(clearance.free)
+            reach.append(clearance.reach)
+            top = float(corners[:, 2].max())
+            clear = max(0.0, top + lowest_grasp_z(0.0) + self._physics.approach_clearance)
+            above.append(0.0 if clearance.free else clear)
+        own = self._arrays.of
+        start = _raised(grasp, own(np.array(above, np.float32)))
+        return start, own(np.array(free)), own(np.array(reach, np.float32))
+
+    def _beginning(self, reach: Array) -> Array:
+        """(n,) where fingers with only air before them begin, from the middle, m.
+
+        A place that they would have been at after a step of the whole ramp: then they meet the part at the
+        same moment of a step as fingers that have come all the way.
+        """
+        step = self._physics.finger_speed / self._motion.rate_hz
+        first = MAX_OPENING / 2 + finger_lag(self._physics)
+        return first - self._arrays.xp.floor((first - reach - AHEAD) / step) * step
+
+    def _wait_for_rest(self) -> None:
+        """Lets parts that were not lifted fall and roll: in flight, a look would call them by its moment."""
+        motion = self._motion
+        before = self._part_pose()
+        for _ in range(round(AFTERMATH_S / REST_WINDOW_S)):
+            motion.step(motion.n_steps(REST_WINDOW_S))
+            now = self._part_pose()
+            if bool(at_rest(before, now).all()):
+                return
+            before = now
+
+    def _lift(self, grasp: Array, lifted: Array, alive: Array, stay: Array) -> tuple[bool, Array]:
+        """Lifts and holds; False where nothing was left to hold, and (n,) the deepest overlap seen, m.
+
+        Arms that stay (n,) may have been stopped on their way down.
+        """
+        motion, physics, xp = self._motion, self._physics, self._arrays.xp
+
+        def behind() -> Array:
+            return self._hand_pose().position[:, 2] - self._part_pose().position[:, 2]
+
+        most_behind = behind() + (1 - MIN_RISE) * physics.lift_height + LEFT_BEHIND
+        deepest = self._arrays.full(motion.n, 0.0)
+
+        def all_lost(_: int) -> bool:
+            nonlocal deepest
+            deepest = xp.maximum(deepest, self._contacts.penetration())
+            lost = ~alive | (motion.gap() <= MIN_GAP) | (behind() > most_behind)
+            return bool(lost.all())
+
+        def rise(times: np.ndarray) -> bool:
+            up = self._way(grasp, lifted, times)
+            return motion.follow(up, check=all_lost, check_every=motion.n_steps(0.05), frozen=stay)
+
+        seconds = ease_duration(physics.lift_height, physics.lift_speed, PEAK_ACCELERATION)
+        times = _moments(motion.n_steps(seconds))
+        times = times[: 1 + int(np.searchsorted(physics.lift_height * ease_at(times), TAKE_OFF))]
+        if not rise(times):
+            return False, deepest
+        # What the fingers and the table do to the part is done: what follows needs no such fine steps. The
+        # last look does: a part trembles between the pads, and more in coarse steps.
+        with motion.coarsely():
+            rest = 1 - times[-1]
+            if rest > 0 and not rise(times[-1] + rest * _moments(motion.n_steps(rest * seconds))):
+                return False, deepest
+            motion.step(motion.n_steps(physics.hold_s - SPEED_WINDOW_S))
+        return True, deepest
+
+    def _outcome(
+        self,
+        commanded: Array,
+        rest: Pose,
+        settled: Array,
+        collided: Array,
+        held: Array,
+        penetration: Array,
+        began: float,
+    ) -> dict[str, Array]:
+        xp = self._arrays.xp
+        speed = self.relative_speed()
+        now, tcp = self._part_pose(), self._hand_pose()
+        touch, deepest = self.grip()
+        deepest, gap = xp.maximum(penetration, deepest), self._motion.gap()
+        moved = now.position - rest.position
+        success, failure = judge(
+            Observed(
+                settled=settled,
+                collided=collided,
+                held_closed=held,
+                pads_touch=touch,
+                gap=gap,
+                rise=moved[:, 2] / self._physics.lift_height,
+                relative_speed=speed,
+                penetration=deepest,
+                wandered=_length(moved[:, :2]),
+            )
+        )
+        before, after = pose_base_tcp(commanded).inverse() @ rest, tcp.inverse() @ now
+        displacement, tilt = object_displacement(before, after)
+        return dict(
+            success=success,
+            failure=failure,
+            displacement=xp.where(success[:, None], displacement, xp.full_like(displacement, math.nan)),
+            tilt=xp.where(success, tilt, xp.full_like(tilt, math.nan)),
+            width_after=gap,
+            pose_base_obj=rest.as_vector(),
+            pose_tcp_obj_before=before.as_vector(),
+            pose_tcp_obj_after=after.as_vector(),
+            penetration=deepest,
+            fastest=self._speed.fastest(),
+            seconds=xp.full_like(deepest, self._motion.seconds - began),
+        )
+
+    def grip(self) -> tuple[Array, Array]:
+        """(n,) whether both pads hold something, and (n,) the deepest overlap of finger and part, m."""
+        force, penetration = self._contacts.pads_on_part()
+        return (force > MIN_PAD_FORCE).all(-1) & (self._motion.gap() > MIN_GAP), penetration
+
+    def relative_speed(self) -> Array:
+        """(n,) speed of the part's origin in the hand over the next 20 ms, which it simulates, m/s.
+
+        From positions: after a TGS step PhysX's velocities still hold impulses that a contact undoes.
+        """
+        start = self._part_in_hand()
+        n_steps = self._motion.n_steps(SPEED_WINDOW_S)
+        self._motion.step(n_steps)
+        end = self._part_in_hand()
+        return _length(end - start) * self._motion.rate_hz / n_steps
+
+    def _part_in_hand(self) -> Array:
+        return self._hand_pose().inverse().apply(self._part_pose().position)
+
+    def _line(self, start: Array, goal: Array, speed: float) -> Array:
+        """(steps, n, 7) joints along straight lines between grasps; as long as the longest line needs."""
+        start, goal = self._arrays.of(start), self._arrays.of(goal)
+        distance = float(_length((goal - start)[:, :3]).max())
+        n_steps = self._motion.n_steps(ease_duration(distance, speed, PEAK_ACCELERATION))
+        return self._way(start, goal, _moments(n_steps))
+
+    def _way(self, start: Array, goal: Array, times: np.ndarray) -> Array:
+        """(steps, n, 7) joints at times of a straight line between grasps, as shares of its duration."""
+        share = self._arrays.of(ease_at(times))[:, None, None]
+        start, goal = _double(start), _double(goal)
+        return top_down(start + share * (goal - start))[0]
+
+
+def at_rest(before: Pose, after: Pose) -> Array:
+    """(n,) whether the parts neither moved nor turned between two looks, beyond the bounds of rest."""
+    cosine = abs((before.quat_wxyz * after.quat_wxyz).sum(-1))
+    moved = _length(after.position - before.position)
+    return (moved < MAX_DRIFT) & (cosine > math.cos(MAX_TURN / 2))
+
+
+def check_grasps(grasp: Array) -> None:
+    """Refuses grasps that would drive the pads into the table or that the arm cannot reach.
+
+    Raises:
+        ValueError: Names the first such grasp.
+    """
+    lowest = lowest_grasp_z(TABLE_Z)
+    if bool((grasp[:, 2] < lowest - 1e-6).any()):  # float32 rounds the bound itself
+        raise ValueError(
+            f"grasp z {float(grasp[:, 2].min()):.4f} m would put the pads into the table; "
+            f"the lowest is {lowest:.4f} m"
+        )
+    reachable = top_down(_double(grasp))[1]
+    if not bool(reachable.all()):
+        first = [round(v, 4) for v in grasp[~reachable][0].tolist()]
+        raise ValueError(f"grasp {first} (x, y, z, theta) is out of the arm's reach")
+
+
+def _spans(hulls: list[np.ndarray]) -> list[slice]:
+    """Where each hull's corners are among all of them."""
+    ends = np.cumsum([len(hull) for hull in hulls]).tolist()
+    return [slice(start, end) for start, end in pairwise([0, *ends])]
+
+
+def _moments(n_steps: int) -> np.ndarray:
+    """(n_steps,) ends of equal steps, as shares of their time."""
+    return np.arange(1, n_steps + 1) / n_steps
+
+
+def _raised(grasp: Array, by: Array | float) -> Array:
+    raised = array_namespace(grasp).asarray(grasp, copy=True)
+    raised[:, 2] += by
+    return raised
+
+
+def _length(vectors: Array) -> Array:
+    return (vectors * vectors).sum(-1) ** 0.5
+
+
+def _double(values: Array) -> Array:
+    xp = array_namespace(values)
+    return xp.astype(values, xp.float64)

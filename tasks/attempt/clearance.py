@@ -1,0 +1,72 @@
+"""Where the hand can be without touching a part: what need not be simulated.
+
+A descent beside which nothing stands, and the first way of fingers that close through air, change nothing
+but the time that they take. Both are read off the part's hulls: exact seen from above, careful in height.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mskgrasp.core.grasp import FINGER_HALF_WIDTH, FINGER_THICKNESS, MAX_OPENING, PAD_REACH, PALM_HEIGHT
+
+MARGIN = 0.002
+"""Between hand and part, m; the arm is placed at a pose to a hundredth of that."""
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """How an open hand stands to a part.
+
+    Attributes:
+        free: The hand can be put at the grasp, open, without a descent.
+        reach: Greatest distance from the middle of what stands between the pads, m; 0 where nothing does.
+            Only told where ``free``.
+    """
+
+    free: bool
+    reach: float
+
+
+def hand_clearance(hulls: Sequence[np.ndarray]) -> Clearance:
+    """How the open hand at a grasp stands to a part.
+
+    Args:
+        hulls: Corners (k, 3) of each of the part's hulls in the grasp frame, metres.
+    """
+    inner, outer = MAX_OPENING / 2 - MARGIN, MAX_OPENING / 2 + FINGER_THICKNESS + MARGIN
+    reach = 0.0
+    for corners in hulls:
+        top = corners[:, 2].max()
+        if top > PALM_HEIGHT - MARGIN:
+            return Clearance(free=False, reach=0.0)
+        if top < -PAD_REACH - MARGIN:
+            continue
+        span = _across(corners[:, :2], FINGER_HALF_WIDTH + MARGIN)
+        if span is None:
+            continue
+        low, high = span
+        if (high > inner and low < outer) or (low < -inner and high > -outer):
+            return Clearance(free=False, reach=0.0)
+        if low < inner and high > -inner:
+            reach = max(reach, high, -low)
+    return Clearance(free=True, reach=reach)
+
+
+def _across(corners: np.ndarray, half_width: float) -> tuple[float, float] | None:
+    """Span of y of the hull of points (k, 2) within |x| <= half_width; None where it has no part there."""
+    x, y = corners.T
+    within = np.abs(x) <= half_width
+    found = [y[within]]
+    for edge in (-half_width, half_width):
+        left, right = x < edge, x > edge
+        if left.any() and right.any():
+            # The hull's outline crosses the edge of the band on a line between two of its corners.
+            run = x[right][None] - x[left][:, None]
+            rise = y[right][None] - y[left][:, None]
+            found.append((y[left][:, None] + rise * (edge - x[left][:, None]) / run).ravel())
+    spans = np.concatenate(found)
+    return (float(spans.min()), float(spans.max())) if len(spans) else None

@@ -1,0 +1,74 @@
+"""When an attempt is a success, and why it failed otherwise; batched, for numpy and torch alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from array_api_compat import array_namespace
+
+from mskgrasp.core.geometry import Array
+from mskgrasp.core.grasp import EJECTED_DISTANCE, FAILURES, MIN_GAP, MIN_RISE
+
+MAX_RELATIVE_SPEED = 0.05
+"""A held part moves slower than this against the hand, m/s."""
+MAX_PENETRATION = 1e-3
+"""Deeper overlap of finger and part makes a label worthless, m."""
+MIN_PAD_FORCE = 0.05
+"""Less force is no touch, N."""
+MAX_SPEED = 3.0
+"""No grasp makes a part faster than this, m/s: a faster one was flung out of an overlap by the solver."""
+MAX_DRIFT = 1e-3
+"""A part that moves more than this on the table before it is grasped was not at rest, m."""
+MAX_TURN = 0.02
+"""Nor was one that turns by more than this, rad."""
+
+CODE = {name: i for i, name in enumerate(FAILURES)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observed:
+    """What was seen of n attempts; every field has shape (n,).
+
+    Attributes:
+        settled: The part was at rest before the grasp.
+        collided: The descent met more force than the reflex allows.
+        held_closed: Both pads touched the part, and there was a gap, when the fingers had closed.
+        pads_touch: Both pads touch the part after the hold.
+        gap: Distance of the pads after the hold, m.
+        rise: How far the part has risen, as a share of the lift.
+        relative_speed: Speed of the part against the hand after the hold, m/s.
+        penetration: Deepest overlap of finger and part seen, m; NaN where it is not known.
+        wandered: Horizontal distance of the part from where it lay, m.
+    """
+
+    settled: Array
+    collided: Array
+    held_closed: Array
+    pads_touch: Array
+    gap: Array
+    rise: Array
+    relative_speed: Array
+    penetration: Array
+    wandered: Array
+
+
+def judge(seen: Observed) -> tuple[Array, Array]:
+    """Success and failure code of attempts.
+
+    Returns:
+        success: (n,) bool, S of the design: all conditions hold.
+        failure: (n,) uint8, index into `mskgrasp.core.grasp.FAILURES`; the earliest reason wins.
+    """
+    holds = seen.pads_touch & (seen.gap > MIN_GAP) & (seen.rise >= MIN_RISE)
+    overlap = seen.penetration > MAX_PENETRATION  # NaN compares false: unknown is no evidence
+    steady = (seen.relative_speed < MAX_RELATIVE_SPEED) & ~overlap
+    success = seen.settled & ~seen.collided & seen.held_closed & holds & steady
+    xp = array_namespace(seen.gap)
+    failure = xp.full_like(seen.gap, CODE["unsettled"], dtype=xp.uint8)
+    failure[~holds] = CODE["slipped"]
+    failure[~seen.held_closed] = CODE["missed"]
+    failure[~holds & (seen.wandered > EJECTED_DISTANCE)] = CODE["ejected"]
+    failure[seen.collided] = CODE["collided"]
+    failure[~seen.settled] = CODE["unsettled"]
+    failure[success] = CODE["none"]
+    return success, failure

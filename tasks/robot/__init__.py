@@ -1,0 +1,1 @@
+"""The simulated Panda: model, motion, contacts."""

@@ -1,0 +1,1 @@
+"""The scene: camera, parts, physics, renderer, frames."""

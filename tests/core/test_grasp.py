@@ -1,0 +1,135 @@
+import numpy as np
+import pytest
+import torch
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, wrap_angle
+from mskgrasp.core.grasp import (
+    PartView,
+    centre_in_grasp_frame,
+    lowest_grasp_z,
+    object_displacement,
+    pose_base_grasp,
+    pose_base_tcp,
+    sample_grasps,
+    to_grasp_displacement,
+    to_object_displacement,
+)
+from tests.core.test_geometry import poses, vectors
+from tests.synthetic import displaced
+
+shifts = st.tuples(*[st.floats(-0.1, 0.1)] * 3, st.floats(-3.1, 3.1)).map(np.array)
+grasps = st.tuples(*[st.floats(-0.7, 0.7)] * 3, st.floats(-1.57, 1.57)).map(np.array)
+centres = arrays(np.float64, 3, elements=st.floats(-0.2, 0.2))
+
+
+def same(first: np.ndarray, second: np.ndarray) -> bool:
+    difference = first - second
+    difference[..., 3] = wrap_angle(difference[..., 3])
+    return bool(np.allclose(difference, 0, atol=1e-9))
+
+
+@given(grasps)
+def test_the_tcp_points_down_and_closes_along_the_grasp_frames_y(grasp):
+    T_base_tcp, T_base_grasp = pose_base_tcp(grasp).as_matrix(), pose_base_grasp(grasp).as_matrix()
+    assert np.allclose(T_base_tcp[:3, 2], [0, 0, -1])
+    assert np.allclose(T_base_tcp[:3, 1], -T_base_grasp[:3, 1])
+    closing = [-np.sin(grasp[3]), np.cos(grasp[3]), 0]
+    assert np.allclose(T_base_grasp[:3, 1], closing)
+    assert np.allclose(T_base_tcp[:3, 3], grasp[:3])
+
+
+@given(shifts, centres)
+def test_object_and_grasp_displacement_are_inverses(displacement, centre):
+    assert same(to_object_displacement(to_grasp_displacement(displacement, centre), centre), displacement)
+    assert same(to_grasp_displacement(to_object_displacement(displacement, centre), centre), displacement)
+
+
+@given(shifts, centres)
+def test_numpy_and_torch_convert_displacements_alike(displacement, centre):
+    array = to_grasp_displacement(displacement, centre)
+    tensor = to_grasp_displacement(torch.from_numpy(displacement), torch.from_numpy(centre))
+    assert np.allclose(tensor.numpy(), array, atol=1e-12)
+
+
+@given(centres, st.floats(-3.0, 3.0))
+def test_a_part_that_turns_about_the_hand_is_a_hand_that_only_turns_the_other_way(centre, turn):
+    turned = Pose(position=np.zeros(3), quat_wxyz=quat_about_z(np.array(turn))).apply(centre)
+    displacement = np.append(turned - centre, turn)
+    assert same(to_grasp_displacement(displacement, centre), np.array([0, 0, 0, -turn]))
+
+
+@given(shifts, centres)
+def test_grasp_displacement_is_the_motion_of_the_hand_seen_from_the_part(displacement, centre):
+    # The part's frame before and after, seen from the hand; the hand's motion follows by inverting them.
+    before = Pose(position=centre, quat_wxyz=quat_about_z(np.array(0.0)))
+    after = Pose(position=centre + displacement[:3], quat_wxyz=quat_about_z(displacement[3]))
+    moved = before @ after.inverse()
+    expected = np.append(moved.position, -displacement[3])
+    assert same(to_grasp_displacement(displacement, centre), expected)
+
+
+@given(poses(), shifts)
+def test_a_displacement_put_into_the_hand_is_measured(T_tcp_obj, displacement):
+    measured, tilt = object_displacement(T_tcp_obj, displaced(T_tcp_obj, displacement))
+    assert same(measured, displacement)
+    assert tilt < 1e-6
+
+
+@given(poses(), poses(), grasps)
+def test_displacement_does_not_depend_on_where_the_hand_is(before, after, grasp):
+    T_base_tcp = pose_base_tcp(grasp)
+    first, _ = object_displacement(before, after)
+    again, _ = object_displacement(*(T_base_tcp.inverse() @ (T_base_tcp @ pose) for pose in (before, after)))
+    assume(abs(abs(first[3]) - np.pi) > 1e-6)
+    assert np.allclose(first, again, atol=1e-6)
+
+
+@given(poses(), st.floats(0.01, 1.5), st.floats(-np.pi, np.pi))
+def test_a_pure_tilt_is_reported_as_tilt_and_not_as_a_turn(T_tcp_obj, tilt, direction):
+    axis = np.array([np.cos(direction), np.sin(direction), 0.0])
+    swing = np.concatenate([[np.cos(tilt / 2)], np.sin(tilt / 2) * axis])
+    tilted = Pose(position=T_tcp_obj.position, quat_wxyz=quat_multiply(swing, T_tcp_obj.quat_wxyz))
+    displacement, measured = object_displacement(T_tcp_obj, tilted)
+    assert np.allclose(displacement, 0, atol=1e-6)
+    assert np.isclose(measured, tilt)
+
+
+@given(grasps, vectors)
+def test_the_centre_in_the_grasp_frame_is_undone_by_the_grasps_pose(grasp, centre):
+    seen = centre_in_grasp_frame(centre, grasp)
+    assert np.allclose(pose_base_grasp(grasp).apply(seen), centre)
+
+
+def a_view(height: float) -> PartView:
+    yaw = 0.7
+    return PartView(
+        centre_base=np.array([0.5, 0.1, 0.02 + height / 2]),
+        T_base_box=Pose(position=np.array([0.5, 0.1, 0.02]), quat_wxyz=quat_about_z(np.array(yaw))),
+        size=np.array([0.06, 0.02, height]),
+        gyration_radius=0.02,
+        table_z=0.02,
+    )
+
+
+def test_sampled_grasps_fill_the_box_and_keep_off_the_table():
+    view = a_view(0.04)
+    sampled = sample_grasps(view, 4000, np.random.default_rng(0))
+    inside = view.T_base_box.inverse().apply(sampled[:, :3])
+    assert np.all(np.abs(inside[:, :2]) <= view.size[:2] / 2)
+    assert np.all(np.abs(inside[:, :2]).max(axis=0) > 0.98 * view.size[:2] / 2)
+    assert sampled[:, 2].min() >= lowest_grasp_z(view.table_z)
+    assert 0.058 < sampled[:, 2].max() <= 0.06
+    assert -np.pi / 2 <= sampled[:, 3].min() < -1.55 and 1.55 < sampled[:, 3].max() < np.pi / 2
+
+
+def test_a_flat_part_is_grasped_at_the_lowest_height():
+    sampled = sample_grasps(a_view(0.003), 10, np.random.default_rng(0))
+    assert np.all(sampled[:, 2] == pytest.approx(lowest_grasp_z(0.02)))
+
+
+def test_seed_zero_is_a_seed():
+    first, second, other = (sample_grasps(a_view(0.04), 5, np.random.default_rng(s)) for s in (0, 0, 1))
+    assert np.array_equal(first, second) and not np.array_equal(first, other)

@@ -1,0 +1,104 @@
+import numpy as np
+import pytest
+import torch
+from scipy.stats import binomtest, mannwhitneyu, norm
+
+from mskgrasp.core import metrics
+from mskgrasp.core.metrics import (
+    auroc,
+    balanced_accuracy,
+    brier,
+    coverage,
+    gaussian_nll,
+    rotation_rmse,
+    translation_rmse,
+    wilson_interval,
+)
+
+
+def test_translation_error_is_a_distance_and_rotation_error_wraps():
+    true = np.zeros((2, 4))
+    predicted = np.array([[3.0, 4.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
+    assert translation_rmse(predicted, true) == pytest.approx(np.sqrt(25 / 2))
+    true[:, 3], predicted[:, 3] = np.pi - 0.1, -np.pi + 0.1
+    assert rotation_rmse(predicted, true) == pytest.approx(0.2)
+
+
+def test_likelihood_agrees_with_torch():
+    rng = np.random.default_rng(0)
+    mean, true, variance = rng.normal(size=(9, 4)), rng.normal(size=(9, 4)), rng.uniform(0.5, 2, (9, 4))
+    mean[:, 3] = true[:, 3] = 0.0
+    normal = torch.distributions.Normal(torch.from_numpy(mean), torch.from_numpy(variance).sqrt())
+    expected = -normal.log_prob(torch.from_numpy(true)).sum(dim=1).mean()
+    assert gaussian_nll(mean, variance, true) == pytest.approx(float(expected))
+
+
+def test_true_gaussians_are_covered_as_often_as_they_should():
+    rng = np.random.default_rng(0)
+    std = np.array([0.001, 0.01, 0.1, 0.2])
+    true = rng.normal(size=(20000, 4)) * std
+    covered = coverage(np.zeros((20000, 4)), np.tile(std**2, (20000, 1)), true)
+    assert np.allclose(covered, 0.9, atol=0.01)
+
+
+def test_auroc_is_the_mann_whitney_statistic_with_ties():
+    rng = np.random.default_rng(0)
+    score, success = rng.integers(0, 6, 200).astype(float), rng.random(200) < 0.3
+    expected = mannwhitneyu(score[success], score[~success]).statistic / (success.sum() * (~success).sum())
+    assert auroc(score, success) == pytest.approx(expected)
+    assert auroc(np.array([0.1, 0.9]), np.array([False, True])) == 1.0
+    assert np.isnan(auroc(np.array([0.1, 0.9]), np.array([True, True])))
+
+
+def test_brier_of_the_base_rate_is_its_variance_and_accuracy_is_balanced():
+    success = np.array([True] + [False] * 3)
+    assert brier(np.full(4, 0.25), success) == pytest.approx(0.25 * 0.75)
+    assert balanced_accuracy(np.zeros(4), success) == 0.5
+    assert balanced_accuracy(np.array([0.9, 0.1, 0.1, 0.9]), success) == pytest.approx((1 + 2 / 3) / 2)
+
+
+@pytest.mark.parametrize(("k", "n"), [(0, 10), (10, 10), (3, 20), (95, 100)])
+def test_wilson_interval_agrees_with_scipy(k, n):
+    expected = binomtest(k, n).proportion_ci(method="wilson")
+    assert wilson_interval(k, n) == pytest.approx((expected.low, expected.high), abs=1e-9)
+
+
+def test_no_trial_tells_nothing():
+    assert wilson_interval(0, 0) == (0.0, 1.0)
+
+
+def test_crps_is_the_integral_of_its_definition():
+    mean, std, true = 0.3, 0.7, 1.1
+    x = np.linspace(-8, 8, 200_001)
+    expected = np.trapezoid((norm.cdf(x, mean, std) - (x >= true)) ** 2, x)
+    found = metrics.crps(np.full((1, 4), mean), np.full((1, 4), std**2), np.full((1, 4), true))
+    assert np.allclose(found, expected, atol=1e-4)
+
+
+def test_calibration_error_is_none_of_honest_gaussians_and_large_of_boastful_ones():
+    rng = np.random.default_rng(0)
+    std = rng.uniform(0.001, 0.01, (20_000, 4))
+    true = rng.normal(0, std)
+    honest = metrics.calibration_error(np.zeros_like(std), std**2, true)
+    boastful = metrics.calibration_error(np.zeros_like(std), (std / 3) ** 2, true)
+    assert (honest < 0.01).all() and (boastful > 0.2).all()
+
+
+def test_ause_is_none_of_an_order_that_knows_and_one_of_an_order_that_does_not():
+    rng = np.random.default_rng(0)
+    error = np.abs(rng.normal(0, 1, 20_000))
+    assert metrics.ause(error, error) == pytest.approx(0.0)
+    assert metrics.ause(error, rng.random(20_000)) == pytest.approx(1.0, abs=0.05)
+    assert metrics.ause(error, -error) > 1.5
+
+
+def test_reliability_counts_what_happened_at_each_probability():
+    rows = metrics.reliability(np.array([0.05, 0.05, 0.95, 1.0]), np.array([0, 1, 1, 1]))
+    assert rows.tolist() == [[0.05, 0.5, 2.0], [0.975, 1.0, 2.0]]
+
+
+def test_bootstrap_draws_whole_objects():
+    # Within an object all is equal: drawn sample by sample, the interval would be ten times narrower.
+    objects = [np.full(100, float(value)) for value in np.random.default_rng(0).normal(0, 1, 25)]
+    low, high = metrics.bootstrap_interval(objects, lambda drawn: float(drawn.mean()))
+    assert 0.5 < high - low < 1.1 and low < np.mean(objects) < high

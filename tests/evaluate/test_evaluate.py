@@ -1,0 +1,249 @@
+"""The experiments as a program, in the simulated cell with the small trained model."""
+
+from __future__ import annotations
+
+import io
+import json
+import multiprocessing
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hal.operator import StoppedByOperator
+from hal.sim import SapienArm
+from mskgrasp.core.errors import BadConfig, UsageError
+from mskgrasp.evaluate.experiments import scenes
+from mskgrasp.evaluate.run import EvaluateConfig, evaluate
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.planning.for_cell import SIMULATED_CELL
+from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.runtime.run_folder import TRIALS, read
+from mskgrasp.trials.trial import Trial
+from mskgrasp.trials.trial_files import read_trial, trial_file
+from mskgrasp.trials.trial_runner import Setup, run_trials
+from tests.browser import Page
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+def config(out: Path, **changes: Any) -> EvaluateConfig:
+    values = dict(
+        models=PRETRAINED, out=out, parts=("hex_nut_m30",), trials=1, workers=1,
+        planner=PlannerConfig(policy="quality", n_candidates=60),
+    )  # fmt: skip
+    return EvaluateConfig(**(values | changes))
+
+
+def trials(out: Path) -> dict[str, Trial]:
+    return {trial.key: trial for trial in read(out / TRIALS, Trial.from_json)}
+
+
+def program(*options: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "mskgrasp.evaluate", *options]
+    return subprocess.run(command, capture_output=True, text=True, cwd=REPOSITORY, timeout=250)
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two trials by this process, before a camera that errs."""
+    out = tmp_path_factory.mktemp("runs") / "alone"
+    report = evaluate(config(out, trials=2, noise="kinect2"))
+    assert report["overall"]["trials"] == 2
+    return out
+
+
+def same(one: Trial, other: Trial) -> bool:
+    """But for the seconds that planning took."""
+    return dict(one.to_json(), planning_s=0) == dict(other.to_json(), planning_s=0)
+
+
+def test_several_processes_go_on_with_a_run_and_make_the_very_same_trials(alone: Path, tmp_path: Path):
+    out, expected = tmp_path / "stopped", trials(alone)
+    shutil.copytree(alone, out)
+    first = (out / TRIALS).read_text().splitlines(keepends=True)[0]
+    (out / TRIALS).write_text(first + '{"part": "hex_nut')  # killed while it wrote the second
+    report = evaluate(config(out, trials=3, noise="kinect2", workers=2))
+    found = trials(out)
+    assert (out / TRIALS).read_text().startswith(first) and list(found) == sorted(found) and len(found) == 3
+    for key, trial in expected.items():
+        assert same(found[key], trial)
+        depths = [read_trial(trial_file(run, key))[0].depth for run in (out, alone)]
+        np.testing.assert_array_equal(*depths)
+    assert not np.array_equal(*(read_trial(trial_file(out, f"hex_nut_m30-00{k}"))[0].depth for k in (0, 1)))
+    assert report == json.loads((out / "report.json").read_text())
+    assert report["overall"]["trials"] == 3 and report["settings"]["noise"] == "kinect2"
+    assert (out / "success.png").exists() and len(list((out / "worst").glob("*.png"))) == 3
+    with Page(out / "report.html") as page:
+        widths = page.evaluate("[...document.images].map(i => i.complete ? i.naturalWidth : 0)")
+        assert len(widths) == 5 and min(widths) > 500  # both figures, and the worst three
+        assert page.evaluate("[...document.links].every(a => document.querySelector(a.hash) !== null)")
+        assert page.complaints == []
+
+
+def test_a_process_that_dies_costs_no_trial(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    planner = PlannerConfig(policy="quality", n_candidates=20)
+    (tmp_path / "trials").mkdir()
+    setup = Setup(cell=SIMULATED_CELL, models=PRETRAINED, planner=planner, out=tmp_path)
+    tasks = scenes({"hex_nut_m30": "hex_nut_m30"}, 3, 0, planner, None)
+    made = run_trials(setup, tasks, 2)
+    first = next(made)
+    for worker in multiprocessing.active_children():
+        worker.kill()
+    others = list(made)
+    assert sorted(one.number for one in (first, *others)) == [0, 1, 2]
+    lost = re.findall(r"trial (hex_nut_m30-\d+) is made again", capfd.readouterr().err)
+    assert lost and set(lost) <= {one.key for one in others}
+    assert not multiprocessing.active_children()
+
+
+def test_a_run_with_other_settings_or_another_model_is_refused(alone: Path, tmp_path: Path):
+    for changes, what in ((dict(seed=1), "seed"), (dict(noise="off"), "noise, cell")):
+        with pytest.raises(UsageError, match=f"{what} differ"):
+            evaluate(config(alone, trials=3, **(dict(noise="kinect2") | changes)))
+    models = tmp_path / "model"
+    shutil.copytree(PRETRAINED, models)
+    meta = json.loads((models / "model.json").read_text())
+    (models / "model.json").write_text(json.dumps(dict(meta, metrics={})))
+    with pytest.raises(UsageError, match="models, model.json differ"):
+        evaluate(config(alone, trials=3, noise="kinect2", models=models))
+
+
+def test_models_are_compared_and_another_one_joins_without_new_grasps_for_all(
+    collected: Path, tmp_path: Path
+):
+    out, part = tmp_path / "out", "parallel_key_a16x10x56"
+    settings = dict(experiment="displacement", parts=(part,), lowess_data=collected)
+    report = evaluate(config(out, compare=(f"gcip_mv={PRETRAINED}",), **settings))
+    found = trials(out)
+    assert set(found) == {f"{part}-000", f"{part}-000-gcip_mv", f"{part}-000-lowess"}
+    frames = [read_trial(trial_file(out, key))[0].depth for key in found]
+    assert all(np.array_equal(frames[0], frame) for frame in frames)  # every policy sees the same
+    best = found[f"{part}-000"]
+    if best.measured is not None:
+        assert set(best.predictions) == {"gcip_mv", "lowess"}
+        assert best.predictions["gcip_mv"].mean == pytest.approx(best.predicted, abs=1e-6)
+    assert report["models"]["gcip_mv"]["quality"]["novel"]["trials"] == 1
+    assert (out / "displacement.png").exists()
+
+    shutil.copytree(PRETRAINED, tmp_path / "other")
+    meta = json.loads((tmp_path / "other" / "model.json").read_text())
+    meta["training"]["training_parts"] = [part]
+    (tmp_path / "other" / "model.json").write_text(json.dumps(meta))
+    both = (f"gcip_mv={PRETRAINED}", f"other={tmp_path / 'other'}")
+    report = evaluate(config(out, compare=both, **settings))
+    assert set(trials(out)) == {*found, f"{part}-000-other"}
+    assert same(trials(out)[f"{part}-000-lowess"], found[f"{part}-000-lowess"])
+    known = report["models"]["other"]["quality"]["known"]
+    assert known["trials"] == 1  # known to this one, novel to the other
+    assert known["translation_rmse"] == report["models"]["gcip_mv"]["quality"]["novel"]["translation_rmse"]
+
+
+def test_the_search_that_is_asked_for_is_the_one_that_is_evaluated(tmp_path: Path):
+    evaluate(config(tmp_path, planner=PlannerConfig(policy="quality", n_candidates=60, refinements=2)))
+    (key,) = trials(tmp_path)
+    _, plan, _ = read_trial(trial_file(tmp_path, key))
+    assert plan is not None and len(plan.candidates) > 60
+    assert plan.quality == plan.qualities.max() > plan.qualities[:60].max()
+
+
+def test_tape_tells_what_the_tracker_knows_or_nothing(tmp_path: Path):
+    report = evaluate(
+        config(tmp_path / "out", measure="markers", parts=("washer_m36", "parallel_pin_12x60"), trials=1)
+    )
+    washer, pin = (trials(tmp_path / "out")[f"{part}-000"] for part in ("washer_m36", "parallel_pin_12x60"))
+    assert washer.success and washer.measured is not None and washer.true is not None
+    off = np.array(washer.measured) - washer.true
+    assert np.isnan(off[2]) and np.hypot(*off[:2]) < 0.5e-3 and abs(np.degrees(off[3])) < 0.5
+    assert pin.measured is None
+    if pin.success:
+        assert report["overall"]["unmeasured"] == {"no room for tape": 1}
+    assert report["overall"]["measured"] == 1
+    assert read_trial(trial_file(tmp_path / "out", washer.key))[2] is not None
+
+
+def test_a_run_without_a_success_and_a_trial_drawn_again(tmp_path: Path):
+    """As a user types it: nothing is good enough, so nothing is grasped."""
+    out = tmp_path / "out"
+    done = program(
+        "--models", str(PRETRAINED), "--parts", "hex_nut_m30", "--trials", "1", "--workers", "1",
+        "--out", str(out), "--planner.n-candidates", "20",
+        "--planner.min-quality", "1",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "0 of 1" in done.stdout and "NoGraspFound 1" in done.stdout and "nan" not in done.stdout
+    assert json.loads((out / "report.json").read_text())["overall"]["translation_rmse"] is None
+    again = program("--replay", str(out), "hex_nut_m30-000")
+    assert again.returncode == 0, again.stderr
+    assert "not lifted (NoGraspFound)" in again.stdout
+    assert (out / "replay" / "hex_nut_m30-000.png").exists()
+
+
+class Person(io.StringIO):
+    """Answers that a person types."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    """The simulated cell, taken for a real one: n, and the part is laid anew; then y; q before the second."""
+    monkeypatch.setattr(SapienArm, "simulated", False)
+    monkeypatch.setattr(sys, "stdin", Person("n\ny\nq\n"))
+    out = tmp_path / "out"
+    with pytest.raises(StoppedByOperator):
+        evaluate(config(out, trials=2))
+    assert list(trials(out)) == ["hex_nut_m30-000"] and (out / "next.png").exists()
+    asked = capfd.readouterr().err
+    assert asked.count("May the arm move?") == 3 and "quality 0." in asked
+    monkeypatch.setattr(sys, "stdin", io.StringIO("y\n"))
+    with pytest.raises(UsageError, match="give --yes"):
+        evaluate(config(out, trials=2))
+    report = evaluate(config(out, trials=2, yes=True))
+    assert report["overall"]["trials"] == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (dict(models=Path("typo")), "no model.json in typo"),
+        (dict(parts=("hex_nut_m3o",)), "hex_nut_m30"),
+        (dict(compare=(f"a={PRETRAINED}",)), "--experiment displacement"),
+        (dict(tape=(0.012, 0.008)), "--measure markers"),
+        (dict(measure="markers", tape=(0.008, 0.012)), "at least 1.25 times"),
+        (dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml", noise="iid"), "for a simulated cell"),
+        (dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml", workers=2), "there is one cell"),
+        (dict(experiment="displacement", compare=("a-b=x",)), "label=folder"),
+        (dict(experiment="displacement", compare=("a",)), "label=folder"),
+        (dict(experiment="displacement", compare=("a=typo",)), "no model.json in typo"),
+        (dict(experiment="displacement", lowess_data=Path("typo")), "no dataset folder typo"),
+        (dict(experiment="displacement", planner=PlannerConfig()), "both policies"),
+        (
+            dict(experiment="displacement", planner=PlannerConfig(policy="quality", refinements=1)),
+            "leave --planner.refinements",
+        ),
+    ],
+)
+def test_what_cannot_be_used_is_told_in_a_line_and_leaves_nothing(
+    changes: dict[str, Any], message: str, tmp_path: Path
+):
+    from mskgrasp.core.errors import MskgraspError
+
+    with pytest.raises(MskgraspError, match=message) as raised:
+        evaluate(config(tmp_path / "out", **changes))
+    assert raised.value.exit_code == (1 if "lowess_data" in changes else 2)
+    assert "\n" not in str(raised.value) and not (tmp_path / "out").exists()
+
+
+def test_models_may_be_named_in_a_file_too():
+    named = EvaluateConfig.model_validate(dict(models="m", compare={"gcip_mv": "models/a"}))
+    assert named.compare == ("gcip_mv=models/a",)
+    with pytest.raises((BadConfig, ValueError)):
+        EvaluateConfig.model_validate(dict(models="m", compare=[1]))

@@ -1,0 +1,221 @@
+"""What the doctor says, on inputs whose fault is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from hal import Camera, RgbdFrame, Workspace
+from hal.camera_calibration import Calibration, write_calibration
+from hal.doctor.checks import (
+    check_calibration,
+    check_drivers,
+    check_stream,
+    check_table,
+    check_view,
+    implausible,
+)
+from hal.doctor.run import examine
+from hal.errors import CaptureFailed
+from hal.table import fit_table
+from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.geometry import Pose
+
+INTRINSICS = np.array([[365.5, 0, 79.5], [0, 365.5, 79.5], [0, 0, 1.0]])
+DOWN = Pose(position=np.array([0.5, 0.0, 0.8]), quat_wxyz=np.array([0.0, 1.0, -1.0, 0.0]) / np.sqrt(2))
+WORKSPACE = Workspace(
+    table_z=0.0,
+    region=(0.38, 0.62, -0.12, 0.12),
+    home=np.zeros(7),
+    min_height=0.006,
+    lift_height=0.1,
+    grasp_force=20.0,
+)
+
+
+def frame_of_table(z: float = 0.0, slope_x: float = 0.0, part: bool = False, pose: Pose = DOWN) -> RgbdFrame:
+    """A plane z + slope_x (x - 0.5) seen from `DOWN`; a part 4 cm high covers a fifth of the region."""
+    rows, columns = np.mgrid[0:160, 0:160]
+    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(INTRINSICS).T
+    unit = DOWN.apply(rays) - DOWN.position
+    # origin + t unit on the plane
+    normal = np.array([-slope_x, 0.0, 1.0])
+    t = (normal @ (np.array([0.5, 0.0, z]) - DOWN.position)) / (unit @ normal)
+    depth = t.astype(np.float32)
+    if part:
+        depth[50:100, 50:100] -= 0.04
+    return RgbdFrame(
+        colour=np.zeros((160, 160, 3), np.uint8),
+        depth=depth,
+        intrinsics=INTRINSICS,
+        T_base_camera=pose,
+        timestamp_s=time.monotonic(),
+        serial="a",
+    )
+
+
+def plane_of(frame: RgbdFrame):
+    return fit_table(frame.depth, frame.intrinsics, frame.T_base_camera, WORKSPACE.region, 0.0)
+
+
+@pytest.mark.parametrize("part", [False, True])
+@pytest.mark.parametrize(("z", "slope"), [(0.0, 0.0), (0.012, 0.0), (-0.024, 0.02)])
+def test_the_tables_height_and_tilt_are_found_with_a_part_on_it(z: float, slope: float, part: bool):
+    plane = plane_of(frame_of_table(z, slope, part))
+    assert plane is not None
+    assert plane.z == pytest.approx(z, abs=1e-4)
+    assert plane.tilt_rad == pytest.approx(np.arctan(slope), abs=1e-3)
+
+
+def test_an_image_without_depth_has_no_table():
+    frame = frame_of_table()
+    assert plane_of(dataclasses.replace(frame, depth=np.full_like(frame.depth, np.nan))) is None
+
+
+@pytest.mark.parametrize(
+    ("z", "slope", "level", "words"),
+    [
+        (0.001, 0.0, "ok", "+1.0 mm"),
+        (0.004, 0.0, "warn", "warm up"),
+        (-0.024, 0.0, "fail", "add -0.0240 to camera.depth_offset (the camera measures too far)"),
+        (0.0, 0.03, "fail", "tilted by 1.72 degrees"),
+    ],
+)
+def test_a_table_elsewhere_is_found_with_its_remedy(z: float, slope: float, level: str, words: str):
+    depth, table = check_table(frame_of_table(z, slope), WORKSPACE)
+    assert depth.level == "ok" and table.level == level and words in table.text
+
+
+def test_missing_depth_is_found():
+    frame = frame_of_table()
+    frame.depth[:80] = np.nan
+    depth = next(check_table(frame, WORKSPACE))
+    assert depth.level in ("warn", "fail") and "50%" in depth.text
+
+
+def test_a_region_out_of_the_image_is_found():
+    wide = dataclasses.replace(WORKSPACE, region=(0.3, 0.7, -0.2, 0.2))
+    assert [f.level for f in check_view(frame_of_table(), WORKSPACE)] == ["ok"]
+    (finding,) = check_view(frame_of_table(), wide)
+    assert finding.level == "fail" and "out of the image" in finding.text
+
+
+@pytest.mark.parametrize(
+    ("position", "quat_wxyz", "words"),
+    [
+        ([0.5, 0, 0.8], [1, 0, 0, 0], "look down"),
+        ([0.5, 0, 8.0], DOWN.quat_wxyz, "8.00 m over the table"),
+        ([0.5, 0, -0.8], DOWN.quat_wxyz, "over the table"),
+        ([-0.5, 0, 0.8], DOWN.quat_wxyz, "beside the region"),
+    ],
+)
+def test_a_camera_that_cannot_be_there_is_found(position, quat_wxyz, words):
+    pose = Pose(position=np.array(position), quat_wxyz=np.array(quat_wxyz, dtype=float))
+    assert words in implausible(pose, WORKSPACE)
+    assert not implausible(DOWN, WORKSPACE)
+
+
+class Frames(Camera):
+    """Gives what it is told to."""
+
+    def __init__(self, stamps: list[float]):
+        self.stamps = stamps
+
+    def connect(self) -> None: ...
+
+    def close(self) -> None: ...
+
+    def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
+        if not self.stamps:
+            raise CaptureFailed("no frame came within 5 s; plug it in")
+        return dataclasses.replace(frame_of_table(), timestamp_s=time.monotonic() - self.stamps.pop(0))
+
+
+@pytest.mark.parametrize(
+    ("ages", "level", "words"),
+    [
+        ([0.0] * 11, "ok", "frames/s"),
+        ([2.0] * 11, "warn", "slow"),
+        ([0.0, 0.0, 0.1] + [0.0] * 8, "fail", "the same exposure twice"),
+        ([0.0, 0.0], "fail", "plug it in"),
+    ],
+)
+def test_stale_repeated_and_missing_frames_are_found(ages, level, words):
+    (finding,) = check_stream(Frames(list(ages)), [])
+    assert finding.level == level and words in finding.text
+
+
+def calibration(**changes: object) -> Calibration:
+    good = Calibration(
+        serial="a", T_base_camera=DOWN, intrinsics=None, rms_translation_m=5e-4, rms_rotation_rad=2e-3,
+        n_poses=24, made="2026-11-21T12:00:00+00:00",
+    )  # fmt: skip
+    return dataclasses.replace(good, **changes)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("changes", "level", "words"),
+    [
+        ({}, "ok", "24 poses"),
+        (dict(n_poses=0), "warn", "measured by hand"),
+        (dict(n_poses=9), "warn", "few poses"),
+        (dict(rms_translation_m=0.02), "warn", "large residuals"),
+        (dict(serial="b"), "fail", "camera b, not of camera a"),
+        (dict(T_base_camera=Pose.identity()), "fail", "over the table"),
+    ],
+)
+def test_a_calibration_file_is_judged(tmp_path: Path, changes: dict, level: str, words: str):
+    write_calibration(tmp_path / "camera.yaml", calibration(**changes))
+    values = dict(camera=dict(driver="kinect2", calibration="camera.yaml", serial="a"))
+    finding = check_calibration(values, tmp_path / "cell.yaml", WORKSPACE)
+    assert finding is not None and finding.level == level and words in finding.text
+
+
+def test_a_missing_calibration_file_is_looked_for_beside_the_cell_file(tmp_path: Path):
+    values = dict(camera=dict(driver="kinect2", calibration="camera.yaml"))
+    finding = check_calibration(values, tmp_path / "cell.yaml", WORKSPACE)
+    assert finding is not None and finding.level == "fail" and str(tmp_path / "camera.yaml") in finding.text
+
+
+def test_a_wheel_for_another_robot_is_found():
+    both = [dict(driver="franky", robot="panda"), dict(driver="panda_py", robot="fr3")]
+    for arm in both:
+        (finding,) = check_drivers(dict(type="devices", arm=arm, camera=dict(driver="replay")))
+        assert finding.level in ("warn", "fail") and str(arm["driver"]) in finding.subject
+
+
+def test_an_arms_driver_in_the_place_of_a_camera_is_a_finding(tmp_path: Path):
+    path = tmp_path / "cell.yaml"
+    path.write_text("type: devices\ncamera: {driver: franky}\nworkspace: {table_z: 0.0}\n")
+    assert [f.level for f in examine(path, move=False) if f.subject == "cell file"] == ["fail"]
+
+
+def test_a_cell_without_its_devices_says_what_is_missing_and_goes_on(tmp_path: Path):
+    """No robot at that address, no Kinect, no calibration: each a line, none an exception."""
+    cell = dict(
+        type="devices",
+        arm=dict(driver="panda_py", host="127.0.0.1", connect_timeout_s=30.0),
+        camera=dict(driver="kinect2", calibration="camera.yaml"),
+        workspace=dict(table_z=0.0),
+    )
+    path = tmp_path / "cell.yaml"
+    path.write_text(yaml.safe_dump(cell))
+    findings = {finding.subject: finding for finding in examine(path, move=True)}
+    assert findings["workspace"].level == findings["cell file"].level == "ok"
+    for subject in ("driver kinect2", "calibration", "camera", "arm", "motion"):
+        assert findings[subject].level == "fail", findings[subject]
+    assert all("\n" not in finding.text for finding in findings.values())
+
+
+def test_a_wrong_cell_file_is_a_finding_and_a_missing_one_an_error(tmp_path: Path):
+    (tmp_path / "cell.yaml").write_text("type: devices\narms: {}")
+    assert [f.level for f in examine(tmp_path / "cell.yaml", move=False) if f.subject == "cell file"] == [
+        "fail"
+    ]
+    with pytest.raises(BadConfig, match="No such file"):
+        list(examine(tmp_path / "none.yaml", move=False))

@@ -1,0 +1,96 @@
+"""The whole calibration in the simulated cell, where the truth is known."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hal.calibrate.board_views import Picture, picture_paths, read_picture
+from hal.calibrate.hand_eye import HandEye, solve_hand_eye
+from hal.calibrate.run import CalibrateConfig, capture, solve
+from hal.camera_calibration import read_calibration
+from hal.charuco import Board
+from mskgrasp.core.errors import UsageError
+from mskgrasp.core.geometry import pose_distance
+from tests.programs import running
+
+SAPIEN = Path(__file__).parents[3] / "configs" / "cells" / "sapien.yaml"
+BOARD = Board()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("calibration")
+    capture(CalibrateConfig(cell=SAPIEN, out=out, poses=16, settle_s=0.1, speed=0.5), SAPIEN)
+    return out
+
+
+@pytest.fixture(scope="module")
+def pictures(folder: Path) -> list[Picture]:
+    return [read_picture(path) for path in picture_paths(folder)]
+
+
+def error(found: HandEye, pictures: list[Picture]) -> tuple[float, float]:
+    """mm and degrees from the simulator's truth."""
+    apart, turn = pose_distance(found.T_base_camera, pictures[0].T_base_camera)
+    return apart * 1e3, float(np.degrees(turn))
+
+
+def test_the_camera_is_found_within_a_millimetre_and_a_tenth_of_a_degree(pictures: list[Picture]):
+    found = solve_hand_eye(BOARD, [picture.view(BOARD) for picture in pictures])
+    millimetres, degrees = error(found, pictures)
+    assert millimetres < 1.0 and degrees < 0.1
+    assert len(found.used) >= 15
+    assert found.T_tcp_board.position == pytest.approx([0.16, 0, 0], abs=1e-3)
+
+
+def test_with_a_cameras_noise_the_error_stays_in_millimetres(pictures: list[Picture]):
+    rng = np.random.default_rng(0)
+    views = []
+    for picture in pictures:
+        noisy = picture.colour + rng.normal(0, 2.0, picture.colour.shape)
+        values = {**vars(picture), "colour": np.clip(np.rint(noisy), 0, 255).astype(np.uint8)}
+        views.append(Picture(**values).view(BOARD))
+    millimetres, degrees = error(solve_hand_eye(BOARD, views), pictures)
+    assert millimetres < 2.0 and degrees < 0.2
+
+
+def test_the_pictures_can_be_solved_again_into_a_file_that_can_be_read(folder: Path, tmp_path: Path):
+    for _ in range(2):
+        lines = solve(CalibrateConfig(out=tmp_path), folder, BOARD, None)
+    assert any(line.startswith("repeatable") for line in lines)
+    calibration = read_calibration(tmp_path / "calibration.yaml", serial="sapien")
+    truth = read_picture(picture_paths(folder)[0]).T_base_camera
+    assert calibration.T_base_camera.position == pytest.approx(truth.position, abs=1e-3)
+    assert calibration.n_poses >= 15 and not calibration.by_hand
+    assert (tmp_path / "corners.png").stat().st_size > 10_000
+    assert (tmp_path / "residuals.png").stat().st_size > 10_000
+
+
+def test_a_folder_with_pictures_is_not_written_over(folder: Path):
+    with pytest.raises(UsageError, match="--from"):
+        capture(CalibrateConfig(cell=SAPIEN, out=folder), SAPIEN)
+
+
+def test_a_damaged_picture_is_named(folder: Path, tmp_path: Path):
+    whole = picture_paths(folder)[0].read_bytes()
+    for content in (whole[: len(whole) // 2], b"", b"not a picture"):
+        (tmp_path / "pose-000.npz").write_bytes(content)
+        with pytest.raises(UsageError, match="pose-000.npz cannot be read"):
+            solve(CalibrateConfig(out=tmp_path), tmp_path, BOARD, None)
+
+
+def test_ctrl_c_keeps_the_pictures(tmp_path: Path):
+    with running("hal.calibrate", "--cell", str(SAPIEN), "--out", str(tmp_path / "out")) as process:
+        deadline = time.monotonic() + 400
+        while len(picture_paths(tmp_path / "out")) < 2:
+            assert process.poll() is None and time.monotonic() < deadline
+            time.sleep(0.2)
+        process.send_signal(signal.SIGINT)
+        _, printed = process.communicate(timeout=120)
+    assert process.returncode == 130 and "Ctrl-C" in printed and "Traceback" not in printed
+    assert len(picture_paths(tmp_path / "out")) >= 2

@@ -1,0 +1,61 @@
+"""Wrong input to the programs: one line, the remedy, exit code 2 or 1."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from hal.calibrate import run as calibrate
+from hal.charuco import Board, detect
+from hal.doctor import run as doctor
+from tests.programs import run_here
+
+CELLS = Path(__file__).parents[3] / "configs" / "cells"
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments", "message"),
+    [
+        (calibrate, [], "give --cell FILE"),
+        (calibrate, ["--cell", "none.yaml"], "No such file"),
+        (calibrate, ["--from", "nowhere"], "holds no pictures"),
+        (calibrate, ["--print-board", "board.doc"], "must end in .pdf or .png"),
+        (calibrate, ["--poses", "3"], "greater than or equal to 8"),
+        (calibrate, ["--board.marker", "0.05", "--print-board", "b.pdf"], "0.4 to 0.9 times the square"),
+        (calibrate, ["--board.columns", "12", "--board.rows", "12"], "columns * rows"),
+        (calibrate, ["--cell", str(CELLS / "panda_kinect2.yaml")], "--camera-at X Y Z"),
+        (
+            calibrate,
+            ["--cell", str(CELLS / "sapien.yaml"), "--camera-at", "0", "0", "1"],
+            "knows where it is",
+        ),
+        (calibrate, ["--cell", "empty.yaml", "--camera-at", "0", "0", "1"], "'type' is None; legal: sapien"),
+        (calibrate, ["--cell", "."], "Is a directory"),
+        (doctor, ["--cell", "none.yaml"], "No such file"),
+        (doctor, ["--cell", "."], "Is a directory"),
+    ],
+)
+def test_wrong_input_is_one_line_and_exit_code_2(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program, arguments: list[str], message: str
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty.yaml").touch()
+    done = run_here(program.main, *arguments)
+    assert done.returncode == 2 and message in done.stderr
+    assert done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
+
+
+def test_the_printed_board_is_the_board_at_its_true_size(tmp_path: Path):
+    path = tmp_path / "board.png"
+    assert run_here(calibrate.main, "--print-board", str(path)).returncode == 0
+    page = (matplotlib.image.imread(path)[::4, ::4, :3] * 255).astype(np.uint8)  # 600 dpi to 150
+    assert page.shape[1] == pytest.approx(0.297 / 0.0254 * 150, abs=1)
+    board = Board()
+    found = detect(board, page)
+    assert len(found.ids) == board.n_corners
+    metres = found.pixels * 0.0254 / 150
+    expected = board.corners()[found.ids, :2]
+    assert metres - metres.mean(0) == pytest.approx(expected - expected.mean(0), abs=2e-4)

@@ -1,0 +1,145 @@
+"""franky-sim in a process of its own: ``python -m tests.hal.franka.franky_sim_server HOST``.
+
+An FR3 over the real wire protocol of server version 10, its dynamics in MuJoCo. Faults, which franky-sim does
+not have, are commanded on standard input, one a line, as in `tests.hal.franka.fci5_server`:
+
+    reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | q | clock
+"""
+
+from __future__ import annotations
+
+import select
+import sys
+import time
+
+import franky_sim
+import mujoco
+from franky_sim.franka_gripper_protocol import GripperCommand, GripperCommandStatus
+from franky_sim.franka_robot_protocol import (
+    AutomaticErrorRecoveryCommand,
+    MoveStatus,
+    RobotCommand,
+    RobotMode,
+)
+from franky_sim.franka_robot_server import FrankaRobotServer
+from franky_sim.franka_robot_state import FrankaRobotState
+from franky_sim.franka_server import BaseCommand
+from franky_sim.mujoco_simulator import MujocoSimulator
+
+from tests.hal.franka.wire import ask_for_priority
+
+_LATE_S = 0.005
+_TURN_S = 3e-4
+_CARTESIAN_REFLEX = 7
+ANSWERS = {
+    "ok": GripperCommandStatus.kSuccess,
+    "unsuccessful": GripperCommandStatus.kUnsuccessful,
+    "fail": GripperCommandStatus.kFail,
+    "aborted": GripperCommandStatus.kAborted,
+}
+
+
+class FaultyServer(FrankaRobotServer):
+    """franky-sim's server with a reflex and a user stop."""
+
+    fault: RobotMode | None = None
+    ticks = 0
+
+    @property
+    def robot_state(self) -> FrankaRobotState:
+        state = super().robot_state
+        if self.fault is None:
+            return state
+        reasons = tuple(self.fault is RobotMode.kReflex and k == _CARTESIAN_REFLEX for k in range(41))
+        return state.replace(robot_mode=self.fault, reflex_reason=reasons)
+
+    def set_fault(self, mode: RobotMode, status: MoveStatus) -> None:
+        self.fault = mode
+        number = self.current_motion_id
+        self.stop_motion(send_preemption_signal=False)
+        self.reset_current_motion_id()
+        if number:
+            BaseCommand.send_response(self._tcp_socket, RobotCommand.kMove, number, status)
+
+
+class Recovery(AutomaticErrorRecoveryCommand):
+    def handle(self, server: FaultyServer) -> None:
+        if server.fault is RobotMode.kReflex:
+            server.fault = None
+        super().handle(server)
+
+
+class Answers:
+    """Stands in the way of the gripper's answers to grasps."""
+
+    def __init__(self) -> None:
+        self.status = GripperCommandStatus.kSuccess
+        self._send = BaseCommand.send_response
+        BaseCommand.send_response = self.send  # type: ignore[method-assign]
+
+    def send(self, sock, command, number, status, payload=b"", **formats) -> None:
+        if command is GripperCommand.kGrasp and status is GripperCommandStatus.kSuccess:
+            status = self.status
+        self._send(sock, command, number, status, payload, **formats)
+
+
+def main() -> None:
+    answers = Answers()
+    with MujocoSimulator() as simulator:
+        simulator.add_robot()
+        with franky_sim.SimulationServer(simulator, hostname_candidates=[sys.argv[1]]) as server:
+            robot = server.robot_servers[0]
+            robot.__class__ = FaultyServer
+            commands = robot._FrankaServer__command_class_map
+            assert commands[RobotCommand.kAutomaticErrorRecovery] is AutomaticErrorRecoveryCommand
+            commands[RobotCommand.kAutomaticErrorRecovery] = Recovery
+            ask_for_priority()
+            print("ready", flush=True)
+            serve(server, simulator, robot, answers)
+
+
+def serve(server, simulator: MujocoSimulator, robot: FaultyServer, answers: Answers) -> None:
+    """As `run_forever`, which sleeps at every tick, be it for 0 s: a busy machine then takes 3 ms for 1."""
+    due = time.monotonic()
+    while True:
+        robot.process_commands()
+        simulator.step()
+        robot.send_state()
+        robot.ticks += 1
+        if select.select([sys.stdin], [], [], 0)[0]:
+            line = sys.stdin.readline()
+            if not line:
+                return
+            print(obey(line.split(), simulator, robot, answers), flush=True)
+        due = max(due + 1e-3, time.monotonic() - _LATE_S)
+        # Late or not, its client must get a turn: a server that never sleeps starves it on a busy machine.
+        time.sleep(max(due - time.monotonic(), _TURN_S))
+
+
+def obey(words: list[str], simulator: MujocoSimulator, robot: FaultyServer, answers: Answers) -> str:
+    match words:
+        case ["reflex"]:
+            robot.set_fault(RobotMode.kReflex, MoveStatus.kReflexAborted)
+        case ["user_stop"]:
+            robot.set_fault(RobotMode.kUserStopped, MoveStatus.kPreempted)
+        case ["user_release"]:
+            robot.fault = None
+        case ["answer", status]:
+            answers.status = ANSWERS[status]
+        case ["part", width]:
+            model = simulator.model
+            assert model is not None
+            for name in ("robot0_finger_joint1", "robot0_finger_joint2"):
+                joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+                model.jnt_range[joint, 0] = float(width) / 2
+        case ["q"]:
+            return " ".join(str(value) for value in robot.robot.inner_state.q)
+        case ["clock"]:
+            return str(robot.ticks * 1e-3)
+        case _:
+            raise ValueError(words)
+    return "done"
+
+
+if __name__ == "__main__":
+    main()

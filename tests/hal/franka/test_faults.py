@@ -1,0 +1,400 @@
+"""Every fault that an arm can have: the documented error in time, nothing moves by itself, all goes on after.
+
+The drivers are the real wheels over the real wire protocol; the faults are made on the robot's side.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hal import Arm, cell_from_yaml
+from hal.arm import JOINT_TOLERANCE
+from hal.errors import (
+    CommunicationLost,
+    DriverMissing,
+    IncompatibleDriver,
+    MotionAborted,
+    NeedsRecovery,
+    NotConnected,
+)
+from hal.franka import FrankaArm
+from hal.franka.driver import DriverName, DriverSettings
+from hal.franka.path import JointPath, joint_path
+from mskgrasp.core.geometry import Pose
+from tests.hal.franka.robots import HOSTS, TIMEOUT_S, FakeRobot, fci5, robot_for, write_cell
+
+
+def arm_at(folder: Path, driver: DriverName, host: str, **settings: object) -> FrankaArm:
+    arm = cell_from_yaml(write_cell(folder, driver, host, **settings)).arm
+    assert isinstance(arm, FrankaArm)
+    return arm
+
+
+@contextmanager
+def once_moving(robot: FakeRobot, action: Callable[[], object]) -> Iterator[None]:
+    """Does something when the arm is on its way; what comes of it must come within seconds."""
+    begin = robot.joints()
+
+    def act() -> None:
+        robot.wait_until_moved(begin)
+        acted.append(time.monotonic())
+        action()
+
+    acted: list[float] = []
+    thread = threading.Thread(target=act)
+    thread.start()
+    try:
+        yield
+    finally:
+        thread.join()
+    assert acted, "the arm never moved"
+    # libfranka gives up a silent link after one or two seconds; what hangs takes over 100 s (patience_s).
+    assert time.monotonic() - acted[0] < 60
+
+
+def assert_at_rest(robot: FakeRobot) -> None:
+    robot.wait(0.5)  # an arm brakes for a moment
+    first = robot.joints()
+    robot.wait(0.5)
+    assert robot.joints() == pytest.approx(first, abs=1e-2)  # MuJoCo creeps; the motion makes ten times that
+
+
+def slow(arm: Arm) -> None:
+    """Half a turn of seconds, whatever a test before has left."""
+    here = arm.state().joints
+    arm.move_to_joints(np.array([-0.5 if here[0] > 0 else 0.5, *here[1:]]), speed=0.1)
+
+
+def nudge(arm: Arm) -> None:
+    """A short motion that shows that the arm moves again."""
+    here = arm.state().joints
+    arm.move_to_joints(here + np.array([-0.05 if here[0] > 0 else 0.05, *np.zeros(6)]), speed=1.0)
+
+
+@pytest.fixture(scope="module", params=["franky", pytest.param("panda_py", marks=pytest.mark.slow)])
+def driver(request: pytest.FixtureRequest) -> DriverName:
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def standing(driver: DriverName) -> Iterator[FakeRobot]:
+    with robot_for(driver) as robot:
+        yield robot
+
+
+@pytest.fixture
+def robot(standing: FakeRobot) -> FakeRobot:
+    """On, without a fault and with empty hands; tests that end a robot start their own."""
+    for order in ("user_release", "answer ok", "part 0"):
+        standing.order(order)
+    return standing
+
+
+def test_a_reflex_ends_the_motion_and_nothing_moves_before_recover(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path
+):
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        with once_moving(robot, lambda: robot.order("reflex")), pytest.raises(MotionAborted, match="reflex"):
+            slow(arm)
+        assert_at_rest(robot)
+        with pytest.raises(NeedsRecovery, match=r"recover\(\)"):
+            nudge(arm)
+        with pytest.raises(NeedsRecovery):
+            arm.move_gripper(0.05)
+        arm.recover()
+        nudge(arm)
+
+
+def test_a_reflex_between_motions_is_not_recovered_silently(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path
+):
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        robot.order("reflex")
+        before = robot.joints()
+        with pytest.raises(NeedsRecovery, match="mode reflex"):
+            nudge(arm)
+        assert robot.joints() == pytest.approx(before, abs=2e-3)
+        arm.recover()
+        nudge(arm)
+
+
+def test_the_user_stop_is_told_and_recover_waits_for_its_release(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path
+):
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        with (
+            once_moving(robot, lambda: robot.order("user_stop")),
+            pytest.raises(MotionAborted, match="preempted"),
+        ):
+            slow(arm)
+        with pytest.raises(NeedsRecovery, match="user stop"):
+            arm.recover()
+        with pytest.raises(NeedsRecovery, match=r"recover\(\)"):
+            nudge(arm)
+        robot.order("user_release")
+        arm.recover()
+        nudge(arm)
+
+
+def test_a_state_is_measured_after_it_was_asked_for(driver: DriverName, robot: FakeRobot, tmp_path: Path):
+    """libfranka keeps a sample that nobody has read; the first to ask would get what was true before."""
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        for _ in range(20):
+            for order, mode in (("user_stop", "user_stopped"), ("user_release", "idle")):
+                robot.order(order)
+                assert arm._measure().mode == mode
+
+
+def test_a_cable_pulled_in_mid_motion_is_told_within_seconds(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path
+):
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        with (
+            once_moving(robot, robot.freeze),
+            pytest.raises(CommunicationLost, match="open the cell again"),
+        ):
+            slow(arm)
+        for command in (arm.state, arm.recover, lambda: slow(arm)):
+            with pytest.raises(CommunicationLost):
+                command()
+    robot.process.send_signal(signal.SIGCONT)
+    assert_at_rest(robot)
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        arm.recover()
+        nudge(arm)
+
+
+def test_a_robot_that_is_switched_off_in_mid_motion_is_told(driver: DriverName, tmp_path: Path):
+    with robot_for(driver) as robot, arm_at(tmp_path, driver, robot.host) as arm:
+        with (
+            once_moving(robot, robot.process.kill),
+            pytest.raises(CommunicationLost, match="open the cell again"),
+        ):
+            slow(arm)
+        with pytest.raises(NotConnected, match="no robot at"):
+            arm_at(tmp_path, driver, robot.host).connect()
+    with robot_for(driver, robot.host), arm_at(tmp_path, driver, robot.host) as arm:
+        arm.state()
+
+
+def test_a_second_program_is_told_and_the_first_goes_on(driver: DriverName, robot: FakeRobot, tmp_path: Path):
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        second = arm_at(tmp_path, driver, robot.host, connect_timeout_s=4.0)
+        begin = time.monotonic()
+        with pytest.raises(
+            NotConnected, match="did not answer within 4 s: .* another program may hold the robot"
+        ):
+            second.connect()
+        assert time.monotonic() - begin < 30
+        nudge(arm)
+        arm.close()
+        with arm_at(tmp_path, driver, robot.host) as third:
+            third.state()
+
+
+def test_a_driver_process_that_dies_is_told_and_the_arm_stops(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path
+):
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        link = arm._link
+        assert link is not None
+        with once_moving(robot, lambda: os.kill(link.pid, signal.SIGKILL)):
+            with pytest.raises(CommunicationLost, match="ended by signal 9"):
+                slow(arm)
+        assert_at_rest(robot)
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        nudge(arm)
+
+
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL])
+def test_a_program_that_is_ended_in_mid_motion_leaves_an_arm_at_rest(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path, ending: signal.Signals
+):
+    """Ctrl-C and a killed process; the motion would take ten seconds more."""
+    path = write_cell(tmp_path, driver, robot.host)
+    code = (
+        "import signal, sys, numpy as np\n"
+        # A shell's background job ignores Ctrl-C, and so would all that it starts.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from hal import cell_from_yaml\n"
+        "with cell_from_yaml(__import__('pathlib').Path(sys.argv[1])).arm as arm:\n"
+        "    q = arm.state().joints\n"
+        "    print('moving', flush=True)\n"
+        "    arm.move_to_joints(np.array([-0.5 if q[0] > 0 else 0.5, *q[1:]]), speed=0.05)\n"
+    )
+    program = subprocess.Popen(
+        [sys.executable, "-c", code, path], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert program.stdout is not None
+    begin = robot.joints()
+    assert program.stdout.readline().strip() == "moving"
+    robot.wait_until_moved(begin, 0.01)
+    program.send_signal(ending)
+    _, error = program.communicate(timeout=TIMEOUT_S)
+    assert program.returncode != 0
+    if ending is signal.SIGINT:
+        assert "KeyboardInterrupt" in error
+    robot.wait(1.5)
+    assert_at_rest(robot)
+    assert np.abs(robot.joints() - begin).max() < 0.4  # it was going for 0.5 rad or more
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        arm.move_gripper(0.05)
+
+
+def test_a_grasp_that_misses_is_the_same_outcome_however_it_is_reported(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path
+):
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        for answer in ("ok", "unsuccessful", "fail", "aborted"):
+            robot.order(f"answer {answer}")
+            arm.move_gripper(0.03)
+            outcome = arm.grasp(20.0)
+            assert outcome.holding is False and outcome.width < 2e-3, answer
+        arm.move_gripper(0.02)  # a miss is no fault
+
+
+def test_a_part_between_the_pads_is_held_at_its_width(driver: DriverName, robot: FakeRobot, tmp_path: Path):
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        arm.move_gripper(0.05)
+        robot.order("part 0.03")
+        outcome = arm.grasp(20.0)
+        assert outcome.holding is True and outcome.width == pytest.approx(0.03, abs=4e-3)  # MuJoCo is soft
+        robot.order("answer fail")  # there is a part, but the hand gave it up: not held
+        arm.move_gripper(0.05)
+        assert arm.grasp(20.0).holding is False
+
+
+def test_a_hand_that_was_never_homed_is_homed_by_the_first_command_and_not_by_connecting(tmp_path: Path):
+    with fci5() as robot:
+        robot.order("unhomed")
+        with arm_at(tmp_path, "panda_py", robot.host) as arm:
+            assert arm.state().gripper_width == pytest.approx(0.06)
+            arm.move_gripper(0.05)
+            arm.move_gripper(0.08)
+            assert arm.state().gripper_width == pytest.approx(0.0797)  # all that homing found
+
+
+@pytest.mark.parametrize(("driver", "version"), [("franky", 5), ("panda_py", 6)])
+def test_a_robot_of_another_version_is_told_with_the_remedy(driver: DriverName, version: int, tmp_path: Path):
+    with fci5(version=version) as robot:
+        with pytest.raises(IncompatibleDriver, match="which wheel fits") as caught:
+            arm_at(tmp_path, driver, robot.host).connect()
+        assert "\n" not in str(caught.value)
+
+
+def test_no_robot_at_the_address_is_told(driver: DriverName, tmp_path: Path):
+    with pytest.raises(NotConnected, match="no robot at 127.0.0.250"):
+        arm_at(tmp_path, driver, "127.0.0.250").connect()
+
+
+def test_a_missing_package_is_told_with_its_extra(driver: DriverName, tmp_path: Path, monkeypatch):
+    name = {"franky": "franky", "panda_py": "panda_py"}[driver]
+    (tmp_path / f"{name}.py").write_text(f"raise ModuleNotFoundError('No module named {name}')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(DriverMissing, match=r"pip install 'mskgrasp\[franka\]'"):
+        arm_at(tmp_path, driver, "127.0.0.250").connect()
+
+
+def test_another_end_effector_in_desk_is_told(tmp_path: Path):
+    """Our server alone: franky-sim's hand cannot be taken off."""
+    with fci5() as robot:
+        robot.order("flange")
+        with pytest.raises(NotConnected, match=r"end effector is at \(0.0000, .*choose it in Desk"):
+            arm_at(tmp_path, "panda_py", robot.host).connect()
+
+
+def test_a_driver_that_hangs_is_ended_and_told_even_where_it_reads_no_request(tmp_path: Path):
+    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
+        link = arm._link
+        assert link is not None
+        os.kill(link.pid, signal.SIGSTOP)
+        begin = time.monotonic()
+        with pytest.raises(CommunicationLost, match="no answer from .* to 'move' within 1.0 s"):
+            link.ask("move", timeout_s=1.0, seconds=[0.0] * 100_000)  # more than a pipe holds
+        assert time.monotonic() - begin < 30
+        with pytest.raises(CommunicationLost, match="ended by signal 9"):
+            arm.state()
+
+
+def test_a_driver_whose_program_was_killed_while_it_connected_ends_by_itself(driver: DriverName):
+    """It must not take the robot later, when another program has left it."""
+    host = next(HOSTS)
+    settings = DriverSettings(
+        host=host, realtime=False, contact_torque=[20.0] * 7, contact_force=20.0,
+        stiffness=[], damping=[], settle_s=1.0,
+    )  # fmt: skip
+    request = {"id": 1, "op": "connect", "settings": asdict(settings), "alarm_s": 3}
+    with socket.create_server((host, 1337)):  # takes the call and says nothing
+        worker = subprocess.Popen(
+            [sys.executable, "-m", "hal.franka.worker", driver],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+        )
+        assert worker.stdin is not None
+        worker.stdin.write(json.dumps(request).encode() + b"\n")
+        worker.stdin.close()
+        assert worker.wait(TIMEOUT_S) in (0, -signal.SIGALRM)
+
+
+def test_pads_that_meet_something_on_their_way_are_told(tmp_path: Path):
+    """Our server alone: the fingers of franky-sim never come to rest when pressed against a stop."""
+    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
+        robot.order("part 0.03")
+        with pytest.raises(MotionAborted, match="pads stopped at 0.0300 m instead of 0.0100 m"):
+            arm.move_gripper(0.01)
+        arm.recover()
+        arm.move_gripper(0.05)
+
+
+def test_leaving_the_context_in_mid_motion_stops_the_arm(tmp_path: Path):
+    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
+        with once_moving(robot, arm.close), pytest.raises((MotionAborted, CommunicationLost)):
+            slow(arm)
+        assert_at_rest(robot)
+
+
+def test_the_config_bounds_the_speed_whatever_a_program_asks_for(tmp_path: Path):
+    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host, max_speed=0.05) as arm:
+        here = arm.state().T_base_tcp
+        target = Pose(position=here.position - np.array([0, 0, 0.05]), quat_wxyz=here.quat_wxyz)
+        begin = time.monotonic()
+        arm.move_to_pose(target, speed=1.0)
+        assert time.monotonic() - begin > 15 / 8 * 0.05 / 0.05 * 0.9
+
+
+def test_a_motion_that_the_solver_gives_up_is_planned_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Speeds that no joint can have are what makes it give up every time."""
+    impossible = [2, 3]
+
+    def path_from(*args: Any, **settings: Any) -> JointPath:
+        path = joint_path(*args, **settings)
+        if impossible[0] == 0:
+            return path
+        impossible[0] -= 1
+        return replace(path, speeds=1e3 * path.speeds)
+
+    monkeypatch.setattr("hal.franka.arm.joint_path", path_from)
+    with robot_for("franky") as robot, arm_at(tmp_path, "franky", robot.host) as arm:
+        goal = arm.state().joints + np.array([0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1])
+        arm.move_to_joints(goal, speed=0.5)
+        stood = arm.state().joints
+        assert impossible[0] == 0 and stood == pytest.approx(goal, abs=JOINT_TOLERANCE)
+        impossible[:] = impossible[1:]
+        with pytest.raises(MotionAborted, match="planner failed with error code"):
+            arm.move_to_joints(goal - 0.1, speed=0.5)
+        assert impossible[0] == 0 and arm.state().joints == pytest.approx(stood, abs=JOINT_TOLERANCE)

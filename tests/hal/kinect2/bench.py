@@ -1,0 +1,70 @@
+"""A Kinect that is not there: the fake driver's control file, and a camera that talks to it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hal.camera_calibration import Calibration, write_calibration
+from hal.kinect2 import Kinect2Camera, Kinect2Config
+from mskgrasp.core.geometry import Pose
+
+FAKE = Path(__file__).parent / "fake"
+SERIAL = "000583142247"
+# The optical frame over the table's middle: the image's top is away from the base, z down.
+OVERHEAD = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+
+
+class Bench:
+    """What is plugged in, and what goes wrong.
+
+    Args:
+        folder: For the control file and the calibration.
+        monkeypatch: Sets the driver's environment.
+    """
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch):
+        self._control = folder / "kinect.json"
+        self.calibration = folder / "calibration.yaml"
+        monkeypatch.setenv("FAKE_KINECT2", str(self._control))
+        monkeypatch.setenv("PYTHONPATH", str(FAKE))
+        self.set()
+        self.calibrate()
+
+    def set(self, **values: Any) -> None:
+        """Tells the fake driver what happens from now on."""
+        text = json.dumps({"serials": [SERIAL]} | values)
+        unfinished = self._control.with_suffix(".tmp")
+        unfinished.write_text(text, encoding="utf-8")
+        unfinished.replace(self._control)
+
+    def calibrate(self, serial: str = SERIAL, intrinsics: np.ndarray | None = None) -> None:
+        """Writes the calibration file: 0.8 m over the middle of the usual region."""
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = OVERHEAD, (0.5, 0.0, 0.8)
+        calibration = Calibration(
+            serial=serial,
+            T_base_camera=Pose.from_matrix(matrix),
+            intrinsics=intrinsics,
+            rms_translation_m=0.001,
+            rms_rotation_rad=0.001,
+            n_poses=20,
+            made="2026-10-01T12:00:00",
+        )
+        write_calibration(self.calibration, calibration)
+
+    def camera(self, **settings: Any) -> Kinect2Camera:
+        """A camera, not connected; quiet about warming up, and patient with a busy machine."""
+        values: dict[str, Any] = dict(
+            driver="kinect2",
+            serial=SERIAL,
+            calibration=self.calibration,
+            warm_up_s=0,
+            connect_timeout_s=60,
+            latency_s=0.4,
+        )
+        return Kinect2Camera(Kinect2Config(**(values | settings)))

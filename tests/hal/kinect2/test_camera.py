@@ -1,0 +1,278 @@
+"""What is particular to the Kinect v2: its geometry, its corrections, its faults."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hal.errors import CaptureFailed, CommunicationLost, DriverMissing, NotConnected
+from hal.kinect2 import Kinect2Config
+from mskgrasp.core.config import check_config
+from mskgrasp.core.errors import BadConfig, MskgraspError
+from tests.hal.kinect2.bench import FAKE, SERIAL, Bench
+
+BLOCK = (0.04, 0.10, -0.03, 0.02)
+"""Of fake/pylibfreenect2/scene.py: left, right, top, bottom, m; right of the middle, seen from the camera."""
+BUSY_S = 20.0
+"""A busy machine may take this much longer."""
+
+
+def test_the_image_is_not_mirrored_and_a_pixel_is_where_its_ray_says(bench: Bench):
+    with bench.camera() as camera:
+        frame = camera.capture()
+    rows, columns = np.nonzero(frame.depth < 0.775)
+    z = 0.75
+    left, right = (columns.min() - 0.5, columns.max() + 0.5)
+    top, bottom = (rows.min() - 0.5, rows.max() + 0.5)
+    (fx, _, cx), (_, fy, cy), _ = frame.intrinsics
+    corners = [(left - cx) * z / fx, (right - cx) * z / fx, (top - cy) * z / fy, (bottom - cy) * z / fy]
+    # Nearest-neighbour undistortion and the block's edge within a pixel: 2 mm a pixel, half of it each.
+    assert corners == pytest.approx(BLOCK, abs=2.2e-3)
+    assert np.mean(corners[:2]) == pytest.approx(0.07, abs=1.1e-3)
+    assert cx == pytest.approx(511 - 254.878)
+
+
+def test_depth_is_metres_and_every_kind_of_invalid_is_nan(bench: Bench):
+    with bench.camera(depth_offset=-0.024) as camera:
+        depth = camera.capture().depth
+    for corner in (depth[:20, :20], depth[:20, -20:], depth[-20:, :20], depth[-20:, -20:]):
+        assert np.isnan(corner).all()
+    assert np.nanmax(depth) == pytest.approx(0.8 - 0.024, abs=1e-6)
+    assert np.nanmin(depth) == pytest.approx(0.75 - 0.024, abs=1e-6)
+
+
+def test_colour_is_rgb_registered_to_depth_and_no_view_of_the_drivers_memory(bench: Bench):
+    with bench.camera() as camera:
+        first = camera.capture()
+        kept = first.colour.copy(), first.depth.copy()
+        camera.capture()
+    middle = np.s_[60:-60, 40:-40]  # the colour camera sees less to the top and the bottom
+    assert (first.colour[middle][..., 0] == 200).all()
+    # The fake's colour image tells its column in blue: mirrored with depth, it falls from left to right.
+    blue = first.colour[212, :, 2].astype(int)
+    assert blue[100] > blue[256] + 30 > blue[400] + 60
+    assert np.array_equal(kept[0], first.colour) and np.array_equal(kept[1], first.depth, equal_nan=True)
+
+
+@pytest.mark.parametrize("source", ["factory", "calibration", "config"])
+def test_intrinsics_come_from_the_config_then_the_calibration_then_the_factory(bench: Bench, source: str):
+    measured = np.array([[366.0, 0, 255.5], [0, 366.5, 210.0], [0, 0, 1]])
+    settings: dict[str, Any] = {}
+    if source != "factory":
+        bench.calibrate(intrinsics=measured)
+    if source == "config":
+        settings["intrinsics"] = {
+            SERIAL: dict(fx=360, fy=361, cx=250, cy=200),
+            "other": dict(fx=1, fy=1, cx=1, cy=1),
+        }
+        with pytest.raises(BadConfig, match="intrinsics.other.fx"):
+            check_config(Kinect2Config, dict(driver="kinect2", calibration="c", **settings), "cell")
+        del settings["intrinsics"]["other"]
+    with bench.camera(**settings) as camera:
+        found = camera.capture().intrinsics
+    expected = {"factory": 365.456, "calibration": 366.0, "config": 360.0}[source]
+    assert found[0, 0] == pytest.approx(expected)
+
+
+def test_a_frame_is_exposed_after_it_was_asked_for(bench: Bench):
+    with bench.camera() as camera:
+        time.sleep(0.3)  # a frame waits in the driver meanwhile
+        for _ in range(3):
+            asked = time.monotonic()
+            assert asked <= camera.capture().timestamp_s <= time.monotonic()
+
+
+@pytest.mark.parametrize(
+    ("fault", "error", "message"),
+    [
+        ("stalled", CaptureFailed, "its stream stands still"),
+        ("slow", CaptureFailed, "its stream stands still"),
+        ("frozen", CaptureFailed, "stale"),
+        ("late", CaptureFailed, r"more than 0.4 s late \(latency_s\)"),
+        ("skewed", CaptureFailed, "without colour of the same moment"),
+        ("dark", CaptureFailed, r"measured 0.0% of its depth image.*min_valid"),
+        ("hung", CommunicationLost, "the driver hung and was ended"),
+        ("crash", CommunicationLost, "SIGSEGV"),
+    ],
+)
+def test_a_fault_ends_in_its_error_in_time_and_the_camera_opens_again(
+    bench: Bench, fault: str, error: type[MskgraspError], message: str
+):
+    camera = bench.camera()
+    with camera:
+        bench.set(fault=fault)
+        begun = time.monotonic()
+        with pytest.raises(error, match=message) as caught:
+            camera.capture(1.6)  # a late frame is more than a second under way
+        assert time.monotonic() - begun < 1.6 + 1.0 + BUSY_S  # timeout, grace
+        assert "\n" not in str(caught.value)
+        if error is CommunicationLost:
+            with pytest.raises(CommunicationLost, match="open the cell again"):
+                camera.capture(1.6)
+        bench.set()
+        if error is CaptureFailed:
+            camera.capture()
+    with camera:
+        camera.capture()
+
+
+def test_an_unplugged_camera_is_named_and_works_once_it_is_back(bench: Bench):
+    camera = bench.camera()
+    with camera:
+        bench.set(serials=[])
+        with pytest.raises(CommunicationLost, match=f"{SERIAL} is unplugged"):
+            camera.capture(0.5)
+    bench.set()
+    with camera:
+        camera.capture()
+
+
+@pytest.mark.parametrize(
+    ("world", "settings", "error", "message"),
+    [
+        (dict(serials=[]), {}, NotConnected, "no Kinect v2 found; check its power"),
+        (dict(serials=["1", "2"]), {}, NotConnected, f"{SERIAL} is not connected; connected: 1, 2"),
+        (dict(serials=["1", SERIAL]), dict(serial=None), NotConnected, "set camera.serial to one of: 1,"),
+        (dict(serials=["1"]), dict(serial=None), BadConfig, f"of camera {SERIAL}, not of camera 1"),
+        (dict(held=[SERIAL]), {}, NotConnected, "SIGSEGV.*end other programs that use it"),
+        (dict(start_fails=True), {}, NotConnected, "did not start"),
+        (dict(fault="stalled"), dict(connect_timeout_s=0.5), CaptureFailed, "no frame within 0.5 s"),
+        ({}, dict(serial="1"), BadConfig, f"calibration of camera {SERIAL}, not of camera 1"),
+        ({}, dict(calibration="nowhere.yaml"), BadConfig, "no calibration file nowhere.yaml"),
+        ({}, dict(pipeline="opengl"), MskgraspError, "built without OpenGLPacketPipeline"),
+    ],
+)
+def test_a_camera_that_cannot_be_used_is_refused_in_one_line(
+    bench: Bench, world: dict[str, Any], settings: dict[str, Any], error: type[Exception], message: str
+):
+    bench.set(**world)
+    camera = bench.camera(**settings)
+    with pytest.raises(error, match=message) as caught:
+        camera.connect()
+    assert "\n" not in str(caught.value)
+    with pytest.raises(NotConnected):
+        camera.capture()
+
+
+def test_without_the_driver_the_extra_is_named(bench: Bench, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.delenv("PYTHONPATH")
+    with pytest.raises(DriverMissing, match=r"mskgrasp\[kinect2\]"):
+        bench.camera().connect()
+
+
+def test_importing_hal_imports_no_driver():
+    code = "import hal, hal.kinect2, sys; assert 'pylibfreenect2' not in sys.modules"
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": str(FAKE)}, capture_output=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_driver_that_does_not_stop_is_ended(bench: Bench):
+    camera = bench.camera()
+    camera.connect()
+    bench.set(fault="refused")
+    begun = time.monotonic()
+    camera.close()
+    camera.close()
+    assert time.monotonic() - begun < 3 + BUSY_S
+
+
+def test_a_killed_driver_is_reported_and_the_program_lives(bench: Bench):
+    with bench.camera() as camera:
+        link = camera._link
+        assert link is not None
+        os.kill(link._process.pid, signal.SIGKILL)
+        with pytest.raises(CommunicationLost, match="SIGKILL"):
+            camera.capture()
+
+
+def test_a_program_that_dies_leaves_no_driver_behind(bench: Bench):
+    code = (
+        "import os\nfrom pathlib import Path\nfrom hal.kinect2 import Kinect2Camera, Kinect2Config\n"
+        f"config = Kinect2Config(driver='kinect2', calibration=Path({str(bench.calibration)!r}))\n"
+        "camera = Kinect2Camera(config)\ncamera.connect()\n"
+        "print(camera._link._process.pid, flush=True)\nos.kill(os.getpid(), 9)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    wait_for_end(int(done.stdout))
+
+
+def test_a_program_that_dies_while_the_driver_hangs_leaves_none_behind(bench: Bench):
+    with bench.camera() as camera:
+        link = camera._link
+        assert link is not None
+        bench.set(fault="hung")
+        request = dict(op="capture", timeout_s=0.5, alarm_s=1)
+        assert link._process.stdin is not None
+        link._process.stdin.write(json.dumps(request).encode() + b"\n")
+        link._process.stdin.flush()  # and nobody waits for an answer
+        assert link._process.wait(1 + BUSY_S) == -signal.SIGALRM
+
+
+def test_after_ctrl_c_no_frame_from_before_it_is_delivered(bench: Bench, monkeypatch: pytest.MonkeyPatch):
+    camera = bench.camera()
+    with camera:
+        link = camera._link
+        assert link is not None
+
+        def interrupt(_: float) -> bytes:
+            raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch:
+            patch.setattr(link, "_read", interrupt)
+            with pytest.raises(KeyboardInterrupt):
+                camera.capture()
+        time.sleep(0.1)
+        with pytest.raises(CommunicationLost, match="open the cell again"):
+            camera.capture()
+    with camera:
+        asked = time.monotonic()
+        assert camera.capture().timestamp_s >= asked
+
+
+def wait_for_end(pid: int) -> None:
+    deadline = time.monotonic() + BUSY_S
+    while time.monotonic() < deadline:
+        try:
+            status = Path(f"/proc/{pid}/stat").read_text()
+        except OSError:
+            return
+        if status.rpartition(")")[2].split()[0] == "Z":
+            return  # ended; a container's first process may never ask how
+        time.sleep(0.05)
+    pytest.fail("the driver's process is still there")
+
+
+def test_two_threads_get_a_frame_each(bench: Bench):
+    frames = []
+    with bench.camera() as camera:
+        threads = [threading.Thread(target=lambda: frames.append(camera.capture())) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert len(frames) == 2 and frames[0].timestamp_s != frames[1].timestamp_s
+
+
+def test_a_cold_camera_says_that_its_depth_drifts(bench: Bench, caplog: pytest.LogCaptureFixture):
+    with caplog.at_level(logging.WARNING), bench.camera(warm_up_s=1200):
+        pass
+    assert "drifts by millimetres for the first 20 minutes" in caplog.text
+
+
+def test_a_serial_without_quotes_is_explained():
+    with pytest.raises(BadConfig, match="must be in quotes"):
+        check_config(Kinect2Config, dict(driver="kinect2", serial=12345, calibration="c.yaml"), "cell.yaml")

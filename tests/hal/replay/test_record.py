@@ -1,0 +1,118 @@
+"""The program hal.record, over a recording of a toy cell: no simulator, no hardware."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import time
+from pathlib import Path
+
+import h5py
+import pytest
+
+from hal.record import main
+from hal.replay import read_recording, recorded_cell
+from tests.hal.replay.toy import toy_cell
+from tests.programs import Ended, run_here, running
+
+TIMEOUT_S = 120.0
+
+
+@pytest.fixture
+def cell_file(tmp_path: Path) -> Path:
+    """A cell file whose camera and arm answer without anything behind them."""
+    with recorded_cell(toy_cell(), tmp_path / "toy.h5").connected() as cell:
+        for _ in range(3):
+            cell.arm.state()
+            cell.camera.capture()
+    path = tmp_path / "cell.yaml"
+    path.write_text(f"type: replay\nrecording: {tmp_path / 'toy.h5'}\n")
+    return path
+
+
+def record(*arguments: str) -> Ended:
+    return run_here(main, *arguments)
+
+
+def test_frames_of_any_cell_are_written_with_the_arms_state(cell_file: Path, tmp_path: Path):
+    out = tmp_path / "new" / "frames.h5"
+    done = record("--cell", str(cell_file), "--out", str(out), "--frames", "3", "--interval", "0")
+    assert done.returncode == 0, done.stderr
+    assert f"wrote {out}: 3 frames, 0 commands to the arm, 6 calls in all" in done.stdout
+    assert [event.call for event in read_recording(out).events] == ["state", "capture"] * 3
+
+
+def test_a_program_runs_on_the_recorded_cell_and_its_faults_are_kept(cell_file: Path, tmp_path: Path):
+    out = tmp_path / "run.h5"
+    inner = f"hal.record --out {tmp_path / 'inner.h5'} --frames 4 --interval 0"
+    with running("hal.record", "--cell", str(cell_file), "--out", str(out), "--run", inner) as program:
+        _, printed = program.communicate(timeout=TIMEOUT_S)
+    assert program.returncode == 1 and "ends after 3 commands; the program asks for capture()" in printed
+    recording = read_recording(out)
+    assert recording.n_frames == 3
+    assert recording.events[-1].error is not None and recording.events[-1].error[0] == "NotRecorded"
+
+
+def test_ctrl_c_keeps_the_frames(cell_file: Path, tmp_path: Path):
+    out = tmp_path / "frames.h5"
+    arguments = ["--cell", str(cell_file), "--out", str(out), "--interval", "3600"]
+    with running("hal.record", *arguments) as program:
+        wait_for_frame(tmp_path / "frames.h5.part")
+        program.send_signal(signal.SIGINT)
+        _, printed = program.communicate(timeout=TIMEOUT_S)
+    assert program.returncode == 130 and "Ctrl-C" in printed and "Traceback" not in printed
+    assert read_recording(out).n_frames == 1
+
+
+def test_a_program_that_did_not_hear_ctrl_c_is_told(cell_file: Path, tmp_path: Path):
+    """A terminal sends Ctrl-C to both, `kill` to one alone."""
+    out, inner = tmp_path / "run.h5", tmp_path / "inner.h5"
+    arguments = ["--cell", str(cell_file), "--out", str(out)]
+    with running("hal.record", *arguments, "--run", f"hal.record --out {inner} --interval 3600") as program:
+        wait_for_frame(tmp_path / "inner.h5.part")
+        program.send_signal(signal.SIGINT)
+        _, printed = program.communicate(timeout=TIMEOUT_S)
+    assert program.returncode == 130 and "Traceback" not in printed
+    assert read_recording(out).n_frames == read_recording(inner).n_frames == 1
+
+
+def test_what_a_killed_program_left_is_not_written_over(cell_file: Path, tmp_path: Path):
+    left = tmp_path / "frames.h5.part"
+    left.write_bytes(b"precious")
+    done = record("--cell", str(cell_file), "--out", str(tmp_path / "frames.h5"))
+    assert done.returncode == 2 and "frames.h5.part is there" in done.stderr
+    assert left.read_bytes() == b"precious"
+
+
+def wait_for_frame(recording: Path) -> None:
+    """Returns when a frame is in it: then the program waits for the time of the next."""
+    deadline = time.monotonic() + TIMEOUT_S
+    while time.monotonic() < deadline:
+        # It is locked and still being written; after each call it is whole.
+        with contextlib.suppress(OSError, KeyError), h5py.File(recording, "r", locking=False) as file:
+            if len(file["frames/depth"]) > 0:
+                return
+        time.sleep(0.1)
+    pytest.fail(f"no frame in {recording}")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["--frames", "0"], 2, "greater than or equal to 1"),
+        (["--run", "rm -r x"], 2, "begin with a program of this project"),
+        (["--run", "mskgrasp.plan --cell a.yaml"], 2, "leave --cell away"),
+        (["--cell", "none.yaml"], 2, "none.yaml"),
+        (["--out", "{cell}"], 2, "exists already"),
+        (["--out", "/proc/x.h5"], 2, "choose another file"),
+    ],
+)
+def test_wrong_input_is_one_line(
+    cell_file: Path, tmp_path: Path, arguments: list[str], code: int, message: str
+):
+    given = {"--cell": str(cell_file), "--out": str(tmp_path / "out.h5"), "--interval": "0"}
+    given |= dict(zip(arguments[::2], (a.format(cell=cell_file) for a in arguments[1::2]), strict=True))
+    done = record(*(word for pair in given.items() for word in pair))
+    assert done.returncode == code, done.stderr
+    assert message in done.stderr and len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out.h5").exists()

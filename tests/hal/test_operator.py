@@ -1,0 +1,94 @@
+"""The operator at a terminal: nothing moves unless they say so, and they may go at any time."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from hal import cell_from_yaml
+from hal.operator import Operator, StoppedByOperator
+from mskgrasp.core.errors import UsageError
+
+REAL = {
+    "type": "devices",
+    "arm": {"driver": "panda_py", "host": "127.0.0.250"},
+    "camera": {"driver": "sapien"},
+    "workspace": {"table_z": 0.0},
+}
+SIMULATED = Path(__file__).parents[2] / "configs" / "cells" / "sapien.yaml"
+
+
+@pytest.fixture
+def real(tmp_path: Path) -> Path:
+    path = tmp_path / "cell.yaml"
+    path.write_text(yaml.safe_dump(REAL))
+    return path
+
+
+def operator(real: Path, answers: str) -> tuple[Operator, io.StringIO]:
+    prompts = io.StringIO()
+    return Operator(cell_from_yaml(real), answers=io.StringIO(answers), prompts=prompts), prompts
+
+
+def test_the_arm_moves_only_after_a_yes(real):
+    asked, prompts = operator(real, "\nperhaps\nn\nYES\n")
+    assert not asked.may_move(Path("out/next.png"), "grasp at x 0.5")
+    assert asked.may_move(Path("out/next.png"), "grasp at x 0.5")
+    text = prompts.getvalue()
+    assert text.count("May the arm move?") == 4
+    assert "'perhaps' is no answer" in text and "picture: out/next.png" in text
+
+
+@pytest.mark.parametrize(
+    ("answers", "why"), [("q\n", "stopped by the operator"), ("", "standard input ended")]
+)
+def test_whoever_goes_stops_the_run(real, answers, why):
+    asked, _ = operator(real, answers)
+    with pytest.raises(StoppedByOperator, match=why):
+        asked.may_move(Path("a.png"), "")
+
+
+def test_the_arm_is_recovered_only_when_its_way_is_clear(real):
+    cell = cell_from_yaml(real)
+    recovered: list[bool] = []
+    cell.arm.recover = lambda: recovered.append(True)  # type: ignore[method-assign]
+    asked, prompts = operator(real, "q\n")
+    with pytest.raises(StoppedByOperator):
+        asked.recover(cell, "contact force over 20 N")
+    assert not recovered and "contact force over 20 N" in prompts.getvalue()
+    asked, _ = operator(real, "\n")
+    asked.recover(cell, "contact")
+    assert recovered == [True]
+
+
+def test_a_real_arm_needs_a_terminal_or_a_yes(real, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO("y\n" * 10))
+    with pytest.raises(UsageError, match="standard input is no terminal.*--yes"):
+        Operator(cell_from_yaml(real))
+    assert not Operator(cell_from_yaml(real), yes=True).asks
+    assert not Operator(cell_from_yaml(SIMULATED)).asks
+
+
+def test_it_is_asked_in_a_terminal(real):
+    code = (
+        "import sys; from pathlib import Path; from hal import cell_from_yaml\n"
+        "from hal.operator import Operator\n"
+        "print(Operator(cell_from_yaml(Path(sys.argv[1]))).may_move(Path('a.png'), 'a grasp'))"
+    )
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, str(real)], stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    os.close(theirs)
+    os.write(ours, b"y\n")
+    out, err = process.communicate(timeout=60)
+    os.close(ours)
+    assert out == b"True\n", err
+    assert b"May the arm move? y: yes" in err

@@ -1,0 +1,176 @@
+"""Palletizing as a program, in the simulated cell with the small trained model."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import yaml
+
+from hal import Cell, GraspResult, execute_grasp
+from hal.errors import CommunicationLost
+from hal.operator import Operator, StoppedByOperator
+from hal.sim import SapienCellConfig, sapien_cell
+from mskgrasp.core.errors import BadModel, UsageError
+from mskgrasp.core.settings import Tape
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.palletize.placer import Placer, Task
+from mskgrasp.palletize.run import PalletizeConfig, main, palletize
+from mskgrasp.palletize.slots import Slot
+from mskgrasp.planning.for_cell import make_planner
+from mskgrasp.planning.planner import PlannerConfig
+from tests.browser import Page
+from tests.hal.test_operator import REAL
+
+REPOSITORY = Path(__file__).parents[2]
+PART = "t_nut_m16x18"
+TAPED = "u_bracket_60x35"
+"""Has room for two squares of tape."""
+
+
+@pytest.fixture(autouse=True)
+def threads() -> Iterator[None]:
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)  # the program takes one
+
+
+def config(out: Path, **changes: object) -> PalletizeConfig:
+    values: dict[str, object] = dict(
+        models=PRETRAINED, out=out, parts=(PART,), trials=1, corrections=("none", "truth"),
+        planner=PlannerConfig(n_candidates=400),
+    )  # fmt: skip
+    return PalletizeConfig(**(values | changes))  # type: ignore[arg-type]
+
+
+def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "run"
+    grasped: list[np.ndarray] = []
+
+    def pulled_cable(cell: Cell, grasp: np.ndarray) -> GraspResult:
+        if grasped:
+            raise CommunicationLost("no answer from the arm")
+        grasped.append(grasp)
+        return execute_grasp(cell, grasp)
+
+    with monkeypatch.context() as patch, pytest.raises(CommunicationLost):
+        patch.setattr("mskgrasp.palletize.placer.execute_grasp", pulled_cable)
+        palletize(config(out))
+    kept = (out / "trials.jsonl").read_text()
+    assert len(kept.splitlines()) == 1
+
+    command = ["palletize", "--models", str(PRETRAINED), "--out", str(out), "--parts", PART, "--trials", "1"]
+    command += ["--corrections", "none", "truth", "--planner.n-candidates", "400"]
+    monkeypatch.setattr("sys.argv", command)
+    assert main() == 0
+    assert "Corrected by the truth" in capsys.readouterr().out
+    first = (out / "trials.jsonl").read_text()
+    assert first.startswith(kept)
+    lines = [json.loads(line) for line in first.splitlines()]
+    assert [line["correction"] for line in lines] == ["none", "truth"]
+    assert all(line["placed"] for line in lines)
+    assert lines[0]["grasp"] == lines[1]["grasp"]
+    # The same grasp moves the part the same way: what differs is where the hand went.
+    np.testing.assert_allclose(lines[0]["measured"], lines[1]["measured"], atol=1e-6)
+    none, truth = (line["translation_error"] for line in lines)
+    shift = float(np.hypot(*lines[0]["measured"][:2]))
+    assert none == pytest.approx(shift, abs=1.5e-3) and truth < 1.5e-3
+
+    # A line lost, as by a kill, is made again to the same values.
+    (out / "trials.jsonl").write_text("\n".join(first.splitlines()[:1]) + '\n{"part": "t_nu')
+    report = palletize(config(out))
+    assert [json.loads(line) for line in (out / "trials.jsonl").read_text().splitlines()] == lines
+    assert report["corrections"]["truth"]["placed"] == 1
+
+    with pytest.raises(UsageError, match="other inputs.*seed differ"):
+        palletize(config(out, seed=1))
+
+    with Page(out / "report.html") as page:
+        widths = page.evaluate("[...document.images].map(i => i.complete ? i.naturalWidth : 0)")
+        assert len(widths) == 4 and min(widths) > 400
+        assert page.complaints == []
+        assert PART in page.evaluate("document.body.textContent")
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        (dict(target="0.9,0,0"), UsageError, r"the target at \(0.9, 0\) m .*outside the workspace"),
+        (dict(parts=("no_such_part",)), UsageError, "no_such_part"),
+        (dict(models=Path("no/model")), BadModel, "no/model"),
+        (dict(slots="small.yaml"), UsageError, rf"slot of 20 x 30 mm is smaller than {PART} \(28 x 28 mm\)"),
+        (dict(slots="none.yaml"), UsageError, "cannot read configuration .*none.yaml"),
+        (dict(cell="real.yaml"), UsageError, "standard input is no terminal"),
+        (dict(cell="real.yaml", yes=True, workers=2), UsageError, "--workers 2: .* is one cell"),
+        (dict(cell="real.yaml", yes=True, corrections=("truth",)), UsageError, "nothing .* tracks the part"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_done_is_refused_before_anything_moves(tmp_path, monkeypatch, changes, error, message):
+    (tmp_path / "small.yaml").write_text("slots: [{x: 0.5, y: 0.2, size: [0.02, 0.03]}]")
+    (tmp_path / "real.yaml").write_text(yaml.safe_dump(REAL))
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    files = {name: tmp_path / value for name, value in changes.items() if name in ("slots", "cell")}
+    with pytest.raises(error, match=message) as caught:
+        palletize(config(tmp_path / "out", **(changes | files)))
+    assert "\n" not in str(caught.value) and not (tmp_path / "out").exists()
+
+
+def test_a_target_that_is_none_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="target must be x,y,theta"):
+        config(tmp_path, target="0.5;0.1;90")
+
+
+class Hands:
+    """An operator's hands and answers: lays the part when told to, then answers the questions."""
+
+    def __init__(self, lay, answers: str):
+        self._lay = lay
+        self._answers = iter(answers)
+
+    def readline(self) -> str:
+        answer = next(self._answers, "")
+        if answer == "\n":
+            self._lay()
+        return answer if answer in ("", "\n") else answer + "\n"
+
+
+def test_a_cell_without_feeder_and_tracker_is_served_by_its_operator_and_measured_by_tape(
+    tmp_path, monkeypatch
+):
+    """As on a real cell: asked before every motion, the error told by two squares of tape."""
+    tape = Tape(large=0.012, small=0.008)
+    whole = sapien_cell(SapienCellConfig(type="sapien", part=TAPED, tape=tape, colour_scale=3))
+    monkeypatch.setattr(type(whole.arm), "simulated", False)
+    cell = dataclasses.replace(whole, feeder=None, tracker=None)
+    assert whole.feeder is not None and whole.tracker is not None
+    feeder, tracker, prompts = whole.feeder, whole.tracker, io.StringIO()
+    hands = Hands(lambda: feeder.present(TAPED, 5), "\nn\ny\nyq")
+    operator = Operator(cell, answers=hands, prompts=prompts)  # type: ignore[arg-type]
+    task = Task(
+        part=TAPED, number=0, index=0, slot=Slot(x=0.52, y=0.05, theta=1.0), correction="predicted", seed=5,
+        keep=False,
+    )  # fmt: skip
+    (tmp_path / "placements").mkdir()
+    with cell.connected():
+        planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=100), cell)
+        placer = Placer(cell, planner, operator, tmp_path / "placements", tape=tape)
+        placed = placer.run(task)
+        true = tracker.part_pose()
+        bare = Placer(cell, planner, operator, tmp_path / "placements")
+        unknown = bare.run(task)
+        with pytest.raises(StoppedByOperator):
+            bare.run(task)
+    assert prompts.getvalue().count("Shake the part") == 4  # again after the n
+    assert prompts.getvalue().count("May the arm move?") == 3
+    assert (tmp_path / "next.png").exists()
+    assert placed.placed and placed.measured is None and placed.unmeasured == ""
+    # The origin is not the seen centre, but no farther from it than some millimetres.
+    assert placed.translation_error is not None
+    assert np.hypot(*(true.position[:2] - [0.52, 0.05])) == pytest.approx(placed.translation_error, abs=4e-3)
+    assert unknown.placed and unknown.translation_error is None and "--tape" in unknown.unmeasured

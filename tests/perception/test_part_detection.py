@@ -1,0 +1,194 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from hal.sim.noise import SensorNoise, add_noise
+from mskgrasp.core.errors import NoPartFound
+from mskgrasp.perception.part_detection import view_part
+from mskgrasp.planning.scoring import Scene
+from tests import synthetic
+from tests.synthetic import INTRINSICS, OVERHEAD, REGION, TABLE_Z, TILTED, Box, render
+
+PIXEL = 0.8 / 365.5  # metres that a pixel covers on the table
+
+
+@pytest.mark.parametrize("yaw", [0.0, np.pi / 2])
+def test_a_boxs_view_is_within_a_pixel_and_unbiased(yaw):
+    rng = np.random.default_rng(0)
+    centres, sizes = [], []
+    for _ in range(120):
+        size = tuple(rng.uniform([0.02, 0.01, 0.01], [0.1, 0.05, 0.05]))
+        box = Box(x=float(rng.uniform(0.37, 0.54)), y=float(rng.uniform(-0.085, 0.085)), yaw=yaw, size=size)
+        view = synthetic.view(render([box]))
+        along = np.array(size[:2]) if yaw else np.array(size[1::-1])  # image x runs along base -y
+        centres.append((view.centre_base - box.T_base_obj.position) / PIXEL)
+        sizes.append((view.size[:2] - along) / PIXEL)
+        assert view.size[2] == pytest.approx(size[2], abs=1e-5)
+    centres, sizes = np.array(centres), np.array(sizes)
+    assert np.abs(sizes).max() <= 1.0
+    # Half a pixel is what sampling an edge leaves open; on average a third is kept, and nothing is biased.
+    assert np.sqrt((centres**2).mean(axis=0)).max() < 1 / 3
+    assert np.abs(centres).max() < 0.55
+    assert np.abs(centres.mean(axis=0)).max() < 0.06
+
+
+def test_a_tilted_camera_sees_the_same_box():
+    box = Box(x=0.46, y=0.01, yaw=0.0, size=(0.06, 0.03, 0.03))
+    view = view_part(render([box], TILTED), INTRINSICS, TILTED, table_z=0.0, region=REGION)
+    assert np.abs(view.centre_base - box.T_base_obj.position).max() < 1.5 * PIXEL
+    assert np.abs(view.size - [0.03, 0.06, 0.03]).max() < 2 * PIXEL
+
+
+def test_the_box_frame_lies_along_the_images_axes_with_z_up():
+    view = synthetic.view(render([Box(x=0.46, y=0.0, yaw=0.0, size=(0.08, 0.02, 0.03))]))
+    assert np.allclose(view.T_base_box.as_matrix()[:3, 0], [0, -1, 0], atol=1e-9)
+    assert np.allclose(view.T_base_box.as_matrix()[:3, 2], [0, 0, 1])
+    assert view.size[1] > 3 * view.size[0]
+
+
+def test_the_radius_of_gyration_is_that_of_a_rectangle():
+    length, width = 0.08, 0.05
+    view = synthetic.view(render([Box(x=0.455, y=0.0, yaw=0.4, size=(length, width, 0.004))]))
+    assert view.gyration_radius == pytest.approx(np.sqrt((length**2 + width**2) / 12), rel=0.03)
+
+
+def test_specks_flying_pixels_and_holes_do_not_move_the_view():
+    box = Box(x=0.455, y=0.0, yaw=0.2, size=(0.06, 0.03, 0.03))
+    depth = render([box])
+    clean = synthetic.view(depth)
+    depth[30, 40], depth[31, 41] = 0.7, np.nan  # a speck on the table
+    depth[80, 80] = 0.6  # a flying pixel on the part
+    depth[78:80, 78:80] = np.nan
+    spoilt = synthetic.view(depth)
+    assert np.allclose(spoilt.centre_base, clean.centre_base, atol=1e-4)
+    assert np.allclose(spoilt.size, clean.size, atol=1e-4)
+
+
+def test_what_stands_outside_the_region_is_not_the_part():
+    part = Box(x=0.455, y=0.0, yaw=0.0, size=(0.03, 0.03, 0.02))
+    wall = Box(x=0.455, y=0.19, yaw=0.0, size=(0.3, 0.02, 0.05))
+    view = synthetic.view(render([part, wall]))
+    assert np.abs(view.centre_base - part.T_base_obj.position).max() < PIXEL
+
+
+@pytest.mark.parametrize(
+    ("depth", "words"),
+    [
+        (render([]), "nothing rises"),
+        (np.full((160, 160), np.nan, np.float32), "no valid pixel"),
+        (render([]) * 1000, "millimetres"),
+        ((render([]) * 1000).astype(np.uint16), "millimetres"),
+        (render([]) + np.linspace(-0.015, 0.015, 160, dtype=np.float32), "the table is tilted"),
+        (render([Box(x=0.6, y=0.0, yaw=0.0, size=(0.04, 0.04, 0.03))]), "outside the region"),
+    ],
+)
+def test_an_image_without_a_part_is_told_in_one_line(depth, words):
+    with pytest.raises(NoPartFound, match=words) as caught:
+        synthetic.view(depth)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("nothing", [np.nan, np.inf, -np.inf])
+def test_pixels_without_a_depth_are_left_out(nothing):
+    depth = render([Box(x=0.5, y=0.0, yaw=0.0, size=(0.04, 0.03, 0.02))])
+    partly = depth.copy()
+    partly[:35], partly[-35:] = nothing, nothing  # 44 % of the pixels
+    assert synthetic.view(partly).size == pytest.approx(synthetic.view(depth).size)
+
+
+def noisy_view(depth, model, seed, min_height=0.003):
+    noisy = add_noise(depth, INTRINSICS, SensorNoise(model=model), np.random.default_rng(seed))
+    return view_part(
+        noisy, INTRINSICS, OVERHEAD, table_z=TABLE_Z, region=REGION, min_height=min_height, alone=True
+    )
+
+
+@pytest.mark.parametrize("model", ["iid", "kinect2"])
+def test_a_flat_part_is_seen_through_noise(model):
+    """Of 5 mm, where noise deviates by 3 mm, or a kinect2 measures 2 mm too far everywhere."""
+    errors = []
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        x, y, yaw = (float(v) for v in rng.uniform([0.42, -0.05, -1.5], [0.5, 0.05, 1.5]))
+        depth = render([Box(x=x, y=y, yaw=yaw, size=(0.06, 0.04, 0.005))])
+        view, clean = noisy_view(depth, model, seed), synthetic.view(depth)
+        errors.append([*(view.centre_base - clean.centre_base)[:2], *(view.size - clean.size)[:2]])
+    # A speck of noise beside the part counts to it.
+    assert np.abs(errors).max() < 0.012
+    assert np.median(np.abs(errors)) < 0.003
+
+
+@pytest.mark.parametrize("model", ["iid", "kinect2"])
+def test_a_narrow_part_is_one_part_through_noise(model):
+    """A pin of 7 mm: three pixels wide."""
+    for seed in range(30):
+        yaw = float(np.random.default_rng(seed).uniform(-1.5, 1.5))
+        depth = render([Box(x=0.455, y=0.0, yaw=yaw, size=(0.065, 0.007, 0.007))])
+        assert np.abs(noisy_view(depth, model, seed).centre_base - [0.455, 0.0, 0.0])[:2].max() < 0.01
+
+
+@pytest.mark.parametrize("model", ["iid", "kinect2"])
+def test_an_empty_table_stays_empty_whatever_the_noise(model):
+    for seed in range(30):
+        with pytest.raises(NoPartFound):
+            noisy_view(render([]), model, seed)
+
+
+def test_noise_does_not_raise_the_top():
+    depth = render([Box(x=0.455, y=0.0, yaw=0.4, size=(0.06, 0.04, 0.03))])
+    tops = [noisy_view(depth, "iid", seed).size[2] for seed in range(30)]
+    assert np.abs(np.mean(tops) - 0.03) < 0.002 and np.std(tops) < 0.001
+
+
+FIND = {"table_z": TABLE_Z, "region": REGION, "min_height": 0.003}
+
+
+def noisy(depth, deviation=0.001, seed=0):
+    return depth + np.random.default_rng(seed).normal(0.0, deviation, depth.shape).astype(np.float32)
+
+
+@pytest.mark.parametrize("offset", [-0.0025, -0.001, 0.001, 0.0025])
+@pytest.mark.parametrize("size", [(0.06, 0.04, 0.005), (0.06, 0.007, 0.007), (0.06, 0.04, 0.03)])
+def test_heights_count_from_the_table_that_a_noisy_camera_sees(offset, size):
+    """Measured 2.5 mm too far, a part of 5 mm rises 2.5 mm over where the table is said to be."""
+    depth = render([Box(x=0.455, y=0.0, yaw=0.0, size=size)])
+    view = view_part(noisy(depth - np.float32(offset)), INTRINSICS, OVERHEAD, **FIND)
+    assert view.table_offset == pytest.approx(offset, abs=2e-4)
+    assert view.size == pytest.approx(synthetic.view(depth).size, abs=0.005)
+    assert view.size[2] == pytest.approx(size[2], abs=0.0015)
+    seen = replace(synthetic.frame([]), depth=noisy(depth - np.float32(offset)))
+    scene = Scene.of(seen, view, TABLE_Z, torch.device("cpu"))
+    assert abs(float(scene.heights.median())) < 3e-4
+
+
+@pytest.mark.parametrize("offset", [-0.005, 0.005])
+def test_a_table_that_is_seen_far_from_where_it_is_said_to_be_is_an_error(offset):
+    depth = render([Box(x=0.455, y=0.0, yaw=0.4, size=(0.06, 0.04, 0.02))]) - np.float32(offset)
+    with pytest.raises(NoPartFound, match=r"the table is seen .5\.. mm from table_z"):
+        view_part(noisy(depth), INTRINSICS, OVERHEAD, **FIND)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_holes_in_a_noisy_image_are_not_table(share):
+    depth = render([Box(x=0.455, y=0.0, yaw=0.4, size=(0.06, 0.04, 0.012))])
+    clean = synthetic.view(depth)
+    holes = noisy(depth, 0.0015)
+    holes[np.random.default_rng(1).random(depth.shape) < share] = np.nan
+    view = view_part(holes, INTRINSICS, OVERHEAD, **FIND)
+    assert view.size == pytest.approx(clean.size, abs=0.006)
+    assert view.centre_base == pytest.approx(clean.centre_base, abs=0.003)
+
+
+def test_more_noise_than_the_least_height_shows_no_parts_that_are_not_there():
+    for seed in range(30):
+        with pytest.raises(NoPartFound):
+            view_part(noisy(render([]), 0.006, seed), INTRINSICS, OVERHEAD, **FIND)
+
+
+def test_depth_in_steps_of_a_tenth_of_a_millimetre_is_exact_for_a_tilted_camera_too():
+    depth = render([Box(x=0.46, y=0.01, yaw=0.3, size=(0.06, 0.03, 0.0025))], TILTED)
+    stepped = (depth * 1e4).round().astype(np.float32) * np.float32(1e-4)
+    view = view_part(stepped, INTRINSICS, TILTED, table_z=0.0, region=REGION)
+    assert view.table_offset == 0.0 and view.size[2] == pytest.approx(0.0025, abs=2e-4)

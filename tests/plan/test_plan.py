@@ -1,0 +1,31 @@
+"""What the planning program takes as a part."""
+
+from __future__ import annotations
+
+import pytest
+import trimesh
+
+from mskgrasp.core.errors import BadPart
+from mskgrasp.parts import find_part
+from mskgrasp.planning.for_cell import part_name
+
+
+def test_a_cad_file_is_made_a_part(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    file = tmp_path / "My Bracket.stl"
+    trimesh.creation.box((4, 2, 1.5)).export(file)
+    name = part_name(str(file))
+    assert find_part(name).longest_axis == pytest.approx(0.004)
+    assert part_name(str(file), "in") == name and find_part(name).longest_axis == pytest.approx(0.004 * 25.4)
+
+
+def test_names_and_folders_stay_what_they_are(tmp_path):
+    assert part_name("hex_nut_m30") == "hex_nut_m30"
+    assert part_name(str(tmp_path)) == str(tmp_path)
+
+
+def test_a_file_that_is_no_cad_is_told(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "part.stl").write_text("a letter")
+    with pytest.raises(BadPart, match="part.stl"):
+        part_name(str(tmp_path / "part.stl"))

@@ -1,0 +1,82 @@
+"""The hand is sent where the part in it, as it moved, lands on its target."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mskgrasp.core.geometry import Pose, quat_about_z, wrap_angle
+from mskgrasp.core.grasp import centre_in_grasp_frame, lowest_grasp_z, pose_base_grasp
+from mskgrasp.planning.placing import Target, displacement_of_point, place_error, place_pose
+
+near = st.floats(-0.04, 0.04)
+angle = st.floats(-3.0, 3.0)
+
+
+def moved_in_hand(grasp: np.ndarray, part: Pose, displacement: np.ndarray) -> Pose:
+    """The part in the hand, as a pose in the grasp frame, after (dx, dy, dz, dtheta)."""
+    held = pose_base_grasp(grasp).inverse() @ part
+    turn = Pose(position=np.zeros(3), quat_wxyz=quat_about_z(np.asarray(displacement[3])))
+    turned = turn @ Pose(position=np.zeros(3), quat_wxyz=held.quat_wxyz)
+    return Pose(position=held.position + displacement[:3], quat_wxyz=turned.quat_wxyz)
+
+
+@settings(deadline=None)  # a busy machine
+@given(near, near, angle, near, near, st.floats(-1.0, 1.0), near, near, angle)
+def test_a_part_whose_displacement_is_known_lands_on_its_target(dx, dy, yaw, cx, cy, dtheta, tx, ty, turn):
+    part = Pose(position=np.array([0.5 + cx, cy, 0.02]), quat_wxyz=quat_about_z(np.asarray(yaw)))
+    grasp = np.array([0.5, 0.0, 0.03, 0.4])
+    displacement = np.array([dx, dy, 0.001, dtheta])
+    target = Target(x=0.55 + tx, y=ty, theta=turn)
+    pose = place_pose(grasp, displacement, part.position, target, 0.0)
+    placed = pose_base_grasp(pose) @ moved_in_hand(grasp, part, displacement)
+    missed, off = place_error(part, placed, np.zeros(2), target)
+    assert missed < 1e-9 and off < 1e-7
+
+
+def test_without_correction_the_part_misses_by_its_displacement():
+    part = Pose(position=np.array([0.5, 0.0, 0.02]), quat_wxyz=np.array([1.0, 0, 0, 0]))
+    grasp, displacement = np.array([0.51, 0.0, 0.03, 0.0]), np.array([0.003, 0.004, 0.0, 0.1])
+    target = Target(x=0.6, y=0.1, theta=np.pi / 2)
+    pose = place_pose(grasp, np.zeros(4), part.position, target, 0.0)
+    placed = pose_base_grasp(pose) @ moved_in_hand(grasp, part, displacement)
+    missed, off = place_error(part, placed, np.zeros(2), target)
+    assert missed == pytest.approx(0.005) and off == pytest.approx(0.1)
+
+
+@settings(deadline=None)  # a busy machine
+@given(near, near, near, near, st.floats(-1.0, 1.0))
+def test_points_of_a_part_move_with_it(px, py, dx, dy, dtheta):
+    origin, point = np.array([0.01, -0.02, 0.0]), np.array([px, py, 0.0])
+    displacement = np.array([dx, dy, 0.0, dtheta])
+    moved = displacement_of_point(displacement, origin, point)
+    cos, sin = np.cos(dtheta), np.sin(dtheta)
+    away = point - origin
+    expected = origin + displacement[:3] + [cos * away[0] - sin * away[1], sin * away[0] + cos * away[1], 0]
+    np.testing.assert_allclose(point + moved[:3], expected, atol=1e-12)
+    assert moved[3] == dtheta
+
+
+def test_the_seen_centre_counts_where_it_is_not_the_origin():
+    part = Pose(position=np.array([0.5, 0.0, 0.02]), quat_wxyz=quat_about_z(np.asarray(0.7)))
+    offset = np.array([0.004, -0.002])
+    centre = part.position + np.append(offset, 0.0)
+    grasp, displacement = np.array([0.49, 0.01, 0.03, -0.3]), np.array([0.002, -0.001, 0.0, 0.2])
+    target = Target(x=0.58, y=-0.05, theta=1.0)
+    of_centre = displacement_of_point(
+        displacement, centre_in_grasp_frame(part.position, grasp), centre_in_grasp_frame(centre, grasp)
+    )
+    pose = place_pose(grasp, of_centre, centre, target, 0.0)
+    placed = pose_base_grasp(pose) @ moved_in_hand(grasp, part, displacement)
+    missed, off = place_error(part, placed, offset, target)
+    assert missed < 1e-9 and off < 1e-9
+
+
+def test_the_hand_stays_above_the_table_and_follows_a_part_that_sank():
+    grasp, centre = np.array([0.5, 0.0, 0.03, 0.0]), np.array([0.5, 0.0, 0.02])
+    target = Target(x=0.5, y=0.0, theta=0.0)
+    sunk = place_pose(grasp, np.array([0, 0, -0.004, 0]), centre, target, 0.0)
+    assert sunk[2] == pytest.approx(0.03 + 0.004 + 0.002)
+    risen = place_pose(np.array([0.5, 0, 0.0106, 0]), np.array([0, 0, 0.005, 0]), centre, target, 0.0)
+    assert risen[2] == lowest_grasp_z(0.0)
+    assert wrap_angle(sunk[3]) == sunk[3]

@@ -1,0 +1,247 @@
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+
+from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound
+from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
+from mskgrasp.learning.grasp_models import ModelMeta, build_models
+from mskgrasp.learning.networks import NetworkConfig, Normalisation
+from mskgrasp.perception.part_detection import view_part
+from mskgrasp.planning.planner import (
+    Planner,
+    PlannerConfig,
+    object_displacement_covariance,
+    select,
+    shortlist,
+    variance_score,
+)
+from mskgrasp.planning.refine import fingers_free
+from mskgrasp.planning.scoring import Scene, displacements
+from mskgrasp.reports.grasp_figures import draw_plan
+from tests import synthetic
+from tests.core.test_grasp import centres, shifts
+from tests.synthetic import REGION, Box
+
+BOX = Box(x=0.45, y=0.02, yaw=0.4, size=(0.07, 0.02, 0.03))
+FRAME = synthetic.frame([BOX])
+
+
+def hand_made_models(variance=True):
+    """Networks of one action feature: quality falls with |centre x|, variance with centre y.
+
+    The action input is (x, y, z) / scale. Feature k of the trunk is relu(+-x) or relu(+-y); the image is
+    cut off by zero weights.
+    """
+    config = NetworkConfig(
+        patch_pixels=32,
+        channels=1,
+        trunk_width=1,
+        action_width=4,
+        head_width=4,
+        dropout=0.0,
+        variance=variance,
+    )
+    meta = ModelMeta(network=config, normalisation=Normalisation(action_scale=(0.05, 0.05, 0.05)))
+    models = build_models(meta)
+    with torch.no_grad():
+        for network in (models.gqn, models.gdn):
+            for parameter in network.parameters():
+                parameter.zero_()
+            network.features.action[0].weight.copy_(
+                torch.tensor([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
+            )
+        copy = torch.cat([torch.zeros(4, 1), torch.eye(4)], dim=1)  # pass the action features on
+        models.gqn.head[0].weight.copy_(copy)
+        models.gqn.head[3].weight[1] = torch.tensor([-4.0, -4.0, 0.0, 0.0])
+        if variance:
+            models.gdn.variance_head[0].weight.copy_(copy)
+            models.gdn.variance_head[3].weight[:] = torch.tensor([0.0, 0.0, 5.0, -5.0])
+            models.gdn.variance_head[3].bias.fill_(-8.0)
+        models.gdn.mean_head[3].bias.copy_(torch.tensor([0.001, 0.002, 0.0, 0.1]))
+    return models
+
+
+def planner(config=None, models=None):
+    return Planner(
+        models or hand_made_models(), config or PlannerConfig(n_candidates=600), table_z=0.0, region=REGION
+    )
+
+
+def test_the_planned_grasp_is_the_least_uncertain_of_the_best():
+    plan = planner(PlannerConfig(n_candidates=600, top_fraction=0.05)).plan(FRAME, np.random.default_rng(0))
+    centre = centre_in_grasp_frame(plan.view.centre_base, plan.candidates)
+    best = np.argsort(np.abs(centre[:, 0]))[:30]  # quality falls with |centre x|
+    expected = plan.candidates[best[np.argmin(centre[best, 1])]]  # and variance rises with centre y
+    assert np.allclose(plan.grasp, expected)
+    assert set(plan.shortlist.tolist()) == set(best.tolist())
+    assert plan.quality == plan.qualities[plan.shortlist].max() or plan.quality >= plan.qualities[best].min()
+    assert plan.score == plan.shortlist_scores.min()
+
+
+def test_the_quality_policy_takes_the_best_and_needs_no_variance():
+    config = PlannerConfig(n_candidates=600, policy="quality")
+    plan = planner(config, hand_made_models(variance=False)).plan(FRAME, np.random.default_rng(0))
+    assert plan.quality == plan.qualities.max()
+    assert np.isnan(plan.grasp_displacement_var).all() and plan.to_json()["score"] is None
+    with pytest.raises(BadModel, match="policy: quality"):
+        planner(PlannerConfig(), hand_made_models(variance=False))
+
+
+def test_the_same_generator_gives_the_same_plan_whatever_the_chunks():
+    plans = [
+        planner(PlannerConfig(n_candidates=300, chunk_size=size)).plan(FRAME, np.random.default_rng(5))
+        for size in (7, 300)
+    ]
+    assert np.array_equal(plans[0].grasp, plans[1].grasp)
+    assert np.allclose(plans[0].qualities, plans[1].qualities, atol=1e-6)
+
+
+def test_the_object_displacement_is_converted_with_the_estimated_centre():
+    plan = planner().plan(FRAME, np.random.default_rng(0))
+    centre = centre_in_grasp_frame(plan.view.centre_base, plan.grasp)
+    assert np.allclose(plan.grasp_displacement, [0.001, 0.002, 0.0, 0.1])
+    assert plan.displacement[3] == pytest.approx(-0.1)
+    cos, sin = np.cos(-0.1), np.sin(-0.1)
+    x, y = centre[:2] - [0.001, 0.002]
+    assert np.allclose(plan.displacement[:2], np.array([cos * x - sin * y, sin * x + cos * y]) - centre[:2])
+
+
+def test_demands_that_no_candidate_meets_and_empty_tables_are_told():
+    with pytest.raises(NoGraspFound, match="min_quality"):
+        planner(PlannerConfig(n_candidates=50, min_quality=0.99)).plan(FRAME, np.random.default_rng(0))
+    with pytest.raises(NoPartFound):
+        planner().plan(synthetic.frame([]), np.random.default_rng(0))
+
+
+def test_a_plan_is_plain_json_and_a_picture(tmp_path):
+    plan = planner().plan(FRAME, np.random.default_rng(0))
+    values = json.loads(json.dumps(plan.to_json(), allow_nan=False))
+    assert np.allclose(values["grasp"], plan.grasp) and len(values["displacement_std"]) == 4
+    for number, drawn in enumerate(
+        (plan, dataclasses.replace(plan, displacement_cov=np.full((4, 4), np.nan)))
+    ):
+        draw_plan(FRAME, drawn, tmp_path / f"{number}.png")
+        assert (tmp_path / f"{number}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_shortlist_is_the_best_share_and_never_empty():
+    qualities = np.random.default_rng(0).permutation(np.arange(200) / 200)
+    best = shortlist(qualities, 0.03)
+    assert qualities[best].tolist() == pytest.approx([0.995, 0.99, 0.985, 0.98, 0.975, 0.97])
+    assert len(shortlist(qualities[:3], 0.03)) == 1
+
+
+def test_selection_minimises_the_score_among_those_good_enough():
+    qualities, scores = np.array([0.9, 0.8, 0.7]), np.array([3.0, 2.0, 1.0])
+    assert select(qualities, scores, PlannerConfig()) == 2
+    assert select(qualities, scores, PlannerConfig(min_quality=0.75)) == 1
+    assert select(qualities, scores, PlannerConfig(policy="quality")) == 0
+
+
+def test_the_score_is_the_mean_squared_error_of_the_parts_points():
+    rng = np.random.default_rng(0)
+    variance = np.array([0.001, 0.002, 0.0005, 0.05]) ** 2
+    points = rng.normal(size=(500, 2)) * 0.01
+    radius = np.sqrt((points**2).sum(axis=1).mean())
+    errors = rng.normal(size=(2000, 4)) * np.sqrt(variance)
+    cos, sin = np.cos(errors[:, 3, None]), np.sin(errors[:, 3, None])
+    moved_x = cos * points[:, 0] - sin * points[:, 1] + errors[:, 0, None]
+    moved_y = sin * points[:, 0] + cos * points[:, 1] + errors[:, 1, None]
+    squared = (moved_x - points[:, 0]) ** 2 + (moved_y - points[:, 1]) ** 2 + errors[:, 2, None] ** 2
+    assert variance_score(variance, radius) == pytest.approx(squared.mean(), rel=0.06)
+
+
+@given(shifts, centres)
+def test_the_covariance_is_that_of_the_derivative(displacement, centre):
+    variance = np.array([1e-6, 4e-6, 9e-6, 1e-4])
+    covariance = object_displacement_covariance(displacement, variance, centre)
+    jacobian = np.zeros((4, 4))
+    for k in range(4):
+        step = np.zeros(4)
+        step[k] = 1e-6
+        ahead, behind = (to_object_displacement(displacement + s * step, centre) for s in (1, -1))
+        change = ahead - behind
+        change[3] = wrap_angle(change[3])
+        jacobian[:, k] = change / 2e-6
+    assert np.allclose(covariance, jacobian @ np.diag(variance) @ jacobian.T, atol=1e-10)
+
+
+def test_a_network_that_sees_the_part_is_told_the_angle():
+    torch.manual_seed(5)
+    network = NetworkConfig(
+        image="object", patch_pixels=32, channels=4, trunk_width=8, action_width=8, head_width=8, dropout=0.0
+    )
+    scale = Normalisation(action_scale=(0.05, 0.05, 0.02))
+    models = build_models(ModelMeta(network=network, normalisation=scale))
+    view = view_part(FRAME.depth, FRAME.intrinsics, FRAME.T_base_camera, table_z=0.0, region=REGION)
+    scene = Scene.of(FRAME, view, 0.0, models.device)
+    grasps = np.tile(np.append(view.centre_base + [0.01, 0.0, 0.0], 0.0), (3, 1))
+    grasps[:, 3] = [0.0, 0.5, 0.5]
+    mean, variance = displacements(models, scene, grasps, 2)
+    assert np.allclose(mean[1], mean[2]) and not np.allclose(mean[0], mean[1])
+    assert mean.shape == variance.shape == (3, 4) and (variance > 0).all()
+    # What the network says along the picture's axes, worked out by hand for the second grasp.
+    action = torch.tensor([[-0.01, 0.0, 0.0, 0.5]])
+    patch = scene.crop(np.append(view.centre_base, 0.0)[None], network)
+    height = torch.tensor([view.centre_base[2]], dtype=torch.float32)
+    with torch.inference_mode():
+        prepared = models.gdn.features.prepare(patch, height)
+        x, y = models.gdn.outputs(models.gdn.features(prepared, action, height))[0][0, :2].tolist()
+    cos, sin = np.cos(0.5), np.sin(0.5)
+    np.testing.assert_allclose(mean[1, :2], [cos * x + sin * y, cos * y - sin * x], atol=1e-6)
+
+
+def test_a_grasp_beside_which_something_stands_is_left_out():
+    other = Box(
+        x=BOX.x - 0.055 * np.sin(0.4), y=BOX.y + 0.055 * np.cos(0.4), yaw=0.4, size=(0.02, 0.01, 0.03)
+    )
+    frame = synthetic.frame([BOX, other])
+    grasps = np.array(
+        [
+            [BOX.x, BOX.y, 0.015, 0.4],  # its second finger would stand on the other box
+            [BOX.x, BOX.y, 0.045, 0.4],  # the same above it
+            [BOX.x, BOX.y, 0.015, 0.4 - np.pi / 2],  # along the box: 70 mm fit between the fingers
+            [BOX.x + 0.02 * np.cos(0.4), BOX.y + 0.02 * np.sin(0.4), 0.015, 0.4 - np.pi / 2],
+        ]
+    )
+    view = view_part(frame.depth, frame.intrinsics, frame.T_base_camera, table_z=0.0, region=REGION)
+    scene = Scene.of(frame, view, 0.0, torch.device("cpu"))
+    assert fingers_free(scene, grasps).tolist() == [False, True, True, False]
+    checked = planner(PlannerConfig(n_candidates=400, check_fingers=True))
+    plan = checked.plan(frame, np.random.default_rng(0))
+    assert fingers_free(scene, plan.candidates[plan.shortlist]).all() and len(plan.shortlist) == 12
+    free = planner(PlannerConfig(n_candidates=400)).plan(frame, np.random.default_rng(0))
+    assert not fingers_free(scene, free.candidates[free.shortlist]).all()
+
+
+@pytest.mark.parametrize("policy", ["low_variance", "quality"])
+def test_refinement_finds_better_grasps_within_the_parts_box(policy):
+    plans = [
+        planner(PlannerConfig(n_candidates=200, refinements=rounds, policy=policy)).plan(
+            FRAME, np.random.default_rng(1)
+        )
+        for rounds in (0, 4)
+    ]
+    first, refined = plans
+    assert refined.quality >= first.qualities[first.shortlist].min()
+    if policy == "quality":
+        assert refined.quality > first.quality
+    else:
+        assert refined.score < first.score
+    assert np.array_equal(refined.candidates[:200], first.candidates) and len(refined.candidates) > 200
+    local = refined.view.T_base_box.inverse().apply(refined.candidates[:, :3])
+    assert (np.abs(local[:, :2]) <= refined.view.size[:2] / 2 + 1e-9).all()
+    assert (refined.candidates[:, 2] >= 0.0105 - 1e-9).all()
+    assert (np.abs(refined.candidates[:, 3]) <= np.pi / 2).all()
+    assert (np.diff(refined.qualities[refined.shortlist]) <= 0).all()
+
+
+def test_two_parts_are_refused():
+    other = Box(x=0.45, y=-0.06, yaw=0.0, size=(0.04, 0.02, 0.02))
+    with pytest.raises(NoPartFound, match="two things lie in the region.*take one away"):
+        planner().plan(synthetic.frame([BOX, other]), np.random.default_rng(0))

@@ -1,0 +1,100 @@
+"""A report is one file that a browser shows without a complaint, whatever stands in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.reports.html import Link, Picture, Section, Table, settings_section, write_html
+from tests.browser import Page
+
+HOSTILE = '<script>document.title="owned"</script> & "quoted" <img src=x onerror=alert(1)>'
+
+
+def picture(path: Path, width: int = 40) -> Path:
+    cv2.imwrite(str(path), np.full((20, width, 3), 128, np.uint8))
+    return path
+
+
+@pytest.fixture
+def report(tmp_path: Path) -> Path:
+    path = tmp_path / "report.html"
+    sections = [
+        Section(
+            title=f"First {HOSTILE}",
+            text=["A paragraph.", HOSTILE],
+            tables=[
+                Table(
+                    header=("part", "error", HOSTILE),
+                    rows=[
+                        ("nut", "1.2 mm", Link(text=HOSTILE, to="worst")),
+                        ("bolt", None, HOSTILE),
+                        *[
+                            (f"part_{k}", "12 mm", "a rather long remark about this row " * 3)
+                            for k in range(4)
+                        ],
+                    ],
+                    caption=HOSTILE,
+                )
+            ],
+        ),
+        Section(
+            title="Pictures",
+            pictures=[
+                Picture(path=picture(tmp_path / "a.png", 1725), caption=HOSTILE, name="worst"),
+                Picture(path=picture(tmp_path / "b.jpg"), caption="A JPEG"),
+            ],
+        ),
+        settings_section(PlannerConfig()),
+    ]
+    write_html(path, title=f"Report {HOSTILE}", sections=sections)
+    for made in (tmp_path / "a.png", tmp_path / "b.jpg"):
+        made.unlink()  # the file needs no other
+    return path
+
+
+def test_a_browser_shows_every_picture_and_complains_of_nothing(report):
+    with Page(report) as page:
+        widths = page.evaluate("[...document.images].map(i => i.complete ? i.naturalWidth : 0)")
+        assert widths == [1725, 40]
+        assert page.evaluate("document.title") == f"Report {HOSTILE}"
+        assert page.evaluate("document.scripts.length") == 0
+        assert page.evaluate("document.querySelector('section p + p').textContent") == HOSTILE
+        assert page.evaluate("[...document.links].every(a => document.querySelector(a.hash) !== null)")
+        assert page.evaluate("getComputedStyle(document.querySelector('td.n')).textAlign") == "right"
+        assert page.complaints == []
+
+
+def test_a_browser_that_finds_fault_says_so(tmp_path):
+    """The test above would pass with a browser that tells nothing."""
+    path = tmp_path / "bad.html"
+    path.write_text('<script>console.error("oh")</script><img src="missing.png"><p>')
+    with Page(path) as page:
+        assert page.evaluate("[...document.images].map(i => i.naturalWidth)") == [0]
+        assert any("oh" in text for text in page.complaints)
+        assert any("missing.png" in text for text in page.complaints)
+
+
+def test_it_fits_a_phone(report):
+    with Page(report, width=390) as page:
+        assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+
+
+def test_what_cannot_be_shown_is_refused(tmp_path):
+    def write(**section: object) -> None:
+        write_html(tmp_path / "r.html", title="t", sections=[Section(title="s", **section)])  # type: ignore[arg-type]
+
+    (tmp_path / "drawing.svg").write_text("<svg onload='alert(1)'/>")
+    with pytest.raises(ValueError, match="neither PNG nor JPEG"):
+        write(pictures=[Picture(path=tmp_path / "drawing.svg", caption="")])
+    with pytest.raises(FileNotFoundError):
+        write(pictures=[Picture(path=tmp_path / "gone.png", caption="")])
+    with pytest.raises(ValueError, match="1 cells under a header of 2"):
+        write(tables=[Table(header=("a", "b"), rows=[("x",)])])
+    with pytest.raises(ValueError, match="'nowhere', which is not in the report"):
+        write(tables=[Table(header=("a",), rows=[(Link(text="x", to="nowhere"),)])])
+    assert not (tmp_path / "r.html").exists()

@@ -1,0 +1,48 @@
+"""What the command line says of a cell beside its file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from mskgrasp.core.errors import UsageError
+from mskgrasp.trials.cell_file import read_cell
+
+CELLS = Path(__file__).parents[2] / "configs" / "cells"
+
+
+def test_noise_takes_the_place_of_the_files_and_keeps_its_settings(tmp_path: Path):
+    path = tmp_path / "cell.yaml"
+    path.write_text("type: sapien\nnoise: {model: iid, seed: 3}\n")
+    plain = read_cell(path, noise=None, measure="truth", tape=None)
+    assert plain.noise == "iid" and plain.tape is None
+    other = read_cell(path, noise="kinect2", measure="truth", tape=None)
+    assert other.noise == "kinect2" and other.digest != plain.digest
+    run = tmp_path / "run"
+    run.mkdir()
+    written = yaml.safe_load(other.write(run).read_text())
+    assert written["noise"] == {"model": "kinect2", "seed": 3}
+
+
+def test_tape_is_stuck_where_it_is_measured_by(tmp_path: Path):
+    sapien = CELLS / "sapien.yaml"
+    found = read_cell(sapien, noise=None, measure="markers", tape=None)
+    assert found.tape is not None and found.tape.sides == (0.012, 0.008) and found.values["colour_scale"] == 3
+    found = read_cell(sapien, noise=None, measure="markers", tape=(0.01, 0.006))
+    assert found.values["tape"] == {"large": 0.01, "small": 0.006}
+    path = tmp_path / "cell.yaml"
+    path.write_text("type: sapien\ntape: {large: 0.009, small: 0.006}\ncolour_scale: 4\n")
+    found = read_cell(path, noise=None, measure="markers", tape=None)
+    assert found.tape is not None and found.tape.sides == (0.009, 0.006) and found.values["colour_scale"] == 4
+
+
+def test_a_real_cells_file_stays_where_it_is(tmp_path: Path):
+    """Files that it names lie beside it."""
+    real = CELLS / "panda_kinect2.yaml"
+    found = read_cell(real, noise=None, measure="markers", tape=None)
+    assert found.write(tmp_path) == real and not list(tmp_path.iterdir())
+    assert found.tape is not None and not found.simulated and found.noise == ""
+    with pytest.raises(UsageError, match="for a simulated cell"):
+        read_cell(real, noise="iid", measure="truth", tape=None)

@@ -1,0 +1,117 @@
+"""Trials on disk: what was seen and planned comes back as it was; what is no trial is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hal.camera import RgbdFrame
+from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.evaluate.replay_trial import draw_trial, find_trial
+from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.planning.planner import GraspPlan, Planner, PlannerConfig
+from mskgrasp.runtime.run_folder import TRIALS, append, read
+from mskgrasp.trials.trial import Prediction, Trial
+from mskgrasp.trials.trial_files import read_trial, trial_file, write_trial
+from tests import synthetic
+from tests.evaluate.test_summary import trial
+
+
+def seen() -> RgbdFrame:
+    """A box on the table, with a hole in the image."""
+    box = synthetic.Box(x=0.5, y=0.01, yaw=0.4, size=(0.06, 0.03, 0.03))
+    frame = synthetic.frame([box])
+    depth = np.round(frame.depth.astype(np.float64), 4).astype(np.float32)
+    depth[:3, :3] = np.nan
+    fine = np.full((2 * depth.shape[0], 2 * depth.shape[1], 3), 7, np.uint8)
+    return dataclasses.replace(frame, depth=depth, fine_colour=fine)
+
+
+def stored(run: Path, one: Trial) -> tuple[RgbdFrame, GraspPlan]:
+    planner = Planner(
+        load_models(PRETRAINED),
+        PlannerConfig(n_candidates=50),
+        table_z=synthetic.TABLE_Z,
+        region=synthetic.REGION,
+    )
+    frame = seen()
+    plan = planner.plan(frame, np.random.default_rng(0))
+    plan = dataclasses.replace(plan, view=dataclasses.replace(plan.view, table_offset=-0.002))
+    write_trial(trial_file(run, one.key), frame, plan, None)
+    append(run / TRIALS, one.to_json())
+    return frame, plan
+
+
+def test_a_trial_comes_back_as_it_was_and_is_drawn(tmp_path: Path):
+    one = trial(predictions={"m": Prediction(mean=[0.0] * 4, std=[np.nan] * 4)}, chosen_by="gcip_mv")
+    frame, plan = stored(tmp_path, one)
+    assert one.key == "a-000-gcip_mv"
+    again, planned, after = read_trial(trial_file(tmp_path, one.key))
+    np.testing.assert_allclose(again.depth, frame.depth, atol=1e-6)
+    np.testing.assert_array_equal(again.T_base_camera.position, frame.T_base_camera.position)
+    assert after is None and again.fine_colour is None  # kept where tape is looked for again
+    assert planned is not None
+    for field in dataclasses.fields(planned):
+        if isinstance(value := getattr(plan, field.name), np.ndarray):
+            np.testing.assert_allclose(getattr(planned, field.name), value, rtol=1e-6, err_msg=field.name)
+    np.testing.assert_array_equal(planned.grasp, plan.grasp)
+    for name in ("centre_base", "size", "gyration_radius", "table_z", "table_offset"):
+        np.testing.assert_allclose(getattr(planned.view, name), getattr(plan.view, name), err_msg=name)
+    draw_trial(tmp_path, find_trial(tmp_path, one.key), tmp_path / "replay" / "one.png")
+    assert (tmp_path / "replay" / "one.png").stat().st_size > 10_000
+
+
+def test_a_trial_without_a_plan_shows_what_was_seen(tmp_path: Path):
+    one = trial(success=False, reason="NoPartFound", grasp=None, predicted=None, measured=None)
+    write_trial(trial_file(tmp_path, one.key), seen(), None, seen())
+    frame, plan, after = read_trial(trial_file(tmp_path, one.key))
+    assert plan is None and after is not None and after.fine_colour is not None
+    assert frame.fine_colour is not None
+    draw_trial(tmp_path, one, tmp_path / "one.png")
+    assert (tmp_path / "one.png").exists()
+
+
+def test_lines_survive_the_file_and_a_line_cut_short(tmp_path: Path):
+    path = tmp_path / "trials.jsonl"
+    first = trial(predicted_std=[np.nan] * 4, measured=[0.1, 0.2, np.nan, 0.3])
+    lines = [json.dumps(one.to_json(), allow_nan=False) for one in (first, trial(number=1))]
+    path.write_text(lines[0] + "\n" + lines[1][:40])
+    (found,) = read(path, Trial.from_json)
+    assert found.key == "a-000" and np.isnan(found.predicted_std).all()
+    np.testing.assert_array_equal(found.measured, first.measured)
+    assert path.read_text() == lines[0] + "\n"
+    path.write_text("no json\n")
+    with pytest.raises(BadDataset, match="line 1 is no trial"):
+        read(path, Trial.from_json)
+
+
+def test_a_name_that_leads_out_of_the_folder_is_no_trial(tmp_path: Path):
+    append(tmp_path / TRIALS, trial().to_json() | {"part": "../../etc/passwd"})
+    with pytest.raises(BadDataset, match="no trial"):
+        find_trial(tmp_path, "../../etc/passwd-000")
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"PK\x03\x04 cut short", b"\x80\x04N."], ids=["empty", "zip", "pickle"]
+)
+def test_a_damaged_file_is_an_error_of_one_line(tmp_path: Path, content: bytes):
+    path = trial_file(tmp_path, "a-000")
+    with pytest.raises(BadDataset, match="no .*a-000.npz"):
+        read_trial(path)
+    path.parent.mkdir()
+    path.write_bytes(content)
+    with pytest.raises(BadDataset, match="a-000.npz is damaged") as raised:
+        read_trial(path)
+    assert "\n" not in str(raised.value)
+
+
+def test_unknown_runs_and_trials_are_told(tmp_path: Path):
+    with pytest.raises(UsageError, match="no run of mskgrasp.evaluate"):
+        find_trial(tmp_path, "a-000")
+    append(tmp_path / TRIALS, trial().to_json())
+    with pytest.raises(UsageError, match="no trial 'a-001' .* a-000"):
+        find_trial(tmp_path, "a-001")
