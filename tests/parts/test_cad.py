@@ -28,7 +28,7 @@ def made(listed, name):
 
 def test_listing_loads_neither_library():
     code = (
-        "import sys; from mskgrasp.parts import cad; print(len(list(cad.recipes())), "
+        "import sys; from mskgrasp.parts.recipes import cad; print(len(list(cad.recipes())), "
         "[name for name in sys.modules if name.startswith(('build123d', 'bd_warehouse', 'OCP'))])"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

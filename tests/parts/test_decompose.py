@@ -20,7 +20,7 @@ from mskgrasp.parts.solids.measure import MeshSurface, hull_fit
 DIGEST = """
 import hashlib
 from tests.parts.test_decompose import angle_body, mesh_of
-from mskgrasp.parts.decompose import convex_pieces
+from mskgrasp.parts.solids.decompose import convex_pieces
 print(hashlib.sha256(b"".join(p.tobytes() for p in convex_pieces(mesh_of(angle_body())))).hexdigest())
 """
 

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import tasks.contacts
-import tasks.motion
 import torch
 
+import tasks.robot.contacts
+import tasks.robot.motion
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.panda_kinematics import top_down
 from tasks.scene.arrays import Arrays
