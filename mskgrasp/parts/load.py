@@ -1,0 +1,27 @@
+"""A part by name, folder or CAD file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mskgrasp.parts.build import find_part
+from mskgrasp.parts.importing.mesh_files import Unit
+from mskgrasp.parts.part import Part
+
+
+def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:
+    """Loads a part; a built-in one is built and a CAD file imported the first time, which takes seconds.
+
+    Args:
+        source: Name of a part, a part folder, or an STL, OBJ, PLY, GLB, 3MF or STEP file.
+        unit: Of a CAD file's coordinates; None takes what the format says, and mm where it says nothing.
+
+    Raises:
+        UnknownPart: There is no such part; the message lists similar names.
+        BadPart: The file or folder cannot be used as a part.
+    """
+    if Path(source).is_file():
+        from mskgrasp.parts.importing.import_file import import_part  # loads CoACD, which takes a while
+
+        return import_part(Path(source), unit=unit)
+    return find_part(source)

@@ -1,0 +1,58 @@
+"""Every program in examples/ runs as its docstring says, and stays short enough to read."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def run(name: str, *arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / name), *arguments],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env=os.environ | {"PYTHONPATH": str(EXAMPLES.parent)},
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
+def test_an_example_has_at_most_60_lines(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 60
+
+
+def test_a_grasp_planned_on_a_cad_file_lifts_the_part_in_simulation():
+    printed = run("plan_on_cad_file.py")
+    assert "bracket: " in printed
+    assert float(re.search(r"predicted quality ([\d.]+)", printed)[1]) > 0.9
+    assert printed.rstrip().endswith("\nlifted")
+
+
+def test_a_dataset_is_read_with_numpy_and_torch(collected):
+    printed = run("read_dataset.py", str(collected))
+    n, parts = re.search(r"(\d+) attempts at (\d+) parts", printed).groups()
+    shares = re.findall(r"^  \S+: \d+% of (\d+)$", printed, re.MULTILINE)
+    assert len(shares) == int(parts) and sum(map(int, shares)) == int(n)
+
+
+def test_networks_are_trained_and_compared_with_those_that_ship(collected, tmp_path):
+    printed = run("train_and_compare.py", str(collected), str(tmp_path / "model"))
+    found = re.findall(r"^(shipped|trained) +AUROC ([\d.]+) +RMSE ([\d.]+) mm$", printed, re.MULTILINE)
+    assert [name for name, _, _ in found] == ["shipped", "trained"]
+    assert (tmp_path / "model" / "model.safetensors").is_file()
+
+
+def test_a_camera_and_an_arm_of_ones_own_perform_a_planned_grasp():
+    assert run("own_camera_and_arm.py").rstrip().endswith("\nholding")
+
+
+def test_the_maniskill_task_runs_in_a_loop():
+    printed = run("maniskill_task.py", "hex_nut_m30", "3")
+    assert re.search(r"^[1-3] of 3 lifted, median shift [\d.]+ mm$", printed, re.MULTILINE)
