@@ -23,6 +23,7 @@ from mskgrasp.collect.workers import Finished, Lost, Progress, make_shards
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.core.files import LOCK, only_here
+from mskgrasp.core.shipped import config_file
 from mskgrasp.dataset import read_shard, shard_path
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.catalogue import ratings, read_index, spread
@@ -43,9 +44,7 @@ def main() -> int:
         CollectConfig,
         prog="python -m mskgrasp.collect",
         description=DESCRIPTION,
-        default_config=Path("configs/collect/demo.yaml")
-        if Path("configs/collect/demo.yaml").exists()
-        else None,
+        default_config=config_file("collect/demo.yaml"),
     )
     collect(config)
     return 0

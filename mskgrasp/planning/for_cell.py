@@ -8,11 +8,12 @@ import torch
 
 from hal.cell import Cell
 from hal.errors import HalError
+from mskgrasp.core.shipped import config_file, example_file
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts.importing.mesh_files import Unit
 from mskgrasp.planning.planner import Planner, PlannerConfig
 
-SIMULATED_CELL = Path(__file__).resolve().parents[2] / "configs" / "cells" / "sapien.yaml"
+SIMULATED_CELL = config_file("cells/sapien.yaml")
 
 
 def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
@@ -46,10 +47,15 @@ def present(cell: Cell, part: str, seed: int) -> None:
 def part_name(text: str, unit: Unit | None = None) -> str:
     """The name of a part, or its folder, from what a user says; a CAD file is made a part first.
 
+    The name of a shipped example stands for that file where the current folder has no such file.
+
     Raises:
         BadPart: The file cannot be made one part.
     """
     path = Path(text)
+    if not path.exists() and (example := example_file(text)) is not None:
+        print(f"{text} is not in this folder: using the shipped example {example}")
+        path = example
     if not path.is_file():
         return text
     from mskgrasp.parts.importing.import_file import import_part  # most parts need no decomposition

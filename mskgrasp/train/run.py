@@ -17,6 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.shipped import config_file
 from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, save_model
 from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.samples import Samples, read_samples
@@ -24,7 +25,7 @@ from mskgrasp.learning.trainer import LearningConfig, Reporter, split, train
 from mskgrasp.runtime import cli
 from mskgrasp.train.figures import draw_curves, draw_uncertainty
 
-DEFAULT_CONFIG = Path(__file__).resolve().parents[2] / "configs" / "train" / "default.yaml"
+DEFAULT_CONFIG = config_file("train/default.yaml")
 CHECKPOINT = "checkpoint.safetensors"
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
+from mskgrasp.core.shipped import config_file
 from mskgrasp.runtime.cli import parse, run
 from mskgrasp.validate.config import ValidateConfig
 
@@ -14,8 +13,6 @@ them, against their meshes; and the same grasps under coarser and finer settings
 the floor: the finest setting against itself with the starts moved by 10 um. Writes validate.json and
 validate.png; ends with 1 if a check fails or the settings under test add something to the floor."""
 
-_DEFAULT = Path("configs/validate/default.yaml")
-
 
 def main() -> int:
     """Parses, checks, reports."""
@@ -23,7 +20,7 @@ def main() -> int:
         ValidateConfig,
         prog="python -m mskgrasp.validate",
         description=DESCRIPTION,
-        default_config=_DEFAULT if _DEFAULT.exists() else None,
+        default_config=config_file("validate/default.yaml"),
     )
     from mskgrasp.validate.run import validate  # loads the simulator: not for a mistyped option
 

@@ -29,3 +29,13 @@ def test_a_file_that_is_no_cad_is_told(tmp_path, monkeypatch):
     (tmp_path / "part.stl").write_text("a letter")
     with pytest.raises(BadPart, match="part.stl"):
         part_name(str(tmp_path / "part.stl"))
+
+
+def test_an_example_is_taken_by_its_name_unless_such_a_file_is_here(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    assert find_part(part_name("bracket.stl")).longest_axis > 0.02
+    assert "using the shipped example" in capsys.readouterr().out
+    trimesh.creation.box((4, 2, 1.5)).export(tmp_path / "bracket.stl")
+    assert find_part(part_name("bracket.stl")).longest_axis == pytest.approx(0.004)
+    assert capsys.readouterr().out == ""

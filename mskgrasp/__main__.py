@@ -1,0 +1,49 @@
+"""The command ``mskgrasp``: every program as a subcommand."""
+
+from __future__ import annotations
+
+import runpy
+import signal
+import sys
+
+PROGRAMS = {
+    "parts": ("mskgrasp.parts", "build, import, list and show parts"),
+    "collect": ("mskgrasp.collect", "simulate random grasps of parts and record a dataset"),
+    "dataset": ("mskgrasp.dataset", "check, describe and export datasets"),
+    "train": ("mskgrasp.train", "train the networks on a dataset"),
+    "plan": ("mskgrasp.plan", "plan one grasp of the part in a cell"),
+    "evaluate": ("mskgrasp.evaluate", "plan and execute grasps and report how well they go"),
+    "palletize": (
+        "mskgrasp.palletize",
+        "grasp parts and place them, corrected by the predicted displacement",
+    ),
+    "validate": (
+        "mskgrasp.validate",
+        "check the simulation's settings against closed forms and finer settings",
+    ),
+    "doctor": ("hal.doctor", "check a cell's camera and arm"),
+    "calibrate": ("hal.calibrate", "find the camera's pose relative to the robot"),
+    "record": ("hal.record", "record a cell's frames, or a whole run, for replay"),
+}
+"""Module and purpose of each program by its name, in the order of work."""
+
+
+def main() -> None:
+    """Runs the program that the first argument names with the others, as ``python -m`` does."""
+    name = sys.argv[1] if len(sys.argv) > 1 else "--help"
+    if name in ("-h", "--help"):
+        print("usage: mskgrasp PROGRAM [OPTIONS]\n")
+        print("\n".join(f"  {known:10} {purpose}" for known, (_, purpose) in PROGRAMS.items()))
+        print("\nmskgrasp PROGRAM --help explains the options of a program.")
+        sys.exit(0)
+    if name not in PROGRAMS:
+        print(f"error: no program is called {name!r}; legal: {', '.join(PROGRAMS)}", file=sys.stderr)
+        sys.exit(2)
+    del sys.argv[1]
+    # Ctrl-C waits for `mskgrasp.runtime.cli.run`: a library whose import it interrupts may swallow it.
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    runpy.run_module(PROGRAMS[name][0], run_name="__main__", alter_sys=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,20 @@
+"""Paths of the files that ship with the package: configurations and example parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+# In a checkout a link to configs/ beside the package: resolved, so that messages show the checkout's path.
+_CONFIGS = (Path(__file__).parents[1] / "configs").resolve()
+_EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+
+
+def config_file(name: str) -> Path:
+    """The path of a shipped configuration, for example ``cells/sapien.yaml``."""
+    return _CONFIGS / name
+
+
+def example_file(name: str) -> Path | None:
+    """The path of a shipped example part such as ``bracket.stl``; None if no example has that name."""
+    path = _EXAMPLES / name
+    return path if Path(name).name == name and path.is_file() else None
