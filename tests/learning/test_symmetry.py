@@ -10,7 +10,7 @@ import torch
 
 from mskgrasp.core.grasp import centre_in_grasp_frame
 from mskgrasp.learning.grasp_models import PRETRAINED, Models, build_models, load_models
-from mskgrasp.learning.networks import NetworkConfig
+from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.symmetry import mirror_and_turn
 from mskgrasp.learning.trainer import LearningConfig
 from tests import synthetic
@@ -136,9 +136,4 @@ def test_no_grasps_have_no_displacement(models):
 
 def test_views_that_the_network_never_learned_are_refused():
     with pytest.raises(ValueError, match="only symmetric: true teaches"):
-        LearningConfig(symmetric=False, network=NetworkConfig(symmetric_views=True))
-
-
-def test_pictures_that_do_not_turn_have_no_views():
-    with pytest.raises(ValueError, match="symmetric_views turns patches"):
-        NetworkConfig(image="object", symmetric_views=True)
+        LearningConfig(symmetric=False, network=PatchNetworkConfig(symmetric_views=True))

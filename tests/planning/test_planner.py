@@ -10,7 +10,7 @@ from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.learning.grasp_models import ModelMeta, build_models
-from mskgrasp.learning.networks import NetworkConfig, Normalisation
+from mskgrasp.learning.network_config import Normalisation, PatchNetworkConfig
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.planner import (
     Planner,
@@ -37,7 +37,7 @@ def hand_made_models(variance=True):
     The action input is (x, y, z) / scale. Feature k of the trunk is relu(+-x) or relu(+-y); the image is
     cut off by zero weights.
     """
-    config = NetworkConfig(
+    config = PatchNetworkConfig(
         patch_pixels=32,
         channels=1,
         trunk_width=1,
@@ -173,7 +173,7 @@ def test_the_covariance_is_that_of_the_derivative(displacement, centre):
 
 def test_a_network_that_sees_the_part_is_told_the_angle():
     torch.manual_seed(5)
-    network = NetworkConfig(
+    network = PatchNetworkConfig(
         image="object", patch_pixels=32, channels=4, trunk_width=8, action_width=8, head_width=8, dropout=0.0
     )
     scale = Normalisation(action_scale=(0.05, 0.05, 0.02))

@@ -11,7 +11,7 @@ from mskgrasp.core.errors import BadDataset, BadModel, UsageError
 from mskgrasp.dataset import shard_path, write_shard
 from mskgrasp.learning.grasp_models import build_models, load_models, save_model
 from mskgrasp.learning.held_out import predict_grasp_displacement
-from mskgrasp.learning.networks import NetworkConfig
+from mskgrasp.learning.network_config import HandNetworkConfig, PatchNetworkConfig
 from mskgrasp.learning.samples import part_sides, read_samples
 from mskgrasp.learning.trainer import (
     LearningConfig,
@@ -25,10 +25,11 @@ from mskgrasp.learning.trainer import (
 from mskgrasp.learning.trainer import train as learn
 from mskgrasp.runtime import cli
 from mskgrasp.train import run as train
+from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
 from tests import synthetic
 from tests.programs import run_here
 
-SMALL = NetworkConfig(
+SMALL = PatchNetworkConfig(
     patch_pixels=40, channels=8, trunk_width=64, action_width=32, head_width=64, dropout=0.0
 )
 CONFIG = LearningConfig(
@@ -46,8 +47,7 @@ SHORT = CONFIG.model_copy(
 )
 HAND = CONFIG.model_copy(
     update={
-        "network": NetworkConfig(
-            architecture="hand",
+        "network": HandNetworkConfig(
             patch_pixels=33,
             patch_side=0.132,
             quality_stride=2,
@@ -85,8 +85,8 @@ def samples(dataset):
     return read_samples(dataset, SMALL)
 
 
-def program(config: LearningConfig, **changes) -> train.TrainConfig:
-    return train.TrainConfig(**(config.model_dump() | {"device": "cpu"} | changes))
+def program(config: LearningConfig, **changes) -> TrainConfig:
+    return TrainConfig(**(config.model_dump() | {"device": "cpu"} | changes))
 
 
 def test_samples_hold_every_attempt_with_its_displacement_seen_from_the_estimated_centre(samples):
@@ -157,7 +157,7 @@ def test_one_number_of_epochs_stands_for_both_networks_and_is_what_a_stopped_run
     assert train.run(program(SHORT, data=dataset, out=out, epochs=1)) == 0
     with open(out / "log.csv") as file:
         assert [row["stage"] for row in csv.DictReader(file)] == ["gqn", "gdn"]
-    kept = read_config(train.TrainConfig, out / "config.yaml")
+    kept = read_config(TrainConfig, out / "config.yaml")
     assert kept.gqn.epochs == kept.gdn.epochs == 1
     assert train.run(program(SHORT, data=dataset, out=out, epochs=1)) == 0
     with pytest.raises(UsageError, match="gdn"):
@@ -319,16 +319,16 @@ def test_mistakes_on_the_command_line_are_one_line_each(tmp_path, dataset):
 @pytest.mark.parametrize("name", ["default", "pretrained", "paper", "paper_quick"])
 def test_the_configurations_that_are_shipped_can_be_read(name):
     config = cli.parse(
-        train.TrainConfig,
+        TrainConfig,
         prog="train",
         description="",
-        argv=["--config", str(train.DEFAULT_CONFIG.with_name(f"{name}.yaml")), "--seed", "3"],
+        argv=["--config", str(DEFAULT_CONFIG.with_name(f"{name}.yaml")), "--seed", "3"],
     )
     assert config.seed == 3 and config.calibrate == ("paper" not in name)
     assert config.network.architecture == ("patch" if "paper" in name else "hand")
     assert config.network.symmetric_views == ("paper" not in name)
     if "paper" in name:
-        assert config.network == NetworkConfig()
+        assert config.network == PatchNetworkConfig()
     if name == "paper":
         assert config.gqn == StageConfig(
             optimiser="rmsprop",
@@ -384,7 +384,7 @@ def test_the_catalogue_decides_the_sides_where_it_is_asked_to(monkeypatch, tmp_p
 
 def test_turned_samples_need_pictures_that_turn(dataset):
     with pytest.raises(ValueError, match="symmetric"):
-        LearningConfig(network=NetworkConfig(image="object"), symmetric=True)
+        LearningConfig(network=PatchNetworkConfig(image="object"), symmetric=True)
     network = SMALL.model_copy(update={"image": "object"})
     samples = read_samples(dataset, network)
     assert samples.object_patches.shape == samples.patches.shape
