@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -82,8 +82,10 @@ def _explain(model: type[BaseModel], error: ValidationError) -> str:
             problems.append(f"unknown key '{key}'" + (f"; legal keys here: {legal}" if legal else ""))
         elif detail["type"] in ("union_tag_invalid", "union_tag_not_found"):
             context = detail.get("ctx", {})
-            legal = context.get("expected_tags", "")
-            problems.append(f"'{key}': unknown type {context.get('tag', '(missing)')!s}; legal: {legal}")
+            name = context.get("discriminator", "'type'").strip("'")
+            legal = ", ".join(_members(_annotation_at(model, detail["loc"]), name))
+            given = f"unknown {name} '{context['tag']}'" if "tag" in context else f"{name} is missing"
+            problems.append(f"'{key}': {given}; legal: {legal}")
         else:
             value = detail.get("input")
             shown = "" if detail["type"] == "missing" or isinstance(value, dict) else f", got {value!r}"
@@ -92,13 +94,27 @@ def _explain(model: type[BaseModel], error: ValidationError) -> str:
 
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> set[str]:
+    return set(getattr(_annotation_at(model, location), "model_fields", {}))
+
+
+def _annotation_at(model: type[BaseModel], location: tuple[int | str, ...]) -> Any:
+    """The type at a location of an error; within a tagged union, a location names the member by its tag."""
     current: Any = model
+    discriminator = None
     for part in location:
+        if discriminator is not None:
+            current, discriminator = _members(current, discriminator).get(str(part)), None
+            continue
         field = getattr(current, "model_fields", {}).get(part)
         if field is None:
-            return set()
-        current = field.annotation
-    return set(getattr(current, "model_fields", {}))
+            return None
+        current, discriminator = field.annotation, field.discriminator
+    return current
+
+
+def _members(union: Any, discriminator: str) -> dict[str, type[BaseModel]]:
+    """Members of a tagged union by their tags."""
+    return {str(member.model_fields[discriminator].default): member for member in get_args(union)}
 
 
 def _reason(error: Exception) -> str:

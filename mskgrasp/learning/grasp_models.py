@@ -9,19 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, field_validator
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadModel
-from mskgrasp.learning.networks import (
-    GraspDisplacementNetwork,
-    GraspQualityNetwork,
-    NetworkConfig,
-    Normalisation,
-)
+from mskgrasp.learning.network_config import NetworkConfig, Normalisation
+from mskgrasp.learning.networks import GraspDisplacementNetwork, GraspQualityNetwork
 from mskgrasp.learning.symmetry import views
 
 PRETRAINED = Path(__file__).parent / "pretrained"
@@ -30,6 +26,11 @@ PRETRAINED = Path(__file__).parent / "pretrained"
 SCHEMA_VERSION = 1
 WEIGHTS = "model.safetensors"
 DESCRIPTION = "model.json"
+_FORMER_FIELDS = {
+    "patch": ("patch_columns", "quality_stride", "quality_columns", "layers", "displacement_layers"),
+    "hand": ("channels", "image"),
+}
+"""Fields of the other architecture, listed when one class described both."""
 
 
 class Calibration(Config):
@@ -51,6 +52,17 @@ class ModelMeta(Config):
     calibration: Calibration = Calibration()
     training: dict[str, Any] = {}
     metrics: dict[str, Any] = {}
+
+    @field_validator("network", mode="before")
+    @classmethod
+    def _without_former_fields(cls, values: Any) -> Any:
+        """Drops the other architecture's fields, which older descriptions list without effect."""
+        if not isinstance(values, dict):
+            return values
+        architecture = values.get("architecture", "patch")
+        unused = _FORMER_FIELDS.get(architecture, ())
+        kept = {name: value for name, value in values.items() if name not in unused}
+        return kept | {"architecture": architecture}
 
 
 @dataclass(frozen=True)

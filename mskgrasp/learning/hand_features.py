@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from mskgrasp.core.grasp import PAD_REACH, PALM_HEIGHT
-from mskgrasp.learning.network_config import NetworkConfig, Normalisation
+from mskgrasp.learning.network_config import HandNetworkConfig, Normalisation
 
 _EDGE = 0.005
 """Metres above and below within which a height counts in part: a depth camera is no sharper."""
@@ -36,7 +36,7 @@ class HandFeatures(nn.Module):
 
     def __init__(
         self,
-        config: NetworkConfig,
+        config: HandNetworkConfig,
         normalisation: Normalisation,
         widths: tuple[int, ...],
         shape: tuple[int, int],

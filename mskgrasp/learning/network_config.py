@@ -1,32 +1,22 @@
-"""What decides the networks' shape, and the numbers that turn their units into metres and radians."""
+"""Configuration of the two network architectures, and the normalisation of their inputs and targets."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from mskgrasp.core.config import Config
 
+_Channels = Annotated[int, Field(ge=1, le=512)]
+_Convolutions = Annotated[tuple[_Channels, ...], Field(min_length=1, max_length=6)]
 
-class NetworkConfig(Config):
-    """Architecture; the defaults are the paper's (figure 3).
 
-    The paper does not state the padding. Convolutions are "valid", the default of Keras at the time.
-    """
+class _NetworkConfig(Config):
+    """Settings that both architectures have; the defaults are the paper's (figure 3)."""
 
-    architecture: Literal["patch", "hand"] = "patch"
-    """patch: the paper's, a picture of the heights; hand: a coarse one of what the hand would meet."""
-    image: Literal["grasp", "object"] = "grasp"
-    """What the displacement network sees: the patch around the grasp (the paper's GCIP), or one around the
-    part, not turned, beside the grasp's angle (OCFI). The quality network always sees the grasp's."""
-    patch_pixels: int = Field(default=64, ge=16, le=256)
-    """Pixels along the closing direction."""
-    patch_columns: int | None = Field(default=None, ge=8, le=256)
-    """Pixels across it; null: as many."""
     patch_side: float = Field(default=0.128, gt=0.0, le=1.0)
     """Length along the closing direction, metres."""
-    channels: int = Field(default=32, ge=1)
     trunk_width: int = Field(default=1024, ge=1)
     action_width: int = Field(default=64, ge=1)
     head_width: int = Field(default=512, ge=1)
@@ -34,45 +24,97 @@ class NetworkConfig(Config):
     variance: bool = True
     """False: the displacement network predicts the mean alone (the paper's GCIP-M)."""
     symmetric_views: bool = False
-    """A grasp's displacement is the mean of what the network says of the four views that a parallel jaw
-    cannot tell apart (`symmetry`), its variance that of their mixture: equal grasps are told the
-    same."""
-    quality_stride: int = Field(default=1, ge=1, le=8)
-    """hand: the quality network sees every so many-th pixel: it has thousands of grasps to look at."""
-    quality_columns: int | None = Field(default=None, ge=4, le=256)
-    """hand: so many of these across the closing direction; null: all that the patch has."""
-    layers: tuple[int, ...] = Field(default=(16, 32), min_length=1, max_length=6)
-    """hand: channels of the quality network's convolutions, each of which halves the picture."""
-    displacement_layers: tuple[int, ...] = Field(default=(16, 32, 32), min_length=1, max_length=6)
-    """hand: the same of the displacement network."""
+    """The displacement is the mean of the predictions for the four views that a parallel jaw cannot tell
+    apart (`symmetry`), its variance that of their mixture: equivalent grasps get the same prediction."""
     least_std: tuple[float, float] = (0.0, 0.0)
-    """Deviation, metres and radians, below which no displacement is claimed to be known (paper: none).
+    """Least standard deviation that is predicted, metres and radians (paper: none).
 
     Most parts do not rise in the hand by 0.1 mm, some rise by 10 mm: without a floor the likelihood drives
     the variance of z so low that one such part costs more than all others gain.
     """
 
+    @field_validator("least_std")
+    @classmethod
+    def _not_negative(cls, values: tuple[float, float]) -> tuple[float, float]:
+        if not all(0 <= value < float("inf") for value in values):
+            raise ValueError("deviations must be finite and not negative")
+        return values
+
+
+class PatchNetworkConfig(_NetworkConfig):
+    """The paper's architecture: a square height image that both networks see.
+
+    The paper does not state the padding. Convolutions are "valid", the default of Keras at the time.
+    """
+
+    architecture: Literal["patch"] = "patch"
+    image: Literal["grasp", "object"] = "grasp"
+    """Input of the displacement network: the patch around the grasp (the paper's GCIP), or one around the
+    part, not rotated, with the grasp's angle (OCFI). The quality network always sees the grasp's."""
+    patch_pixels: int = Field(default=64, ge=32, le=256)
+    """Pixels along either side."""
+    channels: int = Field(default=32, ge=1)
+    quality_stride: ClassVar[int] = 1
+
     @model_validator(mode="after")
-    def _check(self) -> NetworkConfig:
-        if self.architecture == "patch" and self.patch_pixels < 32:
-            raise ValueError("architecture: patch needs patch_pixels of 32 or more")
-        if self.architecture == "patch" and self.patch_shape[0] != self.patch_shape[1]:
-            raise ValueError("architecture: patch needs a square patch; leave patch_columns away")
-        if self.image == "object" and self.architecture != "patch":
-            raise ValueError("image: object needs architecture: patch")
+    def _views_need_rotated_patches(self) -> PatchNetworkConfig:
         if self.image == "object" and self.symmetric_views:
-            raise ValueError("symmetric_views turns patches with their grasp; image: object has none")
-        if self.architecture == "patch" and self.quality_stride != 1:
-            raise ValueError("architecture: patch shows all pixels to both networks; quality_stride is 1")
-        if self.architecture == "patch" and self.quality_columns is not None:
-            raise ValueError("architecture: patch shows both networks all; leave quality_columns away")
+            raise ValueError(
+                "symmetric_views needs patches that are rotated with the grasp; with image: object none are"
+            )
+        return self
+
+    @property
+    def sees_object(self) -> bool:
+        """Whether the displacement network sees the part's patch, not rotated, and the grasp's angle."""
+        return self.image == "object"
+
+    @property
+    def patch_shape(self) -> tuple[int, int]:
+        """Rows and columns of a patch."""
+        return self.patch_pixels, self.patch_pixels
+
+    @property
+    def quality_shape(self) -> tuple[int, int]:
+        """Rows and columns of the quality network's input."""
+        return self.patch_shape
+
+    @property
+    def pixel(self) -> float:
+        """Distance of a patch's pixels, metres."""
+        return self.patch_side / self.patch_pixels
+
+
+class HandNetworkConfig(_NetworkConfig):
+    """Architecture that compares the heights around a grasp with those of the hand's parts."""
+
+    architecture: Literal["hand"] = "hand"
+    sees_object: ClassVar[bool] = False
+    patch_pixels: int = Field(default=64, ge=16, le=256)
+    """Pixels along the closing direction."""
+    patch_columns: int | None = Field(default=None, ge=8, le=256)
+    """Pixels across it; null: as many."""
+    quality_stride: int = Field(default=1, ge=1, le=8)
+    """The quality network sees one pixel in so many, as it has thousands of grasps to score."""
+    quality_columns: int | None = Field(default=None, ge=4, le=256)
+    """Number of these across the closing direction; null: all that the patch has."""
+    layers: _Convolutions = (16, 32)
+    """Channels of the quality network's convolutions, each of which halves the image."""
+    displacement_layers: _Convolutions = (16, 32, 32)
+    """Channels of the displacement network's."""
+
+    @model_validator(mode="after")
+    def _quality_pixels_are_centred(self) -> HandNetworkConfig:
         if any((pixels - 1) % self.quality_stride for pixels in self.patch_shape):
-            raise ValueError("the patch's middle must be a pixel that quality_stride leaves")
+            raise ValueError(
+                f"quality_stride {self.quality_stride} must divide patch_pixels - 1 and patch_columns - 1, "
+                "so that the patch's middle is one of the pixels that are kept"
+            )
         spare = -(-self.patch_shape[1] // self.quality_stride) - self.quality_shape[1]
         if spare < 0 or spare % 2:
-            raise ValueError("quality_columns must leave as many columns of the patch on either side")
-        if not all(0 < width <= 512 for width in (*self.layers, *self.displacement_layers)):
-            raise ValueError("layers: channels must be between 1 and 512")
+            raise ValueError(
+                "quality_columns must leave the same number of the patch's columns on either side"
+            )
         return self
 
     @property
@@ -82,7 +124,7 @@ class NetworkConfig(Config):
 
     @property
     def quality_shape(self) -> tuple[int, int]:
-        """The same of what the quality network sees."""
+        """Rows and columns of the quality network's input."""
         rows, columns = (-(-pixels // self.quality_stride) for pixels in self.patch_shape)
         return rows, self.quality_columns or columns
 
@@ -91,12 +133,9 @@ class NetworkConfig(Config):
         """Distance of a patch's pixels, metres."""
         return self.patch_side / self.patch_pixels
 
-    @field_validator("least_std")
-    @classmethod
-    def _not_negative(cls, values: tuple[float, float]) -> tuple[float, float]:
-        if not all(0 <= value < float("inf") for value in values):
-            raise ValueError("deviations must not be negative")
-        return values
+
+NetworkConfig = Annotated[PatchNetworkConfig | HandNetworkConfig, Field(discriminator="architecture")]
+"""Either architecture; in a file, ``architecture`` says which."""
 
 
 class Normalisation(Config):
@@ -108,7 +147,7 @@ class Normalisation(Config):
     target_std: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     """Of the grasp displacement, metres and radians."""
     base_rate: float = Field(default=0.5, gt=0.0, lt=1.0)
-    """Share of successes among the attempts; training shows the network as many of either kind."""
+    """Share of successes among the attempts; training balances successes and failures."""
 
     @field_validator("action_scale", "target_std")
     @classmethod

@@ -7,7 +7,7 @@ from torch import Tensor, nn
 
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.learning.hand_features import HandFeatures, learning_in_bfloat16
-from mskgrasp.learning.network_config import NetworkConfig, Normalisation
+from mskgrasp.learning.network_config import NetworkConfig, Normalisation, PatchNetworkConfig
 
 STANDARDISE_EPSILON = 1e-4
 """Metres added to a patch's standard deviation: the resolution of a stored depth."""
@@ -29,7 +29,7 @@ def standardise(patches: Tensor) -> Tensor:
 class PatchFeatures(nn.Module):
     """The paper's (figure 3): a patch and an action become one vector."""
 
-    def __init__(self, config: NetworkConfig, normalisation: Normalisation, n_action: int = 3):
+    def __init__(self, config: PatchNetworkConfig, normalisation: Normalisation, n_action: int = 3):
         super().__init__()
         width = config.channels
         self.convolutions = nn.Sequential(
@@ -71,8 +71,8 @@ def make_features(
     config: NetworkConfig, normalisation: Normalisation, *, quality: bool
 ) -> PatchFeatures | HandFeatures:
     """The first part of the quality network, or of the displacement network."""
-    if config.architecture == "patch":
-        n_action = 4 if config.image == "object" and not quality else 3
+    if isinstance(config, PatchNetworkConfig):
+        n_action = 4 if config.sees_object and not quality else 3
         return PatchFeatures(config, normalisation, n_action)
     if quality:
         return HandFeatures(config, normalisation, config.layers, config.quality_shape)
@@ -117,7 +117,7 @@ class GraspDisplacementNetwork(nn.Module):
 
     def __init__(self, config: NetworkConfig, normalisation: Normalisation):
         super().__init__()
-        self.sees_object = config.image == "object"
+        self.sees_object = config.sees_object
         self.features = make_features(config, normalisation, quality=False)
         self.mean_head = _head(self.features.n_features, config, 4)
         self.variance_head = _head(self.features.n_features, config, 4) if config.variance else None

@@ -211,7 +211,7 @@ def _joined(pieces: list[_Piece], folder: Path, network: NetworkConfig) -> Sampl
     around = arrays.pop("object_patches")
     return Samples(
         **arrays,
-        object_patches=around if network.image == "object" else None,
+        object_patches=around if network.sees_object else None,
         part=torch.cat([torch.full((len(piece.arrays["success"]),), number[piece.part]) for piece in seen]),
         parts=parts,
         skipped=dict(skipped),
@@ -253,14 +253,14 @@ def _shard_samples(
             info.T_base_camera,
             n_pixels=network.patch_pixels,
             side=network.patch_side,
-            n_columns=network.patch_columns,
+            n_columns=network.patch_shape[1],
         )
         return (patches / HEIGHT_STEP).round().clamp(-32768, 32767).to(torch.int16).numpy()
 
     around = np.column_stack([np.array(centres), np.zeros(len(rows))])
     return {
         "patches": crop(grasp),
-        "object_patches": crop(around) if network.image == "object" else np.zeros((len(rows), 0)),
+        "object_patches": crop(around) if network.sees_object else np.zeros((len(rows), 0)),
         "theta": grasp[:, 3].astype(np.float32),
         "centre_grasp": centre_grasp.astype(np.float32),
         "height": (grasp[:, 2] - info.table_z).astype(np.float32),

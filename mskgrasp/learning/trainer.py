@@ -25,7 +25,8 @@ from mskgrasp.learning.checkpoint import (
     write_checkpoint,
 )
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models
-from mskgrasp.learning.networks import NetworkConfig, Normalisation, displacement_loss, with_noise
+from mskgrasp.learning.network_config import NetworkConfig, Normalisation, PatchNetworkConfig
+from mskgrasp.learning.networks import displacement_loss, with_noise
 from mskgrasp.learning.samples import Samples, part_sides
 from mskgrasp.learning.symmetry import mirror_and_turn
 
@@ -63,7 +64,7 @@ class LearningConfig(Config):
     """Correct quality and variances on the validation parts, at the end."""
     success_range: tuple[float, float] = (0.0, 1.0)
     """Parts whose share of successful random grasps lies outside are left out (paper: 0.05 to 0.40)."""
-    network: NetworkConfig = NetworkConfig()
+    network: NetworkConfig = PatchNetworkConfig()
     noise_std: float = Field(default=0.003, ge=0.0)
     """Noise on each pixel of a training patch, metres."""
     symmetric: bool = True
@@ -79,7 +80,7 @@ class LearningConfig(Config):
 
     @model_validator(mode="after")
     def _check(self) -> LearningConfig:
-        if self.symmetric and self.network.image == "object":
+        if self.symmetric and self.network.sees_object:
             raise ValueError("symmetric: true turns patches with their grasp; image: object has none")
         if self.network.symmetric_views and not self.symmetric:
             raise ValueError("network.symmetric_views shows views that only symmetric: true teaches")

@@ -83,7 +83,7 @@ def displacements(
     """Mean and variance (n, 4) of the grasps' displacement; NaN variance where the model knows none."""
     network = models.meta.network
     whole = None
-    if network.image == "object":
+    if network.sees_object:
         whole = scene.crop(np.append(scene.view.centre_base, 0.0)[None], network)
     means, variances = [], []
     for rows, centre, height, theta in _chunks(models, scene, grasps, chunk):

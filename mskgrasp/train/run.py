@@ -8,38 +8,23 @@ import json
 import math
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import torch
-from pydantic import Field
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import UsageError
-from mskgrasp.core.shipped import config_file
 from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, save_model
 from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.samples import Samples, read_samples
-from mskgrasp.learning.trainer import LearningConfig, Reporter, split, train
+from mskgrasp.learning.trainer import Reporter, split, train
 from mskgrasp.runtime import cli
+from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
 from mskgrasp.train.figures import draw_curves, draw_uncertainty
 
-DEFAULT_CONFIG = config_file("train/default.yaml")
 CHECKPOINT = "checkpoint.safetensors"
-
-
-class TrainConfig(LearningConfig):
-    """Settings of a training run."""
-
-    data: Path | None = None
-    """The dataset folder."""
-    out: Path | None = None
-    """Where the model goes. A run that was stopped goes on when it is started again in the same way."""
-    epochs: int | None = Field(default=None, ge=1)
-    """Of each network, in place of gqn.epochs and gdn.epochs."""
-    device: Literal["auto", "cpu", "cuda"] = "auto"
-    """auto: a CUDA device where there is one."""
 
 
 class _Bar(Reporter):

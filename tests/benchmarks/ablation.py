@@ -21,7 +21,7 @@ from rich.table import Table
 from tqdm import tqdm
 
 from mskgrasp.core.config import read_config
-from mskgrasp.learning.networks import NetworkConfig
+from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.trainer import LearningConfig, Sides, split, train
 
@@ -36,7 +36,7 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         network = changes.pop("network", {})
         return ours.model_copy(update=changes | {"network": ours.network.model_copy(update=network)})
 
-    assert isinstance(paper, NetworkConfig)
+    assert isinstance(paper, PatchNetworkConfig)
     paper = paper.model_copy(update={"symmetric_views": ours.network.symmetric_views})
     return {
         "ours": ours,

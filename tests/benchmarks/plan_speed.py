@@ -25,7 +25,7 @@ from hal import RgbdFrame, open_cell
 from mskgrasp.core.config import read_config
 from mskgrasp.core.settings import REGION, TABLE_Z
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models, load_models
-from mskgrasp.learning.networks import NetworkConfig, Normalisation
+from mskgrasp.learning.network_config import Normalisation
 from mskgrasp.learning.trainer import LearningConfig
 from mskgrasp.parts import starter_names
 from mskgrasp.planning.for_cell import present
@@ -74,7 +74,6 @@ def main() -> None:
 def fresh(config: str, device: str) -> Models:
     """Networks of a training configuration with weights that learned nothing."""
     network = read_config(LearningConfig, REPOSITORY / "configs" / "train" / f"{config}.yaml").network
-    assert isinstance(network, NetworkConfig)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(0)
         return build_models(ModelMeta(network=network, normalisation=SCALE), device)

@@ -10,9 +10,7 @@ import torch
 
 from mskgrasp.core.grasp import centre_in_grasp_frame
 from mskgrasp.learning.grasp_models import PRETRAINED, Models, build_models, load_models
-from mskgrasp.learning.networks import NetworkConfig
 from mskgrasp.learning.symmetry import mirror_and_turn
-from mskgrasp.learning.trainer import LearningConfig
 from tests import synthetic
 
 VIEWS = {
@@ -132,13 +130,3 @@ def test_no_grasps_have_no_displacement(models):
     patches, centre, height = scenes(models, 0)
     mean, variance = models.grasp_displacement(patches, centre, height)
     assert mean.shape == variance.shape == (0, 4)
-
-
-def test_views_that_the_network_never_learned_are_refused():
-    with pytest.raises(ValueError, match="only symmetric: true teaches"):
-        LearningConfig(symmetric=False, network=NetworkConfig(symmetric_views=True))
-
-
-def test_pictures_that_do_not_turn_have_no_views():
-    with pytest.raises(ValueError, match="symmetric_views turns patches"):
-        NetworkConfig(image="object", symmetric_views=True)

@@ -9,11 +9,8 @@ from hypothesis import given
 from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
-from mskgrasp.learning.grasp_models import ModelMeta, build_models
-from mskgrasp.learning.networks import NetworkConfig, Normalisation
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.planner import (
-    Planner,
     PlannerConfig,
     object_displacement_covariance,
     select,
@@ -21,55 +18,12 @@ from mskgrasp.planning.planner import (
     variance_score,
 )
 from mskgrasp.planning.refine import fingers_free
-from mskgrasp.planning.scoring import Scene, displacements
+from mskgrasp.planning.scoring import Scene
 from mskgrasp.reports.grasp_figures import draw_plan
 from tests import synthetic
 from tests.core.test_grasp import centres, shifts
+from tests.planning.boxes import BOX, FRAME, hand_made_models, planner
 from tests.synthetic import REGION, Box
-
-BOX = Box(x=0.45, y=0.02, yaw=0.4, size=(0.07, 0.02, 0.03))
-FRAME = synthetic.frame([BOX])
-
-
-def hand_made_models(variance=True):
-    """Networks of one action feature: quality falls with |centre x|, variance with centre y.
-
-    The action input is (x, y, z) / scale. Feature k of the trunk is relu(+-x) or relu(+-y); the image is
-    cut off by zero weights.
-    """
-    config = NetworkConfig(
-        patch_pixels=32,
-        channels=1,
-        trunk_width=1,
-        action_width=4,
-        head_width=4,
-        dropout=0.0,
-        variance=variance,
-    )
-    meta = ModelMeta(network=config, normalisation=Normalisation(action_scale=(0.05, 0.05, 0.05)))
-    models = build_models(meta)
-    with torch.no_grad():
-        for network in (models.gqn, models.gdn):
-            for parameter in network.parameters():
-                parameter.zero_()
-            network.features.action[0].weight.copy_(
-                torch.tensor([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
-            )
-        copy = torch.cat([torch.zeros(4, 1), torch.eye(4)], dim=1)  # pass the action features on
-        models.gqn.head[0].weight.copy_(copy)
-        models.gqn.head[3].weight[1] = torch.tensor([-4.0, -4.0, 0.0, 0.0])
-        if variance:
-            models.gdn.variance_head[0].weight.copy_(copy)
-            models.gdn.variance_head[3].weight[:] = torch.tensor([0.0, 0.0, 5.0, -5.0])
-            models.gdn.variance_head[3].bias.fill_(-8.0)
-        models.gdn.mean_head[3].bias.copy_(torch.tensor([0.001, 0.002, 0.0, 0.1]))
-    return models
-
-
-def planner(config=None, models=None):
-    return Planner(
-        models or hand_made_models(), config or PlannerConfig(n_candidates=600), table_z=0.0, region=REGION
-    )
 
 
 def test_the_planned_grasp_is_the_least_uncertain_of_the_best():
@@ -169,31 +123,6 @@ def test_the_covariance_is_that_of_the_derivative(displacement, centre):
         change[3] = wrap_angle(change[3])
         jacobian[:, k] = change / 2e-6
     assert np.allclose(covariance, jacobian @ np.diag(variance) @ jacobian.T, atol=1e-10)
-
-
-def test_a_network_that_sees_the_part_is_told_the_angle():
-    torch.manual_seed(5)
-    network = NetworkConfig(
-        image="object", patch_pixels=32, channels=4, trunk_width=8, action_width=8, head_width=8, dropout=0.0
-    )
-    scale = Normalisation(action_scale=(0.05, 0.05, 0.02))
-    models = build_models(ModelMeta(network=network, normalisation=scale))
-    view = view_part(FRAME.depth, FRAME.intrinsics, FRAME.T_base_camera, table_z=0.0, region=REGION)
-    scene = Scene.of(FRAME, view, 0.0, models.device)
-    grasps = np.tile(np.append(view.centre_base + [0.01, 0.0, 0.0], 0.0), (3, 1))
-    grasps[:, 3] = [0.0, 0.5, 0.5]
-    mean, variance = displacements(models, scene, grasps, 2)
-    assert np.allclose(mean[1], mean[2]) and not np.allclose(mean[0], mean[1])
-    assert mean.shape == variance.shape == (3, 4) and (variance > 0).all()
-    # What the network says along the picture's axes, worked out by hand for the second grasp.
-    action = torch.tensor([[-0.01, 0.0, 0.0, 0.5]])
-    patch = scene.crop(np.append(view.centre_base, 0.0)[None], network)
-    height = torch.tensor([view.centre_base[2]], dtype=torch.float32)
-    with torch.inference_mode():
-        prepared = models.gdn.features.prepare(patch, height)
-        x, y = models.gdn.outputs(models.gdn.features(prepared, action, height))[0][0, :2].tolist()
-    cos, sin = np.cos(0.5), np.sin(0.5)
-    np.testing.assert_allclose(mean[1, :2], [cos * x + sin * y, cos * y - sin * x], atol=1e-6)
 
 
 def test_a_grasp_beside_which_something_stands_is_left_out():

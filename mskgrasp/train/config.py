@@ -1,0 +1,30 @@
+"""Settings of a training run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from pydantic import Field
+
+from mskgrasp.core.shipped import config_file
+from mskgrasp.learning.network_config import NetworkConfig, PatchNetworkConfig
+from mskgrasp.learning.trainer import LearningConfig
+
+DEFAULT_CONFIG = config_file("train/default.yaml")
+
+
+class TrainConfig(LearningConfig):
+    """Settings of a training run."""
+
+    # The file chooses the architecture; options set its fields without naming it again.
+    network: Annotated[NetworkConfig, tyro.conf.AvoidSubcommands] = PatchNetworkConfig()
+    data: Path | None = None
+    """The dataset folder."""
+    out: Path | None = None
+    """The model's folder. A run that was interrupted resumes when it is started again in the same way."""
+    epochs: int | None = Field(default=None, ge=1)
+    """Of each network, in place of gqn.epochs and gdn.epochs."""
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    """auto: a CUDA device where there is one."""

@@ -1,0 +1,25 @@
+import torch
+
+from mskgrasp.learning.grasp_models import ModelMeta, build_models
+from mskgrasp.learning.hand_features import HandFeatures
+from mskgrasp.learning.network_config import HandNetworkConfig
+from tests.learning.small import NORMAL
+
+
+def test_our_network_sees_what_the_hand_would_meet():
+    config = HandNetworkConfig(patch_pixels=16, patch_columns=8, layers=(4, 8))
+    features = HandFeatures(config, NORMAL, config.layers, config.quality_shape)
+    # A step from the table to 30 mm, a finger tip at 10.5 mm (TCP at 20 mm), the palm far above.
+    patch = torch.zeros(1, 1, 16, 8)
+    patch[..., :8, :] = 0.03
+    tips, beside, palm, table = features.prepare(patch, torch.tensor([0.02]))[0]
+    assert torch.equal(tips[:8], torch.ones(8, 8)) and torch.equal(tips[8:], -torch.ones(8, 8))
+    assert torch.allclose(beside[:8], torch.tensor(1 / 3)) and torch.allclose(
+        beside[8:], torch.tensor(-2 / 3)
+    )
+    assert torch.equal(palm, -torch.ones(16, 8)) and torch.allclose(table[:8], torch.tensor(0.6))
+    # 56 mm below the top of a part the palm meets it.
+    assert float(features.prepare(patch + 0.05, torch.tensor([0.02]))[0, 2, 0, 0]) == 1.0
+    models = build_models(ModelMeta(network=config, normalisation=NORMAL))
+    inputs = torch.rand(3, 1, 16, 8), torch.zeros(3, 3), torch.full((3,), 0.02)
+    assert models.quality(*inputs).shape == (3,) and models.grasp_displacement(*inputs)[0].shape == (3, 4)

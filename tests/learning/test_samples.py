@@ -1,0 +1,83 @@
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.learning.samples import part_sides, read_samples
+from tests import synthetic
+from tests.learning.small import PATCH
+
+
+def test_samples_hold_every_attempt_with_its_displacement_seen_from_the_estimated_centre(samples):
+    assert len(samples) == 640 and samples.patches.shape == (640, 1, 40, 40)
+    assert len(samples.parts) == 8 and not samples.skipped
+    held = samples.success
+    assert bool(torch.isfinite(samples.grasp_displacement[held]).all())
+    assert bool(torch.isnan(samples.grasp_displacement[~held]).all())
+    # Closing the jaw centres a box: along y the displacement undoes the centre's offset, to a pixel.
+    sideways = samples.displacement[held][:, 1] + samples.centre_grasp[held][:, 1]
+    assert float(sideways.abs().max()) < 0.0025
+
+
+def held_out_of(names: tuple[str, ...], fraction: float) -> set[str]:
+    return {name for name, side in part_sides(names, fraction, "name").items() if side == "validation"}
+
+
+@pytest.mark.parametrize("image", ["grasp", "object"])
+def test_several_processes_read_the_same_samples(dataset, image):
+    network = PATCH.network.model_copy(update={"image": image})
+    one, two = (read_samples(dataset, network, workers=n) for n in (1, 2))
+    for field in dataclasses.fields(one):
+        first, second = getattr(one, field.name), getattr(two, field.name)
+        if isinstance(first, torch.Tensor):
+            assert first.dtype == second.dtype and np.array_equal(
+                first, second, equal_nan=first.is_floating_point()
+            )
+        else:
+            assert first == second
+    assert (one.object_patches is None) == (image == "grasp")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_damaged_shard_is_named_whoever_reads_it(tmp_path, workers):
+    dataset = synthetic.write_dataset(tmp_path, n_parts=3, n_attempts=20, seed=0)
+    bad = sorted((dataset / "shards").glob("*.h5"))[1]
+    bad.write_bytes(bad.read_bytes()[:500])
+    with pytest.raises(BadDataset, match=bad.name):
+        read_samples(dataset, PATCH.network, workers=workers)
+
+
+def test_parts_are_split_by_name_and_stay_on_their_side():
+    names = tuple(f"part_{k}" for k in range(400))
+    held_out = held_out_of(names, 0.2)
+    assert 50 < len(held_out) < 110
+    fewer = names[:200]
+    assert held_out_of(fewer, 0.2) == held_out & set(fewer)
+    assert all(len(held_out_of(("a", "b"), share)) == 1 for share in (0.01, 0.99))
+    with pytest.raises(BadDataset, match="at least 2 parts"):
+        part_sides(("lonely",), 0.2, "name")
+
+
+def test_parts_outside_the_success_range_are_left_out(dataset):
+    samples = read_samples(dataset, PATCH.network)
+    rates = sorted(
+        float(samples.success[samples.part == i].float().mean()) for i in range(len(samples.parts))
+    )
+    middle = rates[len(rates) // 2]
+    kept = samples.of_parts_between(0.0, middle)
+    assert 0 < len(kept.parts) < len(samples.parts) and len(kept) < len(samples)
+    for i, name in enumerate(kept.parts):
+        rows = samples.part == samples.parts.index(name)
+        assert float(kept.success[kept.part == i].float().mean()) <= middle
+        assert torch.equal(kept.patches[kept.part == i], samples.patches[rows])
+    with pytest.raises(BadDataset, match="widen success_range"):
+        samples.of_parts_between(0.999, 0.9991)
+
+
+def test_the_catalogue_decides_the_sides_where_it_is_asked_to(monkeypatch, tmp_path):
+    names = tuple(f"part_{k}" for k in range(6))
+    with pytest.raises(BadDataset, match="build --catalogue"):
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+        part_sides(names, 0.2, "catalogue")

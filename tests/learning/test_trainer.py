@@ -1,0 +1,141 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from mskgrasp.core.errors import BadDataset, BadModel, UsageError
+from mskgrasp.learning.grasp_models import build_models
+from mskgrasp.learning.held_out import predict_grasp_displacement
+from mskgrasp.learning.network_config import PatchNetworkConfig
+from mskgrasp.learning.samples import read_samples
+from mskgrasp.learning.trainer import (
+    LearningConfig,
+    Reporter,
+    Stage,
+    StageConfig,
+    TrainingDiverged,
+    describe,
+    split,
+)
+from mskgrasp.learning.trainer import train as learn
+from tests.learning.small import HAND, PATCH, SHORT
+
+
+def test_views_that_the_network_never_learned_are_refused():
+    with pytest.raises(ValueError, match="only symmetric: true teaches"):
+        LearningConfig(symmetric=False, network=PatchNetworkConfig(symmetric_views=True))
+
+
+def test_validation_never_sees_a_part_of_training(samples):
+    sides = split(samples, PATCH)
+    assert not set(samples.part[sides.training].tolist()) & set(samples.part[sides.validation].tolist())
+    assert len(sides.training) + len(sides.validation) == len(samples) and not len(sides.test)
+
+
+@pytest.mark.parametrize(("success", "words"), [(True, "no failure"), (False, "no success")])
+def test_data_of_one_outcome_are_told(samples, success, words):
+    alike = dataclasses.replace(samples, success=torch.full((len(samples),), success))
+    with pytest.raises(BadDataset, match=words):
+        split(alike, PATCH)
+
+
+class StopAfter(Reporter):
+    """Ctrl-C in the middle of the epoch that follows the n-th."""
+
+    def __init__(self, n):
+        self.left = n
+
+    def epoch(self, history):
+        self.left -= 1
+
+    def batch(self, loss):
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("after", [1, 2, 4])
+def test_a_stopped_run_goes_on_to_the_same_weights(samples, tmp_path, after):
+    path = tmp_path / "checkpoint.safetensors"
+    whole, history = learn(samples, SHORT, checkpoint_path=tmp_path / "whole.safetensors")
+    with pytest.raises(KeyboardInterrupt):
+        learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(after))
+    resumed, again = learn(samples, SHORT, checkpoint_path=path)
+    for one, other in ((whole.gqn, resumed.gqn), (whole.gdn, resumed.gdn)):
+        assert all(
+            torch.equal(a, b)
+            for a, b in zip(one.state_dict().values(), other.state_dict().values(), strict=True)
+        )
+    assert [row["train_loss"] for row in again] == [row["train_loss"] for row in history]
+
+
+def test_the_seed_decides_the_weights_and_the_global_generator_is_left_alone(samples, tmp_path):
+    torch.manual_seed(5)
+    state = torch.get_rng_state()
+    first, _ = learn(samples, SHORT, checkpoint_path=tmp_path / "a")
+    assert torch.equal(torch.get_rng_state(), state)
+    other, _ = learn(samples, SHORT.model_copy(update={"seed": 1}), checkpoint_path=tmp_path / "b")
+    assert not torch.equal(first.gqn.head[0].weight, other.gqn.head[0].weight)
+
+
+def test_a_checkpoint_of_other_data_or_a_damaged_one_is_refused(samples, tmp_path):
+    path = tmp_path / "checkpoint.safetensors"
+    with pytest.raises(KeyboardInterrupt):
+        learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(1))
+    other = dataclasses.replace(samples, fingerprint="0")
+    with pytest.raises(UsageError, match="other data"):
+        learn(other, SHORT, checkpoint_path=path)
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(BadModel, match="damaged"):
+        learn(samples, SHORT, checkpoint_path=path)
+
+
+def test_a_mean_only_network_and_the_papers_optimiser_can_be_trained(samples, tmp_path):
+    stage = StageConfig(
+        optimiser="rmsprop", learning_rate=1e-4, decay=1e-6, schedule="constant", epochs=1, batch_size=32
+    )
+    changes = {"network": PATCH.network.model_copy(update={"variance": False}), "gqn": stage, "gdn": stage}
+    models, history = learn(samples, SHORT.model_copy(update=changes), checkpoint_path=tmp_path / "c")
+    assert len(history) == 2 and models.meta.metrics["gdn"]["nll"] is None
+
+
+@pytest.mark.parametrize("config", [SHORT, HAND], ids=["the paper's", "ours"])
+def test_what_learned_in_mixed_precision_is_as_good_and_predicts_in_float32(dataset, tmp_path, config):
+    config = config.model_copy(update={"gqn": SHORT.gqn, "gdn": SHORT.gdn})
+    samples = read_samples(dataset, config.network)
+    plain, history = learn(samples, config, checkpoint_path=tmp_path / "plain")
+    mixed, again = learn(
+        samples, config.model_copy(update={"mixed_precision": True}), checkpoint_path=tmp_path / "mixed"
+    )
+    assert all(value.dtype == torch.float32 for value in mixed.gdn.state_dict().values())
+    losses = np.array([[row["validation_loss"] for row in rows] for rows in (history, again)])
+    assert 0 < np.abs(losses[0] - losses[1]).max() < 0.1 * np.abs(losses[0]).max()
+    rows = torch.arange(20)
+    assert mixed.gdn.features.mixed_precision and not plain.gdn.features.mixed_precision
+    first = predict_grasp_displacement(mixed, samples, rows)
+    mixed.gdn.features.mixed_precision = False
+    for one, other in zip(first, predict_grasp_displacement(mixed, samples, rows), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_a_loss_that_is_no_number_stops_the_run_in_one_line(samples, tmp_path):
+    wild = StageConfig(learning_rate=1e30, schedule="constant", epochs=2, batch_size=32)
+    with pytest.raises(TrainingDiverged, match="gqn.learning_rate") as caught:
+        learn(samples, SHORT.model_copy(update={"gqn": wild}), checkpoint_path=tmp_path / "c")
+    assert "\n" not in str(caught.value)
+
+
+def test_turned_samples_need_pictures_that_turn(dataset):
+    with pytest.raises(ValueError, match="symmetric"):
+        LearningConfig(network=PatchNetworkConfig(image="object"), symmetric=True)
+    network = PATCH.network.model_copy(update={"image": "object"})
+    samples = read_samples(dataset, network)
+    assert samples.object_patches.shape == samples.patches.shape
+    config = SHORT.model_copy(update={"network": network, "symmetric": False})
+    rows = torch.arange(8)
+    stage = Stage("gdn", build_models(describe(samples, split(samples, config).training, config)), samples,
+                  split(samples, config), config)  # fmt: skip
+    inputs = stage.batch(rows, torch.Generator().manual_seed(0))[0]
+    assert inputs.shape == (8, 1, 40, 40)

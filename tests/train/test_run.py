@@ -1,0 +1,102 @@
+import csv
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from mskgrasp.core.config import read_config
+from mskgrasp.core.errors import UsageError
+from mskgrasp.dataset import shard_path, write_shard
+from mskgrasp.learning.grasp_models import load_models
+from mskgrasp.learning.trainer import (
+    LearningConfig,
+)
+from mskgrasp.train import run as train
+from mskgrasp.train.config import TrainConfig
+from tests import synthetic
+from tests.learning.small import PATCH, SHORT
+from tests.programs import run_here
+
+
+def program(config: LearningConfig, **changes) -> TrainConfig:
+    return TrainConfig(**(config.model_dump() | {"device": "cpu"} | changes))
+
+
+def test_one_number_of_epochs_stands_for_both_networks_and_is_what_a_stopped_run_needs(dataset, tmp_path):
+    out = tmp_path / "model"
+    assert train.run(program(SHORT, data=dataset, out=out, epochs=1)) == 0
+    with open(out / "log.csv") as file:
+        assert [row["stage"] for row in csv.DictReader(file)] == ["gqn", "gdn"]
+    kept = read_config(TrainConfig, out / "config.yaml")
+    assert kept.gqn.epochs == kept.gdn.epochs == 1
+    assert train.run(program(SHORT, data=dataset, out=out, epochs=1)) == 0
+    with pytest.raises(UsageError, match="gdn"):
+        train.run(program(SHORT, data=dataset, out=out))
+
+
+def test_a_small_dataset_is_learned_and_beats_the_trivial_predictors(dataset, tmp_path):
+    out = tmp_path / "model"
+    config = PATCH.model_copy(update={"validation_fraction": 0.4})  # one part alone has no interval
+    assert train.run(program(config, data=dataset, out=out)) == 0
+    report = json.loads((out / "metrics.json").read_text())
+    gqn, gdn = report["gqn"], report["gdn"]
+    assert gqn["auroc"] > 0.85
+    assert gqn["brier"] < 0.8 * gqn["brier_of_base_rate"]
+    for trivial in ("zero_displacement", "training_mean"):
+        assert gdn["translation_rmse"] < 0.6 * gdn[trivial]["translation_rmse"]
+        # Some 200 successes teach such a small network the shift; the turn takes thousands.
+        assert gdn["nll"] < gdn[trivial]["nll"]
+    assert set(gdn["coverage_90"]) == {"x", "y", "z", "theta"}
+    models = load_models(out)
+    assert models.meta.metrics["gqn"]["auroc"] == pytest.approx(gqn["auroc"])
+    assert len(models.meta.training["training_parts"]) + len(models.meta.training["validation_parts"]) == 8
+    with open(out / "log.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["stage"] for row in rows] == ["gqn"] * 12 + ["gdn"] * 30
+    card = (out / "card.md").read_text()
+    assert f"{gqn['auroc']:.3f}" in card and f"{1e3 * gdn['translation_rmse']:.2f}" in card
+    assert str(dataset) not in card + (out / "model.json").read_text()
+    low, high = gdn["intervals"]["translation_rmse"]
+    assert 0 < gdn["ause_translation"] < 1 and low < gdn["translation_rmse"] < high
+    files = {path.name for path in out.iterdir()}
+    assert files == {
+        "model.safetensors",
+        "model.json",
+        "metrics.json",
+        "card.md",
+        "uncertainty.png",
+        "log.csv",
+        "curves.png",
+        "config.yaml",
+    }
+    # Started again, there is nothing to do; with other settings, the folder is taken.
+    assert train.run(program(config, data=dataset, out=out)) == 0
+    with pytest.raises(UsageError, match=r"other settings \(seed\)"):
+        train.run(program(config, data=dataset, out=out, seed=1))
+
+
+def test_mistakes_on_the_command_line_are_one_line_each(tmp_path, dataset):
+    out = tmp_path / "out"
+    full = tmp_path / "full"
+    full.mkdir()
+    (full / "diary.txt").write_text("mine")
+    lonely = tmp_path / "lonely"
+    attempts = synthetic.random_attempts(6, (0.05, 0.02, 0.03), np.random.default_rng(3))
+    write_shard(shard_path(lonely, "box", 0), attempts, synthetic.info("box"))
+    cases = [
+        ((), 2, "--data is needed"),
+        (("--data", dataset), 2, "--out is needed"),
+        (("--data", tmp_path / "no", "--out", out), 1, "no dataset folder"),
+        (("--data", tmp_path, "--out", out), 1, "no shards"),
+        (("--data", dataset, "--out", full), 2, "holds no training run"),
+        (("--data", lonely, "--out", out), 1, "one part (box)"),
+        (("--config", tmp_path / "no.yaml"), 2, "cannot read configuration"),
+    ]
+    if not torch.cuda.is_available():
+        cases.append((("--data", dataset, "--out", out, "--device", "cuda"), 2, "no CUDA device"))
+    for arguments, code, words in cases:
+        done = run_here(train.main, *map(str, arguments))
+        assert done.returncode == code and words in done.stderr, (arguments, done)
+        assert done.stderr.count("\n") == 1
+    assert not out.exists()
