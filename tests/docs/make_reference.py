@@ -14,7 +14,7 @@ PACKAGES = ("mskgrasp", "hal", "tasks")
 INTRODUCTION = """\
 # Reference
 
-Made from docstrings by `make reference`; do not edit. For every package: its purpose, the names that it exports
+Made from docstrings by `make reference`; do not edit. For every package: its purpose, the names it exports
 (`__all__`), and its modules. Arguments, shapes, units and errors are in the docstrings: `help(NAME)`.
 """
 
