@@ -71,19 +71,6 @@ def test_every_import_in_an_example_resolves(page: Path):
         assert not [name for name in re.findall(r"\w+", names) if not hasattr(found, name)]
 
 
-@pytest.mark.parametrize(
-    "page",
-    sorted(set((ROOT / "docs/results").glob("*.md")) - {ROOT / "docs/results/README.md"}),
-    ids=lambda p: p.stem,
-)
-def test_a_results_page_says_how_each_table_was_made(page: Path):
-    text = page.read_text(encoding="utf-8")
-    keys = ("command", "split", "n", "intervals", "model", "simulation", "recorded", "machine")
-    counts = {key: len(re.findall(rf"^\| {key} \|[^|]+\|$", text, flags=re.M)) for key in keys}
-    assert counts["command"] >= 1
-    assert len(set(counts.values())) == 1, counts
-
-
 def _exists(name: str) -> bool:
     path = ROOT
     parts = name.split(".")

@@ -31,3 +31,11 @@ def test_the_workflow_runs_what_can_be_run_here():
     assert "python:3.11" in job["container"]
     assert job["steps"][-1] == {"run": "bash .ci/run"}
     assert (ROOT / ".ci/run").stat().st_mode & 0o111
+
+
+def test_the_architecture_names_every_room():
+    page = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    rooms = [
+        init.parent for package in ("mskgrasp", "hal") for init in (ROOT / package).glob("*/__init__.py")
+    ]
+    assert not [str(room) for room in rooms if f"`{room.parent.name}.{room.name}`" not in page]
