@@ -5,13 +5,14 @@ READY := $(VENV)/.ready
 TESTABLE := $(VENV)/.testable
 RUN := $(VENV)/bin/python -m
 
-.PHONY: help setup collect train plan evaluate palletize test regression bench-parts bench-collect bench-train bench-plan check format clean
+.PHONY: help setup collect train plan evaluate palletize test test-all regression bench-parts bench-collect bench-train \
+	bench-plan check format reference clean
 .DEFAULT_GOAL := help
 
 help: ## Explain the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 22
 
-setup: $(READY) ## Virtual environment in .venv with pinned packages, and a Vulkan driver
+setup: $(READY) ## Set up .venv with pinned packages, and a Vulkan driver
 
 $(READY): pyproject.toml .ci/constraints.txt .ci/setup
 	PYTHON=$(PYTHON) .ci/setup
@@ -28,41 +29,41 @@ collect: $(READY) ## Collect the demo dataset into data/demo (the main job; resu
 train: $(READY) ## Train both networks on data/demo into models/demo
 	$(RUN) mskgrasp.train --data data/demo --out models/demo
 
-plan: $(READY) ## Plan a grasp in the simulated cell
+plan: $(READY) ## Plan one grasp in the simulated cell, without moving
 	$(RUN) mskgrasp.plan --out out/plan
 
-evaluate: $(READY) ## Plan and execute grasps in the simulated cell
+evaluate: $(READY) ## Plan and execute grasps of held-out parts in the simulated cell
 	$(RUN) mskgrasp.evaluate --parts test --n-parts 10 --trials 2 --out out/evaluate
 
-palletize: $(READY) ## Grasp parts, correct by the predicted displacement and place them
+palletize: $(READY) ## Grasp held-out parts and place them, corrected by the predicted displacement
 	$(RUN) mskgrasp.palletize --parts test --n-parts 6 --trials 2 --out out/palletize
 
-# Two at once: robots that are simulated in real time lose their drivers on a machine that is busier.
+# Two processes: robots simulated in real time lose their drivers on a busier machine.
 test: $(TESTABLE) ## Run the tests
 	$(RUN) pytest -n 2 --dist loadfile --no-loadscope-reorder --durations 15
 
-test-all: $(TESTABLE) ## The same and the slow ones: every family, both drivers' faults, 20 kills
+test-all: $(TESTABLE) ## Run the slow tests, too: every family, the faults of both drivers, 20 kills
 	MSKGRASP_FAMILIES=99 MSKGRASP_KILLS=10 $(RUN) pytest -n 2 --dist loadfile --no-loadscope-reorder \
 		--durations 15 -m "slow or not slow"
 
-# Anew each time: what an earlier state of the code left must not count.
-regression: $(READY) ## Run the loop over a fixed set and print what has changed (ARGS=--store keeps it)
+# The folder is removed first: results of an earlier state of the code must not count.
+regression: $(READY) ## Plan, grasp and place a fixed set, compare with the stored run (ARGS=--store replaces it)
 	rm -rf out/regression
 	$(RUN) tests.sim_in_the_loop.regression --workers 2 $(ARGS)
 
-bench-parts: $(TESTABLE) ## Seconds to make a part, by family and stage
+bench-parts: $(TESTABLE) ## Measure seconds to build a part, by family and stage
 	$(RUN) tests.benchmarks.build_parts
 
-bench-collect: $(TESTABLE) ## Grasps/s of the collector beside plain ManiSkill and raw SAPIEN
+bench-collect: $(TESTABLE) ## Measure grasps/s of the collector, plain ManiSkill and raw SAPIEN
 	$(RUN) tests.benchmarks.collect_speed
 
-bench-train: $(TESTABLE) ## Samples/s of training, our network beside the paper's
+bench-train: $(TESTABLE) ## Measure samples/s of training, our networks and the paper's
 	$(RUN) tests.benchmarks.train_speed
 
-bench-plan: $(TESTABLE) ## Milliseconds of a plan, our network beside the paper's
+bench-plan: $(TESTABLE) ## Measure milliseconds of a plan, our networks and the paper's
 	$(RUN) tests.benchmarks.plan_speed
 
-check: $(TESTABLE) ## Check style, types and the floors of the house
+check: $(TESTABLE) ## Check style, types and the layers of imports
 	$(RUN) ruff format --check .
 	$(RUN) ruff check .
 	$(VENV)/bin/pyright
@@ -71,6 +72,9 @@ check: $(TESTABLE) ## Check style, types and the floors of the house
 format: $(READY) ## Format the code
 	$(RUN) ruff format .
 	$(RUN) ruff check --fix .
+
+reference: $(READY) ## Write docs/reference.md from docstrings
+	$(RUN) tests.docs.make_reference
 
 clean: ## Remove the virtual environment and caches (data, models and out stay)
 	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis .import_linter_cache *.egg-info

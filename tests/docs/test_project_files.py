@@ -1,0 +1,41 @@
+"""Files at the top of the repository agree with each other."""
+
+from __future__ import annotations
+
+import re
+
+import yaml
+
+import mskgrasp
+from tests.docs.pages import ROOT
+
+
+def test_hooks_use_the_ruff_that_is_pinned():
+    hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))
+    (rev,) = (repo["rev"] for repo in hooks["repos"] if "ruff" in repo["repo"])
+    pinned = re.search(
+        r"^ruff==(.*)$", (ROOT / ".ci/constraints.txt").read_text(encoding="utf-8"), flags=re.M
+    )
+    assert pinned and rev == f"v{pinned[1]}"
+
+
+def test_the_citation_names_this_version_and_the_paper():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == mskgrasp.__version__
+    assert "1909.02129" in citation["references"][0]["url"]
+
+
+def test_the_workflow_runs_what_can_be_run_here():
+    workflow = yaml.safe_load((ROOT / ".github/workflows/test.yml").read_text(encoding="utf-8"))
+    job = workflow["jobs"]["test"]
+    assert "python:3.11" in job["container"]
+    assert job["steps"][-1] == {"run": "bash .ci/run"}
+    assert (ROOT / ".ci/run").stat().st_mode & 0o111
+
+
+def test_the_architecture_names_every_room():
+    page = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    rooms = [
+        init.parent for package in ("mskgrasp", "hal") for init in (ROOT / package).glob("*/__init__.py")
+    ]
+    assert not [str(room) for room in rooms if f"`{room.parent.name}.{room.name}`" not in page]
