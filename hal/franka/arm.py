@@ -17,12 +17,12 @@ from hal.franka.config import JOINT_SPEED, FrankyArmConfig, PandaPyArmConfig
 from hal.franka.driver import DriverSettings, DriverState
 from hal.franka.faults import NoTrajectory
 from hal.franka.frames import check_end_effector, pose_from_columns
-from hal.franka.kinematics import forward_pose, reachable
 from hal.franka.link import DriverLink
 from hal.franka.path import JointPath, joint_path, straight_path
 from hal.limits import ArmLimits
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import MAX_OPENING
+from mskgrasp.core.panda_kinematics import forward_pose, reachable
 
 TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""

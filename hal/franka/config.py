@@ -8,17 +8,18 @@ import numpy as np
 from pydantic import Field
 
 from mskgrasp.core.config import Config
+from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER
 
 Seven = tuple[float, float, float, float, float, float, float]
 Robot = Literal["panda", "fr3"]
 
 # Franka Control Interface documentation, "Robot limits"; Panda is the Franka Emika Robot, FR3 the Research 3.
 _JOINT_LOWER: dict[Robot, Seven] = {
-    "panda": (-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973),
+    "panda": JOINT_LOWER,
     "fr3": (-2.7437, -1.7837, -2.9007, -3.0421, -2.8065, 0.5445, -3.0159),
 }
 _JOINT_UPPER: dict[Robot, Seven] = {
-    "panda": (2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973),
+    "panda": JOINT_UPPER,
     "fr3": (2.7437, 1.7837, 2.9007, -0.1518, 2.8065, 4.5169, 3.0159),
 }
 JOINT_SPEED = np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61])

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hal.errors import NotConnected
-from hal.franka.kinematics import TCP_OFFSET
 from mskgrasp.core.geometry import Pose
+from mskgrasp.core.panda_kinematics import TCP_OFFSET
 
 _TURN = math.cos(math.pi / 4)
 F_T_EE = np.array([[_TURN, _TURN, 0, 0], [-_TURN, _TURN, 0, 0], [0, 0, 1, TCP_OFFSET], [0, 0, 0, 1.0]])

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hal.errors import OutOfWorkspace
-from hal.franka.kinematics import forward_pose, solved, track, within
 from mskgrasp.core.geometry import Pose, pose_distance, straight_line
+from mskgrasp.core.minimum_jerk import minimum_jerk, minimum_jerk_duration, minimum_jerk_rate
+from mskgrasp.core.panda_kinematics import POSE_TOLERANCE, forward_pose, track, within_limits
 
 PERIOD_S = 0.05
 """Time between two knots of a path, s: a cubic between them is off by less than 0.1 mm at 0.5 m/s."""
@@ -105,7 +106,7 @@ def _along(
 ) -> JointPath:
     share, _ = _profile(seconds)
     joints, error = track(straight_line(here, goal, share).as_matrix(), start)
-    if not solved(error) or not within(joints, lower, upper):
+    if not (error < POSE_TOLERANCE).all() or not within_limits(joints, lower, upper):
         target = ", ".join(f"{value:.3f}" for value in goal.position)
         raise OutOfWorkspace(
             f"no straight line from here to TCP ({target}) m within the joint limits; "
@@ -118,14 +119,11 @@ def _along(
 
 
 def _profile(seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of the way and their rate at knots: minimum jerk (Flash and Hogan 1985, equation 5)."""
+    """Shares of the way and their rate at knots: minimum jerk."""
     n = max(4, math.ceil(seconds / PERIOD_S))
     t = np.arange(n + 1) / n
-    return t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2 / seconds
+    return minimum_jerk(t), minimum_jerk_rate(t) / seconds
 
 
 def _duration(distance: float, peak_speed: float, peak_acceleration: float) -> float:
-    """Seconds for a minimum-jerk motion: its peaks are 15/8 and 10/sqrt(3) of the mean ones."""
-    return max(
-        15 / 8 * distance / peak_speed, math.sqrt(10 / math.sqrt(3) * distance / peak_acceleration), 0.1
-    )
+    return minimum_jerk_duration(distance, peak_speed, peak_acceleration, shortest_s=0.1)

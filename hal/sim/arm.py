@@ -15,8 +15,16 @@ from hal.limits import ArmLimits
 from hal.sim.world import SapienWorld
 from mskgrasp.core.geometry import Pose, pose_distance, straight_line
 from mskgrasp.core.grasp import MAX_OPENING, MIN_GAP
-from mskgrasp.core.panda_kinematics import HOME, forward, track
-from tasks.robot.motion import PEAK_ACCELERATION, ease, ease_duration
+from mskgrasp.core.minimum_jerk import minimum_jerk_duration, minimum_jerk_steps
+from mskgrasp.core.panda_kinematics import (
+    POSE_TOLERANCE,
+    forward,
+    forward_pose,
+    reachable,
+    track,
+    within_limits,
+)
+from tasks.robot.motion import PEAK_ACCELERATION
 
 JOINT_SPEED = 2.0
 """Greatest joint speed, rad/s (Panda datasheet: 2.175 rad/s for joints 1 to 4)."""
@@ -28,7 +36,6 @@ SETTLE_S = 0.15
 """How long the drives may settle at the end of a motion, s."""
 LOOK_S = 0.004
 """Time between two looks at the force on a hand that moves, s."""
-UNREACHED = 1e-4
 _WAYPOINT_M = 0.01
 
 
@@ -75,8 +82,10 @@ class SapienArm(Arm):
     def _move_to_joints(self, joints: np.ndarray, speed: float) -> None:
         start = self._target()
         goal = torch.as_tensor(joints, dtype=torch.float64)
-        seconds = ease_duration(float((goal - start).abs().max()), speed * JOINT_SPEED, JOINT_ACCELERATION)
-        share = torch.from_numpy(ease(self._world.env.motion.n_steps(seconds)))[:, None]
+        seconds = minimum_jerk_duration(
+            float((goal - start).abs().max()), speed * JOINT_SPEED, JOINT_ACCELERATION
+        )
+        share = torch.from_numpy(minimum_jerk_steps(self._world.env.motion.n_steps(seconds)))[:, None]
         self._follow(start + share * (goal - start))
 
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
@@ -84,16 +93,16 @@ class SapienArm(Arm):
         here = Pose.from_matrix(forward(start)[0].numpy())
         distance, angle = pose_distance(here, T_base_tcp)
         seconds = max(
-            ease_duration(distance, speed, PEAK_ACCELERATION),
-            ease_duration(angle, TURN_SPEED, JOINT_ACCELERATION),
+            minimum_jerk_duration(distance, speed, PEAK_ACCELERATION),
+            minimum_jerk_duration(angle, TURN_SPEED, JOINT_ACCELERATION),
         )
         n_waypoints = max(2, math.ceil(distance / _WAYPOINT_M), math.ceil(angle / 0.05))
         line = straight_line(here, T_base_tcp, np.linspace(0, 1, n_waypoints + 1)[1:])
         joints, error = track(torch.as_tensor(line.as_matrix()), start)
-        if float(error.max()) > UNREACHED or not self._within_limits(joints.numpy()):
+        if float(error.max()) > POSE_TOLERANCE or not self._within_limits(joints.numpy()):
             target = ", ".join(f"{value:.3f}" for value in T_base_tcp.position)
             raise OutOfWorkspace(f"no straight line from here to TCP ({target}) m within the joint limits")
-        share = torch.from_numpy(ease(self._world.env.motion.n_steps(seconds)))
+        share = torch.from_numpy(minimum_jerk_steps(self._world.env.motion.n_steps(seconds)))
         self._follow(_interpolate(torch.cat([start[None], joints]), share))
 
     def _follow(self, path: Tensor) -> None:
@@ -149,16 +158,13 @@ class SapienArm(Arm):
             motion.step()
 
     def _forward(self, joints: np.ndarray) -> Pose:
-        return Pose.from_matrix(forward(torch.as_tensor(joints, dtype=torch.float64))[0].numpy())
+        return forward_pose(joints)
 
     def _reachable(self, T_base_tcp: Pose) -> bool:
-        # From the usual ready pose: the elbow up, the hand down, far from every joint limit.
-        target = torch.as_tensor(T_base_tcp.as_matrix())[None]
-        joints, error = track(target, torch.tensor(HOME, dtype=torch.float64), iterations=40)
-        return float(error[0]) < UNREACHED and self._within_limits(joints.numpy())
+        return reachable(T_base_tcp, self.limits.joint_lower, self.limits.joint_upper)
 
     def _within_limits(self, joints: np.ndarray) -> bool:
-        return bool(((joints >= self.limits.joint_lower) & (joints <= self.limits.joint_upper)).all())
+        return within_limits(joints, self.limits.joint_lower, self.limits.joint_upper)
 
     def _halt(self) -> None:
         """The drives hold their last targets; a motion in progress sees the stop flag."""

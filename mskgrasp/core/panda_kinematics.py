@@ -1,6 +1,7 @@
-"""Kinematics of the Franka Panda with its hand, batched.
+"""Kinematics of the Franka Panda (and of the FR3, which shares its geometry) with the Franka Hand.
 
-Parameters: Franka Control Interface documentation, "Denavit-Hartenberg parameters" (Craig's
+Numpy arrays and torch tensors alike, and without torch for numpy: the machine beside a real robot need not
+have it. Parameters: Franka Control Interface documentation, "Denavit-Hartenberg parameters" (Craig's
 convention), end effector turned by -45 degrees and moved by 0.1034 m (Franka Hand).
 """
 
@@ -8,27 +9,29 @@ from __future__ import annotations
 
 import math
 
-import torch
-from array_api_compat import array_namespace
-from torch import Tensor
+import numpy as np
+from array_api_compat import array_namespace, device
 
-from mskgrasp.core.geometry import Array, components, joined
+from mskgrasp.core.geometry import Array, Pose, components, joined
 
 JOINT_LOWER = (-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973)
 JOINT_UPPER = (2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973)
 HOME = (0.0, math.pi / 8, 0.0, -5 * math.pi / 8, 0.0, 3 * math.pi / 4, math.pi / 4)
 """Arm joints at rest: the hand points down in front of the base."""
+TCP_OFFSET = 0.1034
+"""From the flange to the TCP along the hand, metres (libfranka's default end effector, Franka Hand)."""
+POSE_TOLERANCE = 1e-4
+"""A pose that `track` misses by more, metres and radians mixed, is out of reach."""
 
 _A = (0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088)
 _D = (0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.0)
 _ALPHA = (0.0, -math.pi / 2, math.pi / 2, math.pi / 2, -math.pi / 2, math.pi / 2, math.pi / 2)
 _FLANGE = 0.107
-_TCP = 0.1034
 _UPPER_ARM = math.hypot(0.316, 0.0825)
 _FOREARM = math.hypot(0.384, 0.0825)
 
 
-def forward(q: Tensor) -> tuple[Tensor, Tensor]:
+def forward(q: Array) -> tuple[Array, Array]:
     """Pose of the TCP and the geometric Jacobian.
 
     Args:
@@ -38,34 +41,46 @@ def forward(q: Tensor) -> tuple[Tensor, Tensor]:
         T_base_tcp: (..., 4, 4).
         jacobian: (..., 6, 7), linear rows above angular ones, base frame.
     """
-    shape = q.shape[:-1]
-    frame = torch.eye(4, dtype=q.dtype, device=q.device).expand(*shape, 4, 4)
-    axes, origins = [], []
-    for joint in range(7):
-        frame = frame @ _link(q[..., joint], _A[joint], _D[joint], _ALPHA[joint])
-        axes.append(frame[..., :3, 2])
-        origins.append(frame[..., :3, 3])
-    angle = torch.full(shape, -math.pi / 4, dtype=q.dtype, device=q.device)
-    frame = frame @ _link(angle, 0.0, _FLANGE + _TCP, 0.0)
+    xp = array_namespace(q)
+    angles = [*components(q), xp.full(q.shape[:-1], -math.pi / 4, dtype=q.dtype, device=device(q))]
+    links = _links(xp.stack(angles, axis=-1), (*_A, 0.0), (*_D, _FLANGE + TCP_OFFSET), (*_ALPHA, 0.0))
+    frame = links[..., 0, :, :]
+    frames = [frame]
+    for joint in range(1, 8):
+        frame = frame @ links[..., joint, :, :]
+        frames.append(frame)
     tip = frame[..., :3, 3]
-    columns = [
-        torch.cat([torch.linalg.cross(axis, tip - origin), axis], dim=-1)
-        for axis, origin in zip(axes, origins, strict=True)
-    ]
-    return frame, torch.stack(columns, dim=-1)
+    axes = xp.stack([joint_frame[..., :3, 2] for joint_frame in frames[:7]], axis=-1)
+    origins = xp.stack([joint_frame[..., :3, 3] for joint_frame in frames[:7]], axis=-1)
+    linear = xp.linalg.cross(axes, tip[..., None] - origins, axis=-2)
+    return frame, xp.concat([linear, axes], axis=-2)
 
 
-def _link(theta: Tensor, a: float, d: float, alpha: float) -> Tensor:
-    c, s = torch.cos(theta), torch.sin(theta)
-    ca, sa = math.cos(alpha), math.sin(alpha)
-    zero, one = torch.zeros_like(theta), torch.ones_like(theta)
-    rows = [
-        [c, -s, zero, a * one],
-        [s * ca, c * ca, -sa * one, -d * sa * one],
-        [s * sa, c * sa, ca * one, d * ca * one],
-        [zero, zero, zero, one],
+def forward_pose(q: np.ndarray) -> Pose:
+    """``T_base_tcp`` (...) at joints (..., 7), radians."""
+    return Pose.from_matrix(forward(q)[0])
+
+
+def _links(theta: Array, a: tuple[float, ...], d: tuple[float, ...], alpha: tuple[float, ...]) -> Array:
+    """(..., k, 4, 4) transforms of links at angles (..., k)."""
+    xp = array_namespace(theta)
+    c, s = xp.cos(theta), xp.sin(theta)
+
+    def constant(values: list[float]) -> Array:
+        vector = xp.asarray(values, dtype=theta.dtype, device=device(theta))
+        return xp.broadcast_to(vector, theta.shape)
+
+    zero, one = xp.zeros_like(theta), xp.ones_like(theta)
+    ca, sa = constant([math.cos(angle) for angle in alpha]), constant([math.sin(angle) for angle in alpha])
+    d_sa = constant([-offset * math.sin(angle) for offset, angle in zip(d, alpha, strict=True)])
+    d_ca = constant([offset * math.cos(angle) for offset, angle in zip(d, alpha, strict=True)])
+    entries = [
+        *(c, -s, zero, constant(list(a))),
+        *(s * ca, c * ca, -sa, d_sa),
+        *(s * sa, c * sa, ca, d_ca),
+        *(zero, zero, zero, one),
     ]
-    return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=-2)
+    return xp.reshape(xp.stack(entries, axis=-1), (*theta.shape, 4, 4))
 
 
 def top_down(grasps: Array) -> tuple[Array, Array]:
@@ -85,7 +100,7 @@ def top_down(grasps: Array) -> tuple[Array, Array]:
     x, y, z, theta = components(grasps)
     q1 = xp.atan2(y, x)
     radius = xp.sqrt(x * x + y * y) - _A[6]
-    height = z + _FLANGE + _TCP - _D[0]
+    height = z + _FLANGE + TCP_OFFSET - _D[0]
     distance2 = radius * radius + height * height
     cosine = (distance2 - _UPPER_ARM**2 - _FOREARM**2) / (2 * _UPPER_ARM * _FOREARM)
     within = abs(cosine) <= 1
@@ -105,37 +120,52 @@ def top_down(grasps: Array) -> tuple[Array, Array]:
     return joined([q1, q2, zero, q4, zero, q6, q7]), within
 
 
-def track(path: Tensor, start: Tensor, *, iterations: int = 8) -> tuple[Tensor, Tensor]:
+def track(path: Array, start: Array, *, iterations: int = 8) -> tuple[Array, Array]:
     """Joint angles along a path of poses, each solved from the one before (damped least squares).
 
     Args:
         path: (k, 4, 4) ``T_base_tcp``, consecutive poses close to each other.
-        start: (7,) joints near the first pose.
+        start: (7,) joints near the first pose, radians.
         iterations: Newton steps a pose.
 
     Returns:
         q: (k, 7) radians.
-        error: (k,) what is left, metres and radians mixed; above 1e-4 the pose was not reached.
+        error: (k,) remaining error, metres and radians mixed; above `POSE_TOLERANCE` a pose was not reached.
     """
-    q, solved, errors = start.clone(), [], []
-    damping = 1e-6 * torch.eye(6, dtype=q.dtype, device=q.device)
+    xp = array_namespace(path, start)
+    q, solved, errors = start, [], []
+    damping = 1e-6 * xp.eye(6, dtype=q.dtype, device=device(q))
     for target in path:
+        pose, jacobian = forward(q)
+        residual = _pose_error(pose, target)
         for _ in range(iterations):
+            if float(xp.linalg.vector_norm(residual)) < 1e-7:
+                break
+            q = q + jacobian.T @ xp.linalg.solve(jacobian @ jacobian.T + damping, residual)
             pose, jacobian = forward(q)
             residual = _pose_error(pose, target)
-            if float(residual.norm()) < 1e-7:
-                break
-            q = q + jacobian.T @ torch.linalg.solve(jacobian @ jacobian.T + damping, residual)
         solved.append(q)
-        errors.append(_pose_error(forward(q)[0], target).norm())
-    return torch.stack(solved), torch.stack(errors)
+        errors.append(xp.linalg.vector_norm(residual))
+    return xp.stack(solved), xp.stack(errors)
 
 
-def _pose_error(pose: Tensor, target: Tensor) -> Tensor:
+def _pose_error(pose: Array, target: Array) -> Array:
     """(6,) translation and rotation vector from a pose to its target, base frame."""
+    xp = array_namespace(pose, target)
     turn = target[:3, :3] @ pose[:3, :3].T
-    skew = torch.stack([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    sine = skew.norm() / 2
-    angle = torch.atan2(sine, (torch.trace(turn) - 1) / 2)
-    axis = skew / (2 * sine).clamp(min=1e-12)
-    return torch.cat([target[:3, 3] - pose[:3, 3], angle * axis])
+    skew = xp.stack([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    sine = xp.linalg.vector_norm(skew) / 2
+    angle = xp.atan2(sine, (xp.linalg.trace(turn) - 1) / 2)
+    axis = skew / xp.clip(2 * sine, 1e-12, None)
+    return xp.concat([target[:3, 3] - pose[:3, 3], angle * axis])
+
+
+def within_limits(q: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> bool:
+    """Whether all joints (..., 7) lie within limits (7,), radians."""
+    return bool(((q >= lower) & (q <= upper)).all())
+
+
+def reachable(T_base_tcp: Pose, lower: np.ndarray, upper: np.ndarray) -> bool:
+    """Whether the pose is reached within joint limits (7,) from `HOME`: elbow up, hand down."""
+    q, error = track(T_base_tcp.as_matrix()[None], np.array(HOME), iterations=40)
+    return bool(error[0] < POSE_TOLERANCE) and within_limits(q, lower, upper)

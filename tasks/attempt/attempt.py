@@ -21,13 +21,14 @@ from mskgrasp.core.grasp import (
     pose_base_grasp,
     pose_base_tcp,
 )
+from mskgrasp.core.minimum_jerk import minimum_jerk, minimum_jerk_duration
 from mskgrasp.core.panda_kinematics import top_down
 from mskgrasp.core.settings import TABLE_Z, Physics
 from tasks.attempt.clearance import Clearance, hand_clearance
 from tasks.attempt.outcome import MAX_DRIFT, MAX_TURN, MIN_PAD_FORCE, Observed, judge
 from tasks.attempt.speed_watch import SpeedWatch
 from tasks.robot.contacts import HandContacts
-from tasks.robot.motion import PEAK_ACCELERATION, PandaMotion, ease_at, ease_duration, finger_lag, run_up
+from tasks.robot.motion import PEAK_ACCELERATION, PandaMotion, finger_lag, run_up
 from tasks.robot.panda import GraspPanda
 from tasks.scene.frames import own_pose
 
@@ -237,9 +238,9 @@ class Attempt:
             up = self._way(grasp, lifted, times)
             return motion.follow(up, check=all_lost, check_every=motion.n_steps(0.05), frozen=stay)
 
-        seconds = ease_duration(physics.lift_height, physics.lift_speed, PEAK_ACCELERATION)
+        seconds = minimum_jerk_duration(physics.lift_height, physics.lift_speed, PEAK_ACCELERATION)
         times = _moments(motion.n_steps(seconds))
-        times = times[: 1 + int(np.searchsorted(physics.lift_height * ease_at(times), TAKE_OFF))]
+        times = times[: 1 + int(np.searchsorted(physics.lift_height * minimum_jerk(times), TAKE_OFF))]
         if not rise(times):
             return False, deepest
         # What the fingers and the table do to the part is done: what follows needs no such fine steps. The
@@ -319,12 +320,12 @@ class Attempt:
         """(steps, n, 7) joints along straight lines between grasps; as long as the longest line needs."""
         start, goal = self._arrays.of(start), self._arrays.of(goal)
         distance = float(_length((goal - start)[:, :3]).max())
-        n_steps = self._motion.n_steps(ease_duration(distance, speed, PEAK_ACCELERATION))
+        n_steps = self._motion.n_steps(minimum_jerk_duration(distance, speed, PEAK_ACCELERATION))
         return self._way(start, goal, _moments(n_steps))
 
     def _way(self, start: Array, goal: Array, times: np.ndarray) -> Array:
         """(steps, n, 7) joints at times of a straight line between grasps, as shares of its duration."""
-        share = self._arrays.of(ease_at(times))[:, None, None]
+        share = self._arrays.of(minimum_jerk(times))[:, None, None]
         start, goal = _double(start), _double(goal)
         return top_down(start + share * (goal - start))[0]
 

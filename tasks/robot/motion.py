@@ -35,31 +35,6 @@ CHECK_S = 0.02
 """Time between two looks at fingers that close, and at the part's speed, s."""
 
 
-def ease(n_steps: int) -> np.ndarray:
-    """(n_steps,) fractions of a path from just above 0 to 1, after equal steps of its time; see `ease_at`."""
-    return ease_at(np.arange(1, n_steps + 1) / n_steps)
-
-
-def ease_at(t: np.ndarray) -> np.ndarray:
-    """Fractions of a path at shares of its time, from 0 to 1, without speed or acceleration at its ends.
-
-    The minimum-jerk profile (Flash and Hogan 1985, equation 5): with an acceleration at the end the arm
-    would overshoot by its inertia over its stiffness, more than the clearance between pads and table.
-    """
-    return t**3 * (10 - 15 * t + 6 * t**2)
-
-
-def ease_duration(distance: float, peak_speed: float, peak_acceleration: float) -> float:
-    """Seconds that `ease` needs over a distance without passing a peak speed and a peak acceleration.
-
-    The profile's peaks are 15/8 of the mean speed and 10/sqrt(3) distance / time^2. A short way needs the
-    second bound: at full speed its acceleration would make the arm overshoot.
-    """
-    return max(
-        15 / 8 * distance / peak_speed, math.sqrt(10 / math.sqrt(3) * distance / peak_acceleration), 0.02
-    )
-
-
 def run_up(physics: Physics) -> float:
     """Way after which closing fingers lag behind their ramp as they always will, to a hundredth, m.
 

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -65,3 +67,14 @@ def test_tracking_follows_tilted_poses():
     joints, error = track(torch.stack(path), start)
     assert float(error.max()) < 1e-6
     assert forward(joints)[0].numpy() == pytest.approx(torch.stack(path).numpy(), abs=1e-6)
+
+
+def test_numpy_joints_need_no_torch():
+    program = (
+        "import sys, numpy\n"
+        "from mskgrasp.core.panda_kinematics import HOME, forward, track\n"
+        "joints = numpy.array(HOME)\n"
+        "track(forward(joints)[0][None], joints + 0.01)\n"
+        "assert 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)

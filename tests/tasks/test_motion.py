@@ -5,18 +5,19 @@ import pytest
 import torch
 
 from mskgrasp.core.grasp import TABLE_CLEARANCE, lowest_grasp_z
+from mskgrasp.core.minimum_jerk import minimum_jerk_duration, minimum_jerk_steps
 from mskgrasp.core.settings import Physics
 from tasks.attempt.attempt import AHEAD
-from tasks.robot.motion import PEAK_ACCELERATION, PandaMotion, ease, ease_duration, run_up
+from tasks.robot.motion import PEAK_ACCELERATION, PandaMotion, run_up
 
 SOFT = {"finger_stiffness": 2000.0, "finger_damping": 50.0}
 
 
 @pytest.mark.parametrize(("distance", "speed"), [(0.01, 0.25), (0.06, 0.25), (0.3, 0.25), (0.02, 1.0)])
 def test_a_path_passes_neither_its_speed_nor_its_acceleration(distance, speed):
-    seconds = ease_duration(distance, speed, PEAK_ACCELERATION)
+    seconds = minimum_jerk_duration(distance, speed, PEAK_ACCELERATION)
     n = 2000
-    way = distance * np.concatenate([[0.0], ease(n)])
+    way = distance * np.concatenate([[0.0], minimum_jerk_steps(n)])
     velocity = np.diff(way) * n / seconds
     acceleration = np.diff(velocity) * n / seconds
     assert way[-1] == pytest.approx(distance)
@@ -242,7 +243,7 @@ def test_where_an_arm_is_on_its_path_does_not_depend_on_the_rate(env, lay, monke
         monkeypatch.setattr(motion, "rate_hz", rate)
         env.scene.timestep = 1 / rate
         path = env.attempt._line(goal - [0, 0, 0.1, 0], goal, 0.25)
-        heights = 0.05 + 0.1 * ease(len(path))
+        heights = 0.05 + 0.1 * minimum_jerk_steps(len(path))
         motion.place(path[0])
         found: list[float] = []
         every = rate // 50

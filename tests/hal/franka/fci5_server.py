@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from hal.franka.frames import F_T_EE
-from hal.franka.kinematics import forward
+from mskgrasp.core.panda_kinematics import forward
 from tests.hal.franka.wire import Channel, GripperState, RobotState, ask_for_priority
 
 VERSION, GRIPPER_VERSION = 5, 3

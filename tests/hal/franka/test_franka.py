@@ -18,11 +18,10 @@ from hal.franka.config import JOINT_SPEED
 from hal.franka.driver import column_major
 from hal.franka.faults import explain
 from hal.franka.frames import F_T_EE, check_end_effector, matrix_from_columns, pose_from_columns
-from hal.franka.kinematics import forward, forward_pose, reachable, track
 from hal.franka.path import joint_path, straight_path
-from mskgrasp.core import panda_kinematics as simulated
 from mskgrasp.core.geometry import Pose, quat_multiply
 from mskgrasp.core.grasp import pose_base_tcp
+from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER, forward, forward_pose, reachable, track
 
 HOME = np.array([0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398])
 PANDA = PandaPyArmConfig(driver="panda_py", host="x")
@@ -32,10 +31,10 @@ shares = st.lists(st.floats(0, 1), min_size=7, max_size=7)
 
 @settings(deadline=None, max_examples=50)
 @given(shares)
-def test_the_real_arm_has_the_kinematics_of_the_simulated_one(share: list[float]):
+def test_numpy_arrays_and_torch_tensors_give_the_same_kinematics(share: list[float]):
     joints = LOWER + np.array(share) * (UPPER - LOWER)
     pose, jacobian = forward(joints)
-    expected, expected_jacobian = simulated.forward(torch.tensor(joints))
+    expected, expected_jacobian = forward(torch.tensor(joints))
     assert pose == pytest.approx(expected.numpy(), abs=1e-12)
     assert jacobian == pytest.approx(expected_jacobian.numpy(), abs=1e-12)
 
@@ -166,8 +165,8 @@ def test_a_vendors_text_has_one_meaning(text: str, kind: str):
 def test_both_robots_have_their_own_limits():
     fr3 = FrankyArmConfig(driver="franky", host="x", robot="fr3", joint_margin=0.0)
     panda = FrankyArmConfig(driver="franky", host="x", robot="panda", joint_margin=0.0)
-    assert panda.joint_lower() == pytest.approx(simulated.JOINT_LOWER)
-    assert panda.joint_upper() == pytest.approx(simulated.JOINT_UPPER)
+    assert panda.joint_lower() == pytest.approx(JOINT_LOWER)
+    assert panda.joint_upper() == pytest.approx(JOINT_UPPER)
     assert fr3.joint_lower()[5] == pytest.approx(0.5445)  # FR3: joint 6 does not reach zero
     assert (LOWER > panda.joint_lower()).all() and (UPPER < panda.joint_upper()).all()
 
