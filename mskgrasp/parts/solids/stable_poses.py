@@ -1,8 +1,12 @@
-"""How a part comes to rest on a table: its stable poses and how often each occurs.
+"""Stable poses of a part on a table, and how often each occurs.
 
 The quasi-static model of Goldberg et al., "Part pose statistics" (1999): a part dropped in a uniformly
 random orientation lands on the facet of its convex hull that lies below its centre of mass, and rolls over
 an edge onto the next facet wherever the centre of mass projects outside the facet it stands on.
+
+An implementation of our own: `trimesh.poses.compute_stable_poses` gives the same poses and probabilities
+for 22 of the 25 starter parts, but has no margin: socket_screw_m10x60 would rest in a quarter of its drops
+on facets whose border is 0.015 mm from the centre's projection, where a touch tips it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""STL, binary and text."""
+"""STL, binary and text.
+
+A reader of our own: of sound files trimesh's gives the same triangles, but it reads as much of a text as is
+there where the text is cut off, refuses text with CR line ends, with a facet on one line or with a solid
+called ``vertex...``, and takes a binary file by its exact length alone.
+"""
 
 from __future__ import annotations
 
