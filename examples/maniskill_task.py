@@ -25,9 +25,8 @@ def main(part: str, n: int) -> None:
         if info["success"].item():
             dx, dy, dz, dtheta = np.asarray(info["displacement"])[0]
             shifts.append(np.linalg.norm([dx, dy, dz]))
-            print(
-                f"{episode}: lifted, shifted by {shifts[-1] * 1e3:.1f} mm, turned by {np.degrees(dtheta):.1f} degrees"
-            )
+            turn = np.degrees(dtheta)
+            print(f"{episode}: lifted, shifted by {shifts[-1] * 1e3:.1f} mm, turned by {turn:.1f} degrees")
         else:
             print(f"{episode}: not lifted")
     env.close()

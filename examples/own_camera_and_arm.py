@@ -1,5 +1,4 @@
 """A camera and an arm of your own in a cell: ``python examples/own_camera_and_arm.py``."""
-
 import time
 
 import numpy as np
@@ -51,14 +50,11 @@ class Gantry(Arm):
         return GraspOutcome(width=self.width, holding=True)
 
 
-box = dict(
-    joint_lower=np.full(7, -2.0), joint_upper=np.full(7, 2.0), box_lower=-np.ones(3), box_upper=np.ones(3)
-)
-arm = Gantry(ArmLimits(**box, table_z=0.0, max_force=70.0))
+side = dict(joint_lower=np.full(7, -2.0), joint_upper=np.full(7, 2.0))
+arm = Gantry(ArmLimits(**side, box_lower=-np.ones(3), box_upper=np.ones(3), table_z=0.0, max_force=70.0))
 table = Workspace(table_z=0, region=REGION, home=arm.pose, min_height=0.002, lift_height=0.1, grasp_force=20)
+planner = Planner(load_models(), PlannerConfig(), table_z=0.0, region=REGION)
 with Cell(camera=BlockCamera(), arm=arm, workspace=table).connected() as cell:
-    plan = Planner(load_models(), PlannerConfig(), table_z=0.0, region=REGION).plan(
-        cell.camera.capture(), np.random.default_rng(0)
-    )
+    plan = planner.plan(cell.camera.capture(), np.random.default_rng(0))
     print(plan.summary)
     print("holding" if execute_grasp(cell, plan.grasp).holding else "not holding")

@@ -1,11 +1,63 @@
-"""Grasps of industrial parts that are robust, precise, and know how the part will shift."""
+"""Robust, precise grasps of industrial parts, with a prediction of how the part shifts in the hand.
 
-import signal
-import sys
+Poses are in the robot's base frame (z up), lengths in metres, angles in radians.
+
+    from mskgrasp import Planner, PlannerConfig, load_models, load_part, open_cell, execute_grasp
+
+`load_part` makes a part of a CAD file, `open_cell` connects a simulated or real cell, `Planner.plan` chooses
+a `Grasp` in a depth image and predicts the part's displacement in the hand, `execute_grasp` performs it, and
+`open_dataset` reads collected attempts. The folder ``examples`` shows each in use.
+
+Names are imported when they are first used: ``import mskgrasp`` alone loads neither torch nor a simulator.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hal import Arm, Camera, Cell, RgbdFrame, Workspace, execute_grasp, open_cell
+    from mskgrasp.core.errors import MskgraspError
+    from mskgrasp.core.geometry import Pose
+    from mskgrasp.core.grasp import Grasp, PartView
+    from mskgrasp.dataset import Attempts, Dataset, ShardInfo, open_dataset
+    from mskgrasp.learning.grasp_models import Models, load_models
+    from mskgrasp.parts.load import load_part
+    from mskgrasp.parts.part import Part
+    from mskgrasp.planning.placing import Target, place_pose
+    from mskgrasp.planning.planner import GraspPlan, Planner, PlannerConfig
 
 __version__ = "0.1.0"
 
-if sys.argv[:1] == ["-m"] and sys.orig_argv[-len(sys.argv)].startswith(("mskgrasp.", "hal.")):
-    # A program is being started, and Ctrl-C waits for `mskgrasp.runtime.cli.run`: a library whose import it
-    # would interrupt may swallow it, and go on without what it was importing.
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+__all__ = [
+    "Arm", "Attempts", "Camera", "Cell", "Dataset", "Grasp", "GraspPlan", "Models", "MskgraspError", "Part",
+    "PartView", "Planner", "PlannerConfig", "Pose", "RgbdFrame", "ShardInfo", "Target", "Workspace",
+    "execute_grasp", "load_models", "load_part", "open_cell", "open_dataset", "place_pose",
+]  # fmt: skip
+
+_HOMES = {
+    "hal": ("Arm", "Camera", "Cell", "RgbdFrame", "Workspace", "execute_grasp", "open_cell"),
+    "mskgrasp.core.errors": ("MskgraspError",),
+    "mskgrasp.core.geometry": ("Pose",),
+    "mskgrasp.core.grasp": ("Grasp", "PartView"),
+    "mskgrasp.dataset": ("Attempts", "Dataset", "ShardInfo", "open_dataset"),
+    "mskgrasp.learning.grasp_models": ("Models", "load_models"),
+    "mskgrasp.parts.load": ("load_part",),
+    "mskgrasp.parts.part": ("Part",),
+    "mskgrasp.planning.placing": ("Target", "place_pose"),
+    "mskgrasp.planning.planner": ("GraspPlan", "Planner", "PlannerConfig"),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -164,7 +164,7 @@ def save_model(folder: Path, models: Models) -> None:
     os.replace(temporary, folder / DESCRIPTION)
 
 
-def load_models(folder: Path, device: torch.device | str = "cpu") -> Models:
+def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -> Models:
     """Reads a model folder.
 
     Raises:
