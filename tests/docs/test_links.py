@@ -83,3 +83,16 @@ def _exists(name: str) -> bool:
             init = path.parent / "__init__.py"
             return init.is_file() and re.search(rf"\b{part}\b", init.read_text(encoding="utf-8")) is not None
     return True
+
+
+def test_every_page_named_in_source_exists():
+    sources = [
+        path for pattern in ("mskgrasp", "hal", "tasks", "configs") for path in (ROOT / pattern).rglob("*.*")
+    ]
+    named = {
+        name
+        for path in sources
+        if path.suffix in (".py", ".yaml")
+        for name in re.findall(r"docs/[\w/]+\.(?:md|png|csv)", path.read_text(encoding="utf-8"))
+    }
+    assert named and not [name for name in named if not (ROOT / name).exists()]
