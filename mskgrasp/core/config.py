@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -54,8 +55,24 @@ def read_config(model: type[ConfigT], path: Path) -> ConfigT:
     return check_config(model, read_yaml(path), str(path))
 
 
-def check_config(model: type[ConfigT], values: Any, source: str) -> ConfigT:
-    """Validates plain values as a configuration; ``source`` names their origin in messages.
+def _key(location: tuple[int | str, ...]) -> str:
+    return f"'{'.'.join(map(str, location))}'"
+
+
+def check_config(
+    model: type[ConfigT],
+    values: Any,
+    source: str,
+    *,
+    name: Callable[[tuple[int | str, ...]], str] = _key,
+) -> ConfigT:
+    """Validates plain values as a configuration.
+
+    Args:
+        model: Of the configuration.
+        values: A mapping of plain values.
+        source: Their origin, for messages.
+        name: How a message calls the value at a location.
 
     Raises:
         BadConfig: The values do not fit the model; the message names the key and the legal ones.
@@ -65,7 +82,7 @@ def check_config(model: type[ConfigT], values: Any, source: str) -> ConfigT:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise BadConfig(f"{source}: {_explain(model, error)}") from error
+        raise BadConfig(f"{source}: {_explain(model, error, name)}") from error
 
 
 def write_config(config: BaseModel, path: Path) -> None:
@@ -73,23 +90,28 @@ def write_config(config: BaseModel, path: Path) -> None:
     write_whole(path, yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False).encode())
 
 
-def _explain(model: type[BaseModel], error: ValidationError) -> str:
+def _explain(
+    model: type[BaseModel], error: ValidationError, name: Callable[[tuple[int | str, ...]], str]
+) -> str:
     problems = []
     for detail in error.errors():
-        key = ".".join(str(part) for part in detail["loc"]) or "(top level)"
+        key = name(detail["loc"]) + ": " if detail["loc"] else ""
         if detail["type"] == "extra_forbidden":
             legal = ", ".join(sorted(_fields_at(model, detail["loc"][:-1])))
-            problems.append(f"unknown key '{key}'" + (f"; legal keys here: {legal}" if legal else ""))
+            problems.append(
+                f"unknown key {name(detail['loc'])}" + (f"; legal keys here: {legal}" if legal else "")
+            )
         elif detail["type"] in ("union_tag_invalid", "union_tag_not_found"):
             context = detail.get("ctx", {})
-            name = context.get("discriminator", "'type'").strip("'")
-            legal = ", ".join(_members(_annotation_at(model, detail["loc"]), name))
-            given = f"unknown {name} '{context['tag']}'" if "tag" in context else f"{name} is missing"
-            problems.append(f"'{key}': {given}; legal: {legal}")
+            tag = context.get("discriminator", "'type'").strip("'")
+            legal = ", ".join(_members(_annotation_at(model, detail["loc"]), tag))
+            given = f"unknown {tag} '{context['tag']}'" if "tag" in context else f"{tag} is missing"
+            problems.append(f"{key}{given}; legal: {legal}")
         else:
             value = detail.get("input")
             shown = "" if detail["type"] == "missing" or isinstance(value, dict) else f", got {value!r}"
-            problems.append(f"'{key}': {detail['msg'].lower()}{shown}")
+            cause = detail.get("ctx", {}).get("error")  # of a validator of ours
+            problems.append(f"{key}{cause or detail['msg'].lower()}{shown}")
     return "; ".join(problems)
 
 

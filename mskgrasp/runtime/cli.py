@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
+import argparse
 import errno
-import io
+import itertools
 import os
-import re
 import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import tyro
 from pydantic import BaseModel
+from tyro.constructors import ConstructorRegistry, StructConstructorSpec, StructTypeInfo
 
 from mskgrasp.core.config import check_config, read_config
 from mskgrasp.core.errors import BadConfig, MskgraspError, UsageError
@@ -50,46 +51,46 @@ def parse(
     # Without a file there may be required options: tyro asks for them.
     known: dict[str, Any] = {} if default is None else {"default": default}
     description += note if default_config else ""
-    printed = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(printed):
-            parsed = tyro.cli(model, prog=prog, description=description, args=rest, **known)
-    except SystemExit:
-        _raise_range_error(printed.getvalue())
-        sys.stderr.write(printed.getvalue())
-        raise
-    return check_config(model, parsed.model_dump(), "command line")
-
-
-def _raise_range_error(printed: str) -> None:
-    """Says in one line what tyro quotes from pydantic in a box; does nothing for tyro's own messages."""
-    text = " ".join(re.sub(r"[│╭╮╰╯─]", " ", printed).split())
-    found = re.search(
-        r"validation errors? for \S+ (?:([\w.]+) )?"
-        r"((?:Input should|Value error).*?) \[type=\w+, input_value=(.*?), input_",
-        text,
-    )
-    if found:
-        name, problem, value = found.groups()
-        option = f"--{name.replace('_', '-')}: " if name else ""
-        raise BadConfig(f"command line: {option}{problem.removeprefix('Value error, ')}, got {value}")
+    parsed = tyro.cli(model, prog=prog, description=description, args=rest, registry=_registry, **known)
+    # No warnings: types are checked next.
+    return check_config(model, parsed.model_dump(warnings=False), "command line", name=_option)
 
 
 def _take_config_option(arguments: list[str]) -> tuple[list[str], Path | None]:
-    path = None
-    rest = []
-    pending = iter(arguments)
-    for argument in pending:
-        if argument == "--config":
-            value = next(pending, None)
-            if value is None:
-                raise BadConfig("--config needs a file, for example --config configs/collect/demo.yaml")
-            path = Path(value)
-        elif argument.startswith("--config="):
-            path = Path(argument.removeprefix("--config="))
-        else:
-            rest.append(argument)
-    return rest, path
+    """Splits ``--config FILE`` off: tyro takes its defaults, which the file holds, before it parses."""
+    option = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    option.add_argument("--config", type=Path)
+    try:
+        found, rest = option.parse_known_args(arguments)
+    except argparse.ArgumentError as error:
+        raise BadConfig("--config needs a file, for example --config configs/collect/demo.yaml") from error
+    return rest, found.config
+
+
+_registry = ConstructorRegistry()
+
+
+@_registry.struct_rule
+def _without_validation(info: StructTypeInfo) -> StructConstructorSpec | None:
+    """Has tyro fill models without validating them: it would print pydantic's errors in its own words."""
+    if _registry in info.markers or not (isinstance(info.type, type) and issubclass(info.type, BaseModel)):
+        return None
+    # The marker ends the recursion: tyro's own rule gives the fields.
+    spec = ConstructorRegistry.get_struct_spec(replace(info, markers=(*info.markers, _registry)))
+    if not isinstance(spec, StructConstructorSpec):
+        return None
+
+    def fill(**values: Any) -> BaseModel:
+        return info.type.model_construct(**values)
+
+    fill.__doc__ = info.type.__doc__  # for --help
+    return replace(spec, instantiate=fill)
+
+
+def _option(location: tuple[int | str, ...]) -> str:
+    """The option that sets a field: ``--camera.n-pixels``."""
+    names = itertools.takewhile(lambda part: isinstance(part, str), location)
+    return "--" + ".".join(map(str, names)).replace("_", "-")
 
 
 def make_folder(path: Path) -> None:
