@@ -1,26 +1,108 @@
+"""Metrics and calibration, on networks that learned nothing: what they predict is known."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
 import torch
 
-from mskgrasp.learning.grasp_models import load_models, save_model
-from mskgrasp.learning.samples import read_samples
-from mskgrasp.learning.trainer import train as learn
-from tests import synthetic
-from tests.learning.small import HAND
+from mskgrasp.learning import held_out
+from mskgrasp.learning.grasp_models import Calibration, Models, build_models
+from mskgrasp.learning.trainer import describe, split
+from tests.learning.small import PATCH
+
+CLOSING = ("x", "y", "theta")
+"""A box does not rise in the jaw of the synthetic scenes."""
 
 
-def test_our_network_learns_and_its_intervals_hold_what_they_say(tmp_path):
-    dataset = synthetic.write_dataset(tmp_path, n_parts=8, n_attempts=250, seed=1)
-    samples = read_samples(dataset, HAND.network)
-    assert samples.patches.shape == (2000, 1, 33, 33) and samples.patches.dtype == torch.int16
-    rows = torch.tensor([3, 5])
-    seen = samples.quality_patches_of(rows, "cpu", HAND.network)
-    assert torch.equal(seen, samples.patches_of(rows, "cpu")[..., ::2, 8:25:2])
-    models, _ = learn(samples, HAND, checkpoint_path=tmp_path / "checkpoint")
-    report, found = models.meta.metrics, models.meta.calibration
-    assert report["gqn"]["auroc"] > 0.85
-    assert report["gdn"]["translation_rmse"] < 0.6 * report["gdn"]["zero_displacement"]["translation_rmse"]
-    # Scaled on these very rows, 90 % of them lie inside.
-    assert report["gdn"]["n"] >= 50 and max(found.variance_scale) != 1.0
-    assert all(0.87 <= share <= 0.93 for share in report["gdn"]["coverage_90"].values())
-    assert found.quality_slope > 0 and min(found.variance_scale) > 0
-    save_model(tmp_path / "model", models)
-    assert load_models(tmp_path / "model").meta.calibration == found
+def constant_models(samples, *, variance_factor: float = 1.0, logit: float = 0.0) -> Models:
+    """Networks that predict one mean, one variance and one probability for all grasps."""
+    meta = describe(samples, split(samples, PATCH).training, PATCH)
+    models = build_models(meta)
+    with torch.no_grad():
+        for network in (models.gqn, models.gdn):
+            for parameter in network.parameters():
+                parameter.zero_()
+        models.gqn.head[-1].bias[1] = logit
+        models.gdn.variance_head[-1].bias.fill_(math.log(variance_factor))
+    return models
+
+
+@pytest.fixture(scope="module")
+def halves(samples):
+    """A random half of the rows to calibrate on, and the other half."""
+    order = torch.randperm(len(samples), generator=torch.Generator().manual_seed(0))
+    return order[::2], order[1::2]
+
+
+def with_calibration(models: Models, found: Calibration) -> Models:
+    return dataclasses.replace(models, meta=models.meta.model_copy(update={"calibration": found}))
+
+
+@pytest.mark.parametrize(("factor", "before"), [(0.01, (0.0, 0.45)), (100.0, (0.995, 1.0))])
+def test_calibrated_intervals_hold_their_share_of_rows_that_they_were_not_scaled_on(
+    samples, halves, factor, before
+):
+    models = constant_models(samples, variance_factor=factor)
+    scaled, others = halves
+    calibrated = with_calibration(models, held_out.calibrate(models, samples, scaled))
+
+    def coverage(models):
+        report = held_out.displacement_metrics(models, samples, scaled, others)
+        assert report["n"] > 80
+        return [report["coverage_90"][name] for name in CLOSING]
+
+    assert all(before[0] <= share <= before[1] for share in coverage(models))
+    # Some 100 rows on either side: three standard deviations of the difference are 12 %.
+    assert all(0.78 <= share <= 1.0 for share in coverage(calibrated))
+    assert sum(coverage(calibrated)) / 3 == pytest.approx(0.9, abs=0.06)
+
+
+@pytest.mark.parametrize("logit", [-3.0, 3.0])
+def test_a_calibrated_quality_agrees_with_the_share_that_succeeds_in_other_rows(samples, halves, logit):
+    models = constant_models(samples, logit=logit)
+    scaled, others = halves
+    calibrated = with_calibration(models, held_out.calibrate(models, samples, scaled))
+    true = float(samples.success[others].double().mean())
+    assert abs(held_out.predict_quality(models, samples, others).mean() - true) > 0.25
+    assert held_out.predict_quality(calibrated, samples, others).mean() == pytest.approx(true, abs=0.08)
+    first, second = (
+        held_out.quality_metrics(each, samples, others)["brier"] for each in (models, calibrated)
+    )
+    assert second < first - 0.05
+
+
+def test_too_few_successes_leave_the_variances_alone(samples, halves):
+    models = constant_models(samples, variance_factor=100.0)
+    held = halves[0][samples.success[halves[0]]][:40]
+    failed = halves[0][~samples.success[halves[0]]][:40]
+    assert held_out.calibrate(models, samples, torch.cat([held, failed])).variance_scale == (1.0,) * 4
+
+
+def test_errors_of_a_constant_prediction_are_those_of_the_constant(samples, halves):
+    """The network that predicts the training mean has the errors of the comparison of that name."""
+    models = constant_models(samples)
+    with torch.no_grad():
+        training = samples.grasp_displacement[halves[0][samples.success[halves[0]]]].double()
+        models.gdn.target_mean.copy_(training.mean(dim=0))
+    report = held_out.displacement_metrics(models, samples, *halves)
+    for name in ("translation_rmse", "rotation_rmse"):
+        assert report[name] == pytest.approx(report["training_mean"][name], rel=1e-5)
+        low, high = report["intervals"][name]
+        assert low < report[name] < high
+    moved = samples.displacement[halves[1][samples.success[halves[1]]]].double().numpy()
+    assert report["zero_displacement"]["translation_rmse"] == pytest.approx(
+        float(np.sqrt((moved[:, :3] ** 2).sum(axis=1).mean()))
+    )
+
+
+def test_a_constant_quality_ranks_nothing_and_has_the_brier_score_worked_out_by_hand(samples, halves):
+    rows = halves[1]
+    report = held_out.quality_metrics(constant_models(samples), samples, rows)
+    share = float(samples.success[rows].double().mean())
+    rate = constant_models(samples).meta.normalisation.base_rate
+    assert report["auroc"] == pytest.approx(0.5) and report["base_rate"] == pytest.approx(share)
+    by_hand = share * (1 - rate) ** 2 + (1 - share) * rate**2
+    assert report["brier"] == pytest.approx(by_hand, rel=1e-5)
+    assert report["brier_of_base_rate"] == pytest.approx(by_hand)

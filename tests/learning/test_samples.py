@@ -7,7 +7,7 @@ import torch
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.learning.samples import part_sides, read_samples
 from tests import synthetic
-from tests.learning.small import PATCH
+from tests.learning.small import HAND, PATCH
 
 
 def test_samples_hold_every_attempt_with_its_displacement_seen_from_the_estimated_centre(samples):
@@ -81,3 +81,11 @@ def test_the_catalogue_decides_the_sides_where_it_is_asked_to(monkeypatch, tmp_p
     with pytest.raises(BadDataset, match="build --catalogue"):
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
         part_sides(names, 0.2, "catalogue")
+
+
+def test_the_quality_network_sees_every_second_pixel_of_the_middle_columns(dataset):
+    samples = read_samples(dataset, HAND.network)
+    assert samples.patches.shape == (640, 1, 33, 33) and samples.patches.dtype == torch.int16
+    rows = torch.tensor([3, 5])
+    seen = samples.quality_patches_of(rows, "cpu", HAND.network)
+    assert torch.equal(seen, samples.patches_of(rows, "cpu")[..., ::2, 8:25:2])

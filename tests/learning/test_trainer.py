@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from mskgrasp.core.errors import BadDataset, BadModel, UsageError
-from mskgrasp.learning.grasp_models import build_models
-from mskgrasp.learning.held_out import predict_grasp_displacement
+from mskgrasp.core import metrics
+from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.learning.grasp_models import Calibration, Models, build_models, load_models, save_model
+from mskgrasp.learning.held_out import calibrate, predict_grasp_displacement
 from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.samples import read_samples
 from mskgrasp.learning.trainer import (
@@ -21,6 +22,7 @@ from mskgrasp.learning.trainer import (
     split,
 )
 from mskgrasp.learning.trainer import train as learn
+from tests import synthetic
 from tests.learning.small import HAND, PATCH, SHORT
 
 
@@ -80,16 +82,13 @@ def test_the_seed_decides_the_weights_and_the_global_generator_is_left_alone(sam
     assert not torch.equal(first.gqn.head[0].weight, other.gqn.head[0].weight)
 
 
-def test_a_checkpoint_of_other_data_or_a_damaged_one_is_refused(samples, tmp_path):
+def test_a_checkpoint_of_other_data_is_refused(samples, tmp_path):
     path = tmp_path / "checkpoint.safetensors"
     with pytest.raises(KeyboardInterrupt):
         learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(1))
     other = dataclasses.replace(samples, fingerprint="0")
     with pytest.raises(UsageError, match="other data"):
         learn(other, SHORT, checkpoint_path=path)
-    path.write_bytes(path.read_bytes()[:1000])
-    with pytest.raises(BadModel, match="damaged"):
-        learn(samples, SHORT, checkpoint_path=path)
 
 
 def test_a_mean_only_network_and_the_papers_optimiser_can_be_trained(samples, tmp_path):
@@ -139,3 +138,24 @@ def test_turned_samples_need_pictures_that_turn(dataset):
                   split(samples, config), config)  # fmt: skip
     inputs = stage.batch(rows, torch.Generator().manual_seed(0))[0]
     assert inputs.shape == (8, 1, 40, 40)
+
+
+def test_the_hand_network_learns_what_the_centre_alone_does_not_tell_and_is_calibrated(tmp_path):
+    dataset = synthetic.write_dataset(tmp_path, n_parts=8, n_attempts=250, seed=1)
+    samples = read_samples(dataset, HAND.network)
+    models, _ = learn(samples, HAND, checkpoint_path=tmp_path / "checkpoint")
+    report, found = models.meta.metrics, models.meta.calibration
+    rows = split(samples, HAND).validation
+    distance = np.linalg.norm(samples.centre_grasp[rows, :2].numpy(), axis=1)
+    by_distance = metrics.auroc(-distance, samples.success[rows].numpy())
+    assert 0.6 < by_distance < report["gqn"]["auroc"] - 0.1
+    # The closing jaw centres a box: 85 % of its motion can be foreseen. The turn takes more samples.
+    assert report["gdn"]["translation_rmse"] < 0.25 * report["gdn"]["training_mean"]["translation_rmse"]
+    assert report["gdn"]["n"] >= 50 and found == calibrate(uncalibrated(models), samples, rows)
+    assert found.quality_slope > 0 and min(found.variance_scale) > 0 and max(found.variance_scale) != 1.0
+    save_model(tmp_path / "model", models)
+    assert load_models(tmp_path / "model").meta.calibration == found
+
+
+def uncalibrated(models: Models) -> Models:
+    return dataclasses.replace(models, meta=models.meta.model_copy(update={"calibration": Calibration()}))

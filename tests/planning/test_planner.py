@@ -22,7 +22,7 @@ from mskgrasp.planning.scoring import Scene
 from mskgrasp.reports.grasp_figures import draw_plan
 from tests import synthetic
 from tests.core.test_grasp import centres, shifts
-from tests.planning.boxes import BOX, FRAME, hand_made_models, planner
+from tests.planning.hand_made import BOX, FRAME, hand_made_models, planner
 from tests.synthetic import REGION, Box
 
 

@@ -8,7 +8,7 @@ from mskgrasp.learning.network_config import HandNetworkConfig, Normalisation, P
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.scoring import Scene, displacements
 from tests import synthetic
-from tests.planning.boxes import FRAME
+from tests.planning.hand_made import FRAME
 from tests.synthetic import REGION
 
 

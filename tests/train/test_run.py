@@ -35,18 +35,18 @@ def test_one_number_of_epochs_stands_for_both_networks_and_is_what_a_stopped_run
         train.run(program(SHORT, data=dataset, out=out))
 
 
-def test_a_small_dataset_is_learned_and_beats_the_trivial_predictors(dataset, tmp_path):
+def test_a_small_dataset_is_learned_and_every_file_of_a_model_is_written(dataset, tmp_path):
     out = tmp_path / "model"
     config = PATCH.model_copy(update={"validation_fraction": 0.4})  # one part alone has no interval
     assert train.run(program(config, data=dataset, out=out)) == 0
     report = json.loads((out / "metrics.json").read_text())
     gqn, gdn = report["gqn"], report["gdn"]
     assert gqn["auroc"] > 0.85
-    assert gqn["brier"] < 0.8 * gqn["brier_of_base_rate"]
-    for trivial in ("zero_displacement", "training_mean"):
-        assert gdn["translation_rmse"] < 0.6 * gdn[trivial]["translation_rmse"]
-        # Some 200 successes teach such a small network the shift; the turn takes thousands.
-        assert gdn["nll"] < gdn[trivial]["nll"]
+    assert gqn["brier"] < 0.6 * gqn["brier_of_base_rate"]
+    for constant in ("zero_displacement", "training_mean"):
+        # Some 130 successes teach such a small network the shift; the turn takes thousands.
+        assert gdn["translation_rmse"] < 0.35 * gdn[constant]["translation_rmse"]
+        assert gdn["nll"] < gdn[constant]["nll"] - 0.5
     assert set(gdn["coverage_90"]) == {"x", "y", "z", "theta"}
     models = load_models(out)
     assert models.meta.metrics["gqn"]["auroc"] == pytest.approx(gqn["auroc"])
