@@ -14,7 +14,7 @@ from mskgrasp.parts.recipes.cad.brep import lengths, mesh_of, needs_cad, table
 from mskgrasp.parts.recipes.cad.hulls import turned_hulls
 from mskgrasp.parts.recipes.recipe import ALUMINIUM, STEEL, Recipe
 from mskgrasp.parts.solids import solid as s
-from mskgrasp.parts.solids.measure import MOST_OBLONG, oblongness
+from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, aspect_ratio
 from mskgrasp.parts.solids.pieces import merge_hulls, split_by, turned_pieces
 from mskgrasp.parts.solids.shape import HULL_DETAIL_MM
 
@@ -104,7 +104,7 @@ def _block_pieces(_: trimesh.Trimesh, size: Size) -> list[np.ndarray]:
     for x in (-length / 4, length / 4):
         cutter = s.prism(s.bore_polygon(cross / 2, centre=(x, 0)), 0, height)
         pieces = [rest for points in pieces for rest in split_by(points, cutter)]
-    return merge_hulls([points for points in pieces if oblongness(points) <= 0.9 * MOST_OBLONG], 0.01)
+    return merge_hulls([points for points in pieces if aspect_ratio(points) <= 0.9 * MOST_ASPECT_RATIO], 0.01)
 
 
 def cast_angle(b: Any, size: Size) -> Any:

@@ -10,7 +10,7 @@ import trimesh
 from manifold3d import Manifold, Mesh64
 
 from mskgrasp.parts.solids import solid as s
-from mskgrasp.parts.solids.measure import MOST_OBLONG, oblongness
+from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, aspect_ratio
 from mskgrasp.parts.solids.pieces import convex_polygons, merge_hulls, turned_pieces
 from mskgrasp.parts.solids.shape import FILLED_BORE_MM, HULL_DETAIL_MM
 
@@ -105,14 +105,14 @@ def _cut_to_length(points: np.ndarray, low: float, high: float) -> list[np.ndarr
     for count in range(1, 5):
         levels = np.linspace(low, high, count + 1)
         parts = [s.prism(ends, float(a), float(b)) for a, b in zip(levels[:-1], levels[1:], strict=True)]
-        if oblongness(parts[0]) <= 0.9 * MOST_OBLONG:
+        if aspect_ratio(parts[0]) <= 0.9 * MOST_ASPECT_RATIO:
             return parts
     return []  # a sliver of less than 0.8 mm
 
 
 def _thick(pieces: list[np.ndarray]) -> list[np.ndarray]:
     """Pieces without the slivers that a fillet's facets leave between two others."""
-    return [points for points in pieces if oblongness(points) <= 0.9 * MOST_OBLONG]
+    return [points for points in pieces if aspect_ratio(points) <= 0.9 * MOST_ASPECT_RATIO]
 
 
 def _filled(section: Any) -> Any:
