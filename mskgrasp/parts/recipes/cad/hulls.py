@@ -1,4 +1,4 @@
-"""Convex pieces read off the mesh of a shape whose kind is known: turned, extruded, or a screw."""
+"""Convex pieces from meshes of turned shapes, extruded shapes and screws."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def extruded_hulls(
     detail_mm: float = HULL_DETAIL_MM,
     slack: float = 0.002,
 ) -> list[np.ndarray]:
-    """Pieces of an outline extruded along z, as it is half way up.
+    """Pieces of an outline extruded along z, by its section at half height.
 
     Args:
         mesh: Of the shape.
@@ -94,13 +94,13 @@ def plane_section(mesh: trimesh.Trimesh, z: float) -> Any:
     body = Manifold(Mesh64(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.uint64)))
     region: Any = shapely.Polygon()
     for loop in body.slice(z).to_polygons():
-        # Loops are wound by what they bound: holes clockwise; inside one another they take turns.
+        # Loops are wound by what they bound: holes clockwise; nested loops alternate.
         region = region.symmetric_difference(shapely.Polygon(np.asarray(loop)).buffer(0))
     return region
 
 
 def _cut_to_length(points: np.ndarray, low: float, high: float) -> list[np.ndarray]:
-    """A prism along z cut across until PhysX takes its parts."""
+    """A prism along z cut across until PhysX accepts its parts."""
     ends = points[np.abs(points[:, 2] - low) < 1e-6, :2]
     for count in range(1, 5):
         levels = np.linspace(low, high, count + 1)

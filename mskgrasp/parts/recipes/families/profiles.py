@@ -17,7 +17,7 @@ from mskgrasp.parts.solids.measure import aspect_ratio
 from mskgrasp.parts.solids.pieces import convex_polygons
 
 MOST_SLENDER = 45.0
-"""Length by thickness of a hull: a little less than what PhysX on a GPU takes."""
+"""Largest ratio of length to thickness of a hull, below the limit of PhysX on a GPU."""
 
 
 def recipes() -> Iterator[Recipe]:
@@ -153,12 +153,12 @@ def _rotate(points: np.ndarray, degrees: int) -> np.ndarray:
 
 
 def _laid(upright: h.Shape) -> s.Solid:
-    """What was extruded along z, along x."""
+    """A shape extruded along z, turned to lie along x."""
     return _finished(upright.turned("y", 90).turned("x", 90))
 
 
 def _finished(bar: h.Shape) -> s.Solid:
-    """A bar along x; pieces too slender for PhysX are cut across until they are not."""
+    """A bar along x; pieces too slender for PhysX are cut across."""
     merged = bar.solid()
     return s.solid(bar.body, [part for points in merged.hulls for part in _split_slender(points)])
 
