@@ -1,4 +1,4 @@
-"""Parts: industrial components with a mesh, collision hulls, mass, inertia and resting poses."""
+"""Industrial parts with a mesh, collision hulls, mass, inertia and stable poses."""
 
 from __future__ import annotations
 

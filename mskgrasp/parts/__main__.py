@@ -1,6 +1,6 @@
-"""``python -m mskgrasp.parts``: build, import, list and show parts."""
+"""Program ``python -m mskgrasp.parts``."""
 
-from mskgrasp.parts.commands.verbs import main
+from mskgrasp.parts.commands.command_line import main
 from mskgrasp.runtime.cli import run
 
 if __name__ == "__main__":

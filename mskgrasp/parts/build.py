@@ -1,4 +1,4 @@
-"""From a shape to a part folder, and from a name to a part."""
+"""Part building: from a recipe or a solid to a part folder, and from a name to a part."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from mskgrasp.parts.part import SCHEMA_VERSION, Part
 from mskgrasp.parts.recipes import cad, families
 from mskgrasp.parts.recipes.recipe import Recipe
 from mskgrasp.parts.solids.measure import (
-    MOST_OBLONG,
+    MOST_ASPECT_RATIO,
     HullFit,
+    aspect_ratio,
     hull_fit,
     longest_axis,
     mass_properties,
-    oblongness,
 )
 from mskgrasp.parts.solids.solid import MAX_HULL_VERTICES, Solid
 from mskgrasp.parts.solids.stable_poses import stable_poses
@@ -36,19 +36,19 @@ from mskgrasp.parts.versions import PART_VERSION, stamp
 MAX_HULL_FACES = 64
 LEGAL_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
 MANY_HULLS = 16
-"""From here on a grasp's time grows with every hull, and joining them is worth its while."""
+"""Above this number the time of a grasp grows with every hull, so that joining them pays off."""
 
 MOST_P95_MM = 0.7
 MOST_VOLUME_RATIO = 1.1
 
 
 def builtin_names() -> tuple[str, ...]:
-    """Names of all parts that can be built here, sorted: the families, and with ``[cad]`` those from CAD."""
+    """Names of all parts with a recipe, sorted: the families, and with ``[cad]`` those drawn in CAD."""
     return tuple(sorted(_recipes()))
 
 
 def starter_names() -> tuple[str, ...]:
-    """Names of the starter set, sorted: 25 parts of 17 families, ready in some seconds."""
+    """Names of the starter set, sorted: 25 parts of 17 families, built in a few seconds."""
     return families.STARTER
 
 
@@ -64,7 +64,7 @@ def _recipes() -> dict[str, Recipe]:
 
 
 def recipe_of(name: str) -> Recipe:
-    """The recipe of a part that can be built here.
+    """The recipe of a built-in part.
 
     Raises:
         BadPart: There is no such part.
@@ -76,10 +76,10 @@ def recipe_of(name: str) -> Recipe:
 
 
 def build_part(name: str) -> Part:
-    """Builds a part from its recipe, unless it lies ready in the parts folder.
+    """Builds a part from its recipe, unless the parts folder has it up to date.
 
     Raises:
-        BadPart: There is no such recipe, or no hulls stand for the shape as closely as they must.
+        BadPart: There is no such recipe, or no set of hulls represents the shape closely enough.
     """
     recipe = recipe_of(name)
     if is_built(name):
@@ -101,10 +101,10 @@ def build_part(name: str) -> Part:
 
 
 def with_hulls(solid: Solid) -> Solid:
-    """The family's own hulls, joined where they are many; where it has none, those of a decomposition."""
+    """The solid with hulls: those of its family, joined where they are many, or those of a decomposition."""
     if solid.hulls and len(solid.hulls) <= MANY_HULLS:
         return solid
-    # CoACD takes a while to load, and most parts do without it.
+    # CoACD is slow to load, and most parts do not need it.
     from mskgrasp.parts.solids.decompose import convex_pieces, fewest_hulls
 
     mesh = trimesh.Trimesh(np.array(solid.mesh.vertices), solid.mesh.faces, process=False)
@@ -113,12 +113,12 @@ def with_hulls(solid: Solid) -> Solid:
 
 
 def is_built(name: str) -> bool:
-    """Whether a part lies ready, sound and made by the present recipe."""
+    """Whether the parts folder has a part, undamaged and built by the current recipe."""
     return store.recipe_hash(store.parts_folder() / name) == recipe_hash(name)
 
 
 def find_part(name_or_folder: str | Path) -> Part:
-    """A part by its name or by its folder; a built-in one that is not there yet is built.
+    """A part by its name or by its folder; a built-in one is built where it is missing.
 
     Raises:
         UnknownPart: There is no such part; the message lists similar names.
@@ -162,11 +162,11 @@ def write_solid(
     dimensions: dict[str, float],
     recipe_hash: str,
 ) -> Part:
-    """Measures a shape, moves its centroid to the origin and stores it as a part."""
+    """Measures a solid, moves its centroid to the origin and stores it as a part."""
     masses = mass_properties(solid.mesh, density)
     centroid_mm = masses.centroid * 1000
     mesh = trimesh.Trimesh(solid.mesh.vertices - centroid_mm, solid.mesh.faces, process=False)
-    # Rounded to what the file will hold: everything measured below is then true of the stored hulls.
+    # Rounded to the precision of the file, so that everything measured below holds for the stored hulls.
     hulls = [_corners((points - centroid_mm).astype(np.float32)) for points in solid.hulls]
     for number, points in enumerate(hulls):
         _check_hull(name, number, points)
@@ -206,7 +206,7 @@ def write_solid(
 
 
 def recipe_hash(name: str) -> str:
-    """Digest of everything that decides how a part comes out: versions, dimensions, vendors' libraries."""
+    """Digest of everything that determines a part: versions, dimensions, vendors' libraries."""
     recipe = recipe_of(name)
     module = recipe.make.__module__
     text = [
@@ -230,13 +230,13 @@ def _corners(points: np.ndarray) -> np.ndarray:
 
 
 def _check_fit(name: str, fit: HullFit) -> None:
-    """Refuses hulls that are not the part: what they collide with would be another."""
+    """Refuses hulls that deviate too far from the mesh: contacts would be those of another shape."""
     least = 1 / MOST_VOLUME_RATIO
     if fit.p95 > MOST_P95_MM or not least <= fit.volume_ratio <= MOST_VOLUME_RATIO:
         raise BadPart(
-            f"{name}: the hulls are not the mesh: 95 % of the surface is within {fit.p95:.2f} mm (at most "
-            f"{MOST_P95_MM} mm), volume ratio {fit.volume_ratio:.2f} ({least:.2f} to {MOST_VOLUME_RATIO}): "
-            "simplify fine detail such as threads, grilles and thin walls"
+            f"{name}: the hulls deviate from the mesh: 95 % of the surface is within {fit.p95:.2f} mm (at "
+            f"most {MOST_P95_MM} mm), volume ratio {fit.volume_ratio:.2f} ({least:.2f} to "
+            f"{MOST_VOLUME_RATIO}): simplify fine detail such as threads, grilles and thin walls"
         )
 
 
@@ -247,11 +247,11 @@ def _check_hull(name: str, number: int, points: np.ndarray) -> None:
             f"{name}: hull {number} has {len(points)} vertices and {faces} faces, "
             f"the limits are {MAX_HULL_VERTICES} and {MAX_HULL_FACES}: split it"
         )
-    ratio = oblongness(points.astype(np.float64))
-    if ratio > MOST_OBLONG:
+    ratio = aspect_ratio(points.astype(np.float64))
+    if ratio > MOST_ASPECT_RATIO:
         raise BadPart(
-            f"{name}: hull {number} is {ratio:.0f} times longer than thick, PhysX takes up to "
-            f"{MOST_OBLONG:.0f}: make the part thicker or shorter"
+            f"{name}: hull {number} is {ratio:.0f} times longer than thick, PhysX accepts up to "
+            f"{MOST_ASPECT_RATIO:.0f}: make the part thicker or shorter"
         )
 
 
@@ -261,7 +261,7 @@ def _ply(mesh_mm: trimesh.Trimesh) -> bytes:
 
 
 def _glb(hulls_mm: list[np.ndarray]) -> bytes:
-    """One node per hull. SAPIEN takes the numbers of a GLB as they are, so no turn to y-up is made."""
+    """One node per hull. SAPIEN uses the coordinates of a GLB as they are: no rotation to y-up."""
     scene = trimesh.Scene()
     for number, points in enumerate(hulls_mm):
         hull = trimesh.convex.convex_hull(points.astype(np.float64))
@@ -270,7 +270,7 @@ def _glb(hulls_mm: list[np.ndarray]) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """JSON types, floats to 9 significant digits so that rounding noise does not reach the file."""
+    """JSON types, floats to 9 significant digits so that rounding noise is not stored."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):

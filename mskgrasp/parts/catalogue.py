@@ -1,7 +1,7 @@
-"""The catalogue's index: what every part is, on which side of the split it is, how easily it is grasped.
+"""Index of the catalogue: data, split and rating of every part.
 
-``catalogue.json`` in the parts folder is made from the part folders and may be deleted at any time, except
-for the ratings, which `parts rate` takes from a dataset.
+``catalogue.json`` in the parts folder is generated from the part folders and may be deleted at any time; only
+the ratings, which the command ``rate`` computes from a dataset, are lost with it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ INDEX_NAME = "catalogue.json"
 USABLE_LENGTH = (0.020, 0.150)
 """Longest axis of the catalogue's parts, metres: the paper's range."""
 THIN = 0.004
-"""Parts flatter than this are few: most of their grasps scrape the table."""
+"""Parts flatter than this count as thin, metres: most of their grasps would touch the table."""
 NEIGHBOUR = 1.10
 """Parts of a family whose sorted edges all differ by less than this factor are near-duplicates."""
 
@@ -37,14 +37,14 @@ _SHARES = {"train": 0.70, "validation": 0.15, "test": 0.15}
 
 @dataclass(frozen=True, kw_only=True)
 class Rating:
-    """How a part fared in random grasps.
+    """Success rate of a part in random grasps.
 
     Attributes:
-        attempts: How many were made.
-        successes: How many lifted the part.
+        attempts: Number of grasps.
+        successes: Number of grasps that lifted the part.
         interval: 95 % Wilson interval of the success rate.
-        part_hash: Content hash of the part that was grasped; a rating of another shape counts no more.
-        dataset: Folder that it was taken from.
+        part_hash: Content hash of the part that was grasped; a rating of another shape is dropped.
+        dataset: Folder of the dataset.
     """
 
     attempts: int
@@ -66,21 +66,21 @@ class Entry:
     Attributes:
         name: Of the part.
         family: Kind of part.
-        source: Standard, or what stands in for one.
+        source: Standard, or another origin of the dimensions.
         licence: SPDX identifier.
         longest_axis: Of the oriented minimal box.
         extents: Edges of the bounding box, sorted, the longest last.
         volume: Cubic metres.
         mass: kg.
-        n_hulls: How many convex hulls stand for the part.
+        n_hulls: Number of convex hulls.
         hull_error: Largest distance between hulls and mesh.
         hull_error_p95: 95th percentile of it.
         hull_volume_ratio: Volume of the hulls' union by that of the mesh.
         content_hash: Of the part.
-        recipe_hash: Of what made it.
-        group: Near-duplicates share one: the name of their first.
+        recipe_hash: Of its recipe.
+        group: Shared by near-duplicates: the name of the first of them.
         split: Side of the split, the same for all of a group.
-        rating: From a collected dataset; None until `parts rate` has seen one.
+        rating: From a collected dataset; None before the command ``rate``.
     """
 
     name: str
@@ -104,7 +104,7 @@ class Entry:
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOut:
-    """Why a recipe is no part of the catalogue, and which recipe that was."""
+    """Reason why a recipe is left out of the catalogue, and that recipe's hash."""
 
     reason: str
     recipe_hash: str
@@ -123,7 +123,7 @@ class Index:
 
 
 def index_path() -> Path:
-    """Where the index lies."""
+    """Path of the index."""
     return store.parts_folder() / INDEX_NAME
 
 
@@ -152,7 +152,7 @@ def read_index() -> Index:
 
 
 def write_index(index: Index) -> None:
-    """Writes the index whole or not at all."""
+    """Writes the index atomically."""
     record = {
         "index_version": INDEX_VERSION,
         "parts": {name: asdict(entry) for name, entry in sorted(index.parts.items())},
@@ -172,7 +172,7 @@ def write_index(index: Index) -> None:
 
 
 def entry_of(name: str) -> Entry:
-    """What the index says of a part that lies ready, from its ``part.json`` alone.
+    """The index entry of a built part, from its ``part.json`` alone.
 
     Raises:
         BadPart: There is no such part folder, or its record is damaged.
@@ -204,12 +204,12 @@ def entry_of(name: str) -> Entry:
 
 
 def make_index(entries: Iterable[Entry], failures: Mapping[str, str], before: Index) -> Index:
-    """Sorts the built parts into the catalogue: usable and distinct ones, grouped, split, with their ratings.
+    """Makes the index of the usable, distinct parts, with groups, split and ratings.
 
     Args:
-        entries: Of all parts that could be built.
-        failures: Reason for each that could not.
-        before: The index until now; ratings of parts that have not changed are kept.
+        entries: Of all built parts.
+        failures: Reason of each part that could not be built.
+        before: The previous index; ratings of parts that have not changed are kept.
     """
     left_out = {name: LeftOut(reason=why, recipe_hash=recipe_hash(name)) for name, why in failures.items()}
     kept: dict[str, Entry] = {}
@@ -223,7 +223,7 @@ def make_index(entries: Iterable[Entry], failures: Mapping[str, str], before: In
                 f"longest axis {1e3 * entry.longest_axis:.1f} mm, legal {1e3 * low:.0f} to {1e3 * high:.0f}"
             )
         elif key in seen:
-            reason = f"as large as {seen[key]}, edge by edge"
+            reason = f"duplicate of {seen[key]} by its edges and volume"
         if reason:
             left_out[entry.name] = LeftOut(reason=reason, recipe_hash=entry.recipe_hash)
             continue
@@ -239,7 +239,7 @@ def make_index(entries: Iterable[Entry], failures: Mapping[str, str], before: In
 
 
 def near_duplicates(entries: Iterable[Entry]) -> dict[str, str]:
-    """A group for every part: parts of a family with neighbouring sizes share one, also by a chain."""
+    """Groups of near-duplicates by part: the transitive closure of neighbouring sizes within a family."""
     by_family: dict[str, list[Entry]] = defaultdict(list)
     for entry in entries:
         by_family[entry.family].append(entry)
@@ -261,7 +261,7 @@ def near_duplicates(entries: Iterable[Entry]) -> dict[str, str]:
 
 
 def split_of(group: str) -> Split:
-    """The side of the split that a group stands on: decided by the hash of its name, so never moved."""
+    """The split of a group, by the hash of its name, so that it never changes."""
     number = int.from_bytes(hashlib.sha256(f"split {group}".encode()).digest()[:8], "big") / 2**64
     for side in SPLITS:
         number -= _SHARES[side]
@@ -271,13 +271,13 @@ def split_of(group: str) -> Split:
 
 
 def chosen_names(words: Iterable[str]) -> list[str]:
-    """Names of parts from a user's words: names, folders, or one of the sets below.
+    """Names of parts by names, folders, or the sets below.
 
-    ``starter``: the 25 parts that are ready in some seconds. ``catalogue``: all parts of the catalogue.
-    ``train``, ``validation``, ``test``: those of the catalogue on that side of the split.
+    ``starter``: 25 parts, built in a few seconds. ``catalogue``: all parts of the catalogue.
+    ``train``, ``validation``, ``test``: the parts of the catalogue in that split.
 
     Raises:
-        BadPart: A set of the catalogue is asked for before the catalogue was built.
+        BadPart: A set of the catalogue is named before the catalogue is built.
     """
     names: list[str] = []
     for word in words:
@@ -296,7 +296,7 @@ def chosen_names(words: Iterable[str]) -> list[str]:
 
 
 def spread(entries: Iterable[Entry], count: int) -> list[Entry]:
-    """About so many parts: of every family in proportion to the root of its size, its sizes spread evenly."""
+    """About ``count`` parts: of each family in proportion to the root of its size, evenly by volume."""
     families: dict[str, list[Entry]] = defaultdict(list)
     for entry in entries:
         families[entry.family].append(entry)
@@ -310,7 +310,7 @@ def spread(entries: Iterable[Entry], count: int) -> list[Entry]:
 
 
 def ratings() -> dict[str, Rating]:
-    """Ratings by content hash of the part, so that a part that has changed has none."""
+    """Ratings by content hash, so that a part that has changed has none."""
     return {e.content_hash: e.rating for e in read_index().parts.values() if e.rating is not None}
 
 
@@ -331,7 +331,7 @@ def with_ratings(index: Index, found: Mapping[str, Rating]) -> Index:
                 else (unknown_part(name, builtin_only=True))
             )
         if entry.content_hash != rating.part_hash:
-            raise BadPart(f"part {name!r} has changed since the dataset was made: collect it again")
+            raise BadPart(f"part {name!r} has changed since the dataset was collected: collect it again")
         parts[name] = replace(entry, rating=rating)
     return Index(parts=parts, left_out=index.left_out)
 

@@ -1,4 +1,4 @@
-"""A part: what simulation, pictures and reports need to know about one industrial component."""
+"""Data of one industrial part."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ SCHEMA_VERSION = 2
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """One part folder, read.
+    """A part as read from its folder.
 
     The part's frame *obj* has its origin at the centroid of the volume and the axes of its mesh file.
 
     Attributes:
         name: Unique, also the folder's name; lower case letters, digits, ``-`` and ``_``.
-        folder: Where ``mesh.ply``, ``hulls.glb`` and ``part.json`` lie.
+        folder: Holds ``mesh.ply``, ``hulls.glb`` and ``part.json``.
         family: Kind of part, for example ``hex_bolt``.
         source: Where the dimensions come from, for example ``ISO 4017``.
         licence: SPDX identifier.
-        dimensions: What was built, metres (counts without a unit are allowed).
+        dimensions: Nominal dimensions, metres (counts without a unit are allowed).
         content_hash: Hex digest of mesh, hulls and physical data.
         density: kg/m^3.
         mass: kg.
@@ -33,7 +33,7 @@ class Part:
         quat_obj_principal: (4,) wxyz, orientation of the principal axes in obj.
         extents: (3,) size of the bounding box in obj axes, metres.
         longest_axis: Longest edge of the oriented minimal box, metres.
-        n_hulls: How many convex hulls ``hulls.glb`` holds.
+        n_hulls: Number of convex hulls in ``hulls.glb``.
         hulls_volume: Sum of their volumes, overlaps counted twice, cubic metres.
         hull_error: Largest distance between the hulls' union and the mesh, metres.
         resting: ``T_table_obj`` of the k stable poses (z of the table is 0): position (k, 3) with

@@ -1,4 +1,4 @@
-"""Parts selected by names, folders and sets."""
+"""Selection of parts by names, folders and sets."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from mskgrasp.parts.catalogue import chosen_names
 
 
 def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int = 0) -> list[str]:
-    """Names or folders of parts from a user's words.
+    """Names or folders of parts by names, folders and sets.
 
-    ``train``, ``validation`` and ``test``: the model's, where it was trained with any such; else the
-    catalogue's, for the last two without what the model was trained on. ``all``: every part of the starter
-    set. Other words as `mskgrasp.parts.chosen_names`.
+    ``train``, ``validation`` and ``test``: the sets of the model, where its training names them; otherwise
+    those of the catalogue, the last two without parts that the model was trained on. ``all``: every part of
+    the starter set. Other words as in `mskgrasp.parts.chosen_names`.
 
     Args:
-        words: Of the user.
-        training: What a model says of its training.
-        n_parts: Over 0, at most so many, an equal share of each word's, evenly chosen from their names in
-            order; more of them include the fewer.
+        words: Names, folders and sets.
+        training: Training record of a model.
+        n_parts: Where positive, the greatest number of parts, in equal shares of the words, evenly spaced in
+            the order of names; a larger number includes the parts of a smaller one.
 
     Raises:
         BadPart: A part is unknown.
@@ -45,9 +45,9 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
 
 
 def evenly(names: Sequence[str], n: int) -> list[str]:
-    """At most n of some names, spread evenly over their sorted order; a larger n adds to a smaller one's."""
+    """At most n names, evenly spaced in sorted order; a larger n includes the names of a smaller one."""
     in_order = sorted(names)
-    # The golden ratio's multiples fill an interval evenly, however many there are.
+    # Multiples of the golden ratio modulo 1 fill the interval evenly for any n.
     places = (k * 0.6180339887498949 % 1.0 for k in itertools.count())
     chosen: dict[int, None] = {}
     while len(chosen) < min(n, len(in_order)):
@@ -56,7 +56,7 @@ def evenly(names: Sequence[str], n: int) -> list[str]:
 
 
 def _shares(sets: Sequence[Sequence[str]], n: int) -> list[int]:
-    """How many of each set, n in all where there are so many; what a small one lacks the others give."""
+    """Number of parts of each set, n in total where there are enough; large sets fill up for small ones."""
     shares = [0] * len(sets)
     while sum(shares) < min(n, sum(map(len, sets))):
         open_ = [i for i, one in enumerate(sets) if shares[i] < len(one)]

@@ -1,4 +1,4 @@
-"""Part folders: written whole or not at all, checked when read."""
+"""Part folders, written atomically and checked when read."""
 
 from __future__ import annotations
 
@@ -26,35 +26,34 @@ FILES: tuple[str, ...] = ("mesh.ply", "hulls.glb", "part.json")
 LEGAL_FOLDER = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 _ABANDONED_S = 3600.0
-"""Temporary folders older than this were left by a killed build."""
+"""Temporary folders older than this were left behind by a killed process."""
 
-
-_ELSEWHERE: ContextVar[Path | None] = ContextVar("elsewhere", default=None)
+_FOLDER_OVERRIDE: ContextVar[Path | None] = ContextVar("folder_override", default=None)
 
 
 @contextmanager
 def kept_in(folder: Path) -> Iterator[None]:
-    """Keeps parts in another folder for as long as the context lasts."""
-    token = _ELSEWHERE.set(folder)
+    """Uses another parts folder within the context."""
+    token = _FOLDER_OVERRIDE.set(folder)
     try:
         yield
     finally:
-        _ELSEWHERE.reset(token)
+        _FOLDER_OVERRIDE.reset(token)
 
 
 def parts_folder() -> Path:
     """Where parts are kept: ``$XDG_CACHE_HOME/mskgrasp/parts`` or ``~/.cache/mskgrasp/parts``."""
-    elsewhere = _ELSEWHERE.get()
-    if elsewhere is not None:
-        return elsewhere
+    override = _FOLDER_OVERRIDE.get()
+    if override is not None:
+        return override
     base = os.environ.get("XDG_CACHE_HOME", "")
-    # The XDG specification says that a relative path there is to be ignored.
+    # The XDG specification: a relative path is ignored.
     root = Path(base) if os.path.isabs(base) else Path.home() / ".cache"
     return root / "mskgrasp" / "parts"
 
 
 def content_hash(mesh: bytes, hulls: bytes, record: dict[str, Any]) -> str:
-    """Hex digest of a part's mesh, hulls and physical data: of what decides how it behaves in a grasp."""
+    """Hex digest of all that determines a part's behaviour in a grasp: mesh, hulls and physical data."""
     physical = {
         key: value
         for key, value in record.items()
@@ -67,10 +66,10 @@ def content_hash(mesh: bytes, hulls: bytes, record: dict[str, Any]) -> str:
 
 
 def write_part(name: str, mesh: bytes, hulls: bytes, record: dict[str, Any]) -> Part:
-    """Puts a part into the parts folder under its name, replacing another one of that name.
+    """Writes a part to the parts folder under its name, replacing another part of that name.
 
-    Everything is written to a temporary folder that is renamed at the end. Where another process was faster
-    and its part has the same recipe, that one stays.
+    The files are written to a temporary folder that is renamed at the end. Where another process was faster
+    and its part has the same recipe, that part is kept.
     """
     record = record | {"content_hash": content_hash(mesh, hulls, record)}
     text = json.dumps(record, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
@@ -79,15 +78,15 @@ def write_part(name: str, mesh: bytes, hulls: bytes, record: dict[str, Any]) -> 
 
 
 def pack_part(part: Part) -> dict[str, bytes]:
-    """A part's files by name, to be sent to another machine."""
+    """The files of a part by name, for sending to another machine."""
     return {name: _read(part.folder, name) for name in FILES}
 
 
 def receive_part(name: str, digest: str, contents: Mapping[str, bytes]) -> Part:
-    """Keeps the files of a part that came from another machine.
+    """Stores the files of a part that another machine sent.
 
-    They go to a folder of their own, ``received`` beside the parts folder, named for the hash: what this
-    machine calls by the same name stays as it is.
+    They are written to the folder ``received`` beside the parts folder, under the part's name and hash: a
+    part of the same name on this machine is not touched.
 
     Raises:
         BadPart: The files are not those of the part with this content hash.
@@ -95,7 +94,9 @@ def receive_part(name: str, digest: str, contents: Mapping[str, bytes]) -> Part:
     folder = f"{name}-{digest[:16]}"
     root = parts_folder().with_name("received")
     if not LEGAL_FOLDER.fullmatch(folder) or set(contents) != set(FILES):
-        raise BadPart(f"{name!r} with {', '.join(contents)} was received, which is no part: check the sender")
+        raise BadPart(
+            f"{name!r} with {', '.join(contents)} was received, which is not a part: check the sender"
+        )
     try:
         part = load_part(root / folder)
         if part.content_hash == digest:
@@ -112,7 +113,7 @@ def receive_part(name: str, digest: str, contents: Mapping[str, bytes]) -> Part:
 
 def _put(root: Path, name: str, contents: Mapping[str, bytes], recipe: str) -> Path:
     root.mkdir(parents=True, exist_ok=True)
-    _sweep(root)
+    _remove_abandoned(root)
     temporary = root / f".tmp-{name}-{uuid.uuid4().hex[:12]}"
     temporary.mkdir()
     try:
@@ -121,7 +122,7 @@ def _put(root: Path, name: str, contents: Mapping[str, bytes], recipe: str) -> P
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-        _take_place(temporary, root / name, recipe)
+        _replace_folder(temporary, root / name, recipe)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return root / name
@@ -131,7 +132,7 @@ def load_part(folder: Path | str) -> Part:
     """Reads a part folder.
 
     Raises:
-        BadPart: A file is missing, damaged, of another schema version, or leads out of the folder.
+        BadPart: A file is missing, damaged, of another schema version, or a link out of the folder.
     """
     folder = Path(folder)
     contents = {name: _read(folder, name) for name in FILES}
@@ -152,7 +153,7 @@ def load_part(folder: Path | str) -> Part:
 
 
 def recipe_hash(folder: Path) -> str | None:
-    """The recipe by which a folder's part was made; None where there is no sound part."""
+    """Hash of the recipe that made a folder's part; None where there is no undamaged part."""
     try:
         load_part(folder)
         return str(_record(folder, _read(folder, "part.json")).get("recipe_hash"))
@@ -161,14 +162,14 @@ def recipe_hash(folder: Path) -> str | None:
 
 
 def read_record(folder: Path) -> dict[str, Any]:
-    """All of ``part.json``, also what Part leaves out (``hull_error_p95``, ``hull_volume_ratio``, ...)."""
+    """All of ``part.json``, with what Part leaves out (``hull_error_p95``, ``hull_volume_ratio``, ...)."""
     return _record(folder, _read(folder, "part.json"))
 
 
 _REMEDY = "delete the folder, then build or import the part again"
 
 
-def _take_place(temporary: Path, final: Path, recipe: str) -> None:
+def _replace_folder(temporary: Path, final: Path, recipe: str) -> None:
     for _ in range(20):
         try:
             os.rename(temporary, final)
@@ -190,7 +191,7 @@ def _take_place(temporary: Path, final: Path, recipe: str) -> None:
     raise BadPart(f"{final} keeps being replaced by another process: run one build at a time")
 
 
-def _sweep(root: Path) -> None:
+def _remove_abandoned(root: Path) -> None:
     for folder in root.glob(".tmp-*"):
         try:
             if time.time() - folder.stat().st_mtime > _ABANDONED_S:
@@ -202,7 +203,7 @@ def _sweep(root: Path) -> None:
 def _read(folder: Path, name: str) -> bytes:
     path = folder / name
     if not path.is_file():
-        raise BadPart(f"{folder} is no part folder: {name} is missing; a part has {', '.join(FILES)}")
+        raise BadPart(f"{folder} is not a part folder: {name} is missing; a part has {', '.join(FILES)}")
     if not path.resolve().is_relative_to(folder.resolve()):
         raise BadPart(f"{path} leads out of its folder to {path.resolve()}: {_REMEDY}")
     return path.read_bytes()
@@ -212,9 +213,9 @@ def _record(folder: Path, text: bytes) -> dict[str, Any]:
     try:
         record = json.loads(text.decode())
     except ValueError as error:
-        raise BadPart(f"{folder / 'part.json'} is damaged (no JSON): {_REMEDY}") from error
+        raise BadPart(f"{folder / 'part.json'} is damaged (not JSON): {_REMEDY}") from error
     if not isinstance(record, dict):
-        raise BadPart(f"{folder / 'part.json'} is damaged (no JSON object): {_REMEDY}")
+        raise BadPart(f"{folder / 'part.json'} is damaged (not a JSON object): {_REMEDY}")
     return record
 
 
@@ -251,7 +252,7 @@ def _part_of(folder: Path, record: dict[str, Any]) -> Part:
 
 def _text(record: dict[str, Any], key: str) -> str:
     if not isinstance(record[key], str):
-        raise ValueError(f"{key} is no text")
+        raise ValueError(f"{key} is not a string")
     return record[key]
 
 
@@ -273,8 +274,8 @@ def _array(record: dict[str, Any], key: str, shape: tuple[int, ...]) -> np.ndarr
     array = np.asarray(record[key], dtype=np.float64)
     expected = tuple(len(array) if size == -1 and array.ndim else size for size in shape)
     if array.shape != expected or not np.isfinite(array).all():
-        raise ValueError(f"{key} has shape {array.shape}, it must be finite and {shape}")
-    array.flags.writeable = False  # a Part is shared between whoever asks for it
+        raise ValueError(f"{key} has shape {array.shape}, the legal shape is {shape} with finite numbers")
+    array.flags.writeable = False  # a Part is shared between its users
     return array
 
 

@@ -1,7 +1,7 @@
 """Version numbers of part building and importing.
 
-Whoever changes an outcome raises the number; parts made with another number are made anew.
-`tests/versions.py` names the files that each number stands for.
+A change of the outcome raises the number; parts made with another number are rebuilt.
+`tests/versions.py` lists the files that each number covers.
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ from functools import lru_cache
 from pathlib import Path
 
 PART_VERSION = 1
-"""Of what turns a solid into a part: pieces, decomposition, measures, resting poses, files."""
+"""Building a part from a solid: pieces, decomposition, measurements, stable poses, files."""
 
 IMPORT_VERSION = 1
-"""Of what reads, repairs and simplifies a user's mesh."""
+"""Reading, repairing and simplifying an imported mesh."""
 
 _FIRST = Path(__file__).parent / "first_versions.json"
 
 
 def stamp(what: str, version: int) -> str:
-    """The text that stands for a version in a recipe's hash.
+    """The text that represents a version in a recipe's hash.
 
     Version 1 keeps the digest of source files that parts carried before versions were numbered, so that those
-    parts remain current.
+    parts remain up to date.
 
     Args:
         what: ``part``, ``import``, or a recipe's module as ``families.gears``.

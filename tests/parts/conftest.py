@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mskgrasp.parts import Part, build_part, starter_names
-from mskgrasp.parts.commands.verbs import main
+from mskgrasp.parts.commands.command_line import main
 from tests.programs import Ended, run_here
 
 

@@ -1,4 +1,4 @@
-"""Building many parts: on all cores, resumable, stopped at any time, and told what was left out."""
+"""Building many parts: on all cores, resumable, stopped at any time, with a report of what was left out."""
 
 import os
 import signal
@@ -16,7 +16,7 @@ from mskgrasp.parts import build_part, load_part, starter_names
 from mskgrasp.parts.build import recipe_hash
 from mskgrasp.parts.catalogue import Index, LeftOut, make_index, read_index, write_index
 from mskgrasp.parts.commands.build_parts import build_parts
-from mskgrasp.parts.commands.verbs import main
+from mskgrasp.parts.commands.command_line import main
 from mskgrasp.parts.solids.solid import Solid
 
 EMPTY = Index(parts={}, left_out={})
@@ -106,7 +106,10 @@ def test_mistakes_are_told_in_one_line(arguments, exit_code):
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
-    code = "from mskgrasp.runtime.cli import run; from mskgrasp.parts.commands.verbs import main; run(main)"
+    code = (
+        "from mskgrasp.parts.commands.command_line import main; "
+        "from mskgrasp.runtime.cli import run; run(main)"
+    )
     build = subprocess.Popen(
         [sys.executable, "-c", code, "build", "--workers", "2"],
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # where the tests' own is ignored
@@ -129,7 +132,10 @@ def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
 
 
 def test_workers_of_a_killed_build_end_too(own_cache):
-    code = "from mskgrasp.runtime.cli import run; from mskgrasp.parts.commands.verbs import main; run(main)"
+    code = (
+        "from mskgrasp.parts.commands.command_line import main; "
+        "from mskgrasp.runtime.cli import run; run(main)"
+    )
     build = subprocess.Popen(
         [sys.executable, "-c", code, "build", "--workers", "2"],
         start_new_session=True, stdout=subprocess.DEVNULL,

@@ -13,7 +13,7 @@ from mskgrasp.core.geometry import quat_to_matrix
 from mskgrasp.parts import Part, starter_names
 from mskgrasp.parts.recipes.families import recipes
 from mskgrasp.parts.recipes.recipe import TABLES, table
-from mskgrasp.parts.solids.measure import oblongness
+from mskgrasp.parts.solids.measure import aspect_ratio
 from mskgrasp.parts.store import read_record
 
 STEEL, BRONZE = 7850.0, 8800.0
@@ -52,7 +52,7 @@ def test_meshes_are_closed_single_bodies_with_the_centroid_at_the_origin(builtin
         assert np.allclose(mesh.extents, part.extents, atol=1e-7), part.name
 
 
-def test_hulls_are_convex_small_and_not_too_oblong_for_physx(builtin_parts):
+def test_hulls_are_convex_small_and_not_too_slender_for_physx(builtin_parts):
     for part in builtin_parts.values():
         hulls = hulls_of(part)
         assert len(hulls) == part.n_hulls <= 48, part.name
@@ -60,7 +60,7 @@ def test_hulls_are_convex_small_and_not_too_oblong_for_physx(builtin_parts):
             hull = ConvexHull(points)
             assert len(hull.vertices) == len(points) <= 32, part.name
             assert len(hull.simplices) <= 64, part.name
-            assert oblongness(points) <= 50, part.name
+            assert aspect_ratio(points) <= 50, part.name
 
 
 def test_hulls_stay_within_a_millimetre_of_the_mesh_unless_holes_are_filled(builtin_parts):

@@ -12,7 +12,7 @@ from mskgrasp.core.errors import BadPart
 from mskgrasp.parts.recipes import cad, families
 from mskgrasp.parts.recipes.cad import drawn, screws
 from mskgrasp.parts.recipes.recipe import Recipe
-from mskgrasp.parts.solids.measure import hull_fit, oblongness
+from mskgrasp.parts.solids.measure import aspect_ratio, hull_fit
 
 needs_cad = pytest.mark.skipif(importlib.util.find_spec("bd_warehouse") is None, reason="needs [cad]")
 
@@ -66,7 +66,7 @@ def test_one_screw_of_each_family_is_closed_and_its_hulls_fit(listed, family):
     assert 1 / 1.1 <= fit.volume_ratio <= 1.1
     for points in solid.hulls:
         assert len(points) <= 32
-        assert oblongness(points) <= 50
+        assert aspect_ratio(points) <= 50
     size = listed[name].dimensions
     if family != "set_screw":
         assert -solid.mesh.bounds[0, 2] == pytest.approx(size["l_mm"], abs=0.01)

@@ -67,7 +67,7 @@ def test_a_part_of_the_wrong_size_is_left_out_with_the_reason():
 def test_of_two_equal_parts_one_is_left_out():
     twins = [entry("a", "one", (10, 20, 50)), entry("b", "two", (20, 50.01, 10))]
     index = make_index(twins, {}, EMPTY)
-    assert set(index.parts) == {"a"} and "as large as a" in index.left_out["b"].reason
+    assert set(index.parts) == {"a"} and "duplicate of a" in index.left_out["b"].reason
 
 
 def test_what_failed_to_build_is_remembered_with_its_recipe():

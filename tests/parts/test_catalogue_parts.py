@@ -17,7 +17,7 @@ from mskgrasp.parts import Part, builtin_names, load_part
 from mskgrasp.parts.build import recipe_of
 from mskgrasp.parts.catalogue import Index
 from mskgrasp.parts.commands.build_parts import build_parts
-from mskgrasp.parts.solids.measure import oblongness
+from mskgrasp.parts.solids.measure import aspect_ratio
 
 ONCE_A_FAMILY = {recipe_of(name).family: name for name in reversed(builtin_names())}
 
@@ -96,7 +96,7 @@ def test_hulls_are_few_small_and_stout(family_parts):
         for points in hulls:
             hull = ConvexHull(points)
             assert len(hull.vertices) == len(points) <= 32 and len(hull.simplices) <= 64, part.name
-            assert oblongness(points) <= 50, part.name
+            assert aspect_ratio(points) <= 50, part.name
 
 
 def test_points_of_the_mesh_lie_in_the_hulls_and_points_far_outside_do_not(family_parts):

@@ -92,7 +92,7 @@ def test_errors_each_way_tell_a_filled_notch_from_a_missing_lug():
 
 def test_what_no_pieces_stand_for_is_refused_with_both_numbers(monkeypatch):
     # One rung so coarse that the angle is left as one hull: that adds the triangle between the legs.
-    monkeypatch.setattr(decompose, "LADDER_MM", (60.0,))
+    monkeypatch.setattr(decompose, "CONCAVITIES_MM", (60.0,))
     hull_area, area = 50 * 8 + 32 * 8 + 42 * 32 / 2, 50 * 8 + 32 * 8
     ratio = f"{hull_area / area:.2f}"
     with pytest.raises(
@@ -140,8 +140,8 @@ def test_a_sliver_is_taken_up_by_its_neighbour_instead_of_being_cut_to_pieces():
     ]
     pieces = [np.asarray(box.vertices) for box in boxes]
     mesh = trimesh.creation.box(bounds=[[0, 0, 0], [60, 30, 20]])
-    assert len(decompose._stout(pieces)) > 3
-    assert len(decompose._join(MeshSurface(mesh), pieces, 0.7, 1.1, finish=decompose._stout)) == 1
+    assert len(decompose._split_slender(pieces)) > 3
+    assert len(decompose._join(MeshSurface(mesh), pieces, 0.7, 1.1, finish=decompose._split_slender)) == 1
 
 
 def test_a_fit_that_stops_early_decides_as_the_whole_fit_does():

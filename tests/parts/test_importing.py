@@ -117,14 +117,14 @@ def write_foreign_index(file: Path) -> None:
         ("flat.stl", write_flat, "volume is zero"),
         ("two.stl", write_two_bodies, "2 separate bodies"),
         ("half.stl", write_half, "is cut off"),
-        ("half.ply", write_half, "no readable PLY"),
+        ("half.ply", write_half, "not a readable PLY"),
         ("infinite.ply", write_not_finite, "not finite"),
         ("letter.stl", write_text, "export it again"),
-        ("letter.ply", write_text, "no readable PLY"),
+        ("letter.ply", write_text, "not a readable PLY"),
         ("index.obj", write_foreign_index, "export it again"),
         ("empty.obj", lambda file: file.touch(), "is empty"),
         ("zeros.stl", lambda file: file.write_bytes(bytes(84)), "holds no triangles"),
-        ("part.step", write_text, "is no STEP"),
+        ("part.step", write_text, "is not a STEP file"),
         ("part.iges", write_text, "CAD files end in .stl, .obj, .ply, .glb, .3mf, .step, .stp"),
         ("missing.stl", lambda file: None, "No such file"),
     ],
@@ -178,7 +178,7 @@ def test_split_names_bodies_by_decreasing_volume_and_leaves_them_alone_the_next_
     imported = import_file(tmp_path / "pair.stl", bodies="split", density=1000)
     assert [part.name for part in imported.parts] == ["pair-1", "pair-2"]
     assert [part.mass for part in imported.parts] == pytest.approx([0.024, 0.024])
-    assert imported.told == ("split into 2 parts",)
+    assert imported.notes == ("split into 2 parts",)
     assert import_file(tmp_path / "pair.stl", bodies="split", density=1000).unchanged
     trimesh.creation.box((40, 30, 20)).export(tmp_path / "single.stl")
     assert [part.name for part in import_file(tmp_path / "single.stl", bodies="split").parts] == ["single"]
@@ -204,7 +204,7 @@ def test_dust_beside_a_body_is_refused_as_a_part_of_its_own(tmp_path, own_cache)
 @pytest.mark.parametrize(
     ("edge", "said"),
     [
-        (1000.0, "is 1 m long when read in mm; the cell takes 2 to 500 mm"),
+        (1000.0, "is 1 m long when read in mm; the limits are 2 to 500 mm"),
         (0.05, "--unit m would make it 50 mm"),
     ],
 )

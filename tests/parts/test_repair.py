@@ -1,11 +1,11 @@
-"""What is mended is mended rightly, counted and told; what is refused is refused for the true reason."""
+"""Repairs are right, counted and reported; what is refused is refused for the true reason."""
 
 import numpy as np
 import pytest
 import trimesh
 
 from mskgrasp.core.errors import BadPart
-from mskgrasp.parts.importing.bodies import Mended, mend
+from mskgrasp.parts.importing.bodies import RepairedBodies, repair_bodies
 from mskgrasp.parts.importing.winding import miscounted_fraction, winding_number
 from mskgrasp.parts.solids.surface import Surface
 
@@ -38,13 +38,13 @@ def torus(n: int = 200, m: int = 100, wide: float = 30.0, thick: float = 10.0) -
     return grid(np.stack([radius * np.cos(u), radius * np.sin(u), thick * np.sin(v)], axis=-1))
 
 
-def one(*surfaces: Surface) -> Mended:
-    return mend([soup(*surfaces)], bodies="one")
+def one(*surfaces: Surface) -> RepairedBodies:
+    return repair_bodies([soup(*surfaces)], bodies="one")
 
 
 def refusal(*surfaces: Surface, bodies="one") -> str:
     with pytest.raises(BadPart) as caught:
-        mend([soup(*surfaces)], bodies=bodies)
+        repair_bodies([soup(*surfaces)], bodies=bodies)
     assert "\n" not in str(caught.value)
     return str(caught.value)
 
@@ -53,14 +53,14 @@ TORUS_VOLUME = 2 * np.pi**2 * 30 * 10**2
 
 
 def test_equal_vertices_are_merged_and_the_torus_keeps_the_volume_of_the_formula():
-    mended = one(torus())
-    assert mended.told == () and len(mended.bodies) == 1
+    repaired = one(torus())
+    assert repaired.notes == () and len(repaired.bodies) == 1
     # Inscribed in both circles: of 200 and of 100 sides.
     inscribed = (100 / np.pi * np.sin(np.pi / 100) * np.cos(np.pi / 100)) * (
         200 / np.pi * np.sin(np.pi / 200)
     )
-    assert mended.bodies[0].volume == pytest.approx(TORUS_VOLUME * inscribed, rel=2e-4)
-    assert len(mended.bodies[0].vertices) == 200 * 100 and mended.bodies[0].is_watertight
+    assert repaired.bodies[0].volume == pytest.approx(TORUS_VOLUME * inscribed, rel=2e-4)
+    assert len(repaired.bodies[0].vertices) == 200 * 100 and repaired.bodies[0].is_watertight
 
 
 def test_faces_wound_wrongly_are_turned_and_counted():
@@ -68,15 +68,15 @@ def test_faces_wound_wrongly_are_turned_and_counted():
     faces = surface.faces.copy()
     chosen = np.random.default_rng(0).choice(len(faces), 300, replace=False)
     faces[chosen] = faces[chosen, ::-1]
-    mended = one(Surface(vertices=surface.vertices, faces=faces))
-    assert mended.told == ("turned 300 faces outward",)
-    assert mended.bodies[0].volume == pytest.approx(TORUS_VOLUME, rel=2e-3)
+    repaired = one(Surface(vertices=surface.vertices, faces=faces))
+    assert repaired.notes == ("turned 300 faces outward",)
+    assert repaired.bodies[0].volume == pytest.approx(TORUS_VOLUME, rel=2e-3)
 
 
 def test_a_body_wound_inwards_is_turned_as_a_whole():
-    mended = one(box(40, 30, 20, inward=True))
-    assert mended.told == ("turned 12 faces outward",)
-    assert mended.bodies[0].volume == pytest.approx(24_000)
+    repaired = one(box(40, 30, 20, inward=True))
+    assert repaired.notes == ("turned 12 faces outward",)
+    assert repaired.bodies[0].volume == pytest.approx(24_000)
 
 
 def test_degenerate_and_repeated_faces_are_dropped_and_counted():
@@ -84,23 +84,23 @@ def test_degenerate_and_repeated_faces_are_dropped_and_counted():
     point, edge = cube.triangles[:1, [0, 0, 0]], cube.triangles[1:2, [0, 1, 1]]
     extra = np.concatenate([cube.triangles, point, edge, cube.triangles[3:5]])
     made = Surface(vertices=extra.reshape(-1, 3), faces=np.arange(3 * len(extra)).reshape(-1, 3))
-    mended = mend([made], bodies="one")
-    assert mended.told == ("dropped 2 degenerate faces", "dropped 2 faces lying on another")
-    assert mended.bodies[0].volume == pytest.approx(24_000)
+    repaired = repair_bodies([made], bodies="one")
+    assert repaired.notes == ("dropped 2 degenerate faces", "dropped 2 faces lying on another")
+    assert repaired.bodies[0].volume == pytest.approx(24_000)
 
 
 def test_a_body_drawn_from_both_sides_loses_the_inner_side():
-    mended = one(box(40, 30, 20), box(40, 30, 20, inward=True))
-    assert mended.told[0] == "dropped 12 faces lying on another"
-    assert mended.bodies[0].volume == pytest.approx(24_000)
+    repaired = one(box(40, 30, 20), box(40, 30, 20, inward=True))
+    assert repaired.notes[0] == "dropped 12 faces lying on another"
+    assert repaired.bodies[0].volume == pytest.approx(24_000)
 
 
 def test_a_fin_without_thickness_is_dropped_and_the_body_stays():
     fin = np.array([[20.0, -15.0, -10.0], [20.0, 15.0, 10.0], [50.0, 0.0, 0.0]])
     fins = Surface(vertices=np.concatenate([fin, fin[::-1]]), faces=np.arange(6).reshape(2, 3))
-    mended = one(box(40, 30, 20), fins)
-    assert mended.told == ("dropped 2 faces lying on another",)
-    assert np.allclose(mended.bodies[0].extents, [40, 30, 20])
+    repaired = one(box(40, 30, 20), fins)
+    assert repaired.notes == ("dropped 2 faces lying on another",)
+    assert np.allclose(repaired.bodies[0].extents, [40, 30, 20])
 
 
 def test_faces_that_meet_within_a_micrometre_are_welded_and_wider_gaps_are_not():
@@ -110,15 +110,15 @@ def test_faces_that_meet_within_a_micrometre_are_welded_and_wider_gaps_are_not()
         vertices=(triangles + rng.uniform(-2e-4, 2e-4, triangles.shape)).reshape(-1, 3),
         faces=np.arange(36).reshape(-1, 3),
     )
-    mended = mend([shaken], bodies="one")
-    assert mended.told == ("welded 28 vertices closer than 0.001 mm",)
-    assert mended.bodies[0].volume == pytest.approx(24_000, rel=1e-4)
+    repaired = repair_bodies([shaken], bodies="one")
+    assert repaired.notes == ("welded 28 vertices closer than 0.001 mm",)
+    assert repaired.bodies[0].volume == pytest.approx(24_000, rel=1e-4)
     torn = Surface(
         vertices=(triangles + rng.uniform(-0.05, 0.05, triangles.shape)).reshape(-1, 3),
         faces=np.arange(36).reshape(-1, 3),
     )
     with pytest.raises(BadPart, match="is open: 36 edges"):
-        mend([torn], bodies="one")
+        repair_bodies([torn], bodies="one")
 
 
 def test_an_open_surface_is_refused_with_its_open_edges_counted():
@@ -148,57 +148,61 @@ def test_a_one_sided_surface_is_refused():
     back = np.where(faces < m, (-faces) % m, faces)
     faces[seam] = back[seam]
     with pytest.raises(BadPart, match="one-sided surface"):
-        mend([Surface(vertices=surface.vertices, faces=faces)], bodies="one")
+        repair_bodies([Surface(vertices=surface.vertices, faces=faces)], bodies="one")
 
 
 def test_a_cavity_stays_a_cavity_whichever_way_the_file_was_wound():
     for inner, outer, turned in ((True, False, ()), (False, True, ("turned 24 faces outward",))):
-        mended = one(box(40, 30, 20, inward=outer), box(10, 10, 10, inward=inner))
-        assert len(mended.bodies) == 1 and mended.told == turned
-        assert mended.bodies[0].volume == pytest.approx(23_000)
+        repaired = one(box(40, 30, 20, inward=outer), box(10, 10, 10, inward=inner))
+        assert len(repaired.bodies) == 1 and repaired.notes == turned
+        assert repaired.bodies[0].volume == pytest.approx(23_000)
 
 
 def test_a_body_inside_another_is_a_second_body_and_union_swallows_it():
     assert "has 2 separate bodies (24, 1 cm^3): --split" in refusal(box(40, 30, 20), box(10, 10, 10))
-    joined = mend([soup(box(40, 30, 20), box(10, 10, 10))], bodies="union")
+    joined = repair_bodies([soup(box(40, 30, 20), box(10, 10, 10))], bodies="union")
     assert joined.bodies[0].volume == pytest.approx(24_000)
-    assert joined.told == ("joined 2 bodies into one",)
+    assert joined.notes == ("joined 2 bodies into one",)
 
 
 def test_a_ball_loose_in_a_cavity_is_a_body_and_the_cavity_stays_with_its_host():
     parts = (box(40, 30, 20), box(16, 16, 16, inward=True), box(4, 4, 4))
-    split = mend([soup(*parts)], bodies="split")
+    split = repair_bodies([soup(*parts)], bodies="split")
     assert [body.volume for body in split.bodies] == pytest.approx([24_000 - 4096, 64])
     assert "do not touch even when joined" in refusal(*parts, bodies="union")
 
 
 def test_split_makes_bodies_by_decreasing_volume_and_union_joins_what_overlaps_or_touches():
     small, large = box(10, 10, 10, at=(100, 0, 0)), box(40, 30, 20)
-    split = mend([soup(small, large)], bodies="split")
+    split = repair_bodies([soup(small, large)], bodies="split")
     assert [body.volume for body in split.bodies] == pytest.approx([24_000, 1000])
-    assert split.told == ("split into 2 parts",)
-    overlapping = mend([soup(large, box(40, 30, 20, at=(20, 15, 10)))], bodies="union")
+    assert split.notes == ("split into 2 parts",)
+    overlapping = repair_bodies([soup(large, box(40, 30, 20, at=(20, 15, 10)))], bodies="union")
     assert overlapping.bodies[0].volume == pytest.approx(48_000 - 20 * 15 * 10)
-    touching = mend([soup(large, box(40, 30, 20, at=(40, 5, 0)))], bodies="union")
+    touching = repair_bodies([soup(large, box(40, 30, 20, at=(40, 5, 0)))], bodies="union")
     assert len(touching.bodies) == 1 and touching.bodies[0].volume == pytest.approx(48_000)
     assert "has 2 bodies that do not touch even when joined" in refusal(small, large, bodies="union")
-    assert mend([soup(large)], bodies="union").told == () == mend([soup(large)], bodies="split").told
+    assert (
+        repair_bodies([soup(large)], bodies="union").notes
+        == ()
+        == repair_bodies([soup(large)], bodies="split").notes
+    )
 
 
 def test_bodies_that_touch_along_an_edge_or_a_face_are_told_apart():
     for shift in ((40, 30, 0), (40, 5, 0), (40, 0, 0), (40, 30, 20)):
-        split = mend([soup(box(40, 30, 20), box(40, 30, 20, at=shift))], bodies="split")
+        split = repair_bodies([soup(box(40, 30, 20), box(40, 30, 20, at=shift))], bodies="split")
         if shift != (40, 0, 0):  # there both faces are drawn by the same triangles or by crossed ones
             assert [body.volume for body in split.bodies] == pytest.approx([24_000, 24_000])
         assert sum(body.volume for body in split.bodies) == pytest.approx(48_000)
 
 
 def test_objects_that_are_closed_by_themselves_are_bodies_and_open_ones_are_taken_together():
-    two = mend([box(40, 30, 20), box(40, 30, 20, at=(40, 0, 0))], bodies="split")
+    two = repair_bodies([box(40, 30, 20), box(40, 30, 20, at=(40, 0, 0))], bodies="split")
     assert len(two.bodies) == 2
     cube = box(40, 30, 20)
     coloured = [Surface(vertices=cube.vertices, faces=faces) for faces in np.split(cube.faces, 6)]
-    assert mend(coloured, bodies="one").bodies[0].volume == pytest.approx(24_000)
+    assert repair_bodies(coloured, bodies="one").bodies[0].volume == pytest.approx(24_000)
 
 
 def test_a_thousand_loose_bodies_are_no_part():
@@ -264,7 +268,7 @@ def test_a_crossing_too_small_to_matter_is_kept_and_told():
     share = 0.01 / (2 * np.pi)
     ring = ring_with_lap(0.01)
     assert abs(ring.volume) == pytest.approx(5 * np.pi * 300 * (1 + share), rel=2e-3)
-    told = one(ring).told
+    told = one(ring).notes
     assert told[-1].startswith("crosses itself in ") and told[-1].endswith(" % of its volume (kept)")
     assert 50 * share < float(told[-1].split()[3]) < 200 * share
     with pytest.raises(BadPart, match="crosses itself"):
@@ -279,13 +283,13 @@ def test_faces_folded_over_their_neighbours_are_refused_for_booleans_would_not_k
     assert "folded" in refusal(folded)
 
 
-def test_a_fine_mesh_is_thinned_out_within_the_distance_that_is_told():
+def test_a_fine_mesh_is_decimated_within_the_reported_distance():
     fine = torus(600, 200)
-    mended = one(fine)
-    thin = mended.bodies[0]
+    repaired = one(fine)
+    thin = repaired.bodies[0]
     assert len(thin.faces) < 50_000 and thin.is_watertight
-    assert mended.told[0].startswith("thinned out from 240,000 to ")
-    said = float(mended.told[0].split("at most ")[1].split()[0])
+    assert repaired.notes[0].startswith("decimated from 240,000 to ")
+    said = float(repaired.notes[0].split("at most ")[1].split()[0])
     # The torus knows how far a point is from its surface; its own facets are 0.01 mm inside it.
     points = np.concatenate([thin.vertices, thin.triangles_center])
     true = np.hypot(np.hypot(points[:, 0], points[:, 1]) - 30, points[:, 2]) - 10
@@ -293,7 +297,7 @@ def test_a_fine_mesh_is_thinned_out_within_the_distance_that_is_told():
     assert thin.volume == pytest.approx(TORUS_VOLUME, rel=2e-3)
 
 
-def test_a_mesh_too_rough_to_be_thinned_out_is_refused():
+def test_a_mesh_too_rough_to_be_decimated_is_refused():
     rough = torus(700, 160)
     rng = np.random.default_rng(2)
     noise = rng.uniform(-0.3, 0.3, rough.vertices.shape)

@@ -41,10 +41,10 @@ def test_a_step_in_metres_comes_out_right_and_a_wrong_unit_is_refused(tmp_path):
 
 def test_a_damaged_step_is_refused(tmp_path):
     content = step(tmp_path, Box(40, 30, 20))
-    assert "is no STEP" in refusal("box.step", b"Dear colleague\n")
+    assert "is not a STEP file" in refusal("box.step", b"Dear colleague\n")
     assert "is cut off" in refusal("box.step", content[: len(content) // 2])
     hollow = b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n"
-    assert "is no readable STEP" in refusal("box.step", hollow)
+    assert "is not a readable STEP" in refusal("box.step", hollow)
 
 
 def test_without_cascadio_a_step_is_refused_with_the_extra_to_install(monkeypatch):

@@ -61,7 +61,7 @@ def test_a_part_of_another_recipe_is_built_again():
 
 
 @pytest.mark.parametrize("file_name", FILES)
-def test_a_truncated_file_is_refused_when_loaded_and_mended_when_built(file_name):
+def test_a_truncated_file_is_refused_when_loaded_and_rebuilt(file_name):
     folder = build_part("washer_m36").folder
     good = contents(folder)
     (folder / file_name).write_bytes(good[file_name][:-50])

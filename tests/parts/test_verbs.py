@@ -29,7 +29,7 @@ def test_import_goes_on_after_a_bad_file_and_says_so_with_its_exit_code(program,
     trimesh.creation.box((400, 30, 20)).export(tmp_path / "long beam.stl")
     done = program("import", "letter.stl", "long beam.stl")
     assert done.returncode == 1
-    assert "1 of 2 files are parts now" in done.stdout and (parts_folder() / "long-beam").is_dir()
+    assert "1 of 2 files imported" in done.stdout and (parts_folder() / "long-beam").is_dir()
     errors = done.stderr.splitlines()
     assert len(errors) == 2 and errors[0].startswith("error: letter.stl")
     assert errors[1].startswith("warning: long-beam is 400 mm long")

@@ -1,4 +1,4 @@
-"""The verb ``build``: parts are made from their recipes, one by one or the whole catalogue."""
+"""Command ``build``: parts from their recipes, by name or the whole catalogue."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts import store
 from mskgrasp.parts.build import builtin_names, recipe_of, starter_names
 from mskgrasp.parts.catalogue import Index, make_index, read_index, write_index
-from mskgrasp.parts.commands.build_parts import Built, build_parts
+from mskgrasp.parts.commands.build_parts import BuildResult, build_parts
 from mskgrasp.parts.commands.progress import progress_bar
 from mskgrasp.parts.recipes import cad
 
-_TOLD_EVERY_S = 30.0
+_REPORT_EVERY_S = 30.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Build:
-    """Build parts: the starter set, those named, or the whole catalogue. What is up to date is left alone.
+    """Build parts: the starter set, those named, or the whole catalogue. Parts that are up to date are kept.
 
-    A part takes from a fraction of a second to some seconds. A build that is stopped goes on where it was.
+    A part takes from a fraction of a second to several seconds. A build that was stopped can be resumed.
     Examples: python -m mskgrasp.parts build hex_nut_m20 washer_m36
     or python -m mskgrasp.parts build --catalogue
     """
@@ -32,28 +32,32 @@ class Build:
     names: tyro.conf.Positional[tuple[str, ...]] = ()
     """Names as `list` shows them; none means the starter set."""
     catalogue: bool = False
-    """Build every part there is a recipe for; with the extra [cad] installed there are more."""
+    """Build every part with a recipe; the extra [cad] adds more."""
     workers: int = 0
-    """Processes; 0: one for each core."""
+    """Number of processes; 0: one for each core."""
 
 
-def run_build(verb: Build) -> int:
-    """Builds, and keeps the index; returns the exit code."""
-    if verb.catalogue and verb.names:
-        raise UsageError(f"--catalogue builds all parts, {verb.names[0]!r} among them: give one or the other")
-    if verb.workers < 0:
-        raise UsageError(f"--workers {verb.workers}: give a number of processes, or 0 for one a core")
-    for name in verb.names:
+def run_build(command: Build) -> int:
+    """Builds the parts and updates the index; returns the exit code."""
+    if command.catalogue and command.names:
+        raise UsageError(
+            f"--catalogue builds all parts, {command.names[0]!r} among them: give one or the other"
+        )
+    if command.workers < 0:
+        raise UsageError(
+            f"--workers {command.workers}: give a number of processes, or 0 for one for each core"
+        )
+    for name in command.names:
         recipe_of(name)
-    names = builtin_names() if verb.catalogue else tuple(dict.fromkeys(verb.names)) or starter_names()
+    names = builtin_names() if command.catalogue else tuple(dict.fromkeys(command.names)) or starter_names()
     before = read_index()
-    found: dict[str, Built] = {}
+    found: dict[str, BuildResult] = {}
     started = time.monotonic()
     try:
-        _build(names, before, verb.workers or os.cpu_count() or 1, found)
+        _build(names, before, command.workers or os.cpu_count() or 1, found)
     finally:
-        if verb.catalogue and found:
-            # A build that was stopped is remembered as far as it went.
+        if command.catalogue and found:
+            # The parts of a build that was stopped are kept in the index.
             index = _catalogue(found, before)
             write_index(index)
     fresh = [built for built in found.values() if built.seconds and built.entry is not None]
@@ -62,15 +66,15 @@ def run_build(verb: Build) -> int:
         f"{len(found) - len(refused)} parts ready, {len(fresh)} built now "
         f"({time.monotonic() - started:.0f} s), in {store.parts_folder()}"
     )
-    if verb.catalogue:
-        _tell(_catalogue(found, before))
+    if command.catalogue:
+        _print_summary(_catalogue(found, before))
     elif refused:
         raise BadPart("; ".join(f"{built.name}: {built.reason}" for built in refused))
     return 0
 
 
-def _build(names: tuple[str, ...], before: Index, workers: int, found: dict[str, Built]) -> None:
-    told = started = time.monotonic()
+def _build(names: tuple[str, ...], before: Index, workers: int, found: dict[str, BuildResult]) -> None:
+    reported = started = time.monotonic()
     events = build_parts(names, before, workers)
     with progress_bar() as progress:
         task = progress.add_task("parts", total=len(names))
@@ -79,8 +83,8 @@ def _build(names: tuple[str, ...], before: Index, workers: int, found: dict[str,
                 found[built.name] = built
                 progress.update(task, description=built.name, advance=1)
                 now = time.monotonic()
-                if progress.disable and now - told > _TOLD_EVERY_S:
-                    told = now
+                if progress.disable and now - reported > _REPORT_EVERY_S:
+                    reported = now
                     left = (now - started) / len(found) * (len(names) - len(found))
                     done = f"{len(found)} of {len(names)} parts"
                     print(f"{done}, about {left / 60:.0f} min left", file=sys.stderr)
@@ -88,13 +92,13 @@ def _build(names: tuple[str, ...], before: Index, workers: int, found: dict[str,
             events.close()
 
 
-def _catalogue(found: dict[str, Built], before: Index) -> Index:
+def _catalogue(found: dict[str, BuildResult], before: Index) -> Index:
     entries = [built.entry for built in found.values() if built.entry is not None]
     failures = {name: built.reason for name, built in found.items() if built.entry is None}
     return make_index(entries, failures, before)
 
 
-def _tell(index: Index) -> None:
+def _print_summary(index: Index) -> None:
     for name, left_out in sorted(index.left_out.items()):
         print(f"left out {name}: {left_out.reason.removeprefix(f'{name}: ')}")
     print(f"the catalogue has {len(index.parts)} parts of {len(index.families())} families")

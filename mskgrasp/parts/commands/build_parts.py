@@ -1,4 +1,4 @@
-"""Builds many parts at once, on all cores; what is ready already is left alone."""
+"""Parallel building of many parts; parts that are up to date are skipped."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from mskgrasp.runtime.worker_pool import Work, results
 
 
 @dataclass(frozen=True, kw_only=True)
-class Built:
-    """One part is done with.
+class BuildResult:
+    """Outcome for one part.
 
     Attributes:
         name: Of the part.
-        entry: What it has become; None where it could not be built.
+        entry: Of the part in the index; None where it could not be built.
         reason: Why it could not be built.
-        seconds: How long it took; 0 where it lay ready.
+        seconds: Time it took; 0 where it was up to date.
     """
 
     name: str
@@ -31,17 +31,17 @@ class Built:
     seconds: float = 0.0
 
 
-def build_parts(names: Sequence[str], before: Index, workers: int) -> Generator[Built]:
-    """Builds parts in the order that they get ready; close the iterator to stop early.
+def build_parts(names: Sequence[str], before: Index, workers: int) -> Generator[BuildResult]:
+    """Builds parts and yields their results as they finish; close the iterator to stop early.
 
     Args:
         names: Of built-in parts.
-        before: The index until now: what it left out is not tried again while its recipe is the same.
+        before: The previous index: parts that it left out are not tried again while their recipe is the same.
         workers: Processes.
 
     Raises:
-        WorkerFailed: A part could not be worked on: three processes died of it, or the disk is full.
-        KeyboardInterrupt: The user stopped; a single part's decomposition is finished first, some seconds.
+        WorkerFailed: Three processes died building a part, or the disk is full.
+        KeyboardInterrupt: The user stopped; a running decomposition is finished first, which takes seconds.
     """
     missing = []
     for name in names:
@@ -49,18 +49,18 @@ def build_parts(names: Sequence[str], before: Index, workers: int) -> Generator[
         old = before.left_out.get(name)
         entry = _ready(name, recipe)
         if entry is not None:
-            yield Built(name=name, entry=entry)
+            yield BuildResult(name=name, entry=entry)
         elif old is not None and old.recipe_hash == recipe:
-            yield Built(name=name, entry=None, reason=old.reason)
+            yield BuildResult(name=name, entry=None, reason=old.reason)
         else:
             missing.append(name)
-    # A process for each core serves better than the threads of CoACD (1.45 times with two); starting one
-    # takes longer than most parts, so that a single part is built here.
-    yield from results(Work(_bench, None), missing, max(1, workers), apart=len(missing) > 1)
+    # One process for each core is faster than the threads of CoACD (1.45 times with two); starting a process
+    # takes longer than most parts, so that a single part is built in this one.
+    yield from results(Work(_builder, None), missing, max(1, workers), apart=len(missing) > 1)
 
 
 def _ready(name: str, recipe: str) -> Entry | None:
-    """The entry of a part that lies ready; its bytes are checked when it is loaded, not here."""
+    """The entry of a part that is up to date; its content is checked when it is loaded, not here."""
     folder = store.parts_folder() / name
     try:
         entry = entry_of(name)
@@ -71,15 +71,15 @@ def _ready(name: str, recipe: str) -> Entry | None:
 
 
 @contextmanager
-def _bench(_: None) -> Iterator[Callable[[str], Iterator[Built]]]:
+def _builder(_: None) -> Iterator[Callable[[str], Iterator[BuildResult]]]:
     yield _build_one
 
 
-def _build_one(name: str) -> Iterator[Built]:
+def _build_one(name: str) -> Iterator[BuildResult]:
     started = time.perf_counter()
     try:
         build_part(name)
     except BadPart as error:
-        yield Built(name=name, entry=None, reason=str(error), seconds=time.perf_counter() - started)
+        yield BuildResult(name=name, entry=None, reason=str(error), seconds=time.perf_counter() - started)
     else:
-        yield Built(name=name, entry=entry_of(name), seconds=time.perf_counter() - started)
+        yield BuildResult(name=name, entry=entry_of(name), seconds=time.perf_counter() - started)

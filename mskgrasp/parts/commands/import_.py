@@ -1,4 +1,4 @@
-"""The verb ``import``: files of a user's CAD become parts."""
+"""Command ``import``: parts from CAD files."""
 
 from __future__ import annotations
 
@@ -29,31 +29,31 @@ _TABLE_WIDTH = 130
 _COLOURS = {"imported": "green", "repaired": "yellow", "refused": "red", "unchanged": "dim"}
 
 PAYLOAD_KG = 3.0
-"""What a Panda carries (Franka Emika, Panda datasheet)."""
+"""Payload of a Panda (Franka Emika, Panda datasheet)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Import:
     """Make parts of CAD files: STL, OBJ, PLY, GLB, 3MF, STEP.
 
-    Takes files, folders and quoted patterns such as 'cad/**/*.stl'. What can be mended safely is mended, the
-    rest is refused in one line, and the other files are imported all the same; a table at the end says what
-    became of each. The convex hulls take from a second to a minute a part.
+    Takes files, folders and quoted patterns such as 'cad/**/*.stl'. Defects that can be repaired safely are
+    repaired; a file with others is refused with the reason, and the remaining files are still imported. A
+    table at the end lists the result of each file. The convex hulls of a part take from a second to a minute.
     Example: python -m mskgrasp.parts import clamp.stl cad/ --density 2700
     """
 
     files: tyro.conf.Positional[tuple[Path, ...]]
     """Files (.stl .obj .ply .glb .3mf .step .stp), folders, quoted patterns."""
     unit: Literal["mm", "m", "in"] | None = None
-    """Unit of STL, OBJ and PLY (else mm), and of a GLB not in metres; 3MF and STEP say it themselves."""
+    """Unit of STL, OBJ and PLY (else mm), and of a GLB not in metres; 3MF and STEP state theirs."""
     density: float = 7850.0
     """kg/m^3: steel 7850, aluminium 2700, brass 8500, ABS 1050."""
     split: Annotated[bool, _FLAG] = False
-    """Make a part of each body of a file: NAME-1, NAME-2, ... by decreasing volume."""
+    """Import each body of a file as a part: NAME-1, NAME-2, ... by decreasing volume."""
     union: Annotated[bool, _FLAG] = False
     """Join the bodies of a file that touch or overlap into one part."""
     name: str | None = None
-    """Name of the part; by default the file's name in lower case. Only with a single file."""
+    """Name of the part, for a single file; by default the file's name in lower case."""
     family: str = "imported"
     """Kind of part, for grouping in reports."""
     licence: str = "NOASSERTION"
@@ -68,47 +68,47 @@ class _Row:
     remarks: tuple[str, ...] = ()
 
 
-def run_import(verb: Import) -> int:
+def run_import(command: Import) -> int:
     """Imports the files one by one; returns the exit code: 0, or 1 where a file was refused.
 
     Raises:
         UsageError: There is nothing to import, or the options contradict each other.
     """
-    # CoACD and the readers are loaded here alone, so that the other verbs start without them.
+    # CoACD and the readers are loaded only here, so that the other commands start faster.
     from mskgrasp.parts.importing.import_file import check_density
     from mskgrasp.parts.importing.select_files import select_files
 
-    if verb.split and verb.union:
+    if command.split and command.union:
         raise UsageError("--split and --union exclude each other: choose one")
     try:
-        check_density(verb.density)
+        check_density(command.density)
     except BadPart as error:
         raise UsageError(f"--density: {error}") from error
-    selected = select_files(verb.files)
-    if not selected.files and all(path in verb.files for path, _ in selected.refused):
+    selected = select_files(command.files)
+    if not selected.files and all(path in command.files for path, _ in selected.refused):
         reason = selected.refused[0][1] if selected.refused else "no file given"
         raise UsageError(f"{reason} (python -m mskgrasp.parts import FILE, FOLDER or 'PATTERN')")
-    if verb.name is not None and len(selected.files) > 1:
+    if command.name is not None and len(selected.files) > 1:
         raise UsageError(
-            f"--name {verb.name} with {len(selected.files)} files: import them one by one to name them"
+            f"--name {command.name} with {len(selected.files)} files: import them one by one to name them"
         )
     rows: list[_Row] = []
     for path, why in selected.refused:
         rows.append(_Row(file=str(path), result="refused", remarks=(_without(why, path),)))
         print(f"error: {why}", file=sys.stderr)
     try:
-        _import_all(verb, selected.files, rows)
-    finally:  # also when stopped: what was done is told
+        _import_all(command, selected.files, rows)
+    finally:  # also when stopped: finished files are listed
         if rows:
             _print_table(rows)
-    if selected.passed_over:
-        print(f"passed over {_listed(selected.passed_over)}: no CAD by the suffix", file=sys.stderr)
+    if selected.skipped:
+        print(f"skipped {_listed(selected.skipped)}: not CAD files by their suffix", file=sys.stderr)
     good = sum(row.result != "refused" for row in rows)
-    print(f"{good} of {len(rows)} files are parts now, in {store.parts_folder()}")
+    print(f"{good} of {len(rows)} files imported, in {store.parts_folder()}")
     return 0 if good == len(rows) else 1
 
 
-def _import_all(verb: Import, files: Sequence[Path], rows: list[_Row]) -> None:
+def _import_all(command: Import, files: Sequence[Path], rows: list[_Row]) -> None:
     """Imports the files; adds a row for each."""
     from mskgrasp.parts.importing.import_file import import_file, legal_name
 
@@ -118,17 +118,17 @@ def _import_all(verb: Import, files: Sequence[Path], rows: list[_Row]) -> None:
         for path in files:
             progress.update(task, description=path.name)
             try:
-                name = legal_name(path.stem if verb.name is None else verb.name)
+                name = legal_name(path.stem if command.name is None else command.name)
                 there = (store.parts_folder() / name).is_dir()
                 imported = import_file(
                     path,
                     name=name,
-                    family=verb.family,
-                    unit=verb.unit,
-                    density=verb.density,
-                    licence=verb.licence,
-                    bodies="split" if verb.split else "union" if verb.union else "one",
-                    may_take=partial(_refuse_taken, taken, path),
+                    family=command.family,
+                    unit=command.unit,
+                    density=command.density,
+                    licence=command.licence,
+                    bodies="split" if command.split else "union" if command.union else "one",
+                    check_name=partial(_refuse_taken, taken, path),
                 )
                 taken |= {part.name: path for part in imported.parts}
                 for part in imported.parts:
@@ -148,20 +148,20 @@ def _refuse_taken(taken: dict[str, Path], path: Path, name: str) -> None:
 
 def _row(path: Path, imported: Imported, *, replaced: bool) -> _Row:
     if imported.unchanged:
-        return _Row(file=str(path), result="unchanged", parts=imported.parts, remarks=("there already",))
-    remarks = imported.told
+        return _Row(file=str(path), result="unchanged", parts=imported.parts, remarks=("up to date",))
+    remarks = imported.notes
     if replaced:
-        remarks = (*remarks, "replaces the part of that name")
+        remarks = (*remarks, "replaced the part of that name")
     return _Row(
         file=str(path),
-        result="repaired" if imported.told else "imported",
+        result="repaired" if imported.notes else "imported",
         parts=imported.parts,
         remarks=remarks,
     )
 
 
 def _without(message: str, path: Path) -> str:
-    """A refusal without the file's name, which stands in the first column."""
+    """The reason of a refusal without the file's name, which is in the first column."""
     return message.removeprefix(str(path)).removeprefix(":").strip()
 
 
@@ -173,7 +173,7 @@ def _warnings(part: Part, unit: str) -> list[str]:
     if not USUAL_SIZE_MM[0] <= longest <= USUAL_SIZE_MM[1]:
         hint = f" ({size_hint(longest, unit, MILLIMETRES[unit])})" if unit in MILLIMETRES else ""
         found.append(
-            f"{part.name} is {longest:.4g} mm long; the cell is made for parts of "
+            f"{part.name} is {longest:.4g} mm long; the usual size is "
             f"{USUAL_SIZE_MM[0]:.0f} to {USUAL_SIZE_MM[1]:.0f} mm: is the unit right?{hint}"
         )
     if part.mass > PAYLOAD_KG:
@@ -194,7 +194,7 @@ def _print_table(rows: Sequence[_Row]) -> None:
         table.add_column(header, overflow="fold")
     for header in ("size mm", "mass g", "hulls", "error p95 mm", "max mm"):
         table.add_column(header, justify="right", no_wrap=True)
-    table.add_column("what was done, or why not", overflow="fold")
+    table.add_column("repairs, or reason of refusal", overflow="fold")
     for row in rows:
         remarks = "; ".join(row.remarks)
         first = [Text(row.file), "", Text(row.result, style=_COLOURS[row.result]), *5 * [""], Text(remarks)]
@@ -206,14 +206,14 @@ def _print_table(rows: Sequence[_Row]) -> None:
     if console.is_terminal:
         console.print(table)
         return
-    wide = Console(width=10_000, file=io.StringIO(), no_color=True)  # in a pipe nothing is to be cut off
+    wide = Console(width=10_000, file=io.StringIO(), no_color=True)  # a pipe gets every column in full
     with wide.capture() as capture:
         wide.print(table)
     print("\n".join(line.rstrip() for line in capture.get().splitlines()))
 
 
 def _print_lines(console: Console, row: _Row) -> None:
-    """What the table says, for terminals too narrow for it."""
+    """The content of the table as lines, for narrow terminals."""
     head = Text.assemble((row.file, "bold"), ": ", (row.result, _COLOURS[row.result]))
     console.print(head.append("".join(f"; {remark}" for remark in row.remarks)))
     for part in row.parts:

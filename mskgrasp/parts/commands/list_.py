@@ -1,4 +1,4 @@
-"""The verb ``list``: parts and their numbers."""
+"""Command ``list``: tables of parts."""
 
 from __future__ import annotations
 
@@ -22,30 +22,32 @@ from mskgrasp.parts.catalogue import SPLITS, THIN, Entry, Index, read_index
 class List:
     """List parts: the starter set and imported ones, with size, mass and quality of the hulls.
 
-    With --catalogue: the families of the whole catalogue in numbers; with --family NAME: each part of one.
+    With --catalogue: a summary of each family of the catalogue; with --family NAME: the parts of one family.
     """
 
     catalogue: bool = False
-    """Count the catalogue's parts by family."""
+    """Summarise the catalogue by family."""
     family: str | None = None
     """List each part of this family of the catalogue."""
     csv: Path | None = None
-    """Write the catalogue, a row a part, to this file."""
+    """Write the catalogue to this file, one row for each part."""
 
 
-def run_list(verb: List) -> int:
-    """Prints a table, and the number of parts in the last line."""
-    if verb.csv is not None:
-        write_csv(_built_index(), verb.csv)
-        print(verb.csv)
-    if verb.family is not None:
+def run_list(command: List) -> int:
+    """Prints a table, with the number of parts in the last line."""
+    if command.csv is not None:
+        write_csv(_built_index(), command.csv)
+        print(command.csv)
+    if command.family is not None:
         index = _built_index()
-        entries = [entry for entry in index.parts.values() if entry.family == verb.family]
+        entries = [entry for entry in index.parts.values() if entry.family == command.family]
         if not entries:
-            raise UsageError(f"no family {verb.family!r}; there are {', '.join(sorted(index.families()))}")
+            raise UsageError(
+                f"no family {command.family!r}: give one of {', '.join(sorted(index.families()))}"
+            )
         _print(_entry_table(entries))
         print(f"{len(entries)} parts")
-    elif verb.catalogue or verb.csv is not None:
+    elif command.catalogue or command.csv is not None:
         index = _built_index()
         _print(_family_table(index))
         _print_spread(index)
@@ -64,7 +66,7 @@ def run_list(verb: List) -> int:
 
 
 def write_csv(index: Index, path: Path) -> None:
-    """Writes the catalogue as a table, a row a part, in the order of their names."""
+    """Writes the catalogue as CSV, one row for each part, sorted by name."""
     columns = (
         "name", "family", "source", "licence", "split", "group", "longest_axis_mm", "edge_1_mm", "edge_2_mm",
         "edge_3_mm", "volume_cm3", "mass_g", "hulls", "hull_error_p95_mm", "hull_error_largest_mm",
@@ -183,5 +185,5 @@ def _table(texts: tuple[str, ...], numbers: tuple[str, ...]) -> Table:
 def _print(table: Table) -> None:
     console = Console()
     if not console.is_terminal:
-        console = Console(width=160)  # in a pipe nothing is to be cut off
+        console = Console(width=160)  # a pipe gets every column in full
     console.print(table)

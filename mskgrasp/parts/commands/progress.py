@@ -1,4 +1,4 @@
-"""What the verbs show on a terminal."""
+"""Progress bar of the commands."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 
 def progress_bar() -> Progress:
-    """A bar on standard error that goes away at the end; nothing where nobody watches."""
+    """A transient progress bar on standard error; disabled where that is not a terminal."""
     return Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),

@@ -1,4 +1,4 @@
-"""The verbs that draw: ``show`` one part, ``sheet`` of the whole catalogue."""
+"""Commands that draw: ``show`` one part, ``sheet`` of the whole catalogue."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 
 @dataclass(frozen=True, kw_only=True)
 class Show:
-    """Draw a part: its mesh, its collision hulls moved apart, and how it comes to rest on a table.
+    """Draw a part: its mesh, its collision hulls moved apart, and its stable poses on a table.
 
     Example: python -m mskgrasp.parts show spur_gear_m2_z18 --out gear.png
     """
@@ -38,29 +38,29 @@ class Sheet:
     out: Path = Path("sheet.png")
     """Picture to write, .png, .svg or .pdf."""
     parts: int = 192
-    """About how many parts to draw; every family is there at least once."""
+    """Approximate number of parts; every family is drawn at least once."""
 
 
-def run_show(verb: Show) -> int:
+def run_show(command: Show) -> int:
     """Writes the picture of a part."""
-    # Matplotlib takes a second to load; the other verbs do without it.
+    # Matplotlib takes a second to load; the other commands do not need it.
     from mskgrasp.parts.figures.picture import draw_part
 
-    part = find_part(verb.name)
-    out = verb.out or Path(f"{part.name}.png")
+    part = find_part(command.name)
+    out = command.out or Path(f"{part.name}.png")
     _check(out)
     draw_part(part, out)
     print(out)
     return 0
 
 
-def run_sheet(verb: Sheet) -> int:
+def run_sheet(command: Sheet) -> int:
     """Writes the contact sheet."""
     from mskgrasp.parts.figures.sheet import draw_sheet
 
-    _check(verb.out)
-    if verb.parts < 1:
-        raise UsageError(f"--parts {verb.parts}: draw at least one")
+    _check(command.out)
+    if command.parts < 1:
+        raise UsageError(f"--parts {command.parts}: give at least 1")
     index = read_index()
     if not index.parts:
         raise BadPart("the catalogue is not built yet: python -m mskgrasp.parts build --catalogue")
@@ -68,20 +68,20 @@ def run_sheet(verb: Sheet) -> int:
         task = progress.add_task("sheet", total=None)
         draw_sheet(
             index,
-            verb.out,
-            verb.parts,
+            command.out,
+            command.parts,
             lambda done, total: progress.update(task, completed=done, total=total),
         )
-    print(verb.out)
+    print(command.out)
     return 0
 
 
 def _check(out: Path) -> None:
     if out.suffix.lower() not in PICTURE_SUFFIXES:
-        raise UsageError(f"--out {out}: the picture's name must end in {', '.join(PICTURE_SUFFIXES)}")
+        raise UsageError(f"--out {out}: the suffix must be one of {', '.join(PICTURE_SUFFIXES)}")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(
-            f"--out {out}: cannot make folder {out.parent} ({error.strerror}): choose another"
+            f"--out {out}: cannot make folder {out.parent} ({error.strerror}): choose another folder"
         ) from error

@@ -1,4 +1,4 @@
-"""One picture that shows a part: its mesh, its collision hulls, and how it rests on a table."""
+"""Picture of a part: its mesh, its collision hulls, and its stable poses."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _TILES = 4
 
 @dataclass(frozen=True, kw_only=True)
 class RestingClass:
-    """Stable poses that look alike: the first one's index, how many they are, their joint probability."""
+    """Stable poses that look alike: index of the first, number and total probability."""
 
     index: int
     count: int
@@ -72,7 +72,7 @@ def draw_part(part: Part, out: Path) -> None:
 
 
 def resting_classes(part: Part) -> list[RestingClass]:
-    """The stable poses grouped by what a viewer would call the same, most probable group first."""
+    """The stable poses grouped by appearance, the most probable group first."""
     rotation = quat_to_matrix(part.resting.quat_wxyz)
     height = part.resting.position[:, 2] / part.longest_axis
     about_vertical = np.einsum("ni,ij,nj->n", rotation[:, 2], part.inertia, rotation[:, 2])
@@ -119,7 +119,7 @@ def _exploded(part: Part) -> list[Body]:
 
 
 def _colour(number: int) -> tuple[float, float, float]:
-    """Hues by the golden ratio: neighbours in the list differ clearly however many there are."""
+    """Hues by the golden ratio, so that neighbours in the list differ clearly in any number."""
     red, green, blue = colorsys.hsv_to_rgb((0.58 + 0.618034 * number) % 1.0, 0.50, 0.92)
     return red, green, blue
 

@@ -15,7 +15,7 @@ import trimesh
 from scipy.ndimage import gaussian_filter
 
 SUPERSAMPLING = 2
-_LIGHT = np.array([-0.35, -0.45, 0.82])  # where the main light comes from, world axes
+_LIGHT = np.array([-0.35, -0.45, 0.82])  # direction towards the main light, world axes
 _FILL = np.array([0.8, 0.2, 0.25])
 _TABLE = np.array([0.93, 0.925, 0.915])
 
@@ -128,7 +128,7 @@ def _shade(normals: np.ndarray, colours: np.ndarray, view: np.ndarray) -> np.nda
 
 
 def _outlines(depth: np.ndarray, normal: np.ndarray, owner: np.ndarray, size: float) -> np.ndarray:
-    """Where a body ends, folds sharply, or passes in front of another: 1, elsewhere 0."""
+    """1 where a body ends or occludes another, 0.55 at sharp folds, 0 elsewhere."""
     edge = np.zeros(depth.shape)
     solid = np.where(np.isfinite(depth), depth, -1e6)
     unit = normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-9)
@@ -147,7 +147,7 @@ def _outlines(depth: np.ndarray, normal: np.ndarray, owner: np.ndarray, size: fl
 def _table(
     bodies: Sequence[Body], view: np.ndarray, scale: float, offset: np.ndarray, shape: tuple[int, int]
 ) -> np.ndarray:
-    """The table's picture: a disc that fades into white, darkened by a soft shadow."""
+    """Picture of the table: a disc that fades into white, with a soft shadow."""
     h, w = shape
     cells = 256
     points = np.concatenate([body.mesh.vertices for body in bodies])
@@ -174,7 +174,7 @@ def _table(
     row = ((y / reach + 1) * cells / 2).astype(int).clip(0, cells - 1)
     inside = (np.abs(x) < reach) & (np.abs(y) < reach)
     dark = np.where(inside, shadow[row, column], 0.0)
-    # Fades by distance from the middle of the picture, so that no tile has a visible frame.
+    # The table fades with distance from the centre, so that no tile has a visible frame.
     far = np.hypot((columns - w / 2) / (w / 2), (rows - h / 2) / (h / 2))
     fade = np.clip((1.0 - far) / 0.35, 0, 1)[..., None]
     table = _TABLE * (1 - 0.45 * dark[..., None])

@@ -1,4 +1,4 @@
-"""A contact sheet of the catalogue."""
+"""Contact sheet of the catalogue."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _MATERIALS = (
 )
 
 
-def draw_sheet(index: Index, out: Path, parts: int, tell: Callable[[int, int], None]) -> None:
+def draw_sheet(index: Index, out: Path, parts: int, report_progress: Callable[[int, int], None]) -> None:
     """Draws parts of every family, in the order of the families' names.
 
     Args:
         index: The catalogue.
         out: Picture to write.
-        parts: About how many to draw.
-        tell: Called with the number drawn and the number to draw.
+        parts: Approximate number to draw.
+        report_progress: Called with the number drawn and the number to draw.
     """
     chosen = spread(index.parts.values(), parts)
     rows = -(-len(chosen) // _COLUMNS)
@@ -51,7 +51,7 @@ def draw_sheet(index: Index, out: Path, parts: int, tell: Callable[[int, int], N
     figure.text(1 - 0.15 / width, 1 - 0.3 / height, "longest axis below each part; colour by density",
                 fontsize=10, color=_GREY, va="center", ha="right")  # fmt: skip
     for number, entry in enumerate(chosen):
-        tell(number, len(chosen))
+        report_progress(number, len(chosen))
         row, column = divmod(number, _COLUMNS)
         left, top = column * _TILE[0], height - 0.62 - row * _TILE[1]
         axes = figure.add_axes((left / width, (top - 0.80) / height, _TILE[0] / width, 0.80 / height))
@@ -62,7 +62,7 @@ def draw_sheet(index: Index, out: Path, parts: int, tell: Callable[[int, int], N
                     ha="center", va="center")  # fmt: skip
         figure.text(middle, (top - 0.96) / height, f"{1e3 * entry.longest_axis:.0f} mm", fontsize=5.6,
                     color=_GREY, ha="center", va="center")  # fmt: skip
-    tell(len(chosen), len(chosen))
+    report_progress(len(chosen), len(chosen))
     metadata = {"Software": None} if out.suffix.lower() == ".png" else None
     figure.savefig(out, dpi=_DPI, metadata=metadata)
 
@@ -77,7 +77,7 @@ def _picture(entry: Entry, width: int, height: int) -> np.ndarray:
 
 
 def _simple(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """The mesh with fewer triangles, moved by no more than can be seen in a tile."""
+    """The mesh with fewer triangles, without a visible difference in a tile."""
     vertices = np.array(mesh.vertices, dtype=np.float64)
     body = Manifold(Mesh64(vertices, np.array(mesh.faces, dtype=np.uint64)))
     data = body.simplify(float(np.ptp(vertices, axis=0).max()) / 400).to_mesh64()

@@ -1,4 +1,4 @@
-"""Closed surfaces sorted into bodies: shells of material, shells of cavities, and what to do with several."""
+"""Solid bodies of the closed surfaces in a file: outer shells with the shells of their cavities."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import trimesh
 from manifold3d import Manifold, OpType
 
 from mskgrasp.core.errors import BadPart
-from mskgrasp.parts.importing.repair import Told, close_surface, count_of, turn_consistently
+from mskgrasp.parts.importing.repair import Repairs, close_surface, count_of, wind_consistently
 from mskgrasp.parts.importing.winding import miscounted_fraction, winding_number
-from mskgrasp.parts.solids.simplify import thin_out
+from mskgrasp.parts.solids.simplify import decimate
 from mskgrasp.parts.solids.surface import Surface, manifold_of, surface_of, together
 
 MOST_BODIES = 500
-"""More are lettering, a lattice or loose dust, and no part."""
+"""More indicate lettering, a lattice or scan debris instead of a part."""
 
 MISCOUNTED = 0.005
 """Largest share of the volume that may be counted twice where a surface crosses itself."""
@@ -26,30 +26,30 @@ Bodies = Literal["one", "split", "union"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mended:
-    """Closed bodies, millimetres, wound outwards, by decreasing volume; and what was done to get them."""
+class RepairedBodies:
+    """Closed bodies, millimetres, wound outwards, by decreasing volume; the repairs, one sentence each."""
 
     bodies: tuple[trimesh.Trimesh, ...]
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
-def mend(objects: Sequence[Surface], *, bodies: Bodies) -> Mended:
-    """Makes closed bodies of the objects of a file.
+def repair_bodies(objects: Sequence[Surface], *, bodies: Bodies) -> RepairedBodies:
+    """Makes closed bodies from the objects of a file.
 
     Args:
-        objects: As the file keeps them apart (all of an STL is one), millimetres.
-        bodies: What to do where there are several: refuse them, make a part of each, or join them.
+        objects: As separated in the file (an STL is one object), millimetres.
+        bodies: Whether several bodies are refused, kept apart, or joined.
 
     Raises:
-        BadPart: No sound body can be made; the message starts with "is" or "has" and names no file.
+        BadPart: No proper body can be made; the message starts with "is" or "has" and names no file.
     """
-    surfaces, told = _closed(objects)
+    surfaces, repairs = _closed(objects)
     solids: list[Manifold] = []
     for surface in surfaces:
         found, turned = _solids(surface)
         solids += found
-        told += Told(turned=turned)
-    sentences = list(told.sentences())
+        repairs += Repairs(turned=turned)
+    sentences = list(repairs.sentences())
     if len(solids) > 1:
         solids.sort(key=lambda solid: -solid.volume())
         if bodies == "one":
@@ -61,34 +61,34 @@ def mend(objects: Sequence[Surface], *, bodies: Bodies) -> Mended:
             sentences.append(f"split into {count_of(len(solids), 'part')}")
     meshes = []
     for solid in solids:
-        solid, sentence = thin_out(solid)
+        solid, sentence = decimate(solid)
         sentences += [sentence] if sentence else []
         surface = surface_of(solid)
         sentences += _check_volume(surface)
         meshes.append(trimesh.Trimesh(surface.vertices, surface.faces, process=False))
-    return Mended(bodies=tuple(meshes), told=tuple(sentences))
+    return RepairedBodies(bodies=tuple(meshes), notes=tuple(sentences))
 
 
-def _closed(objects: Sequence[Surface]) -> tuple[list[Surface], Told]:
-    """Each object closed by itself or, where some are not (faces coloured one by one), all of them as one."""
+def _closed(objects: Sequence[Surface]) -> tuple[list[Surface], Repairs]:
+    """Each object closed by itself or, where one is open (faces coloured one by one), all of them as one."""
     try:
         results = [close_surface(item) for item in objects]
     except BadPart:
         if len(objects) == 1:
             raise
         results = [close_surface(together(objects))]
-    return [surface for surface, _ in results], sum((told for _, told in results), Told())
+    return [surface for surface, _ in results], sum((repairs for _, repairs in results), Repairs())
 
 
 def _solids(surface: Surface) -> tuple[list[Manifold], int]:
-    """The bodies of a closed surface, each with its cavities; how many faces had to be turned."""
-    surface, piece, turned = turn_consistently(surface)
+    """The bodies of a closed surface, each with its cavities, and the number of faces that were turned."""
+    surface, piece, turned = wind_consistently(surface)
     shells = [manifold_of(surface)]
     if piece.max() > 0 or surface.volume <= 0:
         if piece.max() >= MOST_BODIES:
             raise BadPart(
-                f"has {piece.max() + 1:,} separate bodies, the most is {MOST_BODIES}: remove what is loose "
-                "(lettering, dust of a scan), or export the part alone"
+                f"has {piece.max() + 1:,} separate bodies, the most is {MOST_BODIES}: remove loose bodies "
+                "(lettering, scan debris), or export the part alone"
             )
         inward = _inward(surface, piece)[piece]
         turned = turned ^ inward
@@ -103,10 +103,10 @@ def _solids(surface: Surface) -> tuple[list[Manifold], int]:
 
 
 def _inward(surface: Surface, piece: np.ndarray) -> np.ndarray:
-    """(p,) which pieces are to be turned.
+    """(p,) whether each piece has to be turned.
 
-    A shell that no other encloses bounds material; what lies inside it is turned along with it, so that a
-    cavity stays a cavity whichever way the file was wound.
+    A shell that no other encloses bounds material; the shells inside it are turned with it, so that a cavity
+    stays a cavity for either winding of the file.
     """
     parts = [
         Surface(vertices=surface.vertices, faces=surface.faces[piece == i]) for i in range(piece.max() + 1)
@@ -123,7 +123,7 @@ def _inward(surface: Surface, piece: np.ndarray) -> np.ndarray:
 
 
 def _enclosing(parts: Sequence[Surface], volumes: np.ndarray) -> list[list[int]]:
-    """For each shell the larger ones that have it inside."""
+    """For each shell the larger shells that enclose it."""
     low = np.array([part.triangles.min(axis=(0, 1)) for part in parts])
     high = np.array([part.triangles.max(axis=(0, 1)) for part in parts])
     result = []
@@ -136,7 +136,7 @@ def _enclosing(parts: Sequence[Surface], volumes: np.ndarray) -> list[list[int]]
 
 
 def _with_cavities(shells: list[Manifold]) -> list[Manifold]:
-    """Shells wound inwards given to the smallest body around them."""
+    """Bodies with their cavities: each shell wound inwards belongs to the smallest body around it."""
     if len(shells) == 1:
         return shells
     surfaces = [surface_of(shell) for shell in shells]
@@ -150,7 +150,7 @@ def _with_cavities(shells: list[Manifold]) -> list[Manifold]:
         hosts = [i for i in around[index] if volumes[i] > 0]
         if not hosts:
             raise BadPart(
-                "is no proper solid: one of its shells is wound inwards and lies in no other; "
+                "is not a proper solid: one of its shells is wound inwards and is inside no other; "
                 "repair and export it again"
             )
         held[min(hosts, key=lambda i: volumes[i])].append(index)
@@ -184,9 +184,9 @@ def _check_volume(surface: Surface) -> list[str]:
     share = miscounted_fraction(surface.triangles)
     if share > MISCOUNTED:
         raise BadPart(
-            f"crosses itself: {100 * min(share, 9.99):.1f} % of its volume would count twice or negative, "
-            f"at most {100 * MISCOUNTED} % may be; join its bodies in the CAD program, or repair it, for "
-            "example with Blender's Remesh"
+            f"crosses itself: {100 * min(share, 9.99):.1f} % of its volume would be counted twice or as "
+            f"negative, the limit is {100 * MISCOUNTED} %; join its bodies in the CAD program, or repair it, "
+            "for example with Blender's Remesh"
         )
     if share > 0:
         return [f"crosses itself in {100 * share:.1g} % of its volume (kept)"]

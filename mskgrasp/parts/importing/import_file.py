@@ -1,4 +1,4 @@
-"""Files of a user's CAD made into parts; what cannot be simulated truly is refused."""
+"""Import of one CAD file as a part; files that cannot be simulated faithfully are refused."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import trimesh
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import store
 from mskgrasp.parts.build import LEGAL_NAME, builtin_names, write_solid
-from mskgrasp.parts.importing.bodies import Bodies, mend
+from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
 from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, MeshFile, Unit, read_content, read_mesh
 from mskgrasp.parts.part import Part
 from mskgrasp.parts.solids.decompose import convex_pieces
@@ -25,26 +25,28 @@ from mskgrasp.parts.solids.solid import Solid
 from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION, stamp
 
 USUAL_DENSITY = (10.0, 25_000.0)
-"""Foam and osmium, kg/m^3."""
+"""From foam to osmium, kg/m^3."""
 
-_SPELLED = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "å": "aa", "æ": "ae"})
+_TRANSLITERATION = str.maketrans(
+    {"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "å": "aa", "æ": "ae"}
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Imported:
-    """What became of one file.
+    """Result of importing one file.
 
     Attributes:
-        parts: One, or with ``bodies="split"`` one a body.
-        unchanged: They were there already, made of the same file in the same way.
-        unit: That the file was read in; empty where it did not need to be read.
-        told: What was mended, one sentence each.
+        parts: One, or with ``bodies="split"`` one for each body.
+        unchanged: The parts folder had them already, from the same file with the same options.
+        unit: Of the file's coordinates; empty where the file was not read.
+        notes: Repairs and remarks, one sentence each.
     """
 
     parts: tuple[Part, ...]
     unchanged: bool
     unit: str
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def import_file(
@@ -56,9 +58,9 @@ def import_file(
     density: float = 7850.0,
     licence: str = "NOASSERTION",
     bodies: Bodies = "one",
-    may_take: Callable[[str], None] = lambda name: None,
+    check_name: Callable[[str], None] = lambda name: None,
 ) -> Imported:
-    """Makes a part of a file, replacing an imported part of the same name.
+    """Imports a file as a part, replacing an imported part of the same name.
 
     Args:
         path: STL, OBJ, PLY, GLB, 3MF or STEP.
@@ -67,12 +69,13 @@ def import_file(
         unit: Of the file's coordinates; None takes what the format says, and mm where it says nothing.
         density: kg/m^3.
         licence: SPDX identifier of the mesh's licence.
-        bodies: Several bodies in the file are refused, split into parts ``NAME-1``, ``NAME-2``, ... by
+        bodies: Whether several bodies are refused, split into parts ``NAME-1``, ``NAME-2``, ... by
             decreasing volume, or joined into one.
-        may_take: Called with each name before its part is written; raises BadPart to keep it free.
+        check_name: Called with each name before writing; raises BadPart for a taken one.
 
     Raises:
-        BadPart: The file cannot be made a part, or the name is a built-in part's; the message says why.
+        BadPart: The file cannot become a part, or the name belongs to a built-in part; the message gives the
+            reason.
     """
     check_density(density)
     name = legal_name(path.stem if name is None else name)
@@ -82,20 +85,20 @@ def import_file(
     digest = hashlib.sha256(json.dumps(recipe).encode() + hashlib.sha256(content).digest()).hexdigest()
 
     if bodies != "split":
-        _check_name(name, may_take)
+        _check_available(name, check_name)
         known = _known(name, digest)
         if known is not None:
-            return Imported(parts=(known,), unchanged=True, unit="", told=())
+            return Imported(parts=(known,), unchanged=True, unit="", notes=())
     file = read_mesh(path, content, unit)
-    del content  # up to a gigabyte, and mending needs room
+    del content  # up to a gigabyte, and repairs need memory
     try:
-        mended = mend(file.objects, bodies=bodies)
+        repaired = repair_bodies(file.objects, bodies=bodies)
     except BadPart as error:
         raise BadPart(f"{path} {error}") from error
-    count = len(mended.bodies)
+    count = len(repaired.bodies)
     names = [name] if count == 1 else [f"{name[: 79 - len(str(count))]}-{i + 1}" for i in range(count)]
-    for each, mesh in zip(names, mended.bodies, strict=True):
-        _check_name(each, may_take)
+    for each, mesh in zip(names, repaired.bodies, strict=True):
+        _check_available(each, check_name)
         longest = float(np.max(mesh.extents))
         if longest < POSSIBLE_SIZE_MM[0]:
             raise BadPart(
@@ -103,14 +106,16 @@ def import_file(
                 "remove it in the CAD program"
             )
     parts, unchanged = [], True
-    for number, (each, mesh) in enumerate(zip(names, mended.bodies, strict=True)):
+    for number, (each, mesh) in enumerate(zip(names, repaired.bodies, strict=True)):
         recipe_hash = digest if count == 1 else f"{digest[:56]}-{number + 1:07d}"
         known = _known(each, recipe_hash)
         if known is None:
             unchanged = False
             known = _make(mesh, path, file, each, family, density, licence, recipe_hash)
         parts.append(known)
-    return Imported(parts=tuple(parts), unchanged=unchanged, unit=file.unit, told=(*file.told, *mended.told))
+    return Imported(
+        parts=tuple(parts), unchanged=unchanged, unit=file.unit, notes=(*file.notes, *repaired.notes)
+    )
 
 
 def import_part(path: Path, **options: object) -> Part:
@@ -119,10 +124,10 @@ def import_part(path: Path, **options: object) -> Part:
 
 
 def check_density(density: float) -> None:
-    """Refuses what no material has.
+    """Checks that a density is plausible.
 
     Raises:
-        BadPart: The density is not that of any solid.
+        BadPart: No solid has this density.
     """
     if not USUAL_DENSITY[0] <= density <= USUAL_DENSITY[1]:
         grams = "; in kg/m^3, not g/cm^3" if 0 < density < USUAL_DENSITY[0] else ""
@@ -133,12 +138,12 @@ def check_density(density: float) -> None:
 
 
 def legal_name(text: str) -> str:
-    """A part's name made of any text: lower case letters, digits, - and _.
+    """A legal part name from any text: lower case letters, digits, - and _.
 
     Raises:
-        BadPart: Nothing legal is left.
+        BadPart: The text has no legal character.
     """
-    plain = unicodedata.normalize("NFC", text).lower().translate(_SPELLED)
+    plain = unicodedata.normalize("NFC", text).lower().translate(_TRANSLITERATION)
     plain = unicodedata.normalize("NFKD", plain).encode("ascii", "ignore").decode()
     name = re.sub(r"[^a-z0-9_-]+", "-", plain).strip("-_")[:80].rstrip("-_")
     if not LEGAL_NAME.fullmatch(name):
@@ -146,10 +151,10 @@ def legal_name(text: str) -> str:
     return name
 
 
-def _check_name(name: str, may_take: Callable[[str], None]) -> None:
+def _check_available(name: str, check_name: Callable[[str], None]) -> None:
     if name in builtin_names():
         raise BadPart(f"the name {name!r} belongs to a built-in part: choose another with --name")
-    may_take(name)
+    check_name(name)
 
 
 def _known(name: str, recipe_hash: str) -> Part | None:

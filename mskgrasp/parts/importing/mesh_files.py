@@ -1,4 +1,4 @@
-"""Files of a user's CAD read into triangles in millimetres, whatever the format and its unit."""
+"""Triangles of CAD files of every supported format, in millimetres."""
 
 from __future__ import annotations
 
@@ -35,35 +35,35 @@ LOADERS = {
 MOST_BYTES = 1 << 30
 
 USUAL_SIZE_MM = (20.0, 150.0)
-"""The paper's parts; what is longer or shorter is imported with a warning."""
+"""Sizes of the paper's parts; others are imported with a warning."""
 
 POSSIBLE_SIZE_MM = (2.0, 500.0)
-"""Shorter parts are within the contact offset of the simulation, longer ones reach out of the cell."""
+"""Shorter parts are within the contact offset of the simulation, longer ones exceed the workspace."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MeshFile:
-    """What a file holds.
+    """Content of a file.
 
     Attributes:
-        objects: As the file keeps them apart, millimetres; all of an STL, OBJ or PLY is one.
-        unit: That the coordinates were taken to be in.
-        told: What a user should know about the reading.
+        objects: As separated in the file, millimetres; an STL, OBJ or PLY is one object.
+        unit: Of the file's coordinates, stated or assumed.
+        notes: Remarks for the user.
     """
 
     objects: tuple[Surface, ...]
     unit: str
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def read_content(path: Path) -> bytes:
     """A file's bytes.
 
     Raises:
-        BadPart: It is no regular file with a known suffix, too large, empty, or not readable.
+        BadPart: It is not a regular file with a known suffix, or is too large, empty, or not readable.
     """
     if path.is_dir():
-        raise BadPart(f"{path} is a folder: name it without a pattern to import the files in it")
+        raise BadPart(f"{path} is a folder: give it without a pattern to import the files in it")
     if path.suffix.lower() not in LOADERS:
         raise BadPart(
             f"{path} has the suffix {path.suffix or '(none)'!r}, CAD files end in {', '.join(LOADERS)}: "
@@ -90,12 +90,12 @@ def read_mesh(path: Path, content: bytes, unit: Unit | None) -> MeshFile:
     """The triangles of a file.
 
     Args:
-        path: Its suffix says the format.
+        path: Its suffix determines the format.
         content: Its bytes.
-        unit: Of the coordinates; None takes what the format says, and mm where it says nothing.
+        unit: Of the coordinates; None takes that of the format, or mm where the format has none.
 
     Raises:
-        BadPart: The content is damaged, has no triangles, states another unit, or is of impossible size.
+        BadPart: The content is damaged, has no triangles, states another unit, or has an impossible size.
     """
     suffix = path.suffix.lower()
     try:
@@ -104,7 +104,7 @@ def read_mesh(path: Path, content: bytes, unit: Unit | None) -> MeshFile:
         raise BadPart(f"{path} {error}") from error
     except (ValueError, KeyError, IndexError, TypeError, OverflowError, MemoryError) as error:
         reason = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise BadPart(f"{path} is no readable {suffix[1:].upper()} ({reason}): export it again") from error
+        raise BadPart(f"{path} is not a readable {suffix[1:].upper()} ({reason}): export it again") from error
     objects = [item for item in loaded.objects if len(item.faces)]
     if not objects:
         raise BadPart(f"{path} holds no triangles: export it again from the CAD program as a solid")
@@ -113,12 +113,12 @@ def read_mesh(path: Path, content: bytes, unit: Unit | None) -> MeshFile:
     name, scale = _unit(path, loaded, unit)
     objects = [Surface(vertices=item.vertices * scale, faces=item.faces) for item in objects]
     _check_size(path, objects, name, scale, may_choose=loaded.unit is None or loaded.unit_by_convention)
-    told = list(loaded.told)
+    notes = list(loaded.notes)
     if loaded.unit_by_convention and unit is not None and scale != loaded.unit_mm:
-        told.append(
+        notes.append(
             f"read in {unit} as --unit says; {suffix[1:].upper()} is in {loaded.unit} by its standard"
         )
-    return MeshFile(objects=tuple(objects), unit=name, told=tuple(told))
+    return MeshFile(objects=tuple(objects), unit=name, notes=tuple(notes))
 
 
 def length_text(millimetres: float) -> str:
@@ -127,7 +127,7 @@ def length_text(millimetres: float) -> str:
 
 
 def size_hint(longest_mm: float, unit: str, scale: float) -> str:
-    """Which --unit would give a part of usual size; says that none would."""
+    """The --unit that would give a part of usual size, or that there is none."""
     for low, high in (USUAL_SIZE_MM, POSSIBLE_SIZE_MM):
         fitting = [
             f"--unit {name} would make it {length_text(longest_mm / scale * factor)}"
@@ -145,7 +145,7 @@ def _check_arrays(path: Path, item: Surface) -> None:
             f"{path} has {len(item.faces):,} triangles, the most is {MOST_TRIANGLES:,}: export it coarser"
         )
     if int(item.faces.max()) >= len(item.vertices) or int(item.faces.min()) < 0:
-        raise BadPart(f"{path}: a face names a vertex that is not there (truncated?): export it again")
+        raise BadPart(f"{path}: a face refers to a missing vertex (truncated?): export it again")
     if not np.isfinite(item.vertices).all():
         raise BadPart(f"{path} has coordinates that are not finite: export it again from the CAD program")
 
@@ -160,7 +160,7 @@ def _unit(path: Path, loaded: Loaded, unit: Unit | None) -> tuple[str, float]:
     if loaded.unit_by_convention or MILLIMETRES[unit] == loaded.unit_mm:
         return unit, MILLIMETRES[unit]
     raise BadPart(
-        f"{path} states its own unit, {loaded.unit}, and --unit says {unit}: leave --unit away, or export "
+        f"{path} states its own unit, {loaded.unit}, and --unit says {unit}: omit --unit, or export "
         "the file with the right unit"
     )
 
@@ -173,6 +173,6 @@ def _check_size(path: Path, objects: list[Surface], unit: str, scale: float, *, 
         return
     remedy = size_hint(longest, unit, scale) if may_choose else "leave it out, or scale it in the CAD program"
     raise BadPart(
-        f"{path} is {length_text(longest)} long when read in {unit}; the cell takes "
+        f"{path} is {length_text(longest)} long when read in {unit}; the limits are "
         f"{POSSIBLE_SIZE_MM[0]:g} to {POSSIBLE_SIZE_MM[1]:g} mm: {remedy}"
     )

@@ -1,7 +1,7 @@
-"""What is mended on a mesh before it becomes a part, and what is refused.
+"""Repairs of closed surfaces that keep their shape.
 
-Only mends that leave the shape as it is: equal vertices are merged, faces without area dropped, faces turned
-outwards, millions of triangles thinned out within a hair's breadth. Nothing is closed, filled or guessed.
+Equal vertices are merged, faces without area are dropped, and faces are wound outwards. No hole is closed or
+filled, and nothing is guessed: other defects are refused.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from mskgrasp.core.errors import BadPart
 from mskgrasp.parts.solids.surface import Surface
 
 WELD_MM = 1e-3
-"""Vertices closer than this are one where the surface is open otherwise (STEP faces meet only so closely)."""
+"""Vertices closer than this are merged where the surface is open otherwise (as between faces of STEP)."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Told:
-    """How much was mended."""
+class Repairs:
+    """Number of repairs by kind."""
 
     merged: int = 0
     welded: int = 0
@@ -30,11 +30,11 @@ class Told:
     doubled: int = 0
     turned: int = 0
 
-    def __add__(self, other: Told) -> Told:
-        return Told(**{name: value + getattr(other, name) for name, value in vars(self).items()})
+    def __add__(self, other: Repairs) -> Repairs:
+        return Repairs(**{name: value + getattr(other, name) for name, value in vars(self).items()})
 
     def sentences(self) -> tuple[str, ...]:
-        """What a user is told; merging alone is not, for STL repeats every vertex."""
+        """Report for the user; merging is not reported, since STL repeats every vertex."""
         return tuple(
             sentence
             for count, sentence in (
@@ -53,25 +53,25 @@ def count_of(number: int, thing: str) -> str:
     return f"{number:,} {thing if number == 1 else plural}"
 
 
-def close_surface(surface: Surface) -> tuple[Surface, Told]:
-    """A surface whose faces join edge to edge, made of one that may repeat vertices and faces.
+def close_surface(surface: Surface) -> tuple[Surface, Repairs]:
+    """Makes a surface whose faces join edge to edge from one that may repeat vertices and faces.
 
     Raises:
         BadPart: It is flat or open; the message starts with "is" and names no file.
     """
     merged, count = _merge_equal(surface)
     _check_not_flat(merged)
-    # In the order of how little they change the surface; the first that closes it is taken.
+    # In the order of increasing change; the first that closes the surface is taken.
     for weld in (False, True):
         candidate, joined = _weld(merged) if weld else (merged, 0)
         for keep_one in (False, True):
-            known = Told(merged=count, welded=joined)
-            mended, told = _drop_faces(candidate, known, keep_one=keep_one)
-            if len(mended.faces) and _open_edges(mended) == (0, 0):
-                return mended, told
-            if not told.doubled:
+            known = Repairs(merged=count, welded=joined)
+            repaired, repairs = _drop_faces(candidate, known, keep_one=keep_one)
+            if len(repaired.faces) and _open_edges(repaired) == (0, 0):
+                return repaired, repairs
+            if not repairs.doubled:
                 break
-    surface, _ = _drop_faces(merged, Told(), keep_one=False)
+    surface, _ = _drop_faces(merged, Repairs(), keep_one=False)
     if len(surface.faces) == 0:
         raise BadPart(f"is {_SHEET}")
     border, crowded = _open_edges(surface)
@@ -81,16 +81,16 @@ def close_surface(surface: Surface) -> tuple[Surface, Told]:
             "example with MeshLab's 'Close Holes' or Blender's 3D-Print Toolbox, or export a solid"
         )
     raise BadPart(
-        f"is no proper solid: at {count_of(crowded, 'edge')} an odd number of faces meet; remove inner walls "
-        "and export it again"
+        f"is not a proper solid: at {count_of(crowded, 'edge')} an odd number of faces meet; remove inner "
+        "walls and export it again"
     )
 
 
-def turn_consistently(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
-    """A closed surface whose neighbouring faces are wound the same way.
+def wind_consistently(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
+    """Winds neighbouring faces of a closed surface the same way.
 
     Returns:
-        The surface; (m,) the piece that each face belongs to (pieces share no edge); (m,) which were turned.
+        The surface; (m,) the piece of each face (pieces share no edge); (m,) whether it was turned.
 
     Raises:
         BadPart: No winding is consistent (as on a Klein bottle).
@@ -100,16 +100,17 @@ def turn_consistently(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray
     first, second, same_way, crowded = _neighbours(surface)
     turned = np.zeros(count, dtype=bool)
     if same_way.any():
-        # Every face stands twice in this graph, as it is and turned; neighbours are tied so that they agree.
+        # Every face has two nodes in this graph, as it is and turned; edges join the nodes that agree.
         flip = np.where(same_way, count, 0)
         rows = np.concatenate([first, first + count])
         columns = np.concatenate([second + flip, second + count - flip])
         group = _components(rows, columns, 2 * count)
         if (group[:count] == group[count:]).any():
             raise BadPart(
-                "is no proper solid: its faces cannot all be wound outward (a one-sided surface); repair it"
+                "is not a proper solid: its faces cannot all be wound outward (a one-sided surface); "
+                "repair it"
             )
-        # Of the two ways to agree, the one that turns fewer faces.
+        # Of the two consistent windings, the one that turns fewer faces.
         kept = np.bincount(group[:count], minlength=group.max() + 1)
         turned = kept[group[:count]] < kept[group[count:]]
         tied = kept[group[:count]] == kept[group[count:]]
@@ -123,7 +124,7 @@ def turn_consistently(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray
     key, up = _edges(surface)
     if not np.array_equal(np.sort(key[up]), np.sort(key[~up])):
         raise BadPart(
-            "is no proper solid: its faces cannot all be wound outward where several meet at an edge; "
+            "is not a proper solid: its faces cannot all be wound outward where several meet at an edge; "
             "remove inner walls and export it again"
         )
     return surface, piece, turned
@@ -145,11 +146,13 @@ def _unique_rows(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Index of each distinct row's first appearance, in order of appearance; each row's distinct one."""
     bits = np.ascontiguousarray(points, dtype=np.float64).view(np.uint64)
     key = np.zeros(len(points), dtype=np.uint64)
-    for column in bits.T:  # sorting one number a row is many times faster than sorting rows
+    for column in bits.T:  # sorting one number for each row is many times faster than sorting rows
         key = (key ^ column) * np.uint64(0x9E3779B97F4A7C15)
         key ^= key >> np.uint64(29)
     _, index, inverse = np.unique(key, return_index=True, return_inverse=True)
-    if not np.array_equal(points[index][inverse], points):  # two rows of one key: once in 10^6 huge meshes
+    if not np.array_equal(
+        points[index][inverse], points
+    ):  # two rows with one key: about once in 10^6 huge meshes
         _, index, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(index)
     rank = np.empty_like(order)
@@ -165,7 +168,7 @@ def _weld(surface: Surface) -> tuple[Surface, int]:
     return Surface(vertices=surface.vertices[index], faces=group[surface.faces]), count - len(index)
 
 
-def _drop_faces(surface: Surface, told: Told, *, keep_one: bool) -> tuple[Surface, Told]:
+def _drop_faces(surface: Surface, repairs: Repairs, *, keep_one: bool) -> tuple[Surface, Repairs]:
     """Without faces that name a vertex twice or repeat another face.
 
     Two faces back to back enclose nothing and both go, unless ``keep_one``: some exporters write every face
@@ -177,12 +180,12 @@ def _drop_faces(surface: Surface, told: Told, *, keep_one: bool) -> tuple[Surfac
     faces = faces[sound]
     degenerate = len(sound) - len(faces)
     keep = _without_doubles(faces, keep_one=keep_one)
-    told = replace(told, degenerate=degenerate, doubled=len(faces) - len(keep))
+    repairs = replace(repairs, degenerate=degenerate, doubled=len(faces) - len(keep))
     faces = faces[keep]
     used = np.zeros(len(surface.vertices), dtype=bool)
     used[faces] = True
     compact = np.cumsum(used) - 1
-    return Surface(vertices=surface.vertices[used], faces=compact[faces]), told
+    return Surface(vertices=surface.vertices[used], faces=compact[faces]), repairs
 
 
 def _without_doubles(faces: np.ndarray, *, keep_one: bool) -> np.ndarray:
@@ -218,9 +221,9 @@ def _edges(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _open_edges(surface: Surface) -> tuple[int, int]:
-    """How many edges bound one face only, and how many join three, five, ... faces."""
+    """Number of edges that bound a single face, and of edges that join three, five, ... faces."""
     key = np.sort(_edges(surface)[0])
-    if len(key) % 2 == 0 and (key[::2] == key[1::2]).all():  # all in pairs: the rule
+    if len(key) % 2 == 0 and (key[::2] == key[1::2]).all():  # all in pairs: the usual case
         return 0, 0
     count = np.diff(np.flatnonzero(np.r_[True, key[1:] != key[:-1], True]))
     return int((count == 1).sum()), int(((count % 2 == 1) & (count > 1)).sum())

@@ -1,4 +1,4 @@
-"""Which files a user means by names, folders and patterns."""
+"""Selection of CAD files by paths, folders and patterns."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from mskgrasp.parts.importing.mesh_files import LOADERS
 
 @dataclass(frozen=True, kw_only=True)
 class Selected:
-    """What is to be imported, and what is not.
+    """Files to import, refused paths and skipped files.
 
     Attributes:
         files: In the order of the arguments, those of a folder or pattern by name; none twice.
-        refused: Path as the user knows it, and the sentence that says why.
-        passed_over: Files in folders that are no CAD by their suffix.
+        refused: Path as given by the user, and the reason.
+        skipped: Files in folders that are not CAD files by their suffix.
     """
 
     files: tuple[Path, ...]
     refused: tuple[tuple[Path, str], ...]
-    passed_over: tuple[Path, ...]
+    skipped: tuple[Path, ...]
 
 
 def select_files(arguments: Sequence[Path]) -> Selected:
     """Resolves files, folders (their files, not their subfolders') and quoted patterns (``**`` descends).
 
-    A file may be a link where the user names it; in a folder or pattern a link that leads out is refused, for
-    nobody has asked for what lies there.
+    A file may be a link where the user names it; in a folder or pattern a link out of it is refused, since
+    the user has not named its target.
     """
     files: dict[str, Path] = {}
     refused: list[tuple[Path, str]] = []
-    passed_over: list[Path] = []
+    skipped: list[Path] = []
     for argument in arguments:
         if argument.is_dir():
             found, root = sorted(argument.iterdir()), argument
@@ -50,16 +50,16 @@ def select_files(arguments: Sequence[Path]) -> Selected:
         before = len(files) + len(refused)
         for path in found:
             if path.suffix.lower() not in LOADERS or path.is_dir():
-                passed_over += [path] if not path.is_dir() else []
+                skipped += [path] if not path.is_dir() else []
             elif path.is_symlink() and not path.exists():
                 refused.append(
-                    (path, f"{path} is a link to {os.readlink(path)}, which is not there: mend it")
+                    (path, f"{path} is a link to {os.readlink(path)}, which does not exist: correct the link")
                 )
             elif not path.resolve().is_relative_to(root.resolve()):
                 refused.append(
                     (
                         path,
-                        f"{path} leads out of {root} to {path.resolve()}: name that file itself to import it",
+                        f"{path} leads out of {root} to {path.resolve()}: give that path to import it",
                     )
                 )
             else:
@@ -69,7 +69,7 @@ def select_files(arguments: Sequence[Path]) -> Selected:
             refused.append(
                 (argument, f"{where} holds no CAD file ({', '.join(LOADERS)}): choose another, or use '**'")
             )
-    return Selected(files=tuple(files.values()), refused=tuple(refused), passed_over=tuple(passed_over))
+    return Selected(files=tuple(files.values()), refused=tuple(refused), skipped=tuple(skipped))
 
 
 def _fixed(pattern: Path) -> Path:

@@ -1,19 +1,19 @@
-"""How often a closed surface winds round points: what is inside, outside, or counted twice."""
+"""Winding numbers of closed surfaces, and the volume that self-intersection miscounts."""
 
 from __future__ import annotations
 
 import numpy as np
 
 LINES = 128
-"""Lines of sight per axis and side; a crossing smaller than 1/128 of the part may be missed."""
+"""Lines per side of the grid along each axis; a crossing smaller than 1/128 of the part may be missed."""
 
 _CHUNK = 2_000_000
 _OFFSETS = (0.1415926, -0.2182818)
-"""Keeps lines off the edges and corners of meshes drawn on a grid."""
+"""Keeps lines off the edges and corners of meshes on a regular grid."""
 
 
 def winding_number(triangles: np.ndarray, point: np.ndarray) -> float:
-    """How often a closed surface, triangles (n, 3, 3), winds round a point: 1 inside, 0 outside.
+    """Winding number of a closed surface, triangles (n, 3, 3), about a point: 1 inside, 0 outside.
 
     The sum of solid angles (van Oosterom and Strackee 1983) over 4 pi.
     """
@@ -30,10 +30,10 @@ def winding_number(triangles: np.ndarray, point: np.ndarray) -> float:
 
 
 def miscounted_fraction(triangles: np.ndarray) -> float:
-    """The volume that an integral over the surface counts twice or negative, by the volume enclosed.
+    """The volume that an integral over the surface counts twice or as negative, as a share of that enclosed.
 
     Zero where the surface does not cross itself. The winding number is followed along ``LINES`` x ``LINES``
-    lines in each of the three axes; the axis that sees most counts.
+    lines along each of the three axes; the largest of the three fractions is returned.
 
     Args:
         triangles: (n, 3, 3) of a closed surface wound outwards.
@@ -51,7 +51,7 @@ def miscounted_fraction(triangles: np.ndarray) -> float:
 
 
 def _crossings(triangles: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where lines along an axis meet the surface: (m, 2) line and height; (m,) +1 in, -1 out."""
+    """Crossings of lines along an axis with the surface: (m, 2) line and height; (m,) +1 in, -1 out."""
     plane = [(axis + 1) % 3, (axis + 2) % 3]
     low = triangles.reshape(-1, 3).min(axis=0)[plane]
     size = np.maximum(np.ptp(triangles.reshape(-1, 3), axis=0)[plane], 1e-300)
@@ -74,7 +74,7 @@ def _crossings(triangles: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray
         start = stop
     rows = np.concatenate(found)
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-    # A line through an edge to within rounding may miss both faces; it says nothing then.
+    # A line through an edge to within rounding may miss both faces; such a line is dropped.
     line = rows[:, 0].astype(np.int64)
     balance = np.bincount(line, weights=rows[:, 2], minlength=LINES * LINES)
     rows = rows[balance[line] == 0]

@@ -1,4 +1,4 @@
-"""A recipe: everything that decides how a built-in part comes out."""
+"""Recipe of a built-in part."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ TABLES = Path(__file__).parent / "families" / "tables"
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """How to make one built-in part.
+    """Everything that determines a built-in part.
 
     Attributes:
         name: The part's name.
         family: Kind of part.
-        source: The standard, or what stands in for one.
+        source: The standard, or another origin of the dimensions.
         density: kg/m^3.
-        dimensions: What ``make`` gets: lengths in millimetres under names that end in ``_mm``, counts.
-        make: Turns the dimensions into a shape; without hulls, they are found by decomposition.
+        dimensions: Argument of ``make``: lengths in millimetres under names that end in ``_mm``, counts.
+        make: Makes a solid of the dimensions; one without hulls is decomposed.
         licence: SPDX identifier.
         version: Raised when `make` gives another shape for the same dimensions.
     """

@@ -1,4 +1,4 @@
-"""Convex pieces of any watertight mesh, as few as an error bound allows, by CoACD.
+"""Convex decomposition of watertight meshes within an error bound, by CoACD.
 
 CoACD: Wei et al., Approximate convex decomposition for 3D meshes with collision-aware concavity and tree
 search, SIGGRAPH 2022.
@@ -15,32 +15,32 @@ from manifold3d import Manifold
 from scipy.spatial import ConvexHull
 
 from mskgrasp.core.errors import BadPart
-from mskgrasp.parts.solids.measure import MOST_OBLONG, HullFit, MeshSurface, oblongness
+from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, HullFit, MeshSurface, aspect_ratio
 from mskgrasp.parts.solids.pieces import merge_hulls
 from mskgrasp.parts.solids.solid import cut, few_corners
 
 MOST_HULLS = 48
 
 MOST_P95_MM = 0.7
-"""A part is left out where 95 % of the surfaces of hulls and mesh are not within this distance."""
+"""95 % of the surfaces of hulls and mesh have to be within this distance."""
 
 MOST_VOLUME_RATIO = 1.1
-"""The same for the hulls' volume by the mesh's, or the mesh's by the hulls'."""
+"""Largest ratio between the volumes of hulls and mesh, either way."""
 
-LADDER_MM = (2.0, 1.0, 0.5)
-"""Concavity that CoACD may leave, tried one after the other, in millimetres.
+CONCAVITIES_MM = (2.0, 1.0, 0.5)
+"""Concavity that CoACD may leave, tried in turn, in millimetres.
 
-Half of the bundled shapes are done after the first; a part of 100 mm is not cut more finely than a part of
-40 mm, as it would be the other way round with a threshold in parts of the size.
+The first suffices for half of the built-in shapes. In millimetres, since a threshold relative to the size
+would cut small parts more finely than large ones.
 """
 
 CLOSE_P95_MM = 0.35
 CLOSE_VOLUME_RATIO = 1.05
 CLOSE_LARGEST_MM = 0.75
-"""What joining may cost where exact pieces were given; no hull may stand out farther than the last."""
+"""Bounds for joining exact pieces; the last is the largest distance of a hull outside the mesh."""
 
 _SLACKS = (0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04)
-"""Shares of the volume that joining may add."""
+"""Shares of the volume that joining may add, tried in turn."""
 
 _MOST_AFTER_SPLITTING = 96
 _SLIVER_MM = 0.2
@@ -50,7 +50,7 @@ _LOST_SHARE = 0.4
 
 
 def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
-    """Convex pieces that stand for a watertight mesh; the same mesh always gives the same pieces.
+    """Convex pieces of a watertight mesh; the same mesh always gives the same pieces.
 
     CoACD cuts more and more finely until the pieces are within ``MOST_P95_MM`` and ``MOST_VOLUME_RATIO``;
     then neighbours are joined as far as these bounds allow.
@@ -58,41 +58,42 @@ def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
     Raises:
         BadPart: Pieces as fine as they may be are too far from the mesh, or too thin for PhysX.
     """
-    # CoACD looks for concavity between the facets of a fine ball, for minutes.
+    # CoACD would search for concavity between the facets of a fine ball, for minutes.
     convex = mesh_mm.convex_hull.volume <= _CONVEX_RATIO * mesh_mm.volume
     surface = MeshSurface(mesh_mm)
     tried: list[tuple[float, int, HullFit]] = []
-    for concavity_mm in LADDER_MM:
+    for concavity_mm in CONCAVITIES_MM:
         cut_up = [np.asarray(mesh_mm.vertices)] if convex else _cut_up(mesh_mm, concavity_mm)
         for pieces in _with_few_corners(cut_up, _LOST_SHARE * concavity_mm):
             fit = surface.fit(pieces)
             if _within(fit, MOST_P95_MM, MOST_VOLUME_RATIO):
-                joined = _join(surface, pieces, MOST_P95_MM, MOST_VOLUME_RATIO, finish=_stout)
+                joined = _join(surface, pieces, MOST_P95_MM, MOST_VOLUME_RATIO, finish=_split_slender)
                 if len(joined) <= MOST_HULLS:
                     return tuple(joined)
             tried.append((fit.p95, len(pieces), fit))
         if len(cut_up) >= MOST_HULLS:
-            break  # with as many pieces as there may be, a finer cut comes no closer, and takes minutes
+            break  # at the limit of pieces a finer cut is no closer, and takes minutes
     _, count, fit = min(tried, key=lambda item: item[0])
     raise BadPart(
-        f"no few convex pieces stand for the mesh: with {count} (at most {MOST_HULLS}), 95 % of the surface "
-        f"is within {fit.p95:.2f} mm (at most {MOST_P95_MM} mm), volume ratio {fit.volume_ratio:.2f} "
-        f"(at most {MOST_VOLUME_RATIO}): simplify fine detail such as threads, grilles and thin walls"
+        f"no small set of convex pieces represents the mesh: with {count} (at most {MOST_HULLS}), 95 % of "
+        f"the surface is within {fit.p95:.2f} mm (at most {MOST_P95_MM} mm), volume ratio "
+        f"{fit.volume_ratio:.2f} (at most {MOST_VOLUME_RATIO}): simplify fine detail such as threads, "
+        "grilles and thin walls"
     )
 
 
 def fewest_hulls(mesh_mm: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
     """Exact pieces joined where that changes little: within ``CLOSE_P95_MM`` and ``CLOSE_VOLUME_RATIO``."""
     surface = MeshSurface(mesh_mm)
-    most_largest = np.inf  # more than PhysX should take have to be joined, whatever stands out
+    most_largest = np.inf  # more than PhysX should handle have to be joined at any distance
     if len(hulls) <= MOST_HULLS:
-        # Holes that are filled on purpose stand out already.
+        # Holes that are filled on purpose count as distance already.
         most_largest = max(CLOSE_LARGEST_MM, surface.outward_largest(hulls) + 0.01)
     return tuple(_join(surface, hulls, CLOSE_P95_MM, CLOSE_VOLUME_RATIO, most_largest))
 
 
 def is_manifold(mesh_mm: trimesh.Trimesh) -> bool:
-    """Whether boolean operations accept the mesh: every edge has one face on either side."""
+    """Whether boolean operations accept the mesh: every edge joins two faces."""
     from manifold3d import Error, Mesh64
 
     body = Manifold(Mesh64(np.array(mesh_mm.vertices, np.float64), np.array(mesh_mm.faces, np.uint64)))
@@ -106,9 +107,9 @@ def _cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
         threshold=concavity_mm,
         real_metric=True,
         max_convex_hull=MOST_HULLS,
-        preprocess_mode="off",  # remeshing serves open meshes, and those were refused before
-        # A third of the time of the defaults at the same number of hulls, measured on brackets and levers; a
-        # search less deep than 3, or with fewer nodes, makes twice the hulls and takes longer.
+        preprocess_mode="off",  # remeshing is for open meshes, which are refused before
+        # A third of the time of the defaults for the same number of hulls, measured on brackets and levers; a
+        # depth under 3, or fewer nodes, gives twice the hulls and takes longer.
         resolution=1000,
         mcts_nodes=10,
         mcts_iterations=30,
@@ -119,11 +120,11 @@ def _cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
 
 
 def _with_few_corners(pieces: Sequence[np.ndarray], most_lost_mm: float) -> Iterator[list[np.ndarray]]:
-    """Pieces with no more corners than PhysX takes; where those lose much, again with the worst cut up.
+    """Pieces with no more corners than PhysX accepts; where that loses much, again with those halved.
 
-    A ball is one convex piece; but with 32 corners it lacks 6 % of its diameter.
+    A ball is one convex piece, but with 32 corners it loses 6 % of its diameter.
     """
-    # CoACD's own decimation cuts the ends off: 6.7 mm of a bent round bar, where this loses 1.8 mm.
+    # CoACD's own decimation cuts 6.7 mm off the ends of a bent round bar, where this loses 1.8 mm.
     few = [few_corners(points) for points in pieces]
     yield few
     pending, close = list(zip(pieces, few, strict=True)), []
@@ -134,13 +135,13 @@ def _with_few_corners(pieces: Sequence[np.ndarray], most_lost_mm: float) -> Iter
         if _lost_mm(points, kept) <= most_lost_mm:
             close.append(kept)
         else:
-            # Where halves lose corners along the cut, a slit would be left between them.
+            # Halves that lose corners along the cut would leave a gap between them.
             pending += [(half, few_corners(half)) for half in _halves(points, _OVERLAP_MM)]
     yield close + [kept for _, kept in pending]
 
 
 def _lost_mm(points: np.ndarray, kept: np.ndarray) -> float:
-    """How far the farthest of the points lies outside the hull of those that were kept."""
+    """Largest distance of the points outside the hull of those that were kept."""
     planes = ConvexHull(kept).equations
     return float((points @ planes[:, :3].T + planes[:, 3]).max())
 
@@ -154,22 +155,22 @@ def _join(
     *,
     finish: Callable[[list[np.ndarray]], list[np.ndarray]] = list,
 ) -> list[np.ndarray]:
-    """Pieces joined with the largest slack that keeps the bounds; as they are where none does.
+    """Pieces joined with the largest slack within the bounds; unchanged where none is.
 
-    ``finish`` is done to them last of all: joining takes up many a sliver that it would have to cut.
+    ``finish`` is applied last: joining absorbs slivers that it would have to cut.
     """
     best: list[np.ndarray] | None = None
-    # A piece that is thin from the start stays so; the caller sees to it.
-    most_oblong = max([0.9 * MOST_OBLONG, *(oblongness(points) for points in hulls)])
+    # Pieces that are slender from the start stay so; ``finish`` cuts them.
+    most_slender = max([0.9 * MOST_ASPECT_RATIO, *(aspect_ratio(points) for points in hulls)])
     low, high, middle = 0, len(_SLACKS), len(_SLACKS) - 1
     while low < high:
-        # The largest slack first: most parts take it, and the rest are found by halving.
+        # The largest slack first, which fits most parts, then bisection.
         joined = merge_hulls(hulls, _SLACKS[middle])
         if len(joined) == len(hulls):
             low, middle = middle + 1, (middle + 1 + high) // 2
             continue
         joined = finish(joined)
-        close = max(oblongness(points) for points in joined) <= most_oblong
+        close = max(aspect_ratio(points) for points in joined) <= most_slender
         if close and surface.fit_within(joined, most_p95, most_ratio, most_largest) is not None:
             best, low = joined, middle + 1
         else:
@@ -182,8 +183,8 @@ def _within(fit: HullFit, most_p95: float, most_ratio: float) -> bool:
     return fit.p95 <= most_p95 and 1 / most_ratio <= fit.volume_ratio <= most_ratio
 
 
-def _stout(pieces: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Pieces cut across their length until PhysX on a GPU takes them.
+def _split_slender(pieces: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Pieces cut across their length until PhysX on a GPU accepts them.
 
     Raises:
         BadPart: There would be too many.
@@ -191,17 +192,17 @@ def _stout(pieces: Sequence[np.ndarray]) -> list[np.ndarray]:
     pending, done = list(pieces), []
     while pending:
         points = pending.pop(0)
-        oblong = oblongness(points)
-        if np.linalg.norm(np.ptp(points, axis=0)) / oblong < _SLIVER_MM:
-            continue  # left over between two cuts; the fit is measured without it
-        if oblong <= 0.9 * MOST_OBLONG:
+        ratio = aspect_ratio(points)
+        if np.linalg.norm(np.ptp(points, axis=0)) / ratio < _SLIVER_MM:
+            continue  # a remainder between two cuts; the fit is measured without it
+        if ratio <= 0.9 * MOST_ASPECT_RATIO:
             done.append(points)
         elif len(done) + len(pending) < _MOST_AFTER_SPLITTING:
             pending += _halves(points)
         else:
             raise BadPart(
                 f"the part is too thin: over {_MOST_AFTER_SPLITTING} hulls would be needed to keep each "
-                f"hull's length under {MOST_OBLONG:.0f} times its thickness; make the thin walls thicker"
+                f"hull's length under {MOST_ASPECT_RATIO:.0f} times its thickness; make thin walls thicker"
             )
     return done
 

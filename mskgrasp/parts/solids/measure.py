@@ -1,4 +1,4 @@
-"""What is measured on a shape: mass, inertia, size, and how well the hulls stand for the mesh."""
+"""Mass, inertia, size and hull fit of solids."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from scipy.spatial import ConvexHull, KDTree
 from mskgrasp.core.geometry import quat_from_matrix
 
 MOST_SAMPLES = 12_000
-"""Points per surface at which hulls and mesh are compared."""
+"""Number of points on each surface at which hulls and mesh are compared."""
 
-MOST_OBLONG = 50.0
+MOST_ASPECT_RATIO = 50.0
 """PhysX on a GPU drops hulls whose length is about 64 times their thickness."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MassProperties:
-    """Of a uniform body.
+    """Mass properties of a body of uniform density.
 
     Attributes:
         volume: Cubic metres.
@@ -42,7 +42,7 @@ class MassProperties:
 
 @dataclass(frozen=True, kw_only=True)
 class HullFit:
-    """How well the union of the hulls stands for the mesh; lengths in millimetres.
+    """Deviation of the union of the hulls from the mesh; lengths in millimetres.
 
     Attributes:
         largest: Largest distance found between the two surfaces, either way.
@@ -65,7 +65,7 @@ class HullFit:
 
 def mass_properties(mesh_mm: trimesh.Trimesh, density: float) -> MassProperties:
     """Integrates over a watertight mesh in millimetres; density in kg/m^3."""
-    # In millimetres and scaled afterwards: the integrals of small parts in metres vanish beside tolerances.
+    # In millimetres and scaled afterwards: in metres the integrals of small parts fall below tolerances.
     found = trimesh.triangles.mass_properties(mesh_mm.triangles, density=1.0, skip_inertia=False)
     inertia = np.asarray(found.inertia, dtype=float) * density * 1e-15
     inertia = (inertia + inertia.T) / 2
@@ -85,7 +85,7 @@ def _principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Principal moments (3,) and right-handed axes as columns (3, 3)."""
     diagonal = np.diag(inertia)
     if np.abs(inertia - np.diag(diagonal)).max() < 1e-6 * diagonal.max():
-        # The mesh's own axes are principal; a symmetric part must not get arbitrary ones from rounding.
+        # The mesh's own axes are principal; rounding must not give a symmetric part arbitrary ones.
         return diagonal.copy(), np.eye(3)
     moments, axes = np.linalg.eigh(inertia)
     largest = np.abs(axes).argmax(axis=0)
@@ -98,7 +98,7 @@ def _principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def longest_axis(mesh: trimesh.Trimesh) -> float:
     """Longest edge of the oriented box of least volume, in the mesh's unit."""
     _, extents = trimesh.bounds.oriented_bounds(mesh)
-    # For round parts the least volume leaves room for turned boxes; none is needed where axes fit as well.
+    # Round parts have several boxes of least volume; the one along the axes is preferred.
     if np.prod(mesh.extents) <= np.prod(extents) * 1.0001:
         extents = mesh.extents
     return float(np.max(extents))
@@ -110,10 +110,10 @@ def hull_fit(mesh_mm: trimesh.Trimesh, hulls_mm: Sequence[np.ndarray]) -> HullFi
 
 
 class MeshSurface:
-    """A mesh prepared for comparing one set of hulls after the other with it."""
+    """A mesh prepared for comparison with several sets of hulls."""
 
     def __init__(self, mesh_mm: trimesh.Trimesh) -> None:
-        """Cuts the surface finely and sorts it for searching."""
+        """Refines the surface and builds its search tree."""
         # Copies: manifold3d takes neither a read-only array nor a view with strides.
         body = Manifold(Mesh64(np.array(mesh_mm.vertices, np.float64), np.array(mesh_mm.faces, np.uint64)))
         self._step = float(np.max(mesh_mm.extents)) / 40
@@ -132,7 +132,7 @@ class MeshSurface:
         most_ratio: float,
         most_outward: float = np.inf,
     ) -> HullFit | None:
-        """The same where it keeps the bounds, else None, as soon as that is certain.
+        """The fit where it is within the bounds, otherwise None, as soon as that is certain.
 
         Args:
             hulls_mm: Corners (n, 3) of each hull.
@@ -144,7 +144,7 @@ class MeshSurface:
         if not 1 / most_ratio <= union.volume / self._volume <= most_ratio:
             return None
         outward = self._surface.distance_to(union.samples)
-        # The 95th percentile is certain where more than 5 % of both surfaces lies beyond it already.
+        # The 95th percentile is certain where more than 5 % of both surfaces is beyond it already.
         beyond = float(union.areas[outward > most_p95].sum())
         both = float(union.areas.sum() + self._areas.sum())
         if outward.max() > most_outward or beyond > 0.0501 * both:
@@ -172,7 +172,7 @@ class MeshSurface:
 
 
 class _Union:
-    """The outer surface of several hulls together, finely cut."""
+    """Refined outer surface of the union of several hulls."""
 
     def __init__(self, hulls_mm: Sequence[np.ndarray], step: float) -> None:
         body = Manifold.batch_boolean(
@@ -193,7 +193,7 @@ class _Surface:
     def distance_to(self, points: np.ndarray) -> np.ndarray:
         """Distance of points (n, 3)."""
         distance = self._by_nearest(points, 8)
-        # Among slivers eight centres may all be of farther triangles: large distances are looked at again.
+        # Among slivers the eight nearest centres may be of farther triangles: large ones are checked again.
         doubtful = np.flatnonzero(distance > max(float(np.quantile(distance, 0.9)), 0.01))
         if len(doubtful):
             distance[doubtful] = self._by_nearest(points[doubtful], 64)
@@ -211,14 +211,14 @@ class _Surface:
 
 
 def _p95(distance: np.ndarray, area: np.ndarray) -> float:
-    """The distance that 95 % of the area keeps."""
+    """The distance within which 95 % of the area is."""
     order = np.argsort(distance)
     covered = np.cumsum(area[order]) / area.sum()
     return float(distance[order][min(int(np.searchsorted(covered, 0.95)), len(distance) - 1)])
 
 
-def oblongness(points: np.ndarray) -> float:
-    """Length of a convex body by its least thickness."""
+def aspect_ratio(points: np.ndarray) -> float:
+    """Length of a convex body divided by its least thickness."""
     hull = ConvexHull(points)
     corners = points[hull.vertices]
     heights = corners @ hull.equations[:, :3].T
@@ -233,7 +233,7 @@ def _triangles(body: Manifold) -> np.ndarray:
 
 
 def _outer_triangles(triangles: np.ndarray, hulls: Sequence[np.ndarray]) -> np.ndarray:
-    """Those triangles that have no hull in front of them.
+    """The triangles without a hull in front of them.
 
     Hulls that share a face differ by rounding, so their union keeps both sides of it as an inner wall.
     """
@@ -244,7 +244,7 @@ def _outer_triangles(triangles: np.ndarray, hulls: Sequence[np.ndarray]) -> np.n
     covered = np.zeros(len(triangles), dtype=bool)
     for points in hulls:
         planes = ConvexHull(points).equations
-        # Most triangles are not even in the hull's box, and those that are need not be tried twice.
+        # Most triangles are outside the hull's box, and covered ones need no second test.
         low, high = points.min(axis=0) - 1e-6, points.max(axis=0) + 1e-6
         in_box = ((in_front >= low[:, None]) & (in_front <= high[:, None])).all(axis=0)
         near = np.flatnonzero(in_box & ~covered)
@@ -254,7 +254,7 @@ def _outer_triangles(triangles: np.ndarray, hulls: Sequence[np.ndarray]) -> np.n
 
 
 def _samples(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points on the surface (centres, and corners without weight) and the area each one stands for."""
+    """Points on the surface (centres, and corners without weight) and the area that each represents."""
     area = np.linalg.norm(
         np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1
     )

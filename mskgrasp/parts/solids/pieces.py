@@ -1,4 +1,4 @@
-"""Exact convex pieces: of plane outlines, of turned profiles, and of one body cut by another."""
+"""Exact convex decomposition of plane outlines, of turned profiles, and of one body cut by another."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def convex_polygons(region: Any, most_corners: int = _MOST_CORNERS) -> list[np.n
 
     Args:
         region: A polygon, or several, with or without holes.
-        most_corners: Of one piece; 16 make a prism of 32 corners.
+        most_corners: Of one piece; 16 give a prism of 32 corners.
     """
     triangles = [
         np.asarray(shapely.get_coordinates(triangle))[:-1]
@@ -36,7 +36,7 @@ def convex_polygons(region: Any, most_corners: int = _MOST_CORNERS) -> list[np.n
     ]
     pieces: dict[int, np.ndarray] = {n: _counter_clockwise(t) for n, t in enumerate(triangles)}
     sides: dict[int, list[int]] = {n: _neighbours(n, pieces) for n in pieces}
-    # Joints of pairs that no later joint has touched need no second look.
+    # Unions of pairs that no later union has changed are not computed again.
     known: dict[tuple[int, int], tuple[float, np.ndarray] | None] = {}
     while True:
         best: tuple[float, int, int, np.ndarray] | None = None
@@ -65,7 +65,7 @@ def convex_polygons(region: Any, most_corners: int = _MOST_CORNERS) -> list[np.n
 def turned_pieces(profile: Sequence[tuple[float, float]], detail_mm: float) -> list[np.ndarray]:
     """Convex pieces of a body of revolution about z.
 
-    What reaches the axis becomes frusta; the rest becomes wedges about the axis.
+    The region that reaches the axis becomes frusta; the rest becomes wedges about the axis.
 
     Args:
         profile: (radius, z) corners of the half section in order.
@@ -105,7 +105,7 @@ def merge_hulls(hulls: Sequence[np.ndarray], slack: float = 0.002) -> list[np.nd
 
     Args:
         hulls: Corner points (n, 3) of each piece.
-        slack: Volume that all the joining may add, as a share of the whole.
+        slack: Volume that all unions together may add, as a share of the whole.
     """
     pieces = {number: np.asarray(points, dtype=float) for number, points in enumerate(hulls)}
     volumes = {number: ConvexHull(points).volume for number, points in pieces.items()}
@@ -113,18 +113,18 @@ def merge_hulls(hulls: Sequence[np.ndarray], slack: float = 0.002) -> list[np.nd
     heap: list[tuple[float, int, int]] = []
     joints: dict[tuple[int, int], tuple[np.ndarray, float]] = {}
 
-    def look(a: int, b: int) -> None:
+    def consider(a: int, b: int) -> None:
         joined = _joined_hull(pieces[a], pieces[b])
         if joined is None or (added := joined[1] - volumes[a] - volumes[b]) >= budget:
             return
-        # What two pieces share is in the sum of their volumes twice.
+        # The sum of their volumes counts the common volume twice.
         added += _common_volume(pieces[a], pieces[b])
         if added < budget:
             joints[a, b] = joined
             heapq.heappush(heap, (added, a, b))
 
     for a, b in combinations(sorted(pieces), 2):
-        look(a, b)
+        consider(a, b)
     fresh = len(pieces)
     while heap:
         added, a, b = heapq.heappop(heap)
@@ -135,7 +135,7 @@ def merge_hulls(hulls: Sequence[np.ndarray], slack: float = 0.002) -> list[np.nd
         del pieces[a], pieces[b]
         for other in sorted(pieces):
             if other != fresh:
-                look(other, fresh)
+                consider(other, fresh)
         fresh += 1
     return list(pieces.values())
 
@@ -181,7 +181,7 @@ def _convex_runs(slabs: list[tuple[float, float, float, float]]) -> list[list[tu
 def _nested_rings(region: Any) -> list[np.ndarray]:
     """Convex pieces of a half section away from the axis: the tube through all of it, then the rest.
 
-    Cut along cylinders, a flange needs wedges only where its inner chords lie hidden in the tube.
+    Cut along cylinders, a flange needs only wedges whose inner chords are hidden in the tube.
     """
     found = []
     for part in shapely.get_parts(region):

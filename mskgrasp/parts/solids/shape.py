@@ -1,7 +1,7 @@
-"""Shapes that carry their own convex pieces: a mesh body and the hulls that stand for it.
+"""Constructive shapes: a body with the convex pieces that represent it, in millimetres.
 
-Families build a part from a few of these, in millimetres. What is added, cut away, moved or turned changes
-body and hulls alike, so that a family need not think of collisions, unless it knows better.
+Families compose a part from a few of these. Adding, cutting, moving and turning apply to body and hulls,
+so that a family does not have to describe its collision geometry.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from mskgrasp.parts.solids import solid as s
 from mskgrasp.parts.solids.pieces import convex_polygons, merge_hulls, split_by, turned_pieces
 
 HULL_DETAIL_MM = 0.15
-"""Detail of an outline or profile that hulls leave out: small chamfers, the facets of fillets."""
+"""Size of detail that hulls leave out of an outline or profile: small chamfers, the facets of fillets."""
 
 FILLED_BORE_MM = 2.6
-"""Bores up to this radius are filled in the hulls: no finger goes in, and each would cost eight pieces."""
+"""Bores up to this radius are filled in the hulls: no finger enters, and each would cost eight pieces."""
 
 _SLIVER_MM = 0.05
-"""Pieces thinner than this are left out: PhysX could not cook them, nor would a finger feel them."""
+"""Pieces thinner than this are left out: PhysX cannot cook them, and they do not affect contact."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,18 +40,18 @@ class Shape:
     hulls: tuple[np.ndarray, ...]
 
     def __add__(self, other: Shape) -> Shape:
-        """Both together."""
+        """The union."""
         return Shape(body=self.body + other.body, hulls=(*self.hulls, *other.hulls))
 
     def __sub__(self, other: Shape) -> Shape:
-        """This one with the other one's room cut out, of the body and of the hulls."""
+        """The difference, of the bodies and of the hulls."""
         hulls = self.hulls
         for cutter in other.hulls:
             hulls = tuple(piece for points in hulls for piece in split_by(points, cutter))
         return Shape(body=self.body - other.body, hulls=hulls)
 
     def drilled(self, *tools: Shape | Manifold) -> Shape:
-        """The body with holes that the hulls fill."""
+        """The shape with holes in the body that its hulls leave filled."""
         body = self.body
         for tool in tools:
             body = body - (tool.body if isinstance(tool, Shape) else tool)
@@ -83,7 +83,7 @@ class Shape:
         )
 
     def solid(self, *, merge: bool = True) -> s.Solid:
-        """The finished part's shape; pieces that make a convex body together become one."""
+        """The solid of a part; pieces that form a convex body together become one."""
         hulls = [points for points in self.hulls if _is_thick(points)]
         if merge:
             hulls = merge_hulls(hulls)
@@ -131,10 +131,10 @@ def turned(profile: Sequence[tuple[float, float]]) -> Shape:
 
 
 def swept(sections: Sequence[np.ndarray]) -> Shape:
-    """A convex cross-section led along a path: each pair of neighbouring sections spans one piece.
+    """A convex cross-section swept along a path: each pair of neighbouring sections spans one piece.
 
     Args:
-        sections: (n, 3) corners of each section, equally many and in the same order. Bends want one section
+        sections: (n, 3) corners of each section, equally many and in the same order. Bends need one section
             for every 15 to 20 degrees.
     """
     pieces = [np.concatenate(pair) for pair in zip(sections[:-1], sections[1:], strict=True)]
@@ -143,7 +143,7 @@ def swept(sections: Sequence[np.ndarray]) -> Shape:
 
 
 def tool(body: Manifold, hulls: Iterable[np.ndarray] = ()) -> Shape:
-    """A body with convex pieces that the caller knows."""
+    """A body with given convex pieces."""
     return Shape(body=body, hulls=tuple(np.asarray(points, dtype=float) for points in hulls))
 
 

@@ -1,4 +1,4 @@
-"""Meshes of millions of triangles thinned out within a measured distance."""
+"""Decimation of meshes within a measured distance."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from mskgrasp.core.errors import BadPart
 from mskgrasp.parts.solids.surface import Surface, manifold_of, surface_of
 
 MANY_TRIANGLES = 50_000
-"""Meshes of more are thinned out: neither picture nor contact gains from them."""
+"""Meshes of more are decimated: neither pictures nor contacts gain from them."""
 
 MOST_TRIANGLES_LEFT = 200_000
 
 TOLERANCES_MM = (0.01, 0.02, 0.04)
-"""Of single collapses, tried in turn; their sum is measured."""
+"""Of single edge collapses, tried in turn; the resulting distance is measured."""
 
 MOST_MOVED_MM = 0.05
-"""How far the surface may be moved; common CAD tessellations are about as far from the true one."""
+"""Largest distance between the surfaces; common CAD tessellations are about as far from the true one."""
 
 COLLISION_TRIANGLES = 6_000
 COLLISION_TOLERANCES_MM = (0.01, 0.02, 0.05, 0.1, 0.2)
-"""Convex decomposition takes time by the triangle, and its pieces are tenths of a millimetre off anyway."""
+"""Convex decomposition takes time for each triangle, and its pieces deviate by tenths of a millimetre."""
 
 _FINE = 1 / 400
 """Of the part's length: the coarsest tolerance for small parts."""
@@ -31,8 +31,8 @@ _FINE = 1 / 400
 _SAMPLES = 40_000
 
 
-def thin_out(body: Manifold) -> tuple[Manifold, str | None]:
-    """The body with fewer triangles, and the sentence that says so; the same body where it has few.
+def decimate(body: Manifold) -> tuple[Manifold, str | None]:
+    """The body with fewer triangles, and a sentence that reports it; the same body where it has few.
 
     Raises:
         BadPart: Too many triangles are left.
@@ -52,13 +52,13 @@ def thin_out(body: Manifold) -> tuple[Manifold, str | None]:
     after = chosen.num_tri()
     if after > MOST_TRIANGLES_LEFT:
         raise BadPart(
-            f"has {before:,} triangles, and {after:,} when thinned out within {MOST_MOVED_MM} mm, "
+            f"has {before:,} triangles, and {after:,} when decimated within {MOST_MOVED_MM} mm, "
             f"the most is {MOST_TRIANGLES_LEFT:,} (a rough scan?): decimate it, for example in MeshLab"
         )
     if after == before:
         return body, None
     return chosen, (
-        f"thinned out from {before:,} to {after:,} triangles, the surface moved by at most {moved:.3f} mm"
+        f"decimated from {before:,} to {after:,} triangles, the surface moved by at most {moved:.3f} mm"
     )
 
 
@@ -76,7 +76,7 @@ def for_collision(mesh_mm: trimesh.Trimesh) -> trimesh.Trimesh:
 def surface_distance(before: Manifold, after: Manifold) -> float:
     """Largest distance of 40,000 points of a surface from its simplified one, mm."""
     size = np.asarray(after.bounding_box()).reshape(2, 3)
-    # Cut finely, so that the nearest triangle is among those with the nearest centres.
+    # Refined, so that the nearest triangle is among those with the nearest centres.
     target = surface_of(after.refine_to_length(float((size[1] - size[0]).max()) / 100)).triangles
     surface = surface_of(before)
     chosen = surface.vertices[surface.faces[:: max(1, 2 * len(surface.faces) // _SAMPLES)]]
@@ -90,7 +90,7 @@ def surface_distance(before: Manifold, after: Manifold) -> float:
 
 
 def _coarsened(body: Manifold, enough: int, tolerances_mm: tuple[float, ...]) -> Manifold:
-    """By the smallest tolerance that leaves few enough triangles, else by the largest."""
+    """Simplified by the smallest tolerance that leaves few enough triangles, or by the largest."""
     simpler = body
     for tolerance in tolerances_mm:
         simpler = body.simplify(tolerance)

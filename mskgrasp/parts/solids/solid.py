@@ -1,6 +1,6 @@
-"""Shapes in millimetres: watertight meshes made by manifold3d, and the convex pieces that stand for them.
+"""Solids in millimetres: watertight meshes made by manifold3d, with convex pieces that represent them.
 
-Families speak millimetres, as their standards do. A convex piece is an (n, 3) array of corner points.
+Families use millimetres, as their standards do. A convex piece is an (n, 3) array of corner points.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from manifold3d import CrossSection, FillRule, Manifold
 from scipy.spatial import ConvexHull, QhullError
 
 CIRCLE_SEGMENTS = 128
-"""Of round mesh surfaces: an inscribed 128-gon has 0.04 % less area than its circle."""
+"""Number of sides of round mesh surfaces: an inscribed 128-gon has 0.04 % less area than its circle."""
 
 ROUND_TOLERANCE_MM = 0.1
-"""How far the facets of a round hull may lie inside or outside the true circle."""
+"""Largest distance of a round hull's facets from the true circle, to either side."""
 
 BORE_TOLERANCE_MM = 0.25
-"""The same for bores: a hull costs one wedge per facet there, and fingers do not go in."""
+"""The same for bores, where each facet costs a wedge, and which fingers do not enter."""
 
 MAX_HULL_VERTICES = 32
-"""PhysX on a GPU silently shrinks hulls of more than 64 faces; 32 vertices have at most 60."""
+"""PhysX on a GPU silently reduces hulls of more than 64 faces; a hull of 32 vertices has at most 60."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Solid:
-    """A part's shape: its watertight mesh and the convex pieces that collide in its place, millimetres."""
+    """A part's watertight mesh and the convex pieces used for collision, millimetres."""
 
     mesh: trimesh.Trimesh
     hulls: tuple[np.ndarray, ...]
@@ -68,7 +68,7 @@ def sides_for(radius: float, tolerance: float, multiple: int, least: int, most: 
 
 
 def bore_polygon(radius: float, multiple: int = 2, centre: Sequence[float] = (0.0, 0.0)) -> np.ndarray:
-    """The polygon that stands for a bore in the hulls: 8 to 16 sides (6 to 18 by sixes)."""
+    """The polygon that represents a bore in the hulls: 8 to 16 sides (6 to 18 in multiples of six)."""
     least = 8 if multiple == 2 else multiple
     return balanced_polygon(radius, sides_for(radius, BORE_TOLERANCE_MM, multiple, least, 16), centre=centre)
 
@@ -201,7 +201,7 @@ def extrude(outline: np.ndarray, z0: float, z1: float, holes: Sequence[np.ndarra
 
 
 def circle(radius: float, centre: Sequence[float] = (0.0, 0.0)) -> np.ndarray:
-    """A circle as meshes draw it."""
+    """A circle as a polygon of the mesh."""
     return polygon(radius, CIRCLE_SEGMENTS) + np.asarray(centre)
 
 

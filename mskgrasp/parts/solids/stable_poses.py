@@ -26,11 +26,11 @@ MOST_POSES = 64
 
 @dataclass(frozen=True, kw_only=True)
 class Facet:
-    """One face of the convex hull that the part may stand on.
+    """Facet of the convex hull that the part may rest on.
 
     Attributes:
         normal: (3,) unit, out of the part.
-        landing: Probability of landing on it first.
+        landing: Probability of landing on it.
         margin: Distance of the centre's projection from the nearest border, negative outside, mm.
         neighbour: Facet across that border.
     """
@@ -57,7 +57,7 @@ def stable_poses(points_obj_mm: np.ndarray) -> tuple[Pose, np.ndarray]:
     for index, facet in enumerate(facets):
         probability[_roll(facets, index)] += facet.landing
     if not probability.any():
-        # Numerically nothing is stable: the widest facet is the best answer there is.
+        # Numerically no facet is stable: the one with the widest margin is taken.
         probability[int(np.argmax([facet.margin for facet in facets]))] = 1.0
     order = np.argsort(-probability, kind="stable")
     kept = [i for i in order if probability[i] >= LEAST_PROBABILITY * probability.sum()][:MOST_POSES]
@@ -88,11 +88,11 @@ def hull_facets(points: np.ndarray) -> list[Facet]:
 
 
 def _roll(facets: list[Facet], index: int) -> int:
-    """The facet on which a body that lands on ``index`` comes to rest."""
+    """The facet on which a body that lands on facet ``index`` comes to rest."""
     seen: list[int] = []
     while facets[index].margin < MARGIN_MM:
         if index in seen:
-            # Facets that send the body back and forth are all marginal: it stays on the widest of them.
+            # A body that rolls in a cycle stays on the facet with the widest margin.
             return max(seen[seen.index(index) :], key=lambda i: facets[i].margin)
         seen.append(index)
         index = facets[index].neighbour
@@ -111,7 +111,7 @@ def _coplanar_groups(hull: ConvexHull) -> np.ndarray:
         stack = [start]
         while stack:
             for other in hull.neighbors[stack.pop()]:
-                # Compared with the first triangle, not pairwise, so that a round surface does not join up.
+                # Compared with the first triangle, not pairwise: a round surface must not become one facet.
                 if group[other] < 0 and _angle(reference, hull.equations[other, :3]) < SAME_FACET_ANGLE:
                     group[other] = count
                     stack.append(other)

@@ -1,4 +1,4 @@
-"""Triangles in millimetres on their way from a file to a part."""
+"""Triangle surfaces in millimetres."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manifold3d import Error, Manifold, Mesh64
 from mskgrasp.core.errors import BadPart
 
 _MOST_CHANGE = 1e-4
-"""Of the volume: manifold3d tidies slivers away without asking, and with them folds that are not slivers."""
+"""Of the volume: manifold3d removes slivers silently, and with them folds that are not slivers."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,19 +41,19 @@ class Surface:
 
 
 def manifold_of(surface: Surface) -> Manifold:
-    """The surface as boolean operations take it.
+    """The surface as a body for boolean operations.
 
     Raises:
-        BadPart: It is no closed surface.
+        BadPart: The surface is not closed.
     """
     body = Manifold(
         Mesh64(np.ascontiguousarray(surface.vertices), np.ascontiguousarray(surface.faces, dtype=np.uint64))
     )
     if body.status() != Error.NoError or body.is_empty():
-        raise BadPart("is no proper solid: its faces do not bound a volume; repair and export it again")
+        raise BadPart("is not a proper solid: its faces do not bound a volume; repair and export it again")
     if abs(body.volume() - surface.volume) > _MOST_CHANGE * abs(surface.volume):
         raise BadPart(
-            "is no proper solid: some of its faces are folded over their neighbours; export it again, in "
+            "is not a proper solid: some of its faces are folded over their neighbours; export it again, in "
             "triangles (STL) where the format has polygons"
         )
     return body

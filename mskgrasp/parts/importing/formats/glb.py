@@ -19,7 +19,7 @@ _MOST_INSTANCES = 10_000
 
 
 def load_glb(content: bytes) -> Loaded:
-    """Reads all meshes of a GLB, each instance where its nodes put it; metres by the standard.
+    """Reads all meshes of a GLB, each instance placed by its nodes; metres by the standard.
 
     Raises:
         Unreadable: It is damaged, compressed, or keeps its geometry in other files.
@@ -38,9 +38,9 @@ def load_glb(content: bytes) -> Loaded:
             objects = _objects(scene)
     except Unreadable:
         raise
-    except Exception as error:  # the reader raises whatever it stumbles over
+    except Exception as error:  # the reader raises exceptions of many types
         reason = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise Unreadable(f"is no readable GLB ({reason[:80]}): export it again") from error
+        raise Unreadable(f"is not a readable GLB ({reason[:80]}): export it again") from error
     return Loaded(objects=objects, unit="m", unit_mm=1000.0, unit_by_convention=True)
 
 
@@ -69,21 +69,21 @@ def _objects(scene: trimesh.Scene) -> tuple[Surface, ...]:
 
 def _header(content: bytes) -> dict[str, Any]:
     if len(content) < 20 or content[:4] != b"glTF":
-        raise Unreadable("is no GLB (its first four bytes are not glTF): export it again as GLB")
+        raise Unreadable("is not a GLB (its first four bytes are not glTF): export it again as GLB")
     version, length = struct.unpack_from("<II", content, 4)
     if version != 2:
         raise Unreadable(f"is GLB of version {version}, only 2 is read: export it again as glTF 2.0 binary")
     if length > len(content):
         raise Unreadable(
-            f"is cut off: its header promises {length:,} bytes, the file has {len(content):,}; copy it again"
+            f"is cut off: its header states {length:,} bytes, the file has {len(content):,}; copy it again"
         )
     size, kind = struct.unpack_from("<I4s", content, 12)
     try:
         tree = json.loads(content[20 : 20 + size].decode()) if kind == b"JSON" else None
     except (ValueError, RecursionError) as error:
-        raise Unreadable("is no readable GLB (its JSON is damaged): export it again") from error
+        raise Unreadable("is not a readable GLB (its JSON is damaged): export it again") from error
     if not isinstance(tree, dict):
-        raise Unreadable("is no readable GLB (it has no JSON): export it again")
+        raise Unreadable("is not a readable GLB (it has no JSON): export it again")
     return tree
 
 
@@ -96,7 +96,7 @@ def _check_header(tree: dict[str, Any]) -> None:
         if any(word in str(name).lower() for word in _PACKED):
             raise Unreadable(f"is compressed ({name}): export it without compression")
     for accessor in _entries(tree, "accessors"):
-        # Without a buffer it is all zeros, as many as it claims.
+        # Without a buffer it is all zeros, in any number that the file claims.
         if "bufferView" not in accessor:
             raise Unreadable(
                 "has an array without data (sparse or compressed): export it without compression"
@@ -105,11 +105,11 @@ def _check_header(tree: dict[str, Any]) -> None:
     children = [str(child) for node in _entries(tree, "nodes") for child in node.get("children", ())]
     roots = {str(root) for scene in _entries(tree, "scenes") for root in scene.get("nodes", ())}
     if len(set(children)) < len(children) or roots & set(children):
-        raise Unreadable("is no readable GLB (a node has two parents or is its own): export it again")
+        raise Unreadable("is not a readable GLB (a node has two parents or is its own): export it again")
 
 
 def _entries(tree: dict[str, Any], key: str) -> list[dict[str, Any]]:
     entries = tree.get(key, [])
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise Unreadable(f"is no readable GLB ({key} is no list of objects): export it again")
+        raise Unreadable(f"is not a readable GLB ({key} is not a list of objects): export it again")
     return entries

@@ -15,7 +15,7 @@ from mskgrasp.parts.solids.surface import Surface
 
 
 def load_obj(content: bytes) -> Loaded:
-    """Reads an OBJ; its unit is unknown. Polygons are cut into triangles.
+    """Reads an OBJ; its unit is unknown. Polygons are triangulated.
 
     Raises:
         Unreadable: A line is damaged, or there are no vertices.
@@ -23,7 +23,7 @@ def load_obj(content: bytes) -> Loaded:
     vertices: list[list[bytes]] = []
     faces: list[tuple[int, int, int]] = []
     polygons: list[list[int]] = []
-    # Names may be in any encoding; what counts is ASCII.
+    # Names may be in any encoding; all that is read is ASCII.
     lines = content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines()
     for number, line in enumerate(lines, start=1):
         words = line.split()
@@ -38,7 +38,7 @@ def load_obj(content: bytes) -> Loaded:
         except ValueError as error:
             text = line.decode("ascii", "replace").strip()[:40]
             raise Unreadable(
-                f"is no readable OBJ (line {number}: {text!r}): export it again from the CAD program"
+                f"is not a readable OBJ (line {number}: {text!r}): export it again from the CAD program"
             ) from error
         # Counted from 1, or backwards from the vertex read last.
         corners = [corner - 1 if corner > 0 else len(vertices) + corner for corner in corners]
@@ -47,7 +47,7 @@ def load_obj(content: bytes) -> Loaded:
         elif len(corners) > 3:
             polygons.append(corners)
     if not vertices:
-        raise Unreadable("holds no vertices (text of another kind?): export it again as OBJ")
+        raise Unreadable("holds no vertices (not an OBJ?): export it again as OBJ")
     points = np.array(vertices, dtype="S").astype(np.float64)
     pieces = [np.array(faces, dtype=np.int64).reshape(-1, 3)]
     pieces += [triangulated(points, np.array(corners)) for corners in polygons]

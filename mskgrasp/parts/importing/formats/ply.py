@@ -16,18 +16,18 @@ def load_ply(content: bytes) -> Loaded:
     """Reads a PLY; its unit is unknown.
 
     Raises:
-        Unreadable: It is damaged or holds points alone.
+        Unreadable: It is damaged or holds only points.
     """
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             # From memory and without a resolver, so that the file cannot make the reader open others.
             mesh = trimesh.load(io.BytesIO(content), file_type="ply", process=False)
-    except Exception as error:  # the reader raises whatever it stumbles over
+    except Exception as error:  # the reader raises exceptions of many types
         reason = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise Unreadable(f"is no readable PLY ({reason[:80]}): export or copy it again") from error
+        raise Unreadable(f"is not a readable PLY ({reason[:80]}): export or copy it again") from error
     if not isinstance(mesh, trimesh.Trimesh):
-        raise Unreadable("holds no triangles (a cloud of points?): export it from the CAD program as a mesh")
+        raise Unreadable("holds no triangles (a point cloud?): export it from the CAD program as a mesh")
     return Loaded(
         objects=(
             Surface(

@@ -1,4 +1,4 @@
-"""Polygons of mesh files cut into triangles."""
+"""Triangulation of polygons in mesh files."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from manifold3d import triangulate
 def triangulated(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Triangles (n - 2, 3) of a polygon (n,) of indices into points, wound as the polygon is.
 
-    A convex polygon becomes a fan; of a concave one a fan would fold over itself. What names a point that is
-    not there is left to the checks that follow.
+    A convex polygon becomes a fan; of a concave one a fan would fold over itself. References to missing
+    points are left to the checks that follow.
     """
     fan = np.stack([np.full(len(corners) - 2, corners[0]), corners[1:-1], corners[2:]], axis=1)
     if corners.min() < 0 or corners.max() >= len(points) or not np.isfinite(points[corners]).all():
         return fan
     rim = points[corners] - points[corners[0]]
     normals = np.cross(rim[1:-1], rim[2:])
-    normal = normals.sum(axis=0)  # twice the area, whatever the shape (Newell)
+    normal = normals.sum(axis=0)  # twice the area of any shape (Newell)
     if (normals @ normal >= 0).all() or not normal.any():
         return fan
     along = np.eye(3)[np.argmin(np.abs(normal))]

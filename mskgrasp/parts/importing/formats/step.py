@@ -11,10 +11,10 @@ from mskgrasp.parts.importing.formats import Loaded, Unreadable
 from mskgrasp.parts.importing.formats.glb import load_glb
 
 TOLERANCE_MM = 0.02
-"""How far a triangle may lie from the true surface."""
+"""Largest distance of a triangle from the true surface."""
 
 ANGLE_RAD = 0.1
-"""Largest angle between neighbouring facets: 63 to a circle, which then has 0.17 % less area."""
+"""Largest angle between neighbouring facets: 63 in a circle, which then has 0.17 % less area."""
 
 LIMIT_S = 300.0
 
@@ -35,7 +35,7 @@ _UNITS = {b"MILLI": ("mm", 1.0), b"CENTI": ("cm", 10.0), b"MICRO": ("micrometre"
 
 
 def load_step(content: bytes) -> Loaded:
-    """Reads the solids of a STEP file; in metres, whatever unit the file states.
+    """Reads the solids of a STEP file, in the unit that the file states.
 
     Raises:
         Unreadable: It is damaged, has no solids, or cascadio is not installed.
@@ -43,11 +43,11 @@ def load_step(content: bytes) -> Loaded:
     if importlib.util.find_spec("cascadio") is None:
         raise Unreadable("is STEP, which needs an extra: pip install 'mskgrasp[cad]'")
     if b"ISO-10303-21" not in content[:4096]:
-        raise Unreadable("is no STEP (ISO-10303-21 is missing at its head): export it again as STEP")
+        raise Unreadable("is not a STEP file (ISO-10303-21 is missing at its head): export it again as STEP")
     if b"END-ISO-10303-21" not in content[-4096:]:
         raise Unreadable("is cut off: END-ISO-10303-21 is missing at its end; export or copy it again")
     try:
-        # In a process of its own: a file that crashes OpenCASCADE or never ends costs no other file.
+        # In a separate process: a file that crashes OpenCASCADE or hangs does not affect other files.
         done = subprocess.run(
             [sys.executable, "-I", "-c", _PROGRAM, str(TOLERANCE_MM), str(ANGLE_RAD)],
             input=content,
@@ -60,10 +60,12 @@ def load_step(content: bytes) -> Loaded:
             f"was not tessellated within {LIMIT_S:.0f} s: simplify it, or export it as STL"
         ) from error
     if done.returncode or not done.stdout:
-        raise Unreadable(f"is no readable STEP ({_reason(done.stderr)}): export it again as STEP or as STL")
+        raise Unreadable(
+            f"is not a readable STEP ({_reason(done.stderr)}): export it again as STEP or as STL"
+        )
     loaded = load_glb(done.stdout)
     name, length = _stated_unit(content)
-    # Vertices come in metres; they are handed on in the unit that the file states, as is its due.
+    # cascadio gives metres in any case; a file is returned in its own unit.
     objects = tuple(
         type(item)(vertices=item.vertices * (1000.0 / length), faces=item.faces) for item in loaded.objects
     )
@@ -80,4 +82,4 @@ def _stated_unit(content: bytes) -> tuple[str, float]:
 def _reason(printed: bytes) -> str:
     text = re.sub(r"\x1b\[[0-9;]*m|\*{2,}", "", printed.decode("utf-8", "replace"))
     lines = [" ".join(line.split()) for line in text.splitlines() if line.strip()]
-    return lines[0][:120] if lines else "OpenCASCADE gave up"
+    return lines[0][:120] if lines else "OpenCASCADE gave no reason"

@@ -25,7 +25,7 @@ def load_stl(content: bytes) -> Loaded:
     """Reads an STL; its unit is unknown.
 
     Raises:
-        Unreadable: It is text of another kind, cut off, or too far from its origin.
+        Unreadable: It is other text, cut off, or too far from its origin.
     """
     size = len(content)
     claimed = int.from_bytes(content[80:_HEADER], "little") if size >= _HEADER else 0
@@ -35,16 +35,16 @@ def load_stl(content: bytes) -> Loaded:
     if b"\0" not in content[:_HEADER] and re.search(rb"(?i)\bfacet\b", content[:4096]):
         return _text(content)
     if size < _HEADER or b"\0" not in content[:4096]:
-        raise Unreadable("is no STL (text without facets?): export it again from the CAD program")
+        raise Unreadable("is not an STL (text without facets?): export it again from the CAD program")
     if size < needed:
         raise Unreadable(
-            f"is cut off: its header promises {claimed:,} triangles, "
+            f"is cut off: its header states {claimed:,} triangles, "
             f"the file ends after {(size - _HEADER) // _TRIANGLE.itemsize:,}; export or copy it again"
         )
     return _binary(content, claimed, (f"ignored {size - needed:,} bytes after the last triangle",))
 
 
-def _binary(content: bytes, count: int, told: tuple[str, ...]) -> Loaded:
+def _binary(content: bytes, count: int, notes: tuple[str, ...]) -> Loaded:
     if count > MOST_TRIANGLES:
         raise Unreadable(f"has {count:,} triangles, the most is {MOST_TRIANGLES:,}: export it coarser")
     records = np.frombuffer(content, dtype=_TRIANGLE, count=count, offset=_HEADER)
@@ -57,7 +57,7 @@ def _binary(content: bytes, count: int, told: tuple[str, ...]) -> Loaded:
                 f"steps of {100 * np.spacing(farthest) / length:.2g} % of it: move it to the origin and "
                 "export it again"
             )
-    return Loaded(objects=(_soup(corners.astype(np.float64)),), told=told)
+    return Loaded(objects=(_soup(corners.astype(np.float64)),), notes=notes)
 
 
 def _text(content: bytes) -> Loaded:

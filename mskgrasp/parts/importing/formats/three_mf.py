@@ -21,12 +21,12 @@ from mskgrasp.parts.importing.formats import MOST_TRIANGLES, Loaded, Unreadable
 from mskgrasp.parts.solids.surface import Surface
 
 MOST_UNPACKED = 1 << 30
-"""Bytes that the zip may unfold to."""
+"""Largest unpacked size of the archive, bytes."""
 
 _MOST_INSTANCES = 10_000
 _DEEPEST = 32
 
-# Core specification, section 3.4: millimetres where nothing is said.
+# Core specification, section 3.4: millimetres by default.
 _UNITS = {
     "micron": ("micron", 1e-3),
     "millimeter": ("mm", 1.0),
@@ -36,7 +36,7 @@ _UNITS = {
     "meter": ("m", 1000.0),
 }
 _FOREIGN = ("beamlattice", "securecontent", "volumetric", "boolean")
-"""Extensions that make something else than triangles of the shape; they stand in their namespaces."""
+"""Extensions that describe the shape by something other than triangles, by a word of their namespace."""
 
 _Key = tuple[str, str]
 
@@ -50,7 +50,7 @@ class _Object:
 
 
 class _Model:
-    """What one ``.model`` file of the archive says."""
+    """Content of one ``.model`` file of the archive."""
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -84,48 +84,50 @@ class _Model:
 
 
 def load_3mf(content: bytes) -> Loaded:
-    """Reads what a 3MF builds, each instance in its place, in the unit that the file states.
+    """Reads the build items of a 3MF, each instance in its place, in the unit that the file states.
 
     Raises:
-        Unreadable: It is damaged, unfolds to more than 1 GiB, or is not made of triangles.
+        Unreadable: It is damaged, unpacks to more than 1 GiB, or is not made of triangles.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             models = _models(archive)
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        raise Unreadable(f"is no readable 3MF ({error}): export or copy it again") from error
+        raise Unreadable(f"is not a readable 3MF ({error}): export or copy it again") from error
     except expat.ExpatError as error:
-        raise Unreadable(f"is no readable 3MF (XML: {error}): export it again") from error
+        raise Unreadable(f"is not a readable 3MF (XML: {error}): export it again") from error
     except (KeyError, ValueError, OverflowError) as error:
-        raise Unreadable(f"is no readable 3MF (bad or missing attribute {error}): export it again") from error
+        raise Unreadable(
+            f"is not a readable 3MF (bad or missing attribute {error}): export it again"
+        ) from error
     root = models[0]
     if root.unit not in _UNITS:
         raise Unreadable(f"states the unit {root.unit!r}, 3MF knows {', '.join(_UNITS)}: export it again")
     objects = {key: item for model in models for key, item in model.objects.items()}
     surfaces, skipped = _placed(root, objects)
     name, length = _UNITS[root.unit]
-    told = (f"left out {skipped} support object{'s' if skipped > 1 else ''}",) if skipped else ()
-    return Loaded(objects=tuple(surfaces), unit=name, unit_mm=length, told=told)
+    notes = (f"left out {skipped} support object{'s' if skipped > 1 else ''}",) if skipped else ()
+    return Loaded(objects=tuple(surfaces), unit=name, unit_mm=length, notes=notes)
 
 
 def _models(archive: zipfile.ZipFile) -> list[_Model]:
-    """The main model first, then those that it may refer to."""
+    """The main model, then the other models of the archive."""
     entries = [entry for entry in archive.infolist() if entry.filename.lower().endswith(".model")]
     unpacked = sum(entry.file_size for entry in entries)
     if unpacked > MOST_UNPACKED:
         raise Unreadable(
-            f"unfolds to {unpacked / 2**30:.1f} GiB, the most is {MOST_UNPACKED >> 30}: export it coarser"
+            f"unpacks to {unpacked / 2**30:.1f} GiB, the most is {MOST_UNPACKED >> 30}: export it coarser"
         )
     main = [entry for entry in entries if entry.filename.lower().lstrip("/") == "3d/3dmodel.model"]
     if not main:
-        raise Unreadable("is no readable 3MF (3D/3dmodel.model is missing): export it again")
+        raise Unreadable("is not a readable 3MF (3D/3dmodel.model is missing): export it again")
     models = []
     for entry in [main[0], *(entry for entry in entries if entry is not main[0])]:
         model = _Model(entry.filename.lstrip("/"))
         parser = expat.ParserCreate()
         parser.buffer_text = True
         parser.StartElementHandler = model.start
-        # The core specification forbids a DTD; it could make the file unfold without end.
+        # The core specification forbids a DTD; its entities could expand without limit.
         parser.StartDoctypeDeclHandler = _refuse_dtd
         with archive.open(entry) as file:
             parser.ParseFile(file)
@@ -134,7 +136,7 @@ def _models(archive: zipfile.ZipFile) -> list[_Model]:
 
 
 def _placed(root: _Model, objects: dict[_Key, _Object]) -> tuple[list[Surface], int]:
-    """What the build lists, components resolved; how many objects were no part of the model."""
+    """Surfaces of the build items with components resolved, and the number of support objects left out."""
     surfaces: list[Surface] = []
     pending = [(key, matrix, 0) for key, matrix in reversed(root.items)]
     skipped = total = steps = 0
@@ -146,7 +148,7 @@ def _placed(root: _Model, objects: dict[_Key, _Object]) -> tuple[list[Surface], 
                 f"nests over {_DEEPEST} components or places over {_MOST_INSTANCES:,}: export one part alone"
             )
         if key not in objects:
-            raise Unreadable(f"refers to the object {key[1]!r} that is not there: export it again")
+            raise Unreadable(f"refers to the missing object {key[1]!r}: export it again")
         item = objects[key]
         if item.kind in ("support", "solidsupport"):
             skipped += 1

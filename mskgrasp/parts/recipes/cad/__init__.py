@@ -18,11 +18,11 @@ def available() -> bool:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the vendors' libraries: they decide how a part comes out."""
+    """Versions of the libraries, on which the shapes depend."""
     return {name: importlib.metadata.version(name) for name in VENDORS}
 
 
 def recipes() -> Iterator[Recipe]:
-    """The parts of all modules here."""
+    """Recipes of all CAD modules."""
     for module in (drawn, screws, stock):
         yield from module.recipes()

@@ -1,4 +1,4 @@
-"""From build123d's exact shapes to meshes: one tolerance for all, and nothing kept between parts."""
+"""Meshes of build123d's exact shapes, with one tolerance for all, and tables of the CAD recipes."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def table(file_name: str) -> list[Row]:
 
 
 def lengths(row: Row) -> dict[str, float]:
-    """What a row says in numbers: the columns that end in ``_mm`` and those that end in ``_count``."""
+    """The numeric columns of a row: those that end in ``_mm``, ``_count`` or ``_deg``."""
     return {key: float(text) for key, text in row.items() if key.endswith(("_mm", "_count", "_deg"))}
 
 
 def needs_cad(make: Callable[..., Any]) -> Callable[..., Any]:
-    """A maker that says what to install where the vendors' libraries are missing, and mutes their warnings.
+    """Wraps a maker: silences the libraries' warnings, and names the extra where they are missing.
 
     Raises:
         BadPart: build123d or bd_warehouse is not installed, or could not draw the part.
@@ -46,7 +46,7 @@ def needs_cad(make: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(make)
     def guarded(size: dict[str, float]) -> Any:
         with warnings.catch_warnings():
-            # Deprecations inside build123d and its dependencies are not ours to mend.
+            # Deprecations inside build123d and its dependencies cannot be fixed here.
             warnings.simplefilter("ignore")
             try:
                 return make(size)
@@ -56,7 +56,7 @@ def needs_cad(make: Callable[..., Any]) -> Callable[..., Any]:
                     "pip install 'mskgrasp[cad]'"
                 ) from error
             except (ValueError, RuntimeError, KeyError) as error:
-                # OpenCascade refuses some fillets; which ones changes with its version.
+                # OpenCASCADE fails on some fillets, depending on its version.
                 raise BadPart(
                     f"build123d could not draw it ({error}): install the versions that pyproject.toml names"
                 ) from error
@@ -65,7 +65,7 @@ def needs_cad(make: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def mesh_of(shape: Any) -> trimesh.Trimesh:
-    """A freshly built shape as a mesh in its own place; one that was meshed before keeps its old facets.
+    """Tessellates a shape that was not tessellated before: OpenCASCADE would return its earlier facets.
 
     Raises:
         BadPart: The facets do not close.

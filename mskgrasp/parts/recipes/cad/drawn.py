@@ -14,7 +14,7 @@ from mskgrasp.parts.recipes.cad.brep import lengths, mesh_of, needs_cad, table
 from mskgrasp.parts.recipes.cad.hulls import turned_hulls
 from mskgrasp.parts.recipes.recipe import ALUMINIUM, STEEL, Recipe
 from mskgrasp.parts.solids import solid as s
-from mskgrasp.parts.solids.measure import MOST_OBLONG, oblongness
+from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, aspect_ratio
 from mskgrasp.parts.solids.pieces import merge_hulls, split_by, turned_pieces
 from mskgrasp.parts.solids.shape import HULL_DETAIL_MM
 
@@ -47,7 +47,7 @@ def _maker(
 
         a, b, c, d, e, f = (size[f"{letter}_mm"] for letter in "abcdef")
         mesh = mesh_of(draw(build123d, (a, b, c, d, e, f)))
-        # Without pieces of its own the mesh is decomposed.
+        # A mesh without given pieces is decomposed.
         hulls = pieces(mesh, (a, b, c, d, e, f)) if pieces else []
         return s.Solid(mesh=mesh, hulls=tuple(hulls))
 
@@ -93,7 +93,7 @@ def port_block(b: Any, size: Size) -> Any:
 
 
 def _block_pieces(_: trimesh.Trimesh, size: Size) -> list[np.ndarray]:
-    """Sectors around the long bore, chamfered, with the room of the cross bores cut out of them."""
+    """Sectors around the long bore, chamfered, with the cross bores cut out of them."""
     length, width, height, bore, cross, edge = size
     outline = s.rectangle(-height / 2, height / 2, -width / 2, width / 2)
     sectors = s.around_hole(outline, s.bore_polygon(bore / 2), -length / 2, length / 2)
@@ -104,7 +104,7 @@ def _block_pieces(_: trimesh.Trimesh, size: Size) -> list[np.ndarray]:
     for x in (-length / 4, length / 4):
         cutter = s.prism(s.bore_polygon(cross / 2, centre=(x, 0)), 0, height)
         pieces = [rest for points in pieces for rest in split_by(points, cutter)]
-    return merge_hulls([points for points in pieces if oblongness(points) <= 0.9 * MOST_OBLONG], 0.01)
+    return merge_hulls([points for points in pieces if aspect_ratio(points) <= 0.9 * MOST_ASPECT_RATIO], 0.01)
 
 
 def cast_angle(b: Any, size: Size) -> Any:
@@ -199,4 +199,4 @@ HULLS: dict[str, Callable[[trimesh.Trimesh, Size], list[np.ndarray]]] = {
     "port_block": _block_pieces,
     "nozzle": lambda mesh, _: merge_hulls(turned_hulls(mesh), 0.03),
 }
-"""Pieces of the families that know their own."""
+"""Makers of the convex pieces of families that are not decomposed."""

@@ -1,4 +1,4 @@
-"""Convex pieces read off the mesh of a shape whose kind is known: turned, extruded, or a screw."""
+"""Convex pieces from meshes of turned shapes, extruded shapes and screws."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import trimesh
 from manifold3d import Manifold, Mesh64
 
 from mskgrasp.parts.solids import solid as s
-from mskgrasp.parts.solids.measure import MOST_OBLONG, oblongness
+from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, aspect_ratio
 from mskgrasp.parts.solids.pieces import convex_polygons, merge_hulls, turned_pieces
 from mskgrasp.parts.solids.shape import FILLED_BORE_MM, HULL_DETAIL_MM
 
@@ -41,7 +41,7 @@ def extruded_hulls(
     detail_mm: float = HULL_DETAIL_MM,
     slack: float = 0.002,
 ) -> list[np.ndarray]:
-    """Pieces of an outline extruded along z, as it is half way up.
+    """Pieces of an outline extruded along z, by its section at half height.
 
     Args:
         mesh: Of the shape.
@@ -94,25 +94,25 @@ def plane_section(mesh: trimesh.Trimesh, z: float) -> Any:
     body = Manifold(Mesh64(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.uint64)))
     region: Any = shapely.Polygon()
     for loop in body.slice(z).to_polygons():
-        # Loops are wound by what they bound: holes clockwise; inside one another they take turns.
+        # Loops are wound by what they bound: holes clockwise; nested loops alternate.
         region = region.symmetric_difference(shapely.Polygon(np.asarray(loop)).buffer(0))
     return region
 
 
 def _cut_to_length(points: np.ndarray, low: float, high: float) -> list[np.ndarray]:
-    """A prism along z cut across until PhysX takes its parts."""
+    """A prism along z cut across until PhysX accepts its parts."""
     ends = points[np.abs(points[:, 2] - low) < 1e-6, :2]
     for count in range(1, 5):
         levels = np.linspace(low, high, count + 1)
         parts = [s.prism(ends, float(a), float(b)) for a, b in zip(levels[:-1], levels[1:], strict=True)]
-        if oblongness(parts[0]) <= 0.9 * MOST_OBLONG:
+        if aspect_ratio(parts[0]) <= 0.9 * MOST_ASPECT_RATIO:
             return parts
     return []  # a sliver of less than 0.8 mm
 
 
 def _thick(pieces: list[np.ndarray]) -> list[np.ndarray]:
     """Pieces without the slivers that a fillet's facets leave between two others."""
-    return [points for points in pieces if oblongness(points) <= 0.9 * MOST_OBLONG]
+    return [points for points in pieces if aspect_ratio(points) <= 0.9 * MOST_ASPECT_RATIO]
 
 
 def _filled(section: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Screws that the own families lack, drawn by bd_warehouse without threads; head at z = 0, shank below."""
+"""Screws of further types from bd_warehouse, without threads; head at z = 0, shank below."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STANDARDS = {
     "iso7045": "ISO 7045",
     "iso7380_2": "ISO 7380-2",
 }
-"""What the vendor's types are; DIN 1662 and DIN 1665 became EN standards under the same numbers."""
+"""Standard of each type of the library; DIN 1662 and DIN 1665 became EN standards under the same numbers."""
 
 _CLOSE_MM = 0.35
 _CLOSE_RATIO = 1.05

@@ -1,4 +1,4 @@
-"""Pipes, rails, rings and machine parts that bd_warehouse draws."""
+"""Pipes, rails, rings and machine parts from bd_warehouse."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ def _maker(row: Row) -> Callable[[dict[str, float]], s.Solid]:
 
 
 def _drawn(row: Row, size: dict[str, float]) -> Any:
-    """The vendor's shape."""
+    """The shape from the library."""
     import build123d as b
     from bd_warehouse import fastener, o_rings, open_builds
 
     match row["class"]:
         case "Pipe":
-            # The vendor's own class asks its materials for a "steel" that they do not know.
+            # The library's class asks for a material "steel" that it does not define.
             outer, length = size["d_mm"] / 2, size["length_mm"]
             return b.Cylinder(outer, length) - b.Cylinder(outer - size["wall_mm"], 2 * length)
         case "VSlotLinearRail":

@@ -1,4 +1,4 @@
-"""The built-in families of parts; each module holds the families that are built alike."""
+"""Built-in families of parts, one module for each kind of construction."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ STARTER = (
     "u_bracket_60x35",
     "washer_m36",
 )
-"""The starter set: 25 parts of 17 families that are ready in some seconds; the demo is made of them."""
+"""The starter set: 25 parts of 17 families that are built in a few seconds; the demo uses them."""
 
 
 @lru_cache(maxsize=1)

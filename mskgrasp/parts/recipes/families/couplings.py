@@ -1,4 +1,4 @@
-"""What joins shafts: couplings of many kinds, clamp collars."""
+"""Shaft couplings and clamp collars."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def bellows_coupling(size: dict[str, float]) -> s.Solid:
 
 
 def beam_coupling(size: dict[str, float]) -> s.Solid:
-    """A sleeve made flexible by narrow cuts, each through all but a bridge, in turns a quarter apart."""
+    """A sleeve made flexible by narrow cuts, each through all but a bridge, alternating by a quarter turn."""
     outer, bore, top, cuts = size["D_mm"] / 2, size["d_mm"] / 2, size["L_mm"], int(size["cuts"])
     body = tube(outer, bore, 0, top)
     middle = np.linspace(0.32, 0.68, cuts) * top

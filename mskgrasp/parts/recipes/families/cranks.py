@@ -1,4 +1,4 @@
-"""Parts that turn a rotation into a stroke: eccentrics, cams, cranks."""
+"""Eccentrics, cams and cranks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def recipes() -> Iterator[Recipe]:
 
 
 def eccentric_shaft(size: dict[str, float]) -> s.Solid:
-    """A shaft whose middle seat lies off its axis."""
+    """A shaft with an eccentric middle seat."""
     l1, l2 = size["l1_mm"], size["l2_mm"]
     lower = seats({"d1_mm": size["d1_mm"], "l1_mm": l1 + 1})
     upper = seats({"d1_mm": size["d3_mm"], "l1_mm": size["l3_mm"] + 1}).moved(z=l1 + l2 - 1)
@@ -38,7 +38,7 @@ def eccentric_shaft(size: dict[str, float]) -> s.Solid:
 
 
 def cam_outline(base: float, nose: float, lift: float, segments: int) -> np.ndarray:
-    """Base circle about the origin and nose circle, joined by tangents; the tip lies ``lift`` further out."""
+    """Base circle about the origin and nose circle, joined by tangents; the tip is ``lift`` further out."""
     circles = [s.polygon(base, segments), s.polygon(nose, segments) + [base + lift - nose, 0.0]]
     hull = shapely.MultiPoint(np.concatenate(circles)).convex_hull
     return np.asarray(shapely.get_coordinates(hull))[:-1]
@@ -101,7 +101,7 @@ def disc_cam(size: dict[str, float]) -> s.Solid:
 
 
 def eccentric_bushing(size: dict[str, float]) -> s.Solid:
-    """A tube whose bore lies off its axis, with a round flange."""
+    """A tube with an eccentric bore and a round flange."""
     r, bore, e, top = size["D_mm"] / 2, size["d_mm"] / 2, size["e_mm"], size["L_mm"]
     flange, t = size["flange_mm"] / 2, size["t_mm"]
     hole = s.bore_polygon(bore, centre=(e, 0))

@@ -11,7 +11,7 @@ from mskgrasp.parts.solids import shape as h
 from mskgrasp.parts.solids import solid as s
 
 MOTOR = 3900.0
-"""kg/m^3 of a stepper motor's envelope: with it one of NEMA size 17 and 40 mm weighs its usual 0.28 kg."""
+"""kg/m^3 of a stepper motor's envelope: a NEMA 17 motor of 40 mm then has its usual mass of 0.28 kg."""
 
 COIL = 5500.0
 """kg/m^3 of iron, copper and air in a coil's frame."""

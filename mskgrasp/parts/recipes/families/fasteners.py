@@ -1,4 +1,4 @@
-"""Bolts, screws, nuts and washers, without threads: a cylinder of the nominal diameter stands for one."""
+"""Bolts, screws, nuts and washers, with threads modelled as cylinders of the nominal diameter."""
 
 from __future__ import annotations
 

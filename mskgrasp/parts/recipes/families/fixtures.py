@@ -1,4 +1,4 @@
-"""Workholding: V-blocks, step blocks, jaws, gripper fingers, clamping straps and blocks."""
+"""Workholding parts: V-blocks, step blocks, jaws, gripper fingers, clamping straps and blocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Forms that fasteners, eyes and grips share: bent rods, rings, knurls, hexagons, lobes; millimetres."""
+"""Shared shapes of fasteners, eyes and grips: bent rods, rings, knurls, hexagons, lobes; millimetres."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mskgrasp.parts.solids import solid as s
 from mskgrasp.parts.solids.pieces import convex_polygons
 
 BEND_TOLERANCE_MM = 0.3
-"""How far the hulls of a bend may lie inside or outside its true arc."""
+"""Largest distance of a bend's hulls from its true arc, to either side."""
 
 _ROD_SEGMENTS = 64
 _FINE_STEP = np.radians(4)
@@ -28,7 +28,7 @@ def arc(
     """Points of a half profile on a circle about (x, z), from one angle to another in degrees."""
     angles = np.radians(np.linspace(start, end, count))
     points = np.stack([x + radius * np.cos(angles), z + radius * np.sin(angles)], axis=1)
-    # Rounding must not leave the axis by a hair: it would open a needle-thin bore.
+    # A rounding error off the axis would open a needle-thin bore.
     points[np.abs(points[:, 0]) < 1e-9, 0] = 0.0
     return [(float(a), float(b)) for a, b in points]
 
@@ -160,7 +160,7 @@ def _hull_section(radius: float, sides: int = 10) -> np.ndarray:
 
 
 def _ring(centre: np.ndarray, heading: float, section: np.ndarray) -> np.ndarray:
-    """A section (n, 2), across the path and along z, put to a path in the xy-plane."""
+    """A section (n, 2), across the path and along z, placed on a path in the xy-plane."""
     across = np.array([-np.sin(heading), np.cos(heading), 0.0])
     return np.array([*centre, 0.0]) + section[:, :1] * across + section[:, 1:] * np.array([0.0, 0.0, 1.0])
 

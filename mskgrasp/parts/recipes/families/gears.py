@@ -74,7 +74,7 @@ def toothing(module: float, teeth: int, face: float, core: sh.Shape, helix: floa
     twist = face * np.tan(helix) / (transverse * teeth / 2)
     steps = max(1, int(np.ceil(abs(twist) / MOST_TWIST)))
     outline = _gear_outline(transverse, teeth, module)
-    # A thin rim carries the teeth; the core fills it, whatever its own shape.
+    # A thin rim carries the teeth; the core fills it in any shape.
     rim = s.circle(transverse * teeth / 2 - DEDENDUM * module - 0.4 * module)
     section = CrossSection([outline, rim], FillRule.EvenOdd)
     body = section.extrude(face, 4 * steps if twist else 0, float(np.degrees(twist)))
@@ -117,7 +117,7 @@ def rim_and_hub(size: dict[str, float], rim: float) -> sh.Shape:
     """The toothed rim of inner radius ``rim`` and the bored hub in its middle, not joined."""
     face, root, hub, bore = size["face_mm"], root_radius(size), size["hub_mm"] / 2, size["bore_mm"] / 2
     low, high = (face - size["hub_length_mm"]) / 2, (face + size["hub_length_mm"]) / 2
-    # Ten wedges stand for the rim; its inner side lies within the web's recess, out of a finger's reach.
+    # Ten wedges represent the rim; its inner side is in the web's recess, which fingers do not reach.
     wedges = s.around_hole(s.round_outline(root, 10), s.balanced_polygon(rim, 10), 0, face)
     ring = sh.tool(s.extrude(s.circle(root), 0, face, [s.circle(rim)]), wedges)
     tube = sh.tool(s.extrude(s.circle(hub), low, high, [s.circle(bore)]), s.ring(hub, bore, low, high))

@@ -1,4 +1,4 @@
-"""Turns the rows of a table into recipes."""
+"""Recipes from the rows of a dimension table."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def one_per_row(
     Args:
         file_name: Of the table.
         name: Format string over the columns without their ``_mm``; a decimal point becomes a p.
-        make: Turns a row into a shape.
-        source: The standard, or what stands in for one.
+        make: Makes a solid of a row.
+        source: The standard, or another origin of the dimensions.
         density: kg/m^3.
         family: Kind of part; the name of ``make`` without one.
     """

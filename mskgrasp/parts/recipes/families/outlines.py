@@ -1,4 +1,4 @@
-"""Outlines and bars that angular families share; millimetres."""
+"""Shared outlines and bars of angular families; millimetres."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def _beaded(size: dict[str, float], length: float) -> h.Shape:
 
 
 def _barbed(size: dict[str, float]) -> h.Shape:
-    """A hose tail along z: the body, then saw teeth, which the hulls draw as a smooth tail.
+    """A hose tail along z: the body, then saw teeth, which are a smooth tail in the hulls.
 
     The sharp side of each tooth faces the body, so that a hose slips on but not off.
     """
@@ -108,7 +108,7 @@ def _tee(leg: h.Shape, branch: h.Shape, bore: float) -> h.Shape:
     holes = [o.bore(bore, 0, 500).turned("y", angle).body for angle in legs]
     body = Manifold.batch_boolean(bodies, OpType.Add)
     run = [piece for angle in (90, -90) for piece in leg.turned("y", angle).hulls]
-    # A box stands for the opening in the run's wall; corners of the wall that it spares are the branch's.
+    # A box represents the opening in the wall of the run; the branch covers the corners that it leaves.
     opening = s.box(-0.9 * bore, 0.9 * bore, -0.8 * bore, 0.8 * bore, 0, 500)
     hulls = [part for piece in run for part in split_by(piece, opening)]
     hulls += s.cut(branch.hulls, [np.array([0.0, 0.0, -1.0])], [-bore])

@@ -83,7 +83,7 @@ def drilled_bar(size: dict[str, float]) -> s.Solid:
 
 
 def link_plate(size: dict[str, float]) -> s.Solid:
-    """Two eyes joined by a waist, as links of heavy chains have it; x runs from eye to eye."""
+    """Two eyes joined by a waist, as in links of heavy chains; x runs from eye to eye."""
     p, eye, waist, t = size["p_mm"] / 2, size["w_mm"] / 2, size["waist_mm"] / 2, size["t_mm"]
     outline = o.together(s.circle(eye, (-p, 0)), s.circle(eye, (p, 0)), s.rectangle(-p, p, -waist, waist))
     bore = size["bore_mm"] / 2

@@ -13,11 +13,11 @@ from mskgrasp.parts.recipes.families.listing import one_per_row
 from mskgrasp.parts.recipes.recipe import ALUMINIUM, Recipe
 from mskgrasp.parts.solids import shape as h
 from mskgrasp.parts.solids import solid as s
-from mskgrasp.parts.solids.measure import oblongness
+from mskgrasp.parts.solids.measure import aspect_ratio
 from mskgrasp.parts.solids.pieces import convex_polygons
 
 MOST_SLENDER = 45.0
-"""Length by thickness of a hull: a little less than what PhysX on a GPU takes."""
+"""Largest ratio of length to thickness of a hull, below the limit of PhysX on a GPU."""
 
 
 def recipes() -> Iterator[Recipe]:
@@ -153,20 +153,20 @@ def _rotate(points: np.ndarray, degrees: int) -> np.ndarray:
 
 
 def _laid(upright: h.Shape) -> s.Solid:
-    """What was extruded along z, along x."""
+    """A shape extruded along z, turned to lie along x."""
     return _finished(upright.turned("y", 90).turned("x", 90))
 
 
 def _finished(bar: h.Shape) -> s.Solid:
-    """A bar along x; pieces too slender for PhysX are cut across until they are not."""
+    """A bar along x; pieces too slender for PhysX are cut across."""
     merged = bar.solid()
-    return s.solid(bar.body, [part for points in merged.hulls for part in _stout(points)])
+    return s.solid(bar.body, [part for points in merged.hulls for part in _split_slender(points)])
 
 
-def _stout(points: np.ndarray) -> list[np.ndarray]:
-    if oblongness(points) <= MOST_SLENDER:
+def _split_slender(points: np.ndarray) -> list[np.ndarray]:
+    if aspect_ratio(points) <= MOST_SLENDER:
         return [points]
     middle = float(points[:, 0].min() + points[:, 0].max()) / 2
     along = np.array([1.0, 0.0, 0.0])
     halves = s.cut([points], [along], [middle]) + s.cut([points], [-along], [-middle])
-    return [part for half in halves for part in _stout(half)]
+    return [part for half in halves for part in _split_slender(half)]

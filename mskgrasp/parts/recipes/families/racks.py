@@ -1,4 +1,4 @@
-"""Toothed parts that are no plain wheels: racks, bevel gears, worms."""
+"""Racks, bevel gears and worms."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _rack_tooth(module: float, x: float, y0: float, y1: float, root: float, tip:
     )
     corners = np.array([[x - foot, root - 0.2], [x + foot, root - 0.2], [x + foot, root], [x + top, tip]])
     corners = np.concatenate([corners, [[x - top, tip], [x - foot, root]]])
-    # Extruded along z, then laid over so that the outline's second axis is z.
+    # Extruded along z, then turned so that the outline's second axis is z.
     return sh.plate(corners, -y1, -y0).turned("x", 90)
 
 

@@ -13,7 +13,7 @@ from mskgrasp.parts.solids import shape as sh
 from mskgrasp.parts.solids import solid as s
 
 BEARING = 5300.0
-"""kg/m^3 of the solid ring: with it a 6204 weighs its catalogue mass of 0.106 kg; raceways are hollow."""
+"""kg/m^3 of the solid ring: a 6204 then has its catalogue mass of 0.106 kg with hollow raceways."""
 
 
 def recipes() -> Iterator[Recipe]:
@@ -106,7 +106,7 @@ def tube(outer: float, bore: float, z0: float, z1: float) -> sh.Shape:
 
 
 def groove(outer: float, floor: float, z0: float, z1: float) -> sh.Shape:
-    """What a turning tool takes from the outside; hulls are to fill it."""
+    """The volume turned off the outside; hulls fill it."""
     return sh.tool(s.lathe([(floor, z0), (outer + 1, z0), (outer + 1, z1), (floor, z1)]))
 
 
@@ -152,7 +152,7 @@ def thrust_bearing(size: dict[str, float]) -> s.Solid:
     housing = s.extrude(s.circle(size["D1_mm"] / 2), -1, middle - gap / 2)
     slit = groove(outer, outer - 0.8, middle - gap / 2, middle + gap / 2)
     ring = tube(outer, bore, 0, height).drilled(slit, housing)
-    # The bore of the hulls lies between those of the two washers, which differ by 1 mm in radius.
+    # The bore of the hulls is between those of the two washers, which differ by 1 mm in radius.
     hole = s.balanced_polygon((bore + size["D1_mm"] / 2) / 2, 18)
     return s.solid(ring.body, s.around_hole(s.round_outline(outer, 18), hole, 0, height))
 
@@ -166,7 +166,7 @@ def spherical_bearing(size: dict[str, float]) -> s.Solid:
     upper = [(bore, width), *side, (outer - 0.6, ring), (outer, ring - 0.6)]
     profile = upper + [(radius, -z) for radius, z in upper[::-1]]
     body = s.lathe(profile[::-1])
-    # Straight collars of the ball's mean radius stand for what looks out of the ring.
+    # Straight collars of the ball's mean radius represent the ends that project from the ring.
     mean = (side[0][0] + side[-1][0]) / 2
     collar = s.around_hole(s.balanced_polygon(mean, 24), s.balanced_polygon(bore, 8), ring, width)
     below = [points * [1, 1, -1] for points in collar]

@@ -1,4 +1,4 @@
-"""Shafts: turned seats on one axis, with what is milled or drilled into them."""
+"""Shafts: turned seats on one axis, with milled and drilled features."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def seats(size: dict[str, float], chamfer: float = CHAMFER) -> sh.Shape:
 
 
 def keyway(radius: float, width: float, depth: float, z0: float, z1: float) -> Manifold:
-    """What an end mill cuts into the +x side of a shaft; hulls fill it, for no finger goes in."""
+    """A keyway milled into the +x side of a shaft; hulls fill it, since no finger enters."""
     middle = shapely.LineString([(z0 + width / 2, 0), (z1 - width / 2, 0)]).buffer(width / 2, quad_segs=16)
     outline = np.asarray(shapely.get_coordinates(middle))[:-1]
     return sh.tool(s.extrude(outline[::-1], -radius - 1, depth - radius)).turned("y", -90).body

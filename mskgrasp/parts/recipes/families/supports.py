@@ -1,4 +1,4 @@
-"""What holds shafts and runs on rails: shaft supports, flanged housings, linear blocks and carriages."""
+"""Supports of shafts and rails: shaft supports, flanged housings, linear blocks and carriages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``python -m mskgrasp.parts`` can do: build, import, list, show, sheet, rate."""
+"""Command line of ``python -m mskgrasp.parts``: build, import, list, show, sheet, rate."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mskgrasp.parts.commands.show import Sheet, Show, run_sheet, run_show
 
 PROG = "python -m mskgrasp.parts"
 
-Verb = (
+Command = (
     Annotated[Build, tyro.conf.subcommand("build")]
     | Annotated[Import, tyro.conf.subcommand("import")]
     | Annotated[List, tyro.conf.subcommand("list")]
@@ -27,25 +27,25 @@ Verb = (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs one verb; returns the exit code."""
-    verb = tyro.cli(
-        Verb,  # pyright: ignore[reportArgumentType]
+    """Runs one command; returns the exit code."""
+    command = tyro.cli(
+        Command,  # pyright: ignore[reportArgumentType]
         prog=PROG,
         description=f"Parts for simulation: a catalogue of {len(builtin_names())}, and your own CAD files.",
         args=None if argv is None else list(argv),
     )
-    match verb:
+    match command:
         case Build():
-            return run_build(verb)
+            return run_build(command)
         case Import():
-            return run_import(verb)
+            return run_import(command)
         case List():
-            return run_list(verb)
+            return run_list(command)
         case Show():
-            return run_show(verb)
+            return run_show(command)
         case Sheet():
-            return run_sheet(verb)
+            return run_sheet(command)
         case Rate():
-            return run_rate(verb)
+            return run_rate(command)
         case _:
-            assert_never(verb)
+            assert_never(command)
