@@ -28,6 +28,7 @@ from mskgrasp.dataset import read_shard, shard_path
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.catalogue import ratings, read_index, spread
 from mskgrasp.runtime.cli import make_folder, parse
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult
 from mskgrasp.simulation.versions import ShardTask, other_versions
 
@@ -99,7 +100,8 @@ def _collect(config: CollectConfig, parts: list[Part]) -> None:
     )
     if missing:
         _simulate(config, missing, parts, done)
-    from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary  # takes seconds
+    with ctrl_c_deferred():  # takes seconds
+        from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary
 
     summaries = summarise(config.out, config.part_filter)
     print_table(summaries, Console(width=None if sys.stdout.isatty() else 150))

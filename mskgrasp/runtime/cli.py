@@ -1,26 +1,24 @@
-"""What every program shares: a configuration file, overrides from the command line, clean exits."""
+"""Command lines and exits of programs; imports the standard library alone, so that `run` is ready at once."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
 import io
-import os
 import re
 import signal
 import sys
-import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import tyro
-from pydantic import BaseModel
-
-from mskgrasp.core.config import check_config, read_config
 from mskgrasp.core.errors import BadConfig, MskgraspError, UsageError
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred, repeat_dropped_ctrl_c
 
-ConfigT = TypeVar("ConfigT", bound=BaseModel)
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+ConfigT = TypeVar("ConfigT", bound="BaseModel")
 
 
 def parse(
@@ -43,6 +41,11 @@ def parse(
     Raises:
         BadConfig: The file or an override is not valid.
     """
+    with ctrl_c_deferred():
+        import tyro
+
+        from mskgrasp.core.config import check_config, read_config
+
     rest, path = _take_config_option(list(sys.argv[1:] if argv is None else argv))
     path = path or default_config
     default = read_config(model, path) if path is not None else None
@@ -62,7 +65,7 @@ def parse(
 
 
 def _raise_range_error(printed: str) -> None:
-    """Says in one line what tyro quotes from pydantic in a box; does nothing for tyro's own messages."""
+    """Raises in one line what tyro quotes from pydantic in a box; does nothing for tyro's own messages."""
     text = " ".join(re.sub(r"[│╭╮╰╯─]", " ", printed).split())
     found = re.search(
         r"validation errors? for \S+ (?:([\w.]+) )?"
@@ -114,29 +117,24 @@ def explain_os_error(error: OSError) -> str:
     return f"{error.strerror or error}{place}; {remedy}"
 
 
-def _heed_ctrl_c(unraisable: Any, report: Callable[[Any], None] = sys.unraisablehook) -> None:
-    """One that comes while Python cleans up an object would be reported, and forgotten: it comes again."""
-    if unraisable.exc_type is KeyboardInterrupt:
-        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
-    else:
-        report(unraisable)
-
-
 def run(main: Callable[[], int | None]) -> None:
     """Runs a program's ``main`` and ends the process: 0, 1 failure, 2 usage, 130 Ctrl-C.
 
-    An error that a user can mend becomes one line on standard error; anything else is a defect and
+    An error that a user can repair becomes one line on standard error; anything else is a defect and
     keeps its traceback.
+
+    Args:
+        main: The program; a ``__main__`` imports it here, by `ctrl_c_deferred`, and not before, so that
+            Ctrl-C meanwhile has the same effect as later.
     """
-    sys.unraisablehook = _heed_ctrl_c
+    sys.unraisablehook = repeat_dropped_ctrl_c
     try:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # it was held while all was imported
         code = main() or 0
     except MskgraspError as error:
         print(f"error: {error}", file=sys.stderr)
         code = error.exit_code
     except KeyboardInterrupt:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # who presses it twice wants no more than this
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one must not interrupt the exit
         print("stopped by Ctrl-C; what was finished is kept", file=sys.stderr)
         code = 130
     except BrokenPipeError:

@@ -13,6 +13,7 @@ from mskgrasp.core.errors import MskgraspError
 from mskgrasp.runtime.cli import explain_os_error
 from mskgrasp.runtime.executor import Bench, Completed, Delivered, Died, WorkerFailed
 from mskgrasp.runtime.worker_process import (
+    ignore_ctrl_c,
     leave_with_parent,
     one_thread_a_process,
     out_of_reach_of_ctrl_c,
@@ -130,6 +131,7 @@ def _serve(
     connection: Connection, bench: Bench[Any, Any, Any], settings: Any, lost_by: tuple[type[Exception], ...]
 ) -> None:
     """A worker process: receives jobs one by one and sends their results."""
+    ignore_ctrl_c()
     leave_with_parent()
     try:
         use_one_core()

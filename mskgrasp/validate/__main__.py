@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from mskgrasp.runtime.cli import parse, run
-from mskgrasp.validate.config import ValidateConfig
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
 DESCRIPTION = """Shows whether simulated labels are right: run it after changing a setting or a part.
 
@@ -19,14 +19,16 @@ _DEFAULT = Path("configs/validate/default.yaml")
 
 def main() -> int:
     """Parses, checks, reports."""
+    with ctrl_c_deferred():
+        from mskgrasp.validate.config import ValidateConfig
     config = parse(
         ValidateConfig,
         prog="python -m mskgrasp.validate",
         description=DESCRIPTION,
         default_config=_DEFAULT if _DEFAULT.exists() else None,
     )
-    from mskgrasp.validate.run import validate  # loads the simulator: not for a mistyped option
-
+    with ctrl_c_deferred():  # loads the simulator: not for a mistyped option
+        from mskgrasp.validate.run import validate
     return validate(config)
 
 
