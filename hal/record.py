@@ -19,7 +19,8 @@ from hal.replay import read_recording
 from hal.replay.cell import recorded_cell
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import UsageError
-from mskgrasp.runtime.cli import parse, run
+from mskgrasp.runtime.cli import run
+from mskgrasp.runtime.options import parse
 
 DESCRIPTION = """Writes the frames of a cell's camera, or a whole run on the cell, into one file.
 

@@ -1,6 +1,15 @@
 """``python -m hal.calibrate``."""
 
-from hal.calibrate.run import main
 from mskgrasp.runtime.cli import run
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
-run(main)
+
+def main() -> int | None:
+    """Imports the program and runs it."""
+    with ctrl_c_deferred():
+        from hal.calibrate.run import main as calibrate
+    return calibrate()
+
+
+if __name__ == "__main__":
+    run(main)

@@ -30,7 +30,8 @@ from mskgrasp.core.config import Config, read_config, read_yaml, write_config
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import MAX_OPENING
-from mskgrasp.runtime.cli import make_folder, parse
+from mskgrasp.runtime.cli import make_folder
+from mskgrasp.runtime.options import parse
 
 DESCRIPTION = """Finds out where the camera over the table is, with a ChArUco board held by the gripper.
 

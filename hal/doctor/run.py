@@ -27,7 +27,7 @@ from hal.doctor.checks import (
 from hal.open_cell import cell_from_values
 from mskgrasp.core.config import Config, read_yaml
 from mskgrasp.core.errors import BadConfig
-from mskgrasp.runtime.cli import parse
+from mskgrasp.runtime.options import parse
 
 DESCRIPTION = """Looks a cell over and prints one line for each thing: ok, warn or fail, and how to mend it.
 

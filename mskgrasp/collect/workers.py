@@ -1,80 +1,37 @@
-"""Shards made by processes with a simulator each."""
+"""Shards made by processes of this machine, each with a simulator."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 from mskgrasp.collect.config import CollectConfig
-from mskgrasp.runtime.worker_pool import Lost as ProcessLost
-from mskgrasp.runtime.worker_pool import Told, Work, spread
+from mskgrasp.runtime.local_executor import LocalExecutor
+from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult, run_jobs
 from mskgrasp.simulation.versions import ShardTask
 
-
-@dataclass(frozen=True, kw_only=True)
-class Progress:
-    """One attempt is over: 1 success, 0 failure, -1 discarded."""
-
-    outcome: int
+ShardEvents = Generator[JobResult[ShardTask, int] | JobDone[ShardTask] | JobLost[ShardTask], None, None]
+"""Results are attempts: 1 success, 0 failure, -1 discarded. A shard that is lost is made again as a whole."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Finished:
-    """A shard lies on disk; `worker` names the process that made it."""
-
-    task: ShardTask
-    worker: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Lost:
-    """A worker died; `undone` attempts of its shard will be made again."""
-
-    task: ShardTask
-    undone: int
-    undone_successes: int
-    reason: str
-
-
-def make_shards(
-    config: CollectConfig, tasks: Sequence[ShardTask], n_workers: int
-) -> Generator[Progress | Finished | Lost, None, None]:
-    """Makes shards in parallel and tells of every step; closing the iterator stops all workers.
-
-    A shard whose worker dies is made again by another, at most `worker_pool.MAX_TRIES` times.
+def make_shards(config: CollectConfig, tasks: Sequence[ShardTask], n_workers: int) -> ShardEvents:
+    """Makes shards in parallel and yields every step; closing the iterator stops all workers.
 
     Raises:
-        WorkerFailed: A shard failed for a reason that trying again will not mend.
+        WorkerFailed: A shard failed for a reason that trying again does not remove.
     """
-    successes: dict[ShardTask, int] = {}
-    work = Work(_shard_bench, config, name=_name, remedy="leave the part out with --parts")
-    events = spread(work, tasks, n_workers)
-    try:
-        for event in events:
-            if isinstance(event, Told):
-                successes[event.job] = successes.get(event.job, 0) + (event.result == 1)
-                yield Progress(outcome=event.result)
-            elif isinstance(event, ProcessLost):
-                yield Lost(
-                    task=event.job,
-                    undone=event.n_told,
-                    undone_successes=successes.pop(event.job, 0),
-                    reason=event.reason,
-                )
-            else:
-                yield Finished(task=event.job, worker=event.process)
-    finally:
-        events.close()
+    executor = LocalExecutor(_shard_bench, config, n_workers)
+    return run_jobs(tasks, executor, name=task_name, remedy="leave the part out with --parts")
 
 
-def _name(task: ShardTask) -> str:
+def task_name(task: ShardTask) -> str:
+    """The shard's name in messages."""
     return f"shard {task.index} of part '{task.part}'"
 
 
 @contextmanager
 def _shard_bench(config: CollectConfig) -> Iterator[Callable[[ShardTask], Iterator[int]]]:
-    """A simulator, and the function that makes a shard and writes it, telling of every attempt."""
+    """A simulator, and the function that makes a shard and writes it, yielding every attempt's outcome."""
     from mskgrasp.simulation.shard import Simulator
 
     simulator = Simulator(config.physics, config.camera, config.noise)

@@ -1,7 +1,15 @@
 """``python -m mskgrasp.dataset``: check, describe and export datasets."""
 
-from mskgrasp.dataset.commands.verbs import main
 from mskgrasp.runtime.cli import run
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
+
+
+def main() -> int | None:
+    """Imports the program and runs it."""
+    with ctrl_c_deferred():
+        from mskgrasp.dataset.commands.verbs import main as dataset
+    return dataset()
+
 
 if __name__ == "__main__":
     run(main)

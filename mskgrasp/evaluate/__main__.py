@@ -1,6 +1,15 @@
 """``python -m mskgrasp.evaluate``."""
 
-from mskgrasp.evaluate.run import main
 from mskgrasp.runtime.cli import run
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
-run(main)
+
+def main() -> int | None:
+    """Imports the program and runs it."""
+    with ctrl_c_deferred():
+        from mskgrasp.evaluate.run import main as evaluate
+    return evaluate()
+
+
+if __name__ == "__main__":
+    run(main)

@@ -38,7 +38,8 @@ from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.planning.planner import PlannerConfig
 from mskgrasp.planning.run_inputs import model_digests, part_digests
 from mskgrasp.reports.html import write_html
-from mskgrasp.runtime.cli import make_folder, parse
+from mskgrasp.runtime.cli import make_folder
+from mskgrasp.runtime.options import parse
 from mskgrasp.runtime.run_folder import TRIALS, append, begin, read, rewrite
 from mskgrasp.simulation.versions import versions
 from mskgrasp.trials.cell_file import CellFile, Noise, read_cell

@@ -33,7 +33,8 @@ from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import SIMULATED_CELL, make_planner
 from mskgrasp.planning.planner import PlannerConfig
 from mskgrasp.planning.run_inputs import inputs_of
-from mskgrasp.runtime.cli import make_folder, parse
+from mskgrasp.runtime.cli import make_folder
+from mskgrasp.runtime.options import parse
 from mskgrasp.runtime.run_folder import TRIALS, append, begin, file_digest, read
 from mskgrasp.runtime.worker_pool import Work, results
 

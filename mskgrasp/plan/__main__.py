@@ -1,6 +1,15 @@
 """``python -m mskgrasp.plan``."""
 
-from mskgrasp.plan.run import main
 from mskgrasp.runtime.cli import run
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
-run(main)
+
+def main() -> int | None:
+    """Imports the program and runs it."""
+    with ctrl_c_deferred():
+        from mskgrasp.plan.run import main as plan
+    return plan()
+
+
+if __name__ == "__main__":
+    run(main)

@@ -15,7 +15,8 @@ from mskgrasp.parts.importing.mesh_files import Unit
 from mskgrasp.planning.for_cell import SIMULATED_CELL, make_planner, part_name, present
 from mskgrasp.planning.planner import GraspPlan, PlannerConfig
 from mskgrasp.reports.grasp_figures import draw_plan
-from mskgrasp.runtime.cli import make_folder, parse
+from mskgrasp.runtime.cli import make_folder
+from mskgrasp.runtime.options import parse
 
 DESCRIPTION = """Takes a depth image of the cell and plans a precise grasp of the part in it.
 

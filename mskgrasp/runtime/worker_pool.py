@@ -1,175 +1,156 @@
-"""Jobs spread over processes, each with a bench of its own; results come as soon as they are there.
+"""Jobs distributed over worker processes, with retries and one stream of events, whatever executes them.
 
-A process that dies takes nothing with it: what it had not told yet is done again by a fresh one.
+A worker that dies takes nothing with it: the results it has not delivered are computed by a fresh one.
 """
 
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import sys
-import traceback
-from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from typing import Any, Generic, TypeVar
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic
 
 from tqdm import tqdm
 
-from mskgrasp.core.errors import MskgraspError
-from mskgrasp.runtime.cli import explain_os_error
-from mskgrasp.runtime.worker_process import (
-    leave_with_parent,
-    one_thread_a_process,
-    out_of_reach_of_ctrl_c,
-    use_one_core,
+from mskgrasp.runtime.executor import (
+    Bench,
+    Delivered,
+    Died,
+    Executor,
+    Job,
+    Loss,
+    Result,
+    Settings,
+    WorkerFailed,
 )
+from mskgrasp.runtime.local_executor import LocalExecutor
 
-MAX_TRIES = 3
 REMEDY = "run the same command again, with fewer --workers if memory was short"
 
-Settings = TypeVar("Settings")
-Job = TypeVar("Job")
-Result = TypeVar("Result")
-Bench = Callable[[Settings], AbstractContextManager[Callable[[Job], Iterator[Result]]]]
-"""Sets up what a process works with, a cell and a planner, and gives the function that does a job."""
 
-
-class WorkerFailed(MskgraspError):
-    """A job could not be done; what was told before is sound."""
+def whole(job: Job, n_results: int) -> Job:
+    """The job itself: its results so far are void once its worker dies."""
+    return job
 
 
 @dataclass(frozen=True)
-class Told(Generic[Job, Result]):
-    """One result of a job that goes on."""
+class JobResult(Generic[Job, Result]):
+    """One result of a job, which may have more."""
 
     job: Job
     result: Result
 
 
 @dataclass(frozen=True)
-class Done(Generic[Job]):
-    """All of a job is done; `process` names who did it."""
+class JobDone(Generic[Job]):
+    """A job is complete; `worker` names the process that did it."""
 
     job: Job
-    process: str
+    worker: str
 
 
 @dataclass(frozen=True)
-class Lost(Generic[Job]):
-    """A process died after `n_told` results of its job; `again` will be done in its place."""
+class JobLost(Generic[Job]):
+    """A worker died after `n_results` results of its job; `retry` will be done in its place."""
 
     job: Job
-    n_told: int
-    again: Job
+    n_results: int
+    retry: Job
     reason: str
-
-
-@dataclass
-class _Ticket:
-    """A job on its way through the processes."""
-
-    job: Any
-    deaths: int = 0
-
-
-@dataclass
-class _Worker:
-    process: Any
-    connection: Connection
-    ticket: _Ticket | None = None
-    n_told: int = 0
 
 
 @dataclass(frozen=True)
 class Work(Generic[Settings, Job, Result]):
-    """What every process does, and what becomes of a job whose process dies.
-
-    `name` and `rest` are called in the process that spreads the jobs.
-    """
+    """What every worker does, and what becomes of a job whose worker dies."""
 
     bench: Bench[Settings, Job, Result]
-    """A function of a module; in a spawned process it is imported again."""
+    """A function of a module; a spawned process imports it."""
     settings: Settings
-    """What it takes; pickled."""
+    """Argument of `bench`; pickled."""
     name: Callable[[Job], str] = str
-    """How a message calls a job."""
-    rest: Callable[[Job, int], Job | None] = lambda job, n_told: job
-    """What is left of a job of which so many results were told, when its process died; None: nothing."""
+    """The job's name in messages."""
+    rest: Callable[[Job, int], Job | None] = whole
+    """What remains of a job after so many results, when its worker has died; None: nothing."""
     remedy: str = REMEDY
-    """What to do about a job that `MAX_TRIES` processes died of."""
+    """What the user can do about a job that cost too many workers."""
     lost_by: tuple[type[Exception], ...] = ()
-    """Errors that a fresh process may be free of: with one of them, too, a process counts as dead."""
+    """Errors that a fresh process may be free of: a worker that raises one counts as dead."""
 
 
-def spread(
-    work: Work[Settings, Job, Result], jobs: Sequence[Job], n_workers: int
-) -> Generator[Told[Job, Result] | Done[Job] | Lost[Job], None, None]:
-    """Does jobs in several processes and tells of every step; closing the iterator ends all processes.
+@dataclass
+class _Running:
+    """A job on its way, and what it has cost so far."""
 
-    Which process does which job is left to chance: a job's results must depend on the job alone.
+    job: Any
+    n_results: int = 0
+    losses: Counter[Loss] = field(default_factory=Counter)
+
+
+def run_jobs(
+    jobs: Sequence[Job],
+    executor: Executor,
+    *,
+    name: Callable[[Job], str] = str,
+    rest: Callable[[Job, int], Job | None] = whole,
+    remedy: str = REMEDY,
+) -> Generator[JobResult[Job, Any] | JobDone[Job] | JobLost[Job], None, None]:
+    """Does jobs on an executor, and closes it at the end; closing the iterator stops all jobs.
+
+    Which worker does which job is left to chance: a job's results must depend on the job alone.
 
     Args:
-        work: What is done.
-        jobs: In the order in which they are begun; pickled, as are their results.
-        n_workers: At most so many processes at once.
+        jobs: In the order in which they are started; pickled, as are their results.
+        executor: Does them.
+        name: See `Work`.
+        rest: See `Work`.
+        remedy: See `Work`.
 
     Raises:
-        WorkerFailed: A job failed for a reason that trying again will not mend.
+        WorkerFailed: A job failed for a reason that trying again does not remove, or cost too many workers.
     """
-    context = multiprocessing.get_context("spawn")  # a forked simulator shares the parent's driver state
-    waiting = deque(_Ticket(job) for job in jobs)
-    workers: list[_Worker] = []
+    waiting = deque(_Running(job) for job in jobs)
+    running: dict[int, _Running] = {}
+    n_started = 0
     try:
-        while waiting or any(worker.ticket for worker in workers):
-            if waiting and len(workers) < min(n_workers, len(jobs)):
-                with one_thread_a_process(), out_of_reach_of_ctrl_c():
-                    while len(workers) < min(n_workers, len(jobs)):
-                        workers.append(_start(context, work))
-            for worker in workers:
-                if worker.ticket is None and waiting:
-                    _give(worker, waiting.popleft())
-            ready = wait([worker.connection for worker in workers], timeout=1.0)
-            for worker in [one for one in workers if one.connection in ready]:
-                kind, value = _hear(worker)
-                ticket = worker.ticket
-                if kind == "error":
-                    raise WorkerFailed(value)
-                if kind == "lost":
-                    _end([worker])
-                    workers.remove(worker)
-                if ticket is None:
+        while waiting or running:
+            n_slots = executor.n_slots()
+            while waiting and len(running) < n_slots:
+                running[n_started] = waiting.popleft()
+                executor.submit(n_started, running[n_started].job)
+                n_started += 1
+            for event in executor.events():
+                one = running[event.number]
+                if isinstance(event, Delivered):
+                    one.n_results += 1
+                    yield JobResult(one.job, event.result)
                     continue
-                if kind == "result":
-                    worker.n_told += 1
-                    yield Told(ticket.job, value)
-                elif kind == "done":
-                    worker.ticket = None
-                    yield Done(ticket.job, str(worker.process.pid))
-                elif (left := work.rest(ticket.job, worker.n_told)) is None:
-                    yield Done(ticket.job, str(worker.process.pid))
-                else:
-                    again = _Ticket(left, ticket.deaths + 1)
-                    if again.deaths >= MAX_TRIES:
-                        raise WorkerFailed(
-                            f"{work.name(again.job)} could not be done in {MAX_TRIES} fresh processes "
-                            f"({value}); what was finished is kept: {work.remedy}"
-                        )
-                    waiting.appendleft(again)
-                    yield Lost(ticket.job, worker.n_told, again.job, value)
+                del running[event.number]
+                died = isinstance(event, Died)
+                left = rest(one.job, one.n_results) if died else None
+                if not died or left is None:
+                    yield JobDone(one.job, event.worker)
+                    continue
+                losses = one.losses + Counter([event.loss])
+                if losses[event.loss] >= event.loss.value:
+                    raise WorkerFailed(
+                        f"{name(left)} could not be done {event.loss} ({event.reason}); "
+                        f"what was finished is kept: {remedy}"
+                    )
+                waiting.appendleft(_Running(left, losses=losses))
+                yield JobLost(one.job, one.n_results, left, event.reason)
     finally:
-        _end(workers)
+        executor.close()
 
 
 def results(
     work: Work[Settings, Job, Result], jobs: Sequence[Job], n_workers: int, apart: bool = False
 ) -> Generator[Result, None, None]:
-    """What `spread` is told, and a line on stderr where a process was lost.
+    """Results of jobs done by processes of this machine, with a line on stderr where a process was lost.
 
-    With one worker, or one job, the jobs are done in this process unless they are to be done apart; then
-    whatever they raise is raised here.
+    With one worker, or one job, the jobs are done in this process, and whatever they raise is raised here,
+    unless `apart` asks for processes of their own.
     """
     if not jobs:
         return
@@ -178,73 +159,12 @@ def results(
             for job in jobs:
                 yield from do(job)
         return
-    with contextlib.closing(spread(work, jobs, n_workers)) as events:
+    executor = LocalExecutor(work.bench, work.settings, n_workers, lost_by=work.lost_by)
+    events = run_jobs(jobs, executor, name=work.name, rest=work.rest, remedy=work.remedy)
+    with contextlib.closing(events):
         for event in events:
-            if isinstance(event, Told):
+            if isinstance(event, JobResult):
                 yield event.result
-            elif isinstance(event, Lost):
-                again = f"{work.name(event.again)} is made again"
-                tqdm.write(f"a process was lost ({event.reason}); {again}", file=sys.stderr)
-
-
-def _start(context: Any, work: Work[Any, Any, Any]) -> _Worker:
-    ours, theirs = context.Pipe()
-    # Not all of it: name and rest may be lambdas, which cannot be pickled.
-    process = context.Process(
-        target=_work, args=(theirs, work.bench, work.settings, work.lost_by), daemon=True
-    )
-    process.start()
-    theirs.close()
-    return _Worker(process=process, connection=ours)
-
-
-def _give(worker: _Worker, ticket: _Ticket) -> None:
-    worker.ticket, worker.n_told = ticket, 0
-    try:
-        worker.connection.send(ticket.job)
-    except OSError:
-        pass  # it has just died; reading from it says so
-
-
-def _hear(worker: _Worker) -> tuple[str, Any]:
-    try:
-        return worker.connection.recv()
-    except (EOFError, OSError):
-        worker.process.join(timeout=5)
-        return "lost", f"exit code {worker.process.exitcode}"
-
-
-def _end(workers: Sequence[_Worker]) -> None:
-    for worker in workers:
-        worker.process.terminate()
-    for worker in workers:
-        worker.process.join(timeout=5)
-        if worker.process.is_alive():
-            worker.process.kill()
-            worker.process.join()
-        worker.connection.close()
-
-
-def _work(
-    connection: Connection, bench: Bench[Any, Any, Any], settings: Any, lost_by: tuple[type[Exception], ...]
-) -> None:
-    """A process's life: receive a job, do it, say so."""
-    leave_with_parent()
-    try:
-        use_one_core()
-        with bench(settings) as do:
-            while True:
-                for result in do(connection.recv()):
-                    connection.send(("result", result))
-                connection.send(("done", None))
-    except (EOFError, BrokenPipeError):
-        pass
-    except lost_by as error:
-        connection.send(("lost", str(error)))
-    except MskgraspError as error:
-        connection.send(("error", str(error)))
-    except OSError as error:
-        connection.send(("error", explain_os_error(error)))
-    except Exception as error:
-        traceback.print_exc()  # a defect: its place is wanted, once
-        connection.send(("error", f"a process failed: {type(error).__name__}: {error}"))
+            elif isinstance(event, JobLost):
+                message = f"a process was lost ({event.reason}); {work.name(event.retry)} is made again"
+                tqdm.write(message, file=sys.stderr)

@@ -1,4 +1,4 @@
-"""Processes that keep to one core each, leave Ctrl-C to the one that started them, and do not outlive it."""
+"""Set-up of worker processes: one core each, no Ctrl-C, no life beyond that of their parent."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
+
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
 
 @contextmanager
@@ -30,28 +32,26 @@ def one_thread_a_process() -> Iterator[None]:
 
 @contextmanager
 def out_of_reach_of_ctrl_c() -> Iterator[None]:
-    """Processes started meanwhile never hear Ctrl-C, this one hears it afterwards: it decides what is to end.
+    """Keeps Ctrl-C from processes started in the block; this process receives it at the end of the block.
 
-    A terminal sends it to all of them. What a process does about it itself comes too late: until then it
-    imports, and would end with a traceback.
+    A terminal sends it to all of them, but which work ends is this process's decision. They inherit a
+    blocked signal until they ignore it themselves, by `ignore_ctrl_c`: until then they import, and would
+    end with a traceback.
     """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
-    resource_tracker.ensure_running()  # starting it lets signals through again
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    # The mask is this thread's: another, a progress bar's, may be handed it, and Python acts on it here.
-    heard: list[int] = []
-    handler = signal.getsignal(signal.SIGINT)
-    ours = handler is not None and threading.current_thread() is threading.main_thread()
-    if ours:
-        signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        if ours:
-            signal.signal(signal.SIGINT, handler)
-        if heard:
-            signal.raise_signal(signal.SIGINT)
+    with ctrl_c_deferred():  # another thread, a progress bar's, may receive it: the mask is this thread's
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+        resource_tracker.ensure_running()  # starting it unblocks signals
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def ignore_ctrl_c() -> None:
+    """Makes this worker process, and what it starts, ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def leave_with_parent() -> None:

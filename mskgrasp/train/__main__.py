@@ -1,6 +1,15 @@
 """``python -m mskgrasp.train``."""
 
 from mskgrasp.runtime.cli import run
-from mskgrasp.train.run import main
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
-run(main)
+
+def main() -> int | None:
+    """Imports the program and runs it."""
+    with ctrl_c_deferred():
+        from mskgrasp.train.run import main as train
+    return train()
+
+
+if __name__ == "__main__":
+    run(main)

@@ -21,6 +21,7 @@ from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.trainer import Reporter, split, train
 from mskgrasp.runtime import cli
+from mskgrasp.runtime.options import parse
 from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
 from mskgrasp.train.figures import draw_curves, draw_uncertainty
 
@@ -188,7 +189,7 @@ def _summarise(console: Console, report: dict[str, Any], out: Path) -> None:
 def main() -> int:
     """Reads the command line and runs."""
     return run(
-        cli.parse(
+        parse(
             TrainConfig,
             prog="python -m mskgrasp.train",
             description="Trains the grasp quality and displacement networks on a dataset.",

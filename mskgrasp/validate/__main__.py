@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from mskgrasp.core.shipped import config_file
-from mskgrasp.runtime.cli import parse, run
-from mskgrasp.validate.config import ValidateConfig
+from mskgrasp.runtime.cli import run
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
+from mskgrasp.runtime.options import parse
 
 DESCRIPTION = """Shows whether simulated labels are right: run it after changing a setting or a part.
 
@@ -16,14 +17,16 @@ validate.png; ends with 1 if a check fails or the settings under test add someth
 
 def main() -> int:
     """Parses, checks, reports."""
+    with ctrl_c_deferred():
+        from mskgrasp.validate.config import ValidateConfig
     config = parse(
         ValidateConfig,
         prog="python -m mskgrasp.validate",
         description=DESCRIPTION,
         default_config=config_file("validate/default.yaml"),
     )
-    from mskgrasp.validate.run import validate  # loads the simulator: not for a mistyped option
-
+    with ctrl_c_deferred():  # loads the simulator: not for a mistyped option
+        from mskgrasp.validate.run import validate
     return validate(config)
 
 

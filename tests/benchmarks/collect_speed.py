@@ -34,13 +34,14 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from mskgrasp.collect.__main__ import plan_shards
 from mskgrasp.collect.config import CollectConfig
-from mskgrasp.collect.workers import Progress, make_shards
+from mskgrasp.collect.run import plan_shards
+from mskgrasp.collect.workers import make_shards
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import PAD_REACH
 from mskgrasp.core.settings import REGION, ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import Part, find_part, starter_names
+from mskgrasp.runtime.worker_pool import JobResult
 from mskgrasp.simulation.shard import Simulator, draw_attempt
 from mskgrasp.simulation.versions import ShardTask
 from tasks.scene.renderer import render_backend
@@ -265,7 +266,7 @@ def throughput(parts: list[Part], shards: int, workers: int) -> dict[str, float]
         done, began, ended, most = 0, 0.0, 0.0, 0.0
         with tqdm(total=total, unit="grasp", desc=f"{workers} workers", file=sys.stderr, disable=None) as bar:
             for event in make_shards(config, tasks, workers):
-                if not isinstance(event, Progress):
+                if not isinstance(event, JobResult):
                     continue
                 done += 1
                 bar.update()
@@ -294,7 +295,7 @@ def endure(parts: list[Part], n: int) -> None:
         began = None
         with tqdm(total=total, unit="grasp", file=sys.stderr, disable=None) as bar:
             for event in make_shards(config, tasks, 1):
-                if not isinstance(event, Progress):
+                if not isinstance(event, JobResult):
                     continue
                 began = began or time.perf_counter()  # the worker has started
                 done += 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import signal
@@ -18,10 +17,14 @@ from pathlib import Path
 import pytest
 
 from mskgrasp.collect import cluster
+from mskgrasp.collect import node as cluster_node
+from mskgrasp.collect.config import CollectConfig
+from mskgrasp.core.config import read_config
 from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.dataset import list_shards
 from mskgrasp.parts import find_part
 from mskgrasp.parts.store import pack_part, receive_part
+from mskgrasp.simulation.versions import ShardTask, versions
 from tests.collecting import PARTS, REPOSITORY, assert_equal, command
 
 RAY = [sys.executable, "-m", "ray.scripts.scripts"]
@@ -63,9 +66,7 @@ class Node:
     def workers(self) -> list[int]:
         """Its processes that make shards: Ray names them for what they do."""
         family = self.family()
-        return [
-            pid for pid, line in command_lines() if pid in family and line.startswith(b"ray::_make_shard")
-        ]
+        return [pid for pid, line in command_lines() if pid in family and line.startswith(b"ray::make_shard")]
 
     def hold(self) -> bool:
         """Stops a process that makes a shard, so that it does not finish meanwhile; False where none does."""
@@ -288,16 +289,13 @@ def test_a_part_keeps_its_hash_on_the_way_and_takes_no_other_parts_place(tmp_pat
 
 
 def test_a_node_of_other_software_or_without_the_folder_is_refused(collected, monkeypatch):
-    from mskgrasp.collect.config import CollectConfig
-    from mskgrasp.core.config import read_config
-
-    monkeypatch.setattr(cluster, "_simulator", None)
+    monkeypatch.setattr(cluster_node, "_simulator", None)
     config = read_config(CollectConfig, collected / "config.yaml")
-    job = cluster.Job(config=config, settings="other", versions=cluster.versions())
-    task = cluster.ShardTask(part=PARTS[1], folder="", index=0, first=0, n=1, seed=5)
-    part = cluster.PackedPart(name=PARTS[1], content_hash="0", files={})
-    made = cluster._make_shard(part, job, task)
-    assert "does not see the dataset" in made.error and str(collected) in made.error
-    old = replace(job, versions=dict(job.versions, sapien="1.0"))
-    assert "the node has sapien" in cluster._make_shard(part, old, task).error
-    assert json.dumps(made.outcomes) == "[]"
+    settings = cluster_node.RunSettings(config=config, digest="other", versions=versions())
+    task = ShardTask(part=PARTS[1], folder="", index=0, first=0, n=1, seed=5)
+    part = cluster_node.PackedPart(name=PARTS[1], content_hash="0", files={})
+    reply = cluster_node.make_shard(part, settings, task)
+    assert "does not see the dataset" in reply.error and str(collected) in reply.error
+    old = replace(settings, versions=dict(settings.versions, sapien="1.0"))
+    assert "the node has sapien" in cluster_node.make_shard(part, old, task).error
+    assert reply.outcomes == ()

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import yaml
 
-from mskgrasp.collect.__main__ import is_done, main
+from mskgrasp.collect.run import is_done, main
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.files import only_here
 from mskgrasp.dataset import list_shards, read_shard

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadConfig
-from mskgrasp.runtime.cli import parse
+from mskgrasp.runtime.options import parse
 
 
 class CameraConfig(Config):

@@ -1,4 +1,4 @@
-"""Jobs over processes: every result once, whoever makes it, and a worker that dies or fails is told of."""
+"""Jobs over processes: every result once, whichever makes it; workers that die or fail are reported."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from pathlib import Path
 import pytest
 
 from mskgrasp.core.errors import UsageError
-from mskgrasp.runtime.worker_pool import MAX_TRIES, Done, Lost, Told, Work, WorkerFailed, results, spread
+from mskgrasp.runtime.executor import MAX_NODES, MAX_TRIES, Completed, Delivered, Died, Loss, WorkerFailed
+from mskgrasp.runtime.local_executor import LocalExecutor
+from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult, Work, results, run_jobs
 
 
 @contextmanager
@@ -55,19 +57,55 @@ def test_all_jobs_are_done_once_wherever():
     assert list(results(Work(bench, 3), [], 2)) == []
 
 
-def test_what_a_dead_process_has_not_told_is_done_again(tmp_path: Path):
+def test_what_a_dead_process_has_not_delivered_is_done_again(tmp_path: Path):
     jobs: list[tuple[int, ...]] = [(1, 2, 3)]
     (job,), again = jobs, (2, 3)
-    events = list(spread(Work(counting, tmp_path, rest=lambda job, n: job[n:]), jobs, 1))
-    assert events[:2] == [Told(job, 1), Lost(job, 1, again, "exit code 9")]
-    assert events[2:4] == [Told(again, 2), Told(again, 3)]
+    events = list(run_jobs(jobs, LocalExecutor(counting, tmp_path, 1), rest=lambda job, n: job[n:]))
+    assert events[:2] == [JobResult(job, 1), JobLost(job, 1, again, "exit code 9")]
+    assert events[2:4] == [JobResult(again, 2), JobResult(again, 3)]
     (last,) = events[4:]
-    assert isinstance(last, Done) and last.job == again
+    assert isinstance(last, JobDone) and last.job == again
 
 
-def test_a_process_that_died_after_all_was_told_has_done_its_job(tmp_path: Path):
-    events = list(spread(Work(counting, tmp_path, rest=lambda job, n: job[n:] or None), [(1,)], 1))
-    assert events[0] == Told((1,), 1) and isinstance(events[1], Done) and len(events) == 2
+def test_a_process_that_died_after_its_last_result_has_done_its_job(tmp_path: Path):
+    jobs: list[tuple[int, ...]] = [(1,)]
+    executor = LocalExecutor(counting, tmp_path, 1)
+    events = list(run_jobs(jobs, executor, rest=lambda job, n: job[n:] or None))
+    assert events[0] == JobResult((1,), 1) and isinstance(events[1], JobDone) and len(events) == 2
+
+
+class Losing:
+    """An executor whose workers are lost with every job, first two processes, then nodes."""
+
+    def __init__(self, n_processes: int):
+        self.losses = [Loss.PROCESS] * n_processes
+        self.submitted: list[int] = []
+        self.closed = False
+
+    def n_slots(self) -> int:
+        return 1
+
+    def submit(self, number: int, job: int) -> None:
+        self.submitted.append(number)
+
+    def events(self) -> Iterator[Delivered | Completed | Died]:
+        loss = self.losses.pop() if self.losses else Loss.NODE
+        yield Died(self.submitted[-1], "somewhere", loss.name, loss)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.mark.parametrize(
+    ("n_processes", "message"),
+    [(MAX_TRIES - 1, f"on {MAX_NODES} nodes"), (MAX_TRIES, f"in {MAX_TRIES} fresh processes")],
+)
+def test_lost_nodes_and_dead_processes_are_counted_apart(n_processes: int, message: str):
+    executor = Losing(n_processes)
+    with pytest.raises(WorkerFailed, match=f"job 7 could not be done {message} .*: repair it"):
+        list(run_jobs([7], executor, name=lambda job: f"job {job}", remedy="repair it"))
+    n_tries = n_processes + MAX_NODES if n_processes < MAX_TRIES else MAX_TRIES
+    assert len(executor.submitted) == len(set(executor.submitted)) == n_tries and executor.closed
 
 
 def test_a_job_that_every_process_dies_of_ends_the_run_in_one_line(capfd: pytest.CaptureFixture[str]):
@@ -81,23 +119,28 @@ def test_a_worker_that_fails_says_why():
         list(results(Work(bench, 3), [1, -2], 2))
 
 
-def test_what_a_fresh_process_may_mend_is_tried_again(capfd: pytest.CaptureFixture[str]):
+def test_an_error_that_a_fresh_process_may_be_free_of_is_tried_again(capfd: pytest.CaptureFixture[str]):
     with pytest.raises(WorkerFailed, match="the cell does not answer"):
         list(results(Work(bench, 3, lost_by=(TimeoutError,)), [1, -3], 2))
     assert capfd.readouterr().err.count("-3 is made again") == MAX_TRIES - 1
 
 
 @contextmanager
-def signals(_: None) -> Iterator[Callable[[int], Iterator[set[int]]]]:
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())
-    yield lambda job: iter([blocked])
+def signals(_: None) -> Iterator[Callable[[int], Iterator[bool]]]:
+    yield lambda job: iter([signal.getsignal(signal.SIGINT) is signal.SIG_IGN])
 
 
-def test_no_worker_hears_ctrl_c_and_a_single_job_is_done_here_or_apart():
-    here, apart = (list(results(Work(signals, None), [0], 1, apart=apart)) for apart in (False, True))
-    several = list(results(Work(signals, None), [1, 2], 2))
-    assert [signal.SIGINT in blocked for blocked in here + apart + several] == [False, True, True, True]
-    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+def test_workers_ignore_ctrl_c_and_a_single_job_is_done_here_or_apart():
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # where the tests' own is ignored
+    try:
+        here, apart = (list(results(Work(signals, None), [0], 1, apart=apart)) for apart in (False, True))
+        several = list(results(Work(signals, None), [1, 2], 2))
+        assert here + apart + several == [False, True, True, True]
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.parametrize("threads", [0, 1])
@@ -106,7 +149,7 @@ def test_ctrl_c_while_workers_are_started_is_heard_by_the_program_alone(threads:
     code = f"""
 import os, signal, threading, time
 from multiprocessing import util
-from mskgrasp.runtime import worker_pool as processes
+from mskgrasp.runtime import worker_pool
 from mskgrasp.runtime.cli import run
 from tests.runtime.test_worker_pool import bench
 
@@ -119,7 +162,7 @@ def start_and_interrupt(*arguments, start=util.spawnv_passfds):
 util.spawnv_passfds = start_and_interrupt
 for _ in range({threads}):
     threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
-run(lambda: list(processes.results(processes.Work(bench, 3), [1, 2], 2)))
+run(lambda: list(worker_pool.results(worker_pool.Work(bench, 3), [1, 2], 2)))
 """
     assert interrupted(code) == (130, STOPPED)
 
@@ -143,27 +186,41 @@ run(main)
     assert interrupted(code) == (130, STOPPED)
 
 
-def test_ctrl_c_while_a_program_imports_is_not_lost():
+@pytest.mark.parametrize("library", ["yaml", "numpy", "torch"])
+def test_ctrl_c_while_a_program_imports_is_not_lost(library: str):
     program = subprocess.Popen(
         [sys.executable, "-m", "mskgrasp.plan"], stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
-    status = Path(f"/proc/{program.pid}/status")
-    while not int(status.read_text().partition("SigBlk:")[2].split()[0], 16) & 1 << signal.SIGINT - 1:
+    loaded = Path(f"/proc/{program.pid}/maps")
+    while f"/{library}/" not in loaded.read_text():
         assert program.poll() is None
     program.send_signal(signal.SIGINT)
     assert (program.communicate()[1], program.returncode) == (STOPPED, 130)
+
+
+def test_importing_the_packages_has_no_side_effect():
+    code = """
+import os, signal, sys, threading
+def state():
+    return (signal.getsignal(signal.SIGINT), signal.pthread_sigmask(signal.SIG_BLOCK, ()),
+            sys.unraisablehook, threading.active_count(), dict(os.environ))
+before = state()
+import hal, mskgrasp, mskgrasp.runtime.cli, mskgrasp.runtime.worker_pool
+assert state() == before
+"""
+    assert interrupted(code) == (0, "")
 
 
 STOPPED = "stopped by Ctrl-C; what was finished is kept\n"
 
 
 def interrupted(code: str) -> tuple[int, str]:
-    told = subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, start_new_session=True, timeout=50,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # where the tests' own is ignored
     )  # fmt: skip
-    return told.returncode, told.stderr
+    return done.returncode, done.stderr
 
 
 def test_whoever_closes_the_iterator_ends_the_workers():

@@ -22,7 +22,8 @@ from mskgrasp.core.metrics import bootstrap_interval
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.palletize.placements import Placement
 from mskgrasp.palletize.run import PalletizeConfig, palletize
-from mskgrasp.runtime.cli import parse, run
+from mskgrasp.runtime.cli import run
+from mskgrasp.runtime.options import parse
 from mskgrasp.runtime.run_folder import TRIALS, file_digest, read
 from tests.sim_in_the_loop.record import PARTS
 

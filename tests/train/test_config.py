@@ -4,13 +4,13 @@ from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.trainer import (
     StageConfig,
 )
-from mskgrasp.runtime import cli
+from mskgrasp.runtime.options import parse
 from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
 
 
 @pytest.mark.parametrize("name", ["default", "pretrained", "paper", "paper_quick"])
 def test_the_configurations_that_are_shipped_can_be_read(name):
-    config = cli.parse(
+    config = parse(
         TrainConfig,
         prog="train",
         description="",

@@ -1,0 +1,271 @@
+"""The steps of a collection run: choose parts, plan shards, simulate what is missing, summarise."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+from rich.console import Console
+from tqdm import tqdm
+
+from mskgrasp.collect.cluster import (
+    check_cluster,
+    connected,
+    count_cores,
+    make_shards_on_cluster,
+    wait_until_seen,
+)
+from mskgrasp.collect.config import CollectConfig
+from mskgrasp.collect.workers import make_shards
+from mskgrasp.core.config import read_config, write_config
+from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
+from mskgrasp.core.files import LOCK, only_here
+from mskgrasp.core.shipped import config_file
+from mskgrasp.dataset import read_shard, shard_path
+from mskgrasp.parts import Part, chosen_names, find_part
+from mskgrasp.parts.catalogue import ratings, read_index, spread
+from mskgrasp.runtime.cli import make_folder
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
+from mskgrasp.runtime.options import parse
+from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult
+from mskgrasp.simulation.versions import ShardTask, other_versions
+
+DESCRIPTION = """Simulates random grasps of parts and records what happened.
+
+For each part and attempt: the part lies in a resting pose at a random place and turn, the overhead
+camera takes a depth image, a grasp is drawn uniformly from the part's box in that image, the arm tries
+it, and one row is written: success, reason of failure, how the part moved in the hand. A run that was
+stopped goes on where it was when started again with the same settings."""
+
+
+def main() -> int:
+    """Parses, collects, reports."""
+    config = parse(
+        CollectConfig,
+        prog="python -m mskgrasp.collect",
+        description=DESCRIPTION,
+        default_config=config_file("collect/demo.yaml"),
+    )
+    collect(config)
+    return 0
+
+
+def collect(config: CollectConfig) -> None:
+    """Makes the shards that are missing and sums up the dataset."""
+    if config.cluster is not None:
+        check_cluster(config.cluster)
+    # Sets of parts are written out: a catalogue that grows must not change a dataset that was begun.
+    names = chosen_names(config.parts or ("starter",))
+    if config.sample:
+        names = sampled(names, config.sample)
+    config = config.model_copy(update={"parts": tuple(names), "sample": 0})
+    parts = chosen_parts(config)
+    config = config.model_copy(update={"parts": tuple(word for word, _ in parts)})
+    check_out(config)
+    with contextlib.nullcontext() if config.cluster is None else connected(config.cluster):
+        make_folder(config.out)
+        with only_here(config.out) as alone:
+            if not alone:
+                raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
+            _collect(config, [part for _, part in parts])
+
+
+def sampled(names: list[str], count: int) -> list[str]:
+    """Some parts of every family.
+
+    Raises:
+        UsageError: A name is not in the catalogue, which knows the families.
+    """
+    index = read_index()
+    unknown = [name for name in names if name not in index.parts]
+    if unknown:
+        raise UsageError(f"--sample: {unknown[0]!r} is not in the catalogue; sample of its sets or its parts")
+    return [entry.name for entry in spread((index.parts[name] for name in names), count)]
+
+
+def _collect(config: CollectConfig, parts: list[Part]) -> None:
+    begin(config)
+    everything = plan_shards(config, parts)
+    hashes = {part.name: part.content_hash for part in parts}
+    missing = [task for task in everything if not is_done(config.out, task, hashes[task.part])]
+    done = sum(task.n for task in everything) - sum(task.n for task in missing)
+    print(
+        f"{len(parts)} parts, {sum(task.n for task in everything)} attempts into {config.out}"
+        + (f", {done} of them already there" if done else "")
+        + (f"; {_hands(config, missing)}" if missing else "")
+    )
+    if missing:
+        _simulate(config, missing, parts, done)
+    with ctrl_c_deferred():  # takes seconds
+        from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary
+
+    summaries = summarise(config.out, config.part_filter)
+    print_table(summaries, Console(width=None if sys.stdout.isatty() else 150))
+    write_summary(summaries, config.out)
+    print(f"wrote {config.out / 'summary.json'} and {draw_summary(config.out, config.seed)}")
+
+
+def _hands(config: CollectConfig, missing: list[ShardTask]) -> str:
+    """Who will make the missing shards."""
+    if config.cluster is not None:
+        cores = count_cores()
+        waits = "" if cores else " (waiting for nodes to join it)"
+        return f"{cores} cores of the cluster at {config.cluster}{waits}"
+    return f"{_n_workers(config, missing)} workers"
+
+
+def _n_workers(config: CollectConfig, missing: list[ShardTask]) -> int:
+    return min(config.workers or os.cpu_count() or 1, len(missing))
+
+
+def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:
+    """The parts of the run, as they were asked for and built where need be, that pass the part filter."""
+    bounds = config.part_filter
+    rated = ratings() if bounds.min_success is not None or bounds.max_success is not None else {}
+    parts: list[tuple[str, Part]] = []
+    easy_or_hard = 0
+    for name in tqdm(config.parts, desc="parts", unit="part", leave=False, disable=None):
+        part = find_part(name)
+        rating = rated.get(part.content_hash)
+        if not bounds.takes_length(part.longest_axis):
+            size = f"longest axis {part.longest_axis * 1e3:.0f} mm"
+            print(f"left out {part.name}: {size} is outside the part filter", file=sys.stderr)
+        elif rating is not None and not bounds.takes_success(rating.rate):
+            easy_or_hard += 1
+        else:
+            parts.append((name, part))
+    if easy_or_hard:
+        print(f"left out {easy_or_hard} parts that were rated outside the part filter", file=sys.stderr)
+    names = [part.name for _, part in parts]
+    doubles = sorted({name for name in names if names.count(name) > 1})
+    if doubles:
+        raise BadPart(f"two parts are called '{doubles[0]}'; give each its own name")
+    if not parts:
+        raise BadPart("no part is left to collect; widen the bounds of part_filter")
+    return parts
+
+
+def check_out(config: CollectConfig) -> None:
+    """Refuses an output folder that holds something else; changes nothing.
+
+    Raises:
+        UsageError: A file is in the way, or the folder was begun with other settings, or is no dataset.
+    """
+    settings = config.out / "config.yaml"
+    if config.out.exists() and not config.out.is_dir():
+        raise UsageError(f"--out {config.out} is a file; choose a folder")
+    if not settings.exists():
+        # A run that is killed before it has settings leaves at most a half-written file of them.
+        if config.out.is_dir() and not all(_is_leftover(path) for path in config.out.iterdir()):
+            raise UsageError(f"--out {config.out} holds other files; choose a new folder")
+        return
+    try:
+        before = read_config(CollectConfig, settings).identity()
+    except BadConfig as error:
+        raise UsageError(f"{error}; choose another --out") from error
+    now = config.identity()
+    changed = [key for key in now if now[key] != before[key]]
+    if changed:
+        raise UsageError(
+            f"{config.out} was begun with other settings ({', '.join(changed)} differ); choose another "
+            "--out, or the settings in its config.yaml"
+        )
+
+
+def _is_leftover(path: Path) -> bool:
+    return path.name == LOCK or (path.name.startswith("config.yaml.") and path.suffix == ".tmp")
+
+
+def begin(config: CollectConfig) -> None:
+    """Opens the dataset's folder, and clears away what a killed run left half-written."""
+    if not (config.out / "config.yaml").exists():
+        write_config(config, config.out / "config.yaml")
+    # Only now: a folder that holds something is known as a dataset by its settings.
+    make_folder(config.out / "shards")
+    for leftover in (*config.out.glob("config.yaml.*.tmp"), *(config.out / "shards").glob("*.tmp")):
+        leftover.unlink(missing_ok=True)  # a worker of that run may just be ending
+
+
+def plan_shards(config: CollectConfig, parts: list[Part]) -> list[ShardTask]:
+    """The shards of a run, dealt part by part in turn so that an early stop leaves some of each."""
+    starts = range(0, config.attempts_per_part, config.shard_size)
+    return [
+        ShardTask(
+            part=part.name,
+            folder=str(part.folder),
+            index=index,
+            first=first,
+            n=min(config.shard_size, config.attempts_per_part - first),
+            seed=config.seed,
+        )
+        for index, first in enumerate(starts)
+        for part in parts
+    ]
+
+
+def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
+    """Whether a shard lies on disk and is whole; a damaged one is told of, to be made again.
+
+    Raises:
+        BadDataset: The part, or what simulates it, has changed since the shard was made.
+    """
+    path = shard_path(out, task.part, task.index)
+    if not path.exists():
+        return False
+    try:
+        _, info = read_shard(path)
+    except BadDataset as error:
+        print(f"making again: {error}", file=sys.stderr)
+        return False
+    if info.part_hash != part_hash:
+        raise BadDataset(
+            f"{path}: part '{task.part}' has changed since; delete its shards or choose another --out"
+        )
+    other = other_versions(info.versions)
+    if other:
+        raise BadDataset(f"{path} was made by other software: {other}; choose another --out")
+    return True
+
+
+def _simulate(config: CollectConfig, tasks: list[ShardTask], parts: list[Part], done: int) -> None:
+    started = time.monotonic()
+    total: Counter[int] = Counter()
+    by_shard: dict[ShardTask, Counter[int]] = {}
+    workers: set[str] = set()
+    bar = tqdm(
+        total=done + sum(task.n for task in tasks), initial=done, unit="grasp", dynamic_ncols=True,
+        smoothing=0.05, mininterval=0.5 if sys.stderr.isatty() else 15.0, file=sys.stderr,
+    )  # fmt: skip
+    if config.cluster is None:
+        events = make_shards(config, tasks, _n_workers(config, tasks))
+    else:
+        events = make_shards_on_cluster(config, tasks, {part.name: part for part in parts})
+    try:
+        for event in events:
+            match event:
+                case JobResult(job=task, result=outcome):
+                    total[outcome] += 1
+                    by_shard.setdefault(task, Counter())[outcome] += 1
+                    rate = total[1] / max(total[0] + total[1], 1)
+                    bar.set_postfix_str(f"success {rate:.1%}", refresh=False)
+                    bar.update(1)
+                case JobLost(job=task, reason=reason, n_results=undone):
+                    total.subtract(by_shard.pop(task, Counter()))
+                    bar.update(-undone)
+                    bar.write(f"a worker died ({reason}); its shard is made again", file=sys.stderr)
+                case JobDone(worker=worker):
+                    workers.add(worker)
+    finally:
+        events.close()
+        bar.close()
+    seconds = time.monotonic() - started
+    if config.cluster is not None:
+        wait_until_seen(config.out, tasks)
+    attempts = total[0] + total[1]
+    print(
+        f"{attempts} grasps in {seconds:.0f} s: {attempts / seconds:.1f} grasps/s with {len(workers)} workers"
+    )
