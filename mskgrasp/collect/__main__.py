@@ -8,7 +8,6 @@ import sys
 import time
 from pathlib import Path
 
-from rich.console import Console
 from tqdm import tqdm
 
 from mskgrasp.collect.cluster import (
@@ -100,7 +99,7 @@ def _collect(config: CollectConfig, parts: list[Part]) -> None:
     from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary  # takes seconds
 
     summaries = summarise(config.out, config.part_filter)
-    print_table(summaries, Console(width=None if sys.stdout.isatty() else 150))
+    print_table(summaries)
     write_summary(summaries, config.out)
     print(f"wrote {config.out / 'summary.json'} and {draw_summary(config.out, config.seed)}")
 

@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import base64
-import importlib.metadata
-import platform
-import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from pydantic import BaseModel
-
-import mskgrasp
 from mskgrasp.core.files import write_whole
+from mskgrasp.reports.section import Figure, Link, Section, Table, cell_text
 
 _KINDS = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 _PACKAGES = ("torch", "sapien", "mani_skill", "numpy", "opencv-python-headless")
-_NUMBER = re.compile(r"[+\-−]?\d.*|[-–]?")
-_LONG = 40
-"""Characters; a column with a longer cell is wrapped."""
+_CLASSES = {"prose": ' class="t"', "number": ' class="n"', "word": ""}
 
 # Nothing but what is in the file: a browser refuses the rest, whatever stands in a caption.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
@@ -57,66 +49,6 @@ figcaption { color: #5c626b; font-size: 0.9rem; margin-top: 0.3rem; }
 """
 
 
-@dataclass(frozen=True, kw_only=True)
-class Link:
-    """A cell that leads to a picture of the same report.
-
-    Attributes:
-        text: What is read.
-        to: The picture's name.
-    """
-
-    text: str
-    to: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Table:
-    """A table; a column of nothing but numbers (or dashes) stands to the right.
-
-    Attributes:
-        header: (k,) names of the columns.
-        rows: Of k cells each; anything that `str` makes readable.
-        caption: Stands above it; empty: none.
-    """
-
-    header: Sequence[str]
-    rows: Sequence[Sequence[object]]
-    caption: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Picture:
-    """A picture that goes into the report.
-
-    Attributes:
-        path: PNG or JPEG; read when the report is written.
-        caption: Stands below it, and is read to those who do not see it.
-        name: What a `Link` leads to; empty: nothing does.
-    """
-
-    path: Path
-    caption: str
-    name: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Section:
-    """A part of the report under a title of its own: text, then tables, then pictures.
-
-    Attributes:
-        title: Its heading; also in the list at the top.
-        text: Paragraphs, plain text.
-        tables: Below the text.
-        pictures: Below the tables.
-    """
-
-    title: str
-    text: Sequence[str] = ()
-    tables: Sequence[Table] = ()
-    pictures: Sequence[Picture] = ()
-
-
 def write_html(path: Path, *, title: str, sections: Sequence[Section]) -> None:
     """Writes a report as one file that needs no other.
 
@@ -132,7 +64,7 @@ def write_html(path: Path, *, title: str, sections: Sequence[Section]) -> None:
         ValueError: A picture is neither PNG nor JPEG, a row has not as many cells as the header, or a link
             leads nowhere; the caller is wrong.
     """
-    names = {picture.name for section in sections for picture in section.pictures if picture.name}
+    names = {figure.name for section in sections for figure in section.figures if figure.name}
     listed = "".join(
         f'<li><a href="#section-{number}">{escape(section.title)}</a></li>'
         for number, section in enumerate(sections, 1)
@@ -150,52 +82,16 @@ def write_html(path: Path, *, title: str, sections: Sequence[Section]) -> None:
     write_whole(path, page.encode())
 
 
-def settings_section(config: BaseModel) -> Section:
-    """A section with a run's settings and the versions of what made it."""
-    versions = {"mskgrasp": mskgrasp.__version__, "python": platform.python_version()}
-    versions |= {name: importlib.metadata.version(name) for name in _PACKAGES if _installed(name)}
-    return Section(
-        title="Settings and versions",
-        tables=[
-            Table(header=("setting", "value"), rows=list(_flat(config.model_dump(mode="json")).items())),
-            Table(header=("package", "version"), rows=list(versions.items())),
-        ],
-    )
-
-
-def _installed(name: str) -> bool:
-    try:
-        importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return False
-    return True
-
-
-def _flat(values: dict[str, object], prefix: str = "") -> dict[str, str]:
-    found: dict[str, str] = {}
-    for key, value in values.items():
-        if isinstance(value, dict):
-            found |= _flat(value, f"{prefix}{key}.")
-        elif isinstance(value, list):
-            found[prefix + key] = ", ".join(map(str, value))
-        else:
-            found[prefix + key] = "not set" if value is None else str(value)
-    return found
-
-
 def _section(section: Section, number: int, names: set[str]) -> str:
     lines = [f'<section id="section-{number}">', f"<h2>{escape(section.title)}</h2>"]
     lines += [f"<p>{escape(paragraph)}</p>" for paragraph in section.text]
     lines += [_table(table, names) for table in section.tables]
-    lines += [_figure(picture) for picture in section.pictures]
+    lines += [_figure(figure) for figure in section.figures]
     return "\n".join([*lines, "</section>"])
 
 
 def _table(table: Table, names: set[str]) -> str:
-    for row in table.rows:
-        if len(row) != len(table.header):
-            raise ValueError(f"a row of {len(row)} cells under a header of {len(table.header)}: {row}")
-    attributes = [_kind([_text(row[k]) for row in table.rows]) for k in range(len(table.header))]
+    attributes = [_CLASSES[kind] for kind in table.kinds()]
     head = "".join(
         f'<th scope="col"{attribute}>{escape(name)}</th>'
         for name, attribute in zip(table.header, attributes, strict=True)
@@ -211,35 +107,22 @@ def _table(table: Table, names: set[str]) -> str:
     return f'<div class="wide"><table>{caption}{body}</table></div>'
 
 
-def _kind(cells: Sequence[str]) -> str:
-    """The attribute of a column's cells: numbers, long text, or neither."""
-    if any(len(cell) > _LONG for cell in cells):
-        return ' class="t"'
-    return ' class="n"' if all(_NUMBER.fullmatch(cell) for cell in cells) else ""
-
-
-def _text(cell: object) -> str:
-    if isinstance(cell, Link):
-        return cell.text
-    return "–" if cell is None else str(cell)
-
-
 def _cell(cell: object, names: set[str]) -> str:
     if isinstance(cell, Link):
         if cell.to not in names:
             raise ValueError(f"link '{cell.text}' leads to picture '{cell.to}', which is not in the report")
         return f'<a href="#picture-{escape(cell.to)}">{escape(cell.text)}</a>'
-    return escape(_text(cell))
+    return escape(cell_text(cell))
 
 
-def _figure(picture: Picture) -> str:
-    content = picture.path.read_bytes()
+def _figure(figure: Figure) -> str:
+    content = figure.path.read_bytes()
     kind = next((kind for start, kind in _KINDS.items() if content.startswith(start)), None)
     if kind is None:
-        raise ValueError(f"{picture.path} is neither PNG nor JPEG")
+        raise ValueError(f"{figure.path} is neither PNG nor JPEG")
     data = base64.b64encode(content).decode()
-    anchor = f' id="picture-{escape(picture.name)}"' if picture.name else ""
-    caption = escape(picture.caption)
+    anchor = f' id="picture-{escape(figure.name)}"' if figure.name else ""
+    caption = escape(figure.caption)
     return (
         f'<figure{anchor}><img src="data:{kind};base64,{data}" alt="{caption}">'
         f"<figcaption>{caption}</figcaption></figure>"

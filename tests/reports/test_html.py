@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from mskgrasp.planning.planner import PlannerConfig
-from mskgrasp.reports.html import Link, Picture, Section, Table, settings_section, write_html
+from mskgrasp.reports.html import write_html
+from mskgrasp.reports.section import Figure, Link, Section, Table, settings_section
 from tests.browser import Page
 
 HOSTILE = '<script>document.title="owned"</script> & "quoted" <img src=x onerror=alert(1)>'
@@ -44,12 +45,12 @@ def report(tmp_path: Path) -> Path:
         ),
         Section(
             title="Pictures",
-            pictures=[
-                Picture(path=picture(tmp_path / "a.png", 1725), caption=HOSTILE, name="worst"),
-                Picture(path=picture(tmp_path / "b.jpg"), caption="A JPEG"),
+            figures=[
+                Figure(path=picture(tmp_path / "a.png", 1725), caption=HOSTILE, name="worst"),
+                Figure(path=picture(tmp_path / "b.jpg"), caption="A JPEG"),
             ],
         ),
-        settings_section(PlannerConfig()),
+        settings_section(PlannerConfig().model_dump()),
     ]
     write_html(path, title=f"Report {HOSTILE}", sections=sections)
     for made in (tmp_path / "a.png", tmp_path / "b.jpg"):
@@ -90,9 +91,9 @@ def test_what_cannot_be_shown_is_refused(tmp_path):
 
     (tmp_path / "drawing.svg").write_text("<svg onload='alert(1)'/>")
     with pytest.raises(ValueError, match="neither PNG nor JPEG"):
-        write(pictures=[Picture(path=tmp_path / "drawing.svg", caption="")])
+        write(figures=[Figure(path=tmp_path / "drawing.svg", caption="")])
     with pytest.raises(FileNotFoundError):
-        write(pictures=[Picture(path=tmp_path / "gone.png", caption="")])
+        write(figures=[Figure(path=tmp_path / "gone.png", caption="")])
     with pytest.raises(ValueError, match="1 cells under a header of 2"):
         write(tables=[Table(header=("a", "b"), rows=[("x",)])])
     with pytest.raises(ValueError, match="'nowhere', which is not in the report"):
