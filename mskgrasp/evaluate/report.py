@@ -39,8 +39,12 @@ def sections(report: dict[str, Any], folder: Path) -> list[Section]:
         folder: Of the run, with the figures.
     """
     body = _success(report, folder) if report["experiment"] == "success" else _displacement(report, folder)
-    found = [*body, _tape(report), _worst(report, folder)]
-    return [*(one for one in found if one), settings_section(report["settings"], report["versions"])]
+    return [
+        *body,
+        _tape(report),
+        _worst(report, folder),
+        settings_section(report["settings"], report["versions"]),
+    ]
 
 
 def conclusion(report: dict[str, Any]) -> str:

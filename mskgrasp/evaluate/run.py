@@ -28,7 +28,7 @@ from mskgrasp.evaluate.experiments import (
 )
 from mskgrasp.evaluate.figures import draw_comparison, draw_errors, draw_success
 from mskgrasp.evaluate.replay_trial import describe_trial, draw_trial, find_trial, outcome_text
-from mskgrasp.evaluate.report import TITLES, print_report, sections
+from mskgrasp.evaluate.report import TITLES, conclusion, print_report, sections
 from mskgrasp.evaluate.summary import farthest_off, summarise, worst_trials
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts import find_part
@@ -297,6 +297,7 @@ def _report(
     text = json.dumps(report, indent=1, allow_nan=False)
     write_whole(config.out / "report.json", (text + "\n").encode())
     write_html(
-        config.out / "report.html", title=TITLES[config.experiment], sections=sections(report, config.out)
-    )
+        config.out / "report.html", title=TITLES[config.experiment], conclusion=conclusion(report),
+        sections=sections(report, config.out),
+    )  # fmt: skip
     return report

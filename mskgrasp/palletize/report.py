@@ -81,13 +81,25 @@ def write_report(
         _lost(out, placements),
         settings_section(config.model_dump(mode="json")),
     ]
-    write_html(out / "report.html", title="Palletizing", sections=[one for one in sections if one])
+    write_html(out / "report.html", title="Palletizing", conclusion=_conclusion(report), sections=sections)
     return report
 
 
 def print_report(report: dict[str, Any], console: Console | None = None) -> None:
     """Prints the counts and errors of each correction, and what correcting gains."""
     print_sections([_result(report)], console)
+
+
+def _conclusion(report: dict[str, Any]) -> str:
+    counts = report["corrections"].values()
+    placed = f"{sum(row['placed'] for row in counts)} of {sum(row['tried'] for row in counts)} parts placed"
+    medians = [
+        f"{name} {millimetres(row['median_translation'])} and {degrees(row['median_rotation'])}"
+        for name, row in report["corrections"].items()
+    ]
+    if not report["compared"]:
+        return f"{placed}; no error was measured under every correction."
+    return f"{placed}; median error by correction: {', '.join(medians)}."
 
 
 def _result(report: dict[str, Any]) -> Section:
