@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 
 from mskgrasp.core.grasp import MAX_DISPLACEMENT
+from mskgrasp.core.palette import GREEN, INK, PALE_GREEN, RED
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.section import Section, Table
+from mskgrasp.reports.style import saved_figure
 from mskgrasp.simulation.versions import versions
 from mskgrasp.validate.closed_form import Check
 from mskgrasp.validate.compare import MOST_DISAGREEMENT, MOST_TIMES_FLOOR, Comparison, complaints
@@ -28,7 +28,6 @@ from tasks.attempt.outcome import MAX_PENETRATION, MAX_SPEED
 
 _FLOORS = (FLOOR, CELL_FLOOR)
 _MARKERS = "o^sDvP"
-_GOOD, _BAD, _INK = "#2b8a3e", "#c92a2a", "#22252b"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,32 +149,29 @@ def draw(
     path: Path, checks: Sequence[Check], config: ValidateConfig, found: dict[str, Comparison] | None
 ) -> Path:
     """Draws the closed-form errors in units of their tolerance and, where compared, accuracy over cost."""
-    figure = Figure(figsize=(13 if found else 7.5, 0.32 * len(checks) + 1.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(
-        1, 3 if found else 1, squeeze=False, width_ratios=(1.3, 1, 1) if found else None
-    )[0]
-    _draw_checks(panels[0], checks)
-    if found:
-        _draw_cost(panels[1], found, config, "agreement", "grasps with the same success, %", 100.0)
-        _draw_cost(panels[2], found, config, "shift_p90", "90 % of displacements differ by less, mm", 1e3)
-        panels[2].set_yscale("log")
-        panels[2].set_yticks([0.5, 1, 2, 4], ["0.5", "1", "2", "4"])
-        panels[2].yaxis.set_minor_formatter(NullFormatter())
-    figure.savefig(path, dpi=140)
+    with saved_figure(path, 13 if found else 7.5, 0.32 * len(checks) + 1.6) as figure:
+        panels = figure.subplots(
+            1, 3 if found else 1, squeeze=False, width_ratios=(1.3, 1, 1) if found else None
+        )[0]
+        _draw_checks(panels[0], checks)
+        if found:
+            _draw_cost(panels[1], found, config, "agreement", "grasps with the same success, %", 100.0)
+            _draw_cost(panels[2], found, config, "shift_p90", "90 % of displacements differ by less, mm", 1e3)
+            panels[2].set_yscale("log")
+            panels[2].set_yticks([0.5, 1, 2, 4], ["0.5", "1", "2", "4"])
+            panels[2].yaxis.set_minor_formatter(NullFormatter())
     return path
 
 
 def _draw_checks(axes: Any, checks: Sequence[Check]) -> None:
-    axes.axvspan(-1, 1, color="#e3efe5", lw=0)
+    axes.axvspan(-1, 1, color=PALE_GREEN, lw=0)
     for row, check in enumerate(checks):
         middle, half = (check.high + check.low) / 2, (check.high - check.low) / 2
         error = max(-2.0, min(2.0, (check.measured - middle) / half))
-        axes.plot(error, row, "o", ms=6, color=_GOOD if check.passed else _BAD)
+        axes.plot(error, row, "o", ms=6, color=GREEN if check.passed else RED)
     axes.set_yticks(range(len(checks)), [check.name for check in checks], fontsize=7.5)
-    axes.set(xlim=(-2.2, 2.2), ylim=(len(checks) - 0.5, -0.5), xlabel="measured, in units of the tolerance")
-    axes.set_title("closed-form physics", loc="left", fontsize=11)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.set(xlim=(-2.2, 2.2), ylim=(len(checks) - 0.5, -0.5), xlabel="error in units of the tolerance")
+    axes.set_title("Closed-form physics")
 
 
 def _draw_cost(
@@ -183,11 +179,11 @@ def _draw_cost(
 ) -> None:
     floor = scale * getattr(found[FLOOR], column)
     if column == "agreement":
-        axes.axhspan(floor - scale * MOST_DISAGREEMENT, 100, color="#e3efe5", lw=0)
+        axes.axhspan(floor - scale * MOST_DISAGREEMENT, 100, color=PALE_GREEN, lw=0)
     else:
-        axes.axhspan(0, MOST_TIMES_FLOOR * floor, color="#e3efe5", lw=0)
+        axes.axhspan(0, MOST_TIMES_FLOOR * floor, color=PALE_GREEN, lw=0)
     for line, style in ((floor, ":"), (scale * getattr(found[CELL_FLOOR], column), "--")):
-        axes.axhline(line, color=_INK, lw=0.8, ls=style)
+        axes.axhline(line, color=INK, lw=0.8, ls=style)
     rates = sorted({*config.rates_hz, config.physics.rate_hz})
     counts = sorted({*config.iterations, config.physics.position_iterations})
     markers = {rate: _MARKERS[k % len(_MARKERS)] for k, rate in enumerate(rates)}
@@ -200,24 +196,22 @@ def _draw_cost(
             fine = not complaints(found[name], found[FLOOR], found[REFERENCE].success_rate)
             axes.plot(*place, markers[rate], ms=6, color=colour, mfc=colour if fine else "white", zorder=2)
             if name == config.production:
-                axes.plot(*place, "o", ms=13, color=_INK, mfc="none", zorder=3)
+                axes.plot(*place, "o", ms=13, color=INK, mfc="none", zorder=3)
     for rate, marker in markers.items():
-        axes.plot([], [], marker, ms=5, color=_INK, mfc="white", label=f"{rate} Hz")
+        axes.plot([], [], marker, ms=5, color=INK, mfc="white", label=f"{rate} Hz")
     if column == "agreement":
         axes.legend(
             fontsize=7.5,
             loc="lower right",
-            frameon=False,
             title="circled: under test\nfilled: adds nothing",
             title_fontsize=7.5,
         )
-    axes.set(xlabel="processor time of a grasp, ms", ylabel=label, xscale="log")
+    axes.set(xlabel="processor time per grasp, ms", ylabel=label, xscale="log")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(ScalarFormatter())
         axis.set_minor_formatter(NullFormatter())
     axes.set_xticks([50, 100, 200, 400])
-    axes.set_title("floors: 10 um (..), 0.1 mm (--)", loc="left", fontsize=9)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.set_title("Floors: 10 um (dotted), 0.1 mm (dashed)", fontsize=9)
 
 
 def _mark(passed: bool) -> str:
