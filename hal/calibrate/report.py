@@ -1,4 +1,4 @@
-"""What a calibration found, in words and pictures."""
+"""Text and figures of a calibration."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from hal.calibrate.board_views import Picture
 from hal.calibrate.hand_eye import HandEye, View
 from hal.charuco import MIN_CORNERS, Board, draw, project
 from hal.table import TablePlane
 from mskgrasp.core.geometry import Pose, pose_distance
+from mskgrasp.core.palette import BLUE, PALE, PALE_RED
+from mskgrasp.reports.style import saved_figure
 
 _SHOWN = 6
 _DEPTH_MATTERS = 0.003
@@ -24,10 +24,10 @@ _DEPTH_MATTERS = 0.003
 
 @dataclass(frozen=True, kw_only=True)
 class DepthOffset:
-    """How much too far the camera measures the board.
+    """Depth error of the camera at the board.
 
     Attributes:
-        metres: Median over the board, measured less true.
+        metres: Median over the board, measured minus true.
         spread: Half the range of the middle 68 % of the views, metres.
         n_views: Views in which the board had depths.
     """
@@ -38,7 +38,7 @@ class DepthOffset:
 
 
 def depth_offset(board: Board, pictures: Sequence[Picture], found: HandEye) -> DepthOffset | None:
-    """Compares the depth of the board's inside with its place in space; None where it has none."""
+    """Compares the measured depth of the board's interior with its pose; None without depth."""
     offsets = []
     for i in found.used:
         picture = pictures[i]
@@ -62,7 +62,7 @@ def depth_offset(board: Board, pictures: Sequence[Picture], found: HandEye) -> D
 
 
 def describe(found: HandEye, views: Sequence[View], before: Pose, offset: DepthOffset | None) -> list[str]:
-    """The result, line by line."""
+    """The result as lines of text."""
     x, y, z = found.T_base_camera.position
     quat = " ".join(f"{value:.5f}" for value in found.T_base_camera.quat_wxyz)
     n_corners = np.mean([len(views[index].corners.ids) for index in found.used])
@@ -92,7 +92,7 @@ def describe(found: HandEye, views: Sequence[View], before: Pose, offset: DepthO
 
 
 def describe_table(plane: TablePlane | None, offset: DepthOffset | None, table_z: float | None) -> str:
-    """Where the table is, in a line; ``table_z`` is what the cell file says, if one was given."""
+    """Height and tilt of the table in one line; ``table_z`` is the value of the cell file, if any."""
     if plane is None:
         return "table       not seen: too little depth over the region"
     # A camera that measures too far puts the table too low.
@@ -107,43 +107,40 @@ def describe_table(plane: TablePlane | None, offset: DepthOffset | None, table_z
 def draw_corners(
     board: Board, pictures: Sequence[Picture], views: Sequence[View], found: HandEye | None, path: Path
 ) -> None:
-    """A few pictures with the corners found (circles) and expected (crosses)."""
+    """Draws some pictures with the corners detected (circles) and expected (crosses)."""
     chosen = np.unique(np.linspace(0, len(pictures) - 1, min(_SHOWN, len(pictures))).round().astype(int))
-    figure = Figure(figsize=(12, 4.2 * ((len(chosen) + 2) // 3)), layout="constrained")
-    FigureCanvasAgg(figure)
-    for place, index in enumerate(chosen):
-        picture, view = pictures[index], views[index]
-        expected = None
-        if found is not None:
-            T_camera_board = found.T_base_camera.inverse() @ picture.T_base_tcp @ found.T_tcp_board
-            expected = project(T_camera_board.apply(board.corners()), picture.intrinsics)
-        axes = figure.add_subplot((len(chosen) + 2) // 3, 3, place + 1)
-        axes.imshow(draw(picture.colour, view.corners, expected))
-        used = "" if found is None or index in found.used else ", not used"
-        axes.set_title(
-            f"picture {index}: {len(view.corners.ids)} of {board.n_corners} corners{used}", fontsize=10
-        )
-        axes.set_axis_off()
-    figure.savefig(path, dpi=110)
+    rows = (len(chosen) + 2) // 3
+    with saved_figure(path, 12, 4.2 * rows) as figure:
+        for place, index in enumerate(chosen):
+            picture, view = pictures[index], views[index]
+            expected = None
+            if found is not None:
+                T_camera_board = found.T_base_camera.inverse() @ picture.T_base_tcp @ found.T_tcp_board
+                expected = project(T_camera_board.apply(board.corners()), picture.intrinsics)
+            axes = figure.add_subplot(rows, 3, place + 1)
+            axes.imshow(draw(picture.colour, view.corners, expected))
+            used = "" if found is None or index in found.used else ", not used"
+            axes.set_title(
+                f"picture {index}: {len(view.corners.ids)} of {board.n_corners} corners{used}", fontsize=10
+            )
+            axes.set_axis_off()
 
 
 def draw_residuals(views: Sequence[View], found: HandEye, path: Path) -> None:
-    """What is left in each picture, in pixels, millimetres and degrees."""
-    figure = Figure(figsize=(10, 6), layout="constrained")
-    FigureCanvasAgg(figure)
+    """Draws the residuals of each picture in pixels, millimetres and degrees."""
     rows = (
         ("corners, px (RMS)", found.rms_px),
         ("board, mm", found.translation_m * 1e3),
         ("board, degrees", np.degrees(found.rotation_rad)),
     )
     few = {i for i, view in enumerate(views) if len(view.corners.ids) < MIN_CORNERS}
-    legend = "picture (grey: too few corners; pink: left out, it contradicts the others)"
-    for place, (name, values) in enumerate(rows):
-        axes = figure.add_subplot(3, 1, place + 1)
-        axes.bar(found.used, values, color="tab:blue")
-        for index in set(range(len(views))) - set(found.used.tolist()):
-            axes.axvspan(index - 0.4, index + 0.4, color="0.85" if index in few else "mistyrose")
-        axes.set_ylabel(name)
-        axes.set_xlim(-0.7, len(views) - 0.3)
-        axes.set_xlabel(legend if place == len(rows) - 1 else "")
-    figure.savefig(path, dpi=110)
+    legend = "picture (grey: too few corners; red: rejected as an outlier)"
+    with saved_figure(path, 10, 6) as figure:
+        for place, (name, values) in enumerate(rows):
+            axes = figure.add_subplot(3, 1, place + 1)
+            axes.bar(found.used, values, color=BLUE)
+            for index in set(range(len(views))) - set(found.used.tolist()):
+                axes.axvspan(index - 0.4, index + 0.4, color=PALE if index in few else PALE_RED)
+            axes.set_ylabel(name)
+            axes.set_xlim(-0.7, len(views) - 0.3)
+            axes.set_xlabel(legend if place == len(rows) - 1 else "")

@@ -1,4 +1,4 @@
-"""What a collection run found: a table for the reader, JSON for programs, a picture to look at."""
+"""Summary of a collection run: table, JSON and picture."""
 
 from __future__ import annotations
 
@@ -9,35 +9,40 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from mskgrasp.collect.config import PartFilter
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.dataset import ShardInfo, list_shards, read_shard
 from mskgrasp.dataset.shards import read_columns
+from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.grasp_figures import draw_contact_sheet
+from mskgrasp.reports.section import Section, Table
 
 N_PICTURES = 24
+_HEADER = (
+    "part", "attempts", "success", "95 % interval", "median displacement", "median turn", "failures",
+    "discarded attempts", "passes the part filter",
+)  # fmt: skip
 
 Columns = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True, kw_only=True)
 class PartSummary:
-    """One part's attempts in numbers.
+    """Attempts on one part in numbers.
 
     Attributes:
-        part: Name.
-        family: Kind of part.
-        attempts: How many.
-        successes: How many lifted the part.
+        part: Its name.
+        family: Its family.
+        attempts: Number of attempts.
+        successes: Number of those that lifted the part.
         success_interval: 95 % Wilson interval of the success rate.
         median_displacement: Median of |d| over successes, metres; None without any.
         median_turn: Median of |dtheta| over successes, radians; None without any.
         median_tilt: Median tilt over successes, radians; None without any.
-        failures: Count for each reason.
-        discarded: Attempts thrown away, by reason.
+        failures: Number of failures by reason.
+        discarded: Number of discarded attempts by reason; not among the attempts.
         kept: Whether the part passes the filter on its success rate.
     """
 
@@ -55,16 +60,18 @@ class PartSummary:
 
 
 def summarise(folder: Path, part_filter: PartFilter) -> list[PartSummary]:
-    """Reads a dataset and sums up each part."""
+    """Reads a dataset and summarises each part."""
     parts: dict[str, list[tuple[Columns, ShardInfo]]] = {}
     for path in list_shards(folder):
         # Without the images: those of a large dataset do not fit into memory.
         columns, info = read_columns(path, ("success", "failure", "displacement", "tilt"))
         parts.setdefault(info.part, []).append((columns, info))
-    return [_sum_up(name, shards, part_filter) for name, shards in sorted(parts.items())]
+    return [_summarise_part(name, shards, part_filter) for name, shards in sorted(parts.items())]
 
 
-def _sum_up(name: str, shards: list[tuple[Columns, ShardInfo]], part_filter: PartFilter) -> PartSummary:
+def _summarise_part(
+    name: str, shards: list[tuple[Columns, ShardInfo]], part_filter: PartFilter
+) -> PartSummary:
     success, failure, displacement, tilt = (
         np.concatenate([columns[name] for columns, _ in shards])
         for name in ("success", "failure", "displacement", "tilt")
@@ -93,34 +100,31 @@ def _median(values: np.ndarray) -> float | None:
     return float(np.median(values)) if len(values) else None
 
 
-def print_table(summaries: list[PartSummary], console: Console) -> None:
-    """A row a part, and the sum of all."""
-    table = Table(title="Random grasps by part")
-    for column, justify in (
-        ("part", "left"), ("attempts", "right"), ("success", "right"), ("95 % interval", "right"),
-        ("|d| median", "right"), ("|turn| median", "right"), ("failures", "left"), ("kept", "left"),
-    ):  # fmt: skip
-        table.add_column(column, justify=justify, no_wrap=column != "failures")  # type: ignore[arg-type]
-    for row in summaries:
-        low, high = row.success_interval
-        table.add_row(
+def print_table(summaries: list[PartSummary], console: Console | None = None) -> None:
+    """Prints a row for each part and a total."""
+    rows = [
+        (
             row.part,
-            str(row.attempts),
+            row.attempts,
             f"{row.successes / max(row.attempts, 1):.1%}",
-            f"{low:.0%} - {high:.0%}",
+            f"{row.success_interval[0]:.0%} - {row.success_interval[1]:.0%}",
             "-" if row.median_displacement is None else f"{row.median_displacement * 1e3:.1f} mm",
             "-" if row.median_turn is None else f"{np.degrees(row.median_turn):.1f} deg",
-            _counts({**row.failures, **row.discarded}),
+            _counts(row.failures),
+            _counts(row.discarded),
             "yes" if row.kept else "no",
         )
+        for row in summaries
+    ]
     attempts, successes = sum(r.attempts for r in summaries), sum(r.successes for r in summaries)
     failures = sum((Counter(row.failures) for row in summaries), Counter())
-    table.add_section()
-    table.add_row(
-        f"all {len(summaries)}", str(attempts), f"{successes / max(attempts, 1):.1%}", "", "", "",
-        _counts(failures), str(sum(row.kept for row in summaries)),
+    discarded = sum((Counter(row.discarded) for row in summaries), Counter())
+    total = (
+        f"all {len(summaries)}", attempts, f"{successes / max(attempts, 1):.1%}", "", "", "",
+        _counts(failures), _counts(discarded), f"{sum(row.kept for row in summaries)} parts",
     )  # fmt: skip
-    console.print(table)
+    table = Table(header=_HEADER, rows=[*rows, total], total=True)
+    print_sections([Section(title="Random grasps by part", tables=[table])], console)
 
 
 def _counts(counts: dict[str, int]) -> str:
@@ -128,13 +132,13 @@ def _counts(counts: dict[str, int]) -> str:
 
 
 def write_summary(summaries: list[PartSummary], folder: Path) -> None:
-    """``summary.json``: the table's numbers."""
+    """Writes the table's numbers as ``summary.json``."""
     text = json.dumps({"schema_version": 1, "parts": [asdict(row) for row in summaries]}, indent=1)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
 
 
 def draw_summary(folder: Path, seed: int) -> Path:
-    """``summary.png``: attempts of many parts, successes and failures mixed."""
+    """Draws attempts of many parts, successes and failures mixed, as ``summary.png``."""
     paths = list_shards(folder)
     rng = np.random.default_rng(seed)
     chosen = rng.permutation(len(paths))[:N_PICTURES]

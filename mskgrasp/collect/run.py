@@ -9,7 +9,6 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from rich.console import Console
 from tqdm import tqdm
 
 from mskgrasp.collect.cluster import (
@@ -104,7 +103,7 @@ def _collect(config: CollectConfig, parts: list[Part]) -> None:
         from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary
 
     summaries = summarise(config.out, config.part_filter)
-    print_table(summaries, Console(width=None if sys.stdout.isatty() else 150))
+    print_table(summaries)
     write_summary(summaries, config.out)
     print(f"wrote {config.out / 'summary.json'} and {draw_summary(config.out, config.seed)}")
 

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.metrics import wilson_interval
+from mskgrasp.core.palette import FAINT, GREEN, PALE_GREEN
 from mskgrasp.dataset import list_shards, read_success
 from mskgrasp.parts.catalogue import Entry, Index, Rating
 
@@ -144,11 +145,11 @@ def draw_ratings(index: Index, bounds: tuple[float, float], path: Path) -> Path:
     grid = figure.add_gridspec(2, columns, height_ratios=(4.0, 0.15 * rows))
     above = figure.add_subplot(grid[0, :])
     low, high = bounds
-    above.axhspan(100 * low, 100 * high, color="#d9ead9", lw=0)
+    above.axhspan(100 * low, 100 * high, color=PALE_GREEN, lw=0)
     for entry in rated:
         assert entry.rating is not None
         rate, interval = entry.rating.rate, entry.rating.interval
-        colour = "#2f7d4f" if low <= rate <= high else "#8a94a0"
+        colour = GREEN if low <= rate <= high else FAINT
         x = 1e3 * entry.longest_axis
         above.plot([x, x], [100 * end for end in interval], color=colour, lw=0.6, alpha=0.5)
         above.plot(x, 100 * rate, "o", ms=3.5, color=colour)
@@ -159,10 +160,10 @@ def draw_ratings(index: Index, bounds: tuple[float, float], path: Path) -> Path:
         # The hardest families stand at the top of the first column.
         shown = families[column * rows : (column + 1) * rows]
         axes = figure.add_subplot(grid[1, column])
-        axes.axvspan(100 * low, 100 * high, color="#d9ead9", lw=0)
+        axes.axvspan(100 * low, 100 * high, color=PALE_GREEN, lw=0)
         for row, family in enumerate(shown):
             for rate in by_family[family]:
-                colour = "#2f7d4f" if low <= rate <= high else "#8a94a0"
+                colour = GREEN if low <= rate <= high else FAINT
                 axes.plot(100 * rate, row, "o", ms=3.5, color=colour, alpha=0.8)
         axes.set_yticks(range(len(shown)), [family.replace("_", " ") for family in shown], fontsize=6.5)
         axes.set(xlabel="success, %", xlim=(-3, 103), ylim=(rows - 0.5, -0.5))

@@ -1,4 +1,4 @@
-"""Pictures of an evaluation: success by family, errors of displacement, models beside each other."""
+"""Figures of an evaluation: success, errors of displacement, comparison of models."""
 
 from __future__ import annotations
 
@@ -6,41 +6,49 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from mskgrasp.core.palette import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    LINE,
+    MID_BLUE,
+    MID_RED,
+    ORANGE,
+    PALE_BLUE,
+    RED,
+)  # fmt: skip
 from mskgrasp.evaluate.comparison import PAPER, POLICIES, POLICY_NAMES, SIDES, paper_label
 from mskgrasp.evaluate.summary import displacement_errors
+from mskgrasp.reports.style import saved_figure
 from mskgrasp.trials.trial import Trial
 
-_COLOURS = {"dx": "#1f6feb", "dy": "#e8590c", "dz": "#8b909a", "turn": "#2b8a3e"}
-_OURS = {"quality": "#1f6feb", "low_variance": "#c92a2a"}
-_PAPERS = {"quality": "#b6cdf3", "low_variance": "#edbcbc"}
-_INK, _FAINT = "#22252b", "#8b909a"
-_STYLE: dict[Any, Any] = {"axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 11}
+_COLOURS = {"dx": BLUE, "dy": ORANGE, "dz": FAINT, "turn": GREEN}
+_OURS = {"quality": BLUE, "low_variance": RED}
+_PAPERS = {"quality": MID_BLUE, "low_variance": MID_RED}
 _MOST_ROWS = 40
 
 
 def draw_success(report: dict[str, Any], path: Path) -> None:
-    """Draws how many grasps lifted, by family or, where every family has one part, by part; and why not."""
+    """Draws success by family, or by part where every family has one part, and the reasons of failures."""
     overall = report["overall"]
     by = "families" if len(report["families"]) < len(report["parts"]) else "parts"
     rows = sorted(report[by].items(), key=lambda item: (item[1]["success_rate"], item[0]))
     shown = rows[:_MOST_ROWS]
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(10, 1.8 + 0.24 * max(len(shown), 6)), layout="constrained")
+    with saved_figure(path, 10, 1.8 + 0.24 * max(len(shown), 6)) as figure:
         left, right = figure.subplots(1, 2, width_ratios=(3, 1))
         for y, (_, one) in enumerate(shown):
             low, high = one["success_interval"]
-            left.plot([low, high], [y, y], color=_FAINT, lw=2, solid_capstyle="butt")
+            left.plot([low, high], [y, y], color=FAINT, lw=2, solid_capstyle="butt")
             left.plot(one["success_rate"], y, "o", color=_OURS["quality"], ms=5)
         names = [f"{name} ({one['successes']} of {one['trials']})" for name, one in shown]
         left.set_yticks(range(len(shown)), names, fontsize=8)
         low, high = overall["success_interval"]
-        left.axvspan(low, high, color="#e7effc", zorder=0, lw=0)
+        left.axvspan(low, high, color=PALE_BLUE, zorder=0, lw=0)
         left.axvline(
             overall["success_rate"],
             color=_OURS["quality"],
@@ -48,50 +56,47 @@ def draw_success(report: dict[str, Any], path: Path) -> None:
             label=f"all: {overall['success_rate']:.1%}",
         )
         paper = report["paper"]["simulated"]
-        left.axvline(paper, color=_INK, lw=1, ls="--", label=f"paper, simulated: {paper:.1%}")
+        left.axvline(paper, color=INK, lw=1, ls="--", label=f"paper, simulated: {paper:.1%}")
         rest = f", the worst {len(shown)} of {len(rows)}" if len(rows) > len(shown) else ""
-        left.set_title(f"Lifted, by {'family' if by == 'families' else 'part'}{rest}", loc="left")
+        left.set_title(f"Lifted, by {'family' if by == 'families' else 'part'}{rest}")
         left.set(xlim=(-0.02, 1.02), xlabel="share of grasps, 95 % Wilson intervals")
         left.set_ylim(-0.7, len(shown) - 0.3)
-        left.legend(frameon=False, fontsize=8, loc="upper left")
+        left.legend(fontsize=8, loc="upper left")
         reasons = overall["reasons"]
         right.barh(
             list(reasons) or ["none"], list(reasons.values()) or [0], color=_OURS["low_variance"], height=0.5
         )
-        right.set_title(f"Not lifted: {sum(reasons.values())} of {overall['trials']}", loc="left")
+        right.set_title(f"Not lifted: {sum(reasons.values())} of {overall['trials']}")
         right.xaxis.get_major_locator().set_params(integer=True)
         right.set_xlabel("grasps")
         right.set_ylim(-0.7, max(len(reasons), 5) - 0.3)
         right.set_xlim(left=0, right=max([1, *reasons.values()]) * 1.1)
-        figure.savefig(path, dpi=150)
 
 
 def draw_errors(trials: Sequence[Trial], path: Path) -> None:
-    """Draws the measured displacement of every success over the predicted one, with its deviation."""
+    """Draws measured over predicted displacement of every success, with the predicted deviation."""
     measured = [trial for trial in trials if trial.measured is not None]
     predicted = np.array([trial.predicted for trial in measured]).reshape(-1, 4)
     deviation = np.array([trial.predicted_std for trial in measured]).reshape(-1, 4)
     true = np.array([trial.measured for trial in measured]).reshape(-1, 4)
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(10, 4.8), layout="constrained")
+    with saved_figure(path, 10, 4.8) as figure:
         shift, turn = figure.subplots(1, 2)
         for k, name in enumerate(("dx", "dy", "dz")):
             _points(shift, predicted[:, k] * 1e3, true[:, k] * 1e3, deviation[:, k] * 1e3, name)
         degrees = [np.degrees(values[:, 3]) for values in (predicted, true, deviation)]
         _points(turn, degrees[0], degrees[1], degrees[2], "turn")
         for axes, unit in ((shift, "mm"), (turn, "deg")):
-            axes.axline((0, 0), slope=1, color="#c5c9d0", lw=1, zorder=0)
+            axes.axline((0, 0), slope=1, color=LINE, lw=1, zorder=0)
             low, high = (f(*axes.get_xlim(), *axes.get_ylim()) for f in (min, max))
             axes.set(xlabel=f"predicted, {unit}", ylabel=f"measured, {unit}", aspect="equal")
             axes.set(xlim=(low, high), ylim=(low, high))
-        rmse = ("no success was measured", "")
+        rmse = ("none measured", "none measured")
         if measured:
             distance, angle = (np.sqrt((e**2).mean()) for e in displacement_errors(predicted, true))
             rmse = (f"RMSE {distance * 1e3:.1f} mm", f"RMSE {np.degrees(angle):.1f} deg")
-        shift.set_title(f"Displacement in the hand: {rmse[0]}", loc="left")
-        turn.set_title(f"Turn in the hand: {rmse[1]}", loc="left")
-        shift.legend(frameon=False, loc="lower right")
-        figure.savefig(path, dpi=150)
+        shift.set_title(f"Displacement in the hand: {rmse[0]}")
+        turn.set_title(f"Turn in the hand: {rmse[1]}")
+        shift.legend(loc="lower right")
 
 
 def _points(
@@ -104,26 +109,25 @@ def _points(
 
 
 def draw_comparison(report: dict[str, Any], path: Path) -> None:
-    """Draws each model's RMSE with both policies, as the paper's figure 5, with the paper's own bars beside.
+    """Draws each model's RMSE under both policies as in figure 5 of the paper, beside the paper's bars.
 
-    A row for known and one for novel parts, a column for translation and one for rotation. The paper's bars
-    are of known and novel parts together, and stand in both rows; bars without a line: one part alone.
+    Rows: known and novel parts; columns: translation and rotation. The paper's bars are of known and novel
+    parts together and appear in both rows. A bar without an error bar is of a single part.
     """
     models = report["models"]
     ours = {paper_label(label) or label: label for label in models}
     order = [*(name for name in PAPER), *(name for name in ours if name not in PAPER)]
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(5 + 1.4 * len(order), 7.4), layout="constrained")
+    with saved_figure(path, 5 + 1.4 * len(order), 7.4) as figure:
         grid = figure.subplots(2, 2, sharex=True, sharey="col")
         for row, side in zip(grid, SIDES, strict=True):
             for axes, kind, scale, unit in zip(
                 row, ("translation", "rotation"), (100.0, 180 / np.pi), ("cm", "degrees"), strict=True
             ):
                 for x, name in enumerate(order):
-                    # What LOWESS knows are known parts.
+                    # LOWESS is fitted to known parts.
                     paper = {} if (name, side) == ("LOWESS", "novel") else PAPER.get(name, {})
                     _bars(axes, x, models.get(ours.get(name, ""), {}), paper, side, kind, scale)
-                axes.set_title(f"{kind.capitalize()} RMSE, {side} parts", loc="left")
+                axes.set_title(f"{kind.capitalize()} RMSE, {side} parts")
                 axes.set_ylabel(unit)
                 labels = [name if ours.get(name, name) == name else f"{name}\n{ours[name]}" for name in order]
                 axes.set_xticks(range(len(order)), labels, fontsize=8)
@@ -131,11 +135,10 @@ def draw_comparison(report: dict[str, Any], path: Path) -> None:
                 axes.set_xlim(-0.6, len(order) - 0.4)
         handles = [
             Patch(color=colours[policy], label=f"{POLICY_NAMES[policy]}, {who}")
-            for who, colours in (("here", _OURS), ("paper (all parts)", _PAPERS))
+            for who, colours in (("this run", _OURS), ("paper (all parts)", _PAPERS))
             for policy in POLICIES
         ]
-        figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
-        figure.savefig(path, dpi=150)
+        figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=9)
 
 
 def _bars(
@@ -147,7 +150,7 @@ def _bars(
     kind: str,
     scale: float,
 ) -> None:
-    """Ours to the left, the paper's to the right."""
+    """Draws our bars on the left and the paper's on the right."""
     width = 0.2
     for k, policy in enumerate(POLICIES):
         found = (model.get(policy) or {}).get(side)
@@ -156,7 +159,7 @@ def _bars(
             axes.bar(x + (k - 1.5) * width, value, width, color=_OURS[policy])
             if interval is not None:
                 reach = [[max(value - interval[0] * scale, 0)], [max(interval[1] * scale - value, 0)]]
-                axes.errorbar(x + (k - 1.5) * width, value, yerr=reach, color=_INK, lw=1, capsize=2.5)
+                axes.errorbar(x + (k - 1.5) * width, value, yerr=reach, color=INK, lw=1, capsize=2.5)
         elif found is not None and found["trials"]:
             axes.text(x + (k - 1.5) * width, 0, "-", ha="center", va="bottom", color=_OURS[policy])
         bar = paper.get(policy)

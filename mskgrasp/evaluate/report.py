@@ -1,165 +1,117 @@
-"""The report of an evaluation as titled tables and figures: plain data for the console and for a page."""
+"""The report of an evaluation as sections."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from mskgrasp.evaluate.comparison import POLICIES, POLICY_NAMES, SIDES
-from mskgrasp.reports import html as html_report
+from mskgrasp.reports.console import print_sections
+from mskgrasp.reports.section import Figure, Link, Section, Table, settings_section
 
-Rows = tuple[tuple[str, ...], ...]
-WORST = "Worst trials"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Section:
-    """A piece of a report.
-
-    Attributes:
-        title: Over it.
-        text: Sentences under the title.
-        columns: Names of a table's columns; empty: no table.
-        rows: Of the table, as text.
-        figures: Picture files and their captions.
-        on_page_only: Too long for the console.
-    """
-
-    title: str
-    text: str = ""
-    columns: tuple[str, ...] = ()
-    rows: Rows = ()
-    figures: tuple[tuple[Path, str], ...] = ()
-    on_page_only: bool = False
+TITLES = {"success": "Success of planned grasps", "displacement": "Displacement in the hand"}
+_SUCCESS_COLUMNS = (
+    "lifted", "95 % interval", "RMSE", "RMSE if none predicted", "turn RMSE", "turn RMSE if none predicted",
+    "failures",
+)  # fmt: skip
+_ERROR_COLUMNS = (
+    "model", "policy", "parts", "measured", "RMSE", "RMSE if none predicted", "turn RMSE",
+    "turn RMSE if none predicted", "inside 90 % interval",
+)  # fmt: skip
+_ERRORS_EXPLAINED = (
+    "RMSE: of the predicted displacement in the hand, over the grasps that lifted the part and were "
+    "measured; RMSE if none predicted: of predicting that nothing moves, over the same grasps."
+)
+_COMPARISON_EXPLAINED = (
+    f"{_ERRORS_EXPLAINED} In brackets: 95 % interval over parts. Inside 90 % interval: share of the measured "
+    "values within the predicted central 90 %. Known parts are those a model was made from grasps of."
+)
 
 
 def sections(report: dict[str, Any], folder: Path) -> list[Section]:
-    """A report's pieces, in order.
+    """The sections of a report, in order.
 
     Args:
         report: As in ``report.json``.
-        folder: Of the run; the figures lie there.
+        folder: Of the run, with the figures.
     """
     body = _success(report, folder) if report["experiment"] == "success" else _displacement(report, folder)
-    worst = tuple((folder / name, caption) for name, caption in report["worst"])
     return [
         *body,
-        *_tape(report),
-        *([Section(title=WORST, figures=worst, on_page_only=True)] if worst else []),
-        Section(
-            title="Settings",
-            columns=("setting", "value"),
-            rows=tuple((name, str(value)) for name, value in report["settings"].items()),
-            on_page_only=True,
-        ),
-        Section(
-            title="Versions",
-            columns=("of", "version"),
-            rows=tuple((name, str(value)) for name, value in report["versions"].items()),
-            on_page_only=True,
-        ),
+        _tape(report),
+        _worst(report, folder),
+        settings_section(report["settings"], report["versions"]),
     ]
 
 
-def page(report: dict[str, Any], folder: Path) -> list[html_report.Section]:
-    """The pieces as `mskgrasp.reports.html.write_html` takes them, the worst trials behind links."""
-    found = []
-    for one in sections(report, folder):
-        tables = [html_report.Table(header=one.columns, rows=one.rows)] if one.columns else []
-        if one.title == WORST:
-            rows = [
-                (html_report.Link(text=path.stem, to=path.stem), text.removeprefix(f"{path.stem}: "))
-                for path, text in one.figures
-            ]
-            tables = [html_report.Table(header=("trial", "outcome"), rows=rows)]
-        pictures = [
-            html_report.Picture(path=path, caption=text, name=path.stem) for path, text in one.figures
-        ]
-        text = one.text.splitlines()
-        found.append(html_report.Section(title=one.title, text=text, tables=tables, pictures=pictures))
-    return found
+def conclusion(report: dict[str, Any]) -> str:
+    """The result of an evaluation in one sentence."""
+    if report["experiment"] == "success":
+        overall = report["overall"]
+        if overall["success_rate"] is None:
+            return "No grasp was tried."
+        text = (
+            f"{overall['success_rate']:.1%} of {overall['trials']} planned grasps lifted the part "
+            f"(95 % interval {interval_text(overall['success_interval'], digits=1)})"
+        )
+        if overall["translation_rmse"] is None:
+            return text + "; no displacement was measured."
+        return (
+            f"{text}; RMSE of the predicted displacement in the hand: "
+            f"{millimetres(overall['translation_rmse'])} and {degrees(overall['rotation_rmse'])}."
+        )
+    label, model = next(iter(report["models"].items()))
+    errors = [
+        f"{millimetres(model[policy][side]['translation_rmse'])} and "
+        f"{degrees(model[policy][side]['rotation_rmse'])} on {side} parts ({POLICY_NAMES[policy]} grasps)"
+        for policy in POLICIES
+        for side in SIDES
+        if model[policy] is not None and model[policy][side]["translation_rmse"] is not None
+    ]
+    return f"RMSE of {label}: {'; '.join(errors)}." if errors else "No displacement was measured."
 
 
-def print_report(report: dict[str, Any], folder: Path, console: Console) -> None:
-    """Prints the tables that fit a console."""
-    for section in sections(report, folder):
-        if section.on_page_only:
-            continue
-        if section.columns:
-            table = Table(title=section.title)
-            for name in section.columns:
-                table.add_column(name, justify="left" if name in _WORDS else "right")
-            for row in section.rows:
-                if row[0] in _TOTALS and table.rows:
-                    table.add_section()
-                table.add_row(*row)
-            console.print(table)
-        if section.text:
-            console.print(section.text, highlight=False, soft_wrap=True)
-
-
-_WORDS = (
-    "part",
-    "in the hand",
-    "family",
-    "failures",
-    "model",
-    "policy",
-    "parts",
-    "not measured",
-    "setting",
-    "value",
-)
-_TOTALS = ("all",)
-_ERROR_COLUMNS = (
-    "model", "policy", "parts", "measured", "RMSE", "of zero", "turn RMSE", "of zero", "in 90 %",
-)  # fmt: skip
-_EXPLAINED = (
-    "RMSE over the measured successes [95 % interval over parts], beside that of predicting no displacement; "
-    "in 90 %: how many lie within the predicted central 90 %. A part is known to a model that was made from "
-    "grasps of it."
-)
-_SUCCESS_COLUMNS = ("lifted", "95 % interval", "RMSE", "of zero", "turn RMSE", "of zero", "failures")
+def print_report(report: dict[str, Any], folder: Path, console: Console | None = None) -> None:
+    """Prints the sections that fit a console."""
+    print_sections(sections(report, folder), console)
 
 
 def _success(report: dict[str, Any], folder: Path) -> list[Section]:
     overall, parts, families = report["overall"], report["parts"], report["families"]
-    several = len(families) < len(parts)
+    by_family = Section(title="Families", tables=[_success_table("family", families)])
     return [
-        *([_by("Families", "family", families, on_page_only=False)] if several else []),
-        _by("Parts", "part", parts, overall, text=_success_text(report)),
+        *([by_family] if len(families) < len(parts) else []),
+        Section(
+            title="Parts",
+            text=[*_success_text(report), _ERRORS_EXPLAINED],
+            tables=[_success_table("part", parts, overall)],
+        ),
         Section(
             title="Figures",
-            figures=(
-                (folder / "success.png", "Share of grasps that lifted the part, with 95 % Wilson intervals"),
-                (folder / "errors.png", "Measured displacement in the hand over the predicted one"),
-            ),
-            on_page_only=True,
+            figures=[
+                Figure(
+                    path=folder / "success.png",
+                    caption="Share of grasps that lifted the part, with 95 % Wilson intervals",
+                ),
+                Figure(
+                    path=folder / "errors.png",
+                    caption="Measured displacement in the hand over the predicted one",
+                ),
+            ],
+            page_only=True,
         ),
     ]
 
 
-def _by(
-    title: str,
-    what: str,
-    groups: dict[str, Any],
-    overall: dict[str, Any] | None = None,
-    *,
-    text: str = "",
-    on_page_only: bool = False,
-) -> Section:
+def _success_table(what: str, groups: dict[str, Any], overall: dict[str, Any] | None = None) -> Table:
     rows = [*groups.items(), *([("all", overall)] if overall is not None else [])]
-    return Section(
-        title=title,
-        text=text,
-        columns=(what, *_SUCCESS_COLUMNS),
-        rows=tuple((name, *_success_row(one)) for name, one in rows),
-        on_page_only=on_page_only,
+    return Table(
+        header=(what, *_SUCCESS_COLUMNS),
+        rows=[(name, *_success_row(one)) for name, one in rows],
+        total=overall is not None,
     )
 
 
@@ -175,20 +127,13 @@ def _success_row(one: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _success_text(report: dict[str, Any]) -> str:
-    overall = report["overall"]
+def _success_text(report: dict[str, Any]) -> list[str]:
+    overall, paper = report["overall"], report["paper"]
     rate = "-" if overall["success_rate"] is None else f"{overall['success_rate']:.1%}"
-    paper = report["paper"]
     lines = [
         f"{rate} lifted, 95 % interval {interval_text(overall['success_interval'], digits=1)} (paper: "
-        f"{paper['simulated']:.1%} simulated, {paper['real']:.1%} real)",
-        *_common_text(overall),
+        f"{paper['simulated']:.1%} simulated, {paper['real']:.1%} real)"
     ]
-    return "\n".join(lines)
-
-
-def _common_text(overall: dict[str, Any]) -> list[str]:
-    lines = []
     if overall["unmeasured"]:
         n = sum(overall["unmeasured"].values())
         lines.append(f"{n} of {overall['successes']} lifted not measured: {counted(overall['unmeasured'])}")
@@ -198,42 +143,46 @@ def _common_text(overall: dict[str, Any]) -> list[str]:
 
 
 def _displacement(report: dict[str, Any], folder: Path) -> list[Section]:
-    rows = []
-    for side in SIDES:
-        for label, model in report["models"].items():
-            for policy in POLICIES:
-                if model[policy] is None or not model[policy][side]["trials"]:
-                    continue
-                rows.append((f"{label}", POLICY_NAMES[policy], side, *_error_row(model[policy][side])))
-    lifted = tuple(
+    lifted = [
         (name, f"{one['successes']} of {one['trials']}", interval_text(one["success_interval"]),
          counted(one["reasons"]), counted(one["unmeasured"]))
         for name, one in report["policies"].items()
-    )  # fmt: skip
-    paper = tuple(
+    ]  # fmt: skip
+    rows = [
+        (label, POLICY_NAMES[policy], side, *_error_row(model[policy][side]))
+        for side in SIDES
+        for label, model in report["models"].items()
+        for policy in POLICIES
+        if model[policy] is not None and model[policy][side]["trials"]
+    ]
+    paper = [
         (label, POLICY_NAMES[policy], millimetres(bar["translation_rmse"]), degrees(bar["rotation_rmse"]))
         for label, bars in report["paper"].items()
         for policy, bar in bars.items()
         if bar is not None
-    )
+    ]
     return [
         Section(
             title="Lifted",
-            columns=("policy", "lifted", "95 % interval", "failures", "not measured"),
-            rows=lifted,
+            tables=[
+                Table(header=("policy", "lifted", "95 % interval", "failures", "not measured"), rows=lifted)
+            ],
         ),
         Section(
-            title="Displacement in the hand",
-            text=_EXPLAINED,
-            columns=_ERROR_COLUMNS,
-            rows=tuple(rows),
-            figures=((folder / "displacement.png", "As the paper's figure 5, with the paper's own bars"),),
+            title=TITLES["displacement"],
+            text=[_COMPARISON_EXPLAINED],
+            tables=[Table(header=_ERROR_COLUMNS, rows=rows)],
+            figures=[
+                Figure(
+                    path=folder / "displacement.png",
+                    caption="The models' errors as in figure 5 of the paper, beside those of the paper",
+                )
+            ],
         ),
         Section(
-            title="The paper's",
-            columns=("model", "policy", "RMSE", "turn RMSE"),
-            rows=paper,
-            on_page_only=True,
+            title="Results of the paper",
+            tables=[Table(header=("model", "policy", "RMSE", "turn RMSE"), rows=paper)],
+            page_only=True,
         ),
     ]
 
@@ -250,37 +199,51 @@ def _error_row(one: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _tape(report: dict[str, Any]) -> list[Section]:
-    found = report["tape_against_truth"]
+def _tape(report: dict[str, Any]) -> Section:
+    """Errors of measuring by tape, where simulation knows the truth; empty without."""
+    title, found = "Measured by tape, against the truth", report["tape_against_truth"]
     if found is None:
-        return []
+        return Section(title=title)
     rows = []
     for name in ("flat", "tilted"):
         one = found[name]
         if one["trials"]:
-            millimetres_, degrees_ = (
+            lengths, angles = (
                 [f"{scale * one[f'{kind}_{which}']:.2f} {unit}" for which in ("rmse", "worst")]
                 for kind, scale, unit in (("translation", 1e3, "mm"), ("rotation", 180 / np.pi, "deg"))
             )
-            rows.append((name, str(one["trials"]), *millimetres_, *degrees_))
-    return [
-        Section(
-            title="Measured by tape, against the truth",
-            text=f"in the plane; tilted: by over {np.degrees(found['tilt']):.0f} degree in the hand, "
-            "and flat again when it is put down",
-            columns=("in the hand", "trials", "RMS", "worst", "turn RMS", "worst"),
-            rows=tuple(rows),
-        )
+            rows.append((name, one["trials"], *lengths, *angles))
+    return Section(
+        title=title,
+        text=[
+            "Errors in the plane. Tilted: parts that were tilted by more than "
+            f"{np.degrees(found['tilt']):.0f} degree in the hand, and lay flat again when put down."
+        ],
+        tables=[
+            Table(
+                header=("in the hand", "trials", "RMS", "worst", "turn RMS", "worst turn"),
+                rows=rows,
+            )
+        ],
+    )
+
+
+def _worst(report: dict[str, Any], folder: Path) -> Section:
+    figures = [
+        Figure(path=folder / name, caption=caption, name=Path(name).stem) for name, caption in report["worst"]
     ]
+    rows = [(Link(text=one.name, to=one.name), one.caption.removeprefix(f"{one.name}: ")) for one in figures]
+    tables = [Table(header=("trial", "outcome"), rows=rows)] if rows else []
+    return Section(title="Worst trials", tables=tables, figures=figures, page_only=True)
 
 
 def millimetres(value: float | None, interval: list[float] | None = None) -> str:
-    """A length, with its interval where there is one; '-' where it is absent."""
+    """A length with its interval, if any; '-' for None."""
     return _unit(value, interval, 1e3, "mm")
 
 
 def degrees(value: float | None, interval: list[float] | None = None) -> str:
-    """An angle, with its interval where there is one; '-' where it is absent."""
+    """An angle with its interval, if any; '-' for None."""
     return _unit(value, interval, 180 / np.pi, "deg")
 
 
@@ -292,10 +255,10 @@ def _unit(value: float | None, interval: list[float] | None, scale: float, unit:
 
 
 def interval_text(interval: list[float] | None, digits: int = 0) -> str:
-    """An interval of a share; '-' where it is absent."""
+    """An interval of a share; '-' for None."""
     return "-" if interval is None else f"{interval[0]:.{digits}%} - {interval[1]:.{digits}%}"
 
 
 def counted(counts: dict[str, int]) -> str:
-    """``missed 2, slipped 1``."""
+    """Counts as text, ``missed 2, slipped 1``."""
     return ", ".join(f"{reason} {n}" for reason, n in counts.items())

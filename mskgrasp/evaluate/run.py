@@ -12,7 +12,6 @@ from typing import Any, Literal
 
 import torch
 from pydantic import Field, field_validator
-from rich.console import Console
 from tqdm import tqdm
 
 from mskgrasp.core.config import Config
@@ -29,7 +28,7 @@ from mskgrasp.evaluate.experiments import (
 )
 from mskgrasp.evaluate.figures import draw_comparison, draw_errors, draw_success
 from mskgrasp.evaluate.replay_trial import describe_trial, draw_trial, find_trial, outcome_text
-from mskgrasp.evaluate.report import page, print_report
+from mskgrasp.evaluate.report import TITLES, conclusion, print_report, sections
 from mskgrasp.evaluate.summary import farthest_off, summarise, worst_trials
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts import find_part
@@ -120,7 +119,7 @@ def main() -> int:
     if config.replay is not None:
         return replay(*config.replay)
     report = evaluate(config)
-    print_report(report, config.out, Console(width=None if sys.stdout.isatty() else 150))
+    print_report(report, config.out)
     pictures = "success.png, errors.png" if config.experiment == "success" else "displacement.png"
     print(f"wrote {config.out}/report.html, report.json, {pictures}; any trial: --replay {config.out} TRIAL")
     return 0
@@ -298,6 +297,8 @@ def _report(
         draw_comparison(report, config.out / "displacement.png")
     text = json.dumps(report, indent=1, allow_nan=False)
     write_whole(config.out / "report.json", (text + "\n").encode())
-    title = {"success": "Success of planned grasps", "displacement": "Displacement in the hand"}
-    write_html(config.out / "report.html", title=title[config.experiment], sections=page(report, config.out))
+    write_html(
+        config.out / "report.html", title=TITLES[config.experiment], conclusion=conclusion(report),
+        sections=sections(report, config.out),
+    )  # fmt: skip
     return report

@@ -1,54 +1,46 @@
-"""Pictures of parts that were put down: where each shall lie, and where it lies."""
+"""Figures of placements: targets, placed parts and errors."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import cv2
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.geometry import quat_to_matrix
 from mskgrasp.core.grasp import MAX_OPENING
+from mskgrasp.core.palette import BLUE, FAINT, GREEN, INK, LINE, ORANGE
 from mskgrasp.palletize.placements import CORRECTIONS, Correction, Placement, compared, corrections_of
 from mskgrasp.palletize.slots import Slot
 from mskgrasp.palletize.views import Views
+from mskgrasp.reports.style import saved_figure
 
-COLOURS: dict[Correction, str] = {"none": "#8b909a", "predicted": "#1f6feb", "truth": "#2b8a3e"}
+COLOURS: dict[Correction, str] = {"none": FAINT, "predicted": BLUE, "truth": GREEN}
 TITLES: dict[Correction, str] = {
-    "none": "no correction", "predicted": "corrected by the prediction", "truth": "by the truth",
-}  # fmt: skip
-_INK, _TARGET, _JAW, _MISS = "#22252b", "#2b8a3e", "#1f6feb", "#e8590c"
-_STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans", "font.size": 10, "axes.titlesize": 10, "axes.titlelocation": "left",
-    "axes.spines.top": False, "axes.spines.right": False, "savefig.dpi": 130,
+    "none": "no correction", "predicted": "corrected by the prediction", "truth": "corrected by the truth",
 }  # fmt: skip
 _MM = 1e3
 _CUT = 0.004
-"""Outlines are those of what is higher than half of this, m."""
+"""Outlines are drawn at half this height, m."""
 
 
 def draw_placement(views: Views, placement: Placement, path: Path) -> None:
-    """Draws one placement: the grasp, the target, where the part came to lie; millimetres from the target."""
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(9.2, 4.9), layout="constrained")
+    """Draws one placement: before with the grasp, after with the target; millimetres from the target."""
+    with saved_figure(path, 9.2, 4.9) as figure:
         left, right = figure.subplots(1, 2)
         _show_before(left, views)
         left.set(title="before, with the grasp", xlabel="mm along base x", ylabel="mm along base y")
         _show_after(right, views)
         right.set(title=f"after, {TITLES[placement.correction]}", xlabel="mm from the target, along base x")
         figure.suptitle(f"{placement.part}: {outcome_text(placement)}", x=0.01, ha="left", fontsize=11)
-        figure.savefig(path)
 
 
 def outcome_text(placement: Placement) -> str:
-    """What came of it, in words."""
+    """The outcome of a placement in words."""
     if not placement.placed:
         return f"not placed ({placement.reason})"
     if placement.translation_error is None or placement.rotation_error is None:
@@ -66,36 +58,36 @@ def _axes(axes: Axes, views: Views, heights: np.ndarray) -> None:
 
 def _show_before(axes: Axes, views: Views) -> None:
     _axes(axes, views, views.before)
-    _outline(axes, views, 0.0, _INK, "-")
+    _outline(axes, views, 0.0, INK, "-")
     origin, theta = views.grasp[:2] * _MM, float(views.grasp[2])
     closing = np.array([-np.sin(theta), np.cos(theta)])
     reach = MAX_OPENING / 2 * _MM
-    axes.plot(*np.stack([origin - reach * closing, origin + reach * closing]).T, color=_JAW, lw=1.2, ls="--")
+    axes.plot(*np.stack([origin - reach * closing, origin + reach * closing]).T, color=BLUE, lw=1.2, ls="--")
     for start in (reach, -reach - 8.0):
         corner = origin + start * closing - 10.0 * np.array([np.cos(theta), np.sin(theta)])
-        pad = Rectangle(tuple(corner), 20.0, 8.0, angle=np.degrees(theta), fc=_JAW, ec="white", lw=0.8)
+        pad = Rectangle(tuple(corner), 20.0, 8.0, angle=np.degrees(theta), fc=BLUE, ec="white", lw=0.8)
         axes.add_patch(pad)
 
 
 def _show_after(axes: Axes, views: Views) -> None:
     if not views.after.size:
-        axes.text(0.5, 0.5, "not placed", transform=axes.transAxes, ha="center", color=_MISS)
+        axes.text(0.5, 0.5, "not placed", transform=axes.transAxes, ha="center", color=ORANGE)
         axes.set(xticks=[], yticks=[])
         return
     _axes(axes, views, views.after)
-    _outline(axes, views, views.turn, _TARGET, "--")
+    _outline(axes, views, views.turn, GREEN, "--")
     _cross(axes, np.zeros(2), views.theta, 0.42 * views.side * _MM)
 
 
 def _cross(axes: Axes, at: np.ndarray, theta: float, length: float) -> None:
-    """The target as in the paper: its centre, and the orientation as the longer arm."""
+    """Draws the target as in the paper: its centre, and its orientation as the longer arm."""
     for angle, share, width in ((theta, 1.0, 1.6), (theta + np.pi / 2, 0.4, 1.0)):
         arm = share * length * np.array([np.cos(angle), np.sin(angle)])
-        axes.plot(*np.stack([at - arm, at + arm]).T, color=_TARGET, lw=width, alpha=0.9, zorder=6)
+        axes.plot(*np.stack([at - arm, at + arm]).T, color=GREEN, lw=width, alpha=0.9, zorder=6)
 
 
 def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> None:
-    """The part's outline as it lay, turned about its centre."""
+    """Draws the part's outline before the grasp, turned about its centre."""
     n = len(views.before)
     pitch = views.side * _MM / n
     steps = (np.arange(n) - (n - 1) / 2) * pitch
@@ -115,17 +107,14 @@ def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> N
 def draw_comparison(
     rows: Sequence[tuple[Placement, dict[Correction, Views], dict[Correction, Placement]]], path: Path
 ) -> None:
-    """Draws parts before and after, a row each: target in green, and a column for each correction.
+    """Draws a row for each part: before the grasp, then after it under each correction, targets in green.
 
     Args:
-        rows: A placement of the row (any), the views and the placements by correction.
+        rows: For each part one of its placements, and the views and placements by correction.
         path: The picture, PNG.
     """
     names: list[Correction] = [name for name in CORRECTIONS if rows and name in rows[0][1]]
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(
-            figsize=(2.45 * (1 + len(names)), 2.6 * max(1, len(rows)) + 0.2), layout="constrained"
-        )
+    with saved_figure(path, 2.45 * (1 + len(names)), 2.6 * max(1, len(rows)) + 0.2) as figure:
         grid = figure.subplots(max(1, len(rows)), 1 + len(names), squeeze=False)
         for line, (first, views, placements) in zip(grid, rows, strict=False):
             _show_before(line[0], next(iter(views.values())))
@@ -138,15 +127,13 @@ def draw_comparison(
                 axes.spines[:].set_visible(False)
         for axes, title in zip(grid[0], ["before", *(TITLES[name] for name in names)], strict=True):
             axes.set_title(title, fontsize=9)
-        figure.savefig(path)
 
 
 def draw_errors(placements: Sequence[Placement], path: Path) -> None:
-    """Draws how many placements err by no more than so much, and the medians of parts beside each other."""
+    """Draws the cumulative distribution of the errors, and the medians of each part."""
     groups = compared(placements)
     names = corrections_of(placements)
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(11.5, 4.3), layout="constrained")
+    with saved_figure(path, 11.5, 4.3) as figure:
         shift, turn, parts = figure.subplots(1, 3)
         for axes, error, scale, unit in (
             (shift, "translation", _MM, "mm"),
@@ -162,12 +149,11 @@ def draw_errors(placements: Sequence[Placement], path: Path) -> None:
                     )
             axes.set(xlabel=f"{error} error, {unit}", ylim=(0, 1.02), xlim=(0, None))
             if groups:
-                axes.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+                axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
         shift.set_ylabel("share of placements")
         _draw_parts(parts, groups)
         if not groups:
             shift.text(0.5, 0.5, "no placement was measured", transform=shift.transAxes, ha="center")
-        figure.savefig(path)
 
 
 def _draw_parts(axes: Axes, groups: list[dict[Correction, Placement]]) -> None:
@@ -185,25 +171,25 @@ def _draw_parts(axes: Axes, groups: list[dict[Correction, Placement]]) -> None:
         ]
     )
     most = 1.1 * float(medians.max()) + 0.1
-    axes.plot([0, most], [0, most], color="#c5c9d0", lw=1)
-    axes.plot([0, most], [0, most / 2], color=_TARGET, lw=1, ls="--", label="half the error")
+    axes.plot([0, most], [0, most], color=LINE, lw=1)
+    axes.plot([0, most], [0, most / 2], color=GREEN, lw=1, ls="--", label="half the error")
     axes.plot(*medians.T, "o", color=COLOURS["predicted"], ms=5, alpha=0.8)
-    axes.set(xlim=(0, most), ylim=(0, most), aspect="equal", title="a part's median error, mm")
+    axes.set(xlim=(0, most), ylim=(0, most), aspect="equal", title="Median error by part, mm")
     axes.set(xlabel="no correction", ylabel="corrected by the prediction")
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    axes.legend(fontsize=8, loc="upper left")
 
 
 def pallet_image(
     frame: RgbdFrame, slots: Sequence[Slot], table_z: float, tops: Mapping[int, float]
 ) -> np.ndarray:
-    """(h, w, 3) uint8 RGB of the slots from above, base x up and y to the left; 1 mm a pixel.
+    """The slots from above as (h, w, 3) uint8 RGB, base x up and y to the left; 1 mm per pixel.
 
     Args:
-        frame: Of the pallet, the arm out of sight.
-        slots: Of which some hold a part.
+        frame: Image of the pallet, the arm out of view.
+        slots: All slots.
         table_z: Height of the table, metres.
-        tops: Height of the part in a slot, metres. What stands on a table leans away from the middle of the
-            picture; within a slot of known size this is undone for the part's top.
+        tops: Height of the part in each filled slot, metres. In a slot of known size the parallax of the
+            part's top is removed.
     """
     bounds = pallet_bounds(slots)
     image = _seen_at(frame, bounds, table_z)
@@ -220,7 +206,7 @@ def pallet_image(
 
 
 def _seen_at(frame: RgbdFrame, bounds: tuple[float, float, float, float], z: float) -> np.ndarray:
-    """What a frame shows of a rectangle at a height, as if it all lay in that plane."""
+    """A rectangle of the base at height z, rectified from a frame."""
     x_min, x_max, y_min, y_max = bounds
     colour = frame.colour if frame.fine_colour is None else frame.fine_colour
     scale = colour.shape[0] / frame.depth.shape[0]
@@ -243,15 +229,14 @@ def pallet_bounds(slots: Sequence[Slot]) -> tuple[float, float, float, float]:
 
 
 def draw_pallets(images: dict[Correction, np.ndarray], slots: Sequence[Slot], title: str, path: Path) -> None:
-    """Draws a pallet under each correction, with the targets in green and the slots' outlines."""
+    """Draws a pallet under each correction, with targets in green and slot outlines in white."""
     x_min, x_max, y_min, y_max = pallet_bounds(slots)
     height = 4.2 * (x_max - x_min) / max(y_max - y_min, 1e-6)
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(4.2 * len(images), height + 0.9), layout="constrained")
+    with saved_figure(path, 4.2 * len(images), height + 0.9) as figure:
         for axes, (name, image) in zip(
             figure.subplots(1, len(images), squeeze=False)[0], images.items(), strict=True
         ):
-            # Right is -y and up is +x: as somebody sees it who stands behind the robot.
+            # Right is -y and up is +x: the view from behind the robot.
             axes.imshow(image, extent=(-y_max * _MM, -y_min * _MM, x_min * _MM, x_max * _MM))
             for slot in slots:
                 at = np.array([-slot.y, slot.x]) * _MM
@@ -264,4 +249,3 @@ def draw_pallets(images: dict[Correction, np.ndarray], slots: Sequence[Slot], ti
                     )
             axes.set(title=TITLES[name], xticks=[], yticks=[], aspect="equal")
         figure.suptitle(title, x=0.01, ha="left", fontsize=11)
-        figure.savefig(path)

@@ -1,4 +1,4 @@
-"""What came of putting parts down, and what a set of placements amounts to: numbers and a table."""
+"""What came of putting parts down, and what a set of placements amounts to: in numbers."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from mskgrasp.core.metrics import bootstrap_interval
 
@@ -192,28 +190,6 @@ def _interval(by_part: list[np.ndarray], statistic: Any) -> list[float] | None:
     return list(bootstrap_interval(by_part, statistic)) if len(by_part) > 1 else None
 
 
-def table_rows(report: dict[str, Any]) -> list[list[str]]:
-    """A row a correction: name, placed, measured, both medians with intervals, failures."""
-    rows = []
-    for name, row in report["corrections"].items():
-        rows.append(
-            [
-                name,
-                f"{row['placed']} of {row['tried']}",
-                str(row["measured"]),
-                millimetres(row["median_translation"]),
-                interval_text(row["median_translation_interval"], 1e3),
-                degrees(row["median_rotation"]),
-                interval_text(row["median_rotation_interval"], 180 / np.pi),
-                ", ".join(f"{reason} {n}" for reason, n in row["reasons"].items()) or "-",
-            ]
-        )
-    return rows
-
-
-HEADER = ("correction", "placed", "measured", "median error", "95 %", "median turn", "95 %", "not placed")
-
-
 def gain_lines(report: dict[str, Any]) -> list[str]:
     """What correcting gains, in sentences."""
     if not report["compared"]:
@@ -233,18 +209,6 @@ def gain_lines(report: dict[str, Any]) -> list[str]:
 def _share(gain: dict[str, Any], error: str) -> str:
     text, interval = f"{gain[f'{error}_ratio']:.2f}", gain[f"{error}_ratio_interval"]
     return text if interval is None else f"{text} ({interval_text(interval, 1)})"
-
-
-def print_placements(report: dict[str, Any], console: Console) -> None:
-    """A row a correction, then what correcting gains."""
-    table = Table(title="Placed parts")
-    for k, name in enumerate(HEADER):
-        table.add_column(name, justify="left" if k in (0, len(HEADER) - 1) else "right")
-    for row in table_rows(report):
-        table.add_row(*row)
-    console.print(table)
-    for line in gain_lines(report):
-        console.print(line, highlight=False)
 
 
 def millimetres(value: float | None) -> str:

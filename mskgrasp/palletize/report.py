@@ -1,4 +1,4 @@
-"""What a palletizing run leaves for people: figures, report.json, and one report.html."""
+"""The report of a palletizing run: sections, figures and report.json."""
 
 from __future__ import annotations
 
@@ -10,80 +10,118 @@ from typing import Any
 import cv2
 import numpy as np
 from pydantic import BaseModel
+from rich.console import Console
 
 from mskgrasp.core.files import write_whole
 from mskgrasp.palletize.figures import draw_comparison, draw_errors, draw_pallets, outcome_text
 from mskgrasp.palletize.placements import (
     CORRECTIONS,
     GOAL,
-    HEADER,
     Correction,
     Placement,
     compared,
     degrees,
     gain_lines,
+    interval_text,
     millimetres,
     summarise_placements,
-    table_rows,
 )
 from mskgrasp.palletize.slots import Slot
 from mskgrasp.palletize.views import read_views
-from mskgrasp.reports.html import Link, Picture, Section, Table, settings_section, write_html
+from mskgrasp.reports.console import print_sections
+from mskgrasp.reports.html import write_html
+from mskgrasp.reports.section import Figure, Link, Section, Table, settings_section
 
 WORST = 10
 _ROWS = 4
+_HEADER = (
+    "correction", "placed", "measured", "median error", "95 % interval, mm", "median turn error",
+    "95 % interval, deg", "not placed",
+)  # fmt: skip
 _DEFINITIONS = (
-    "Error: distance of the placed part's centre from its target, and the difference between the turn it "
-    "made and the one it was asked for. The centre and the direction of the longer side are those that the "
-    "depth image showed before the grasp: what seeing them costs is in no column.",
-    "Correction none: as if nothing had moved in the hand; predicted: by the displacement network; truth: by "
-    "what the tracker saw in the hand, which a prediction beats by luck alone. Goal: the prediction leaves "
-    f"{GOAL:g} of the median error at most. Intervals: bootstrap over parts, 95 %.",
+    "Error: distance of the placed part's centre from its target. Turn error: difference between the turn "
+    "the part made and the turn commanded. Centre and direction of the longer side before the grasp are "
+    "those seen in the depth image, so no column includes the error of seeing them.",
+    "Correction none: the part is assumed not to move in the hand; predicted: displacement predicted by the "
+    "network; truth: displacement measured in simulation, a lower bound. Goal: correcting by the prediction "
+    f"leaves at most {GOAL:g} of the median error. Intervals: bootstrap over parts, 95 %.",
 )
 
 
 def write_report(
     config: BaseModel, out: Path, placements: Sequence[Placement], slots: Sequence[Slot]
 ) -> dict[str, Any]:
-    """Sums a run up and writes report.json, report.html and the pictures in it.
+    """Summarises a run and writes report.json, report.html and its figures.
 
     Args:
         config: Settings of the run.
         out: Its folder, with the pictures and views of the placements in ``placements``.
         placements: All of them.
-        slots: Where they went.
+        slots: The targets.
 
     Returns:
-        What report.json holds.
+        The content of report.json.
     """
     report = summarise_placements(placements)
     text = json.dumps(report, indent=1, allow_nan=False)
     write_whole(out / "report.json", text.encode() + b"\n")
     draw_errors(placements, out / "errors.png")
+    errors = Section(
+        title="Errors",
+        text=_DEFINITIONS,
+        figures=[Figure(path=out / "errors.png", caption="Distribution of the errors, and medians by part")],
+    )
     sections = [
-        Section(
-            title="Result",
-            text=[*gain_lines(report), *_DEFINITIONS],
-            tables=[Table(header=HEADER, rows=table_rows(report))],
-            pictures=[
-                Picture(path=out / "errors.png", caption="How large the errors are, and each part's medians")
-            ],
-        ),
+        _result(report),
+        errors,
         _pallets(out, placements, slots),
         _examples(out, placements),
         _parts(report),
         _worst(out, placements),
         _lost(out, placements),
-        settings_section(config),
+        settings_section(config.model_dump(mode="json")),
     ]
-    kept = [one for one in sections if one.text or one.tables or one.pictures]
-    write_html(out / "report.html", title="Palletizing", sections=kept)
+    write_html(out / "report.html", title="Palletizing", conclusion=_conclusion(report), sections=sections)
     return report
 
 
+def print_report(report: dict[str, Any], console: Console | None = None) -> None:
+    """Prints the counts and errors of each correction, and what correcting gains."""
+    print_sections([_result(report)], console)
+
+
+def _conclusion(report: dict[str, Any]) -> str:
+    counts = report["corrections"].values()
+    placed = f"{sum(row['placed'] for row in counts)} of {sum(row['tried'] for row in counts)} parts placed"
+    medians = [
+        f"{name} {millimetres(row['median_translation'])} and {degrees(row['median_rotation'])}"
+        for name, row in report["corrections"].items()
+    ]
+    if not report["compared"]:
+        return f"{placed}; no error was measured under every correction."
+    return f"{placed}; median error by correction: {', '.join(medians)}."
+
+
+def _result(report: dict[str, Any]) -> Section:
+    rows = [
+        (
+            name,
+            f"{row['placed']} of {row['tried']}",
+            row["measured"],
+            millimetres(row["median_translation"]),
+            interval_text(row["median_translation_interval"], 1e3),
+            degrees(row["median_rotation"]),
+            interval_text(row["median_rotation_interval"], 180 / np.pi),
+            ", ".join(f"{reason} {n}" for reason, n in row["reasons"].items()) or "-",
+        )
+        for name, row in report["corrections"].items()
+    ]
+    return Section(title="Result", text=gain_lines(report), tables=[Table(header=_HEADER, rows=rows)])
+
+
 def _pallets(out: Path, placements: Sequence[Placement], slots: Sequence[Slot]) -> Section:
-    """Whole pallets, where the run has any, beside each other by correction."""
-    pictures = []
+    """Pictures of whole pallets, side by side by correction; empty without pallets."""
+    figures = []
     for number in sorted({one.number for one in placements}):
         images: dict[Correction, np.ndarray] = {}
         for name in CORRECTIONS:
@@ -95,14 +133,14 @@ def _pallets(out: Path, placements: Sequence[Placement], slots: Sequence[Slot]) 
             path = out / f"pallet-{number:03d}.png"
             draw_pallets(images, slots, f"pallet {number + 1}", path)
             caption = (
-                f"Pallet {number + 1} from above; green: targets, the longer arm along the part's longer side"
+                f"Pallet {number + 1} from above. Green: targets, the longer arm along the part's longer side"
             )
-            pictures.append(Picture(path=path, caption=caption))
-    return Section(title="Pallets", pictures=pictures)
+            figures.append(Figure(path=path, caption=caption))
+    return Section(title="Pallets", figures=figures)
 
 
 def _examples(out: Path, placements: Sequence[Placement]) -> Section:
-    """One placement of each of a few parts, before and after, beside each other by correction."""
+    """One placement of each of a few parts, before and after, side by side by correction."""
     by_part = {group_part(group): group for group in reversed(compared(placements))}
     names = sorted(by_part)
     chosen = [names[int(i)] for i in np.linspace(0, len(names) - 1, min(_ROWS, len(names)))]
@@ -116,14 +154,14 @@ def _examples(out: Path, placements: Sequence[Placement]) -> Section:
         return Section(title="Examples")
     draw_comparison(rows, out / "placed.png")
     caption = (
-        "The first compared placement of each part: the grasp, and where the part came to lie. Green: the "
-        "target, its longer arm along the part's longer side, and the part's outline there"
+        "The first compared placement of each part: the part with the grasp, and the part as placed. Green: "
+        "target, the longer arm along the part's longer side, and the part's outline at the target"
     )
-    return Section(title="Examples", pictures=[Picture(path=out / "placed.png", caption=caption)])
+    return Section(title="Examples", figures=[Figure(path=out / "placed.png", caption=caption)])
 
 
 def group_part(group: dict[Correction, Placement]) -> str:
-    """The part that all placements of a group are of."""
+    """The part of a group of placements."""
     return next(iter(group.values())).part
 
 
@@ -135,16 +173,18 @@ def _parts(report: dict[str, Any]) -> Section:
         + [degrees(row["median_rotation"][name]) for name in names]
         for part, row in report["parts"].items()
     ]
-    header = ["part", "compared", *names, *(f"turn, {name}" for name in names)]
-    return Section(title="Parts", tables=[Table(header=header, rows=rows, caption="Median errors")])
+    header = ["part", "compared", *names, *(f"{name}, turn" for name in names)]
+    return Section(
+        title="Parts", tables=[Table(header=header, rows=rows, caption="Median errors by correction")]
+    )
 
 
 def _worst(out: Path, placements: Sequence[Placement]) -> Section:
-    """The placements that missed by most with the prediction, or with whatever was tried."""
+    """The placements with the largest errors under the prediction, or under all corrections without it."""
     measured = [one for one in placements if one.translation_error is not None]
     predicted = [one for one in measured if one.correction == "predicted"] or measured
     worst = sorted(predicted, key=lambda one: -(one.translation_error or 0.0))[:WORST]
-    rows, pictures = [], []
+    rows, figures = [], []
     for one in worst:
         rows.append(
             [
@@ -154,21 +194,21 @@ def _worst(out: Path, placements: Sequence[Placement]) -> Section:
             ]
         )  # fmt: skip
         path = out / "placements" / f"{one.name}.png"
-        pictures.append(Picture(path=path, caption=f"{one.name}: {outcome_text(one)}", name=one.name))
+        figures.append(Figure(path=path, caption=f"{one.name}: {outcome_text(one)}", name=one.name))
     header = (
         "part",
         "trial",
         "slot",
         "correction",
         "error",
-        "turn",
-        "predicted in the hand",
-        "measured in the hand",
+        "turn error",
+        "predicted displacement",
+        "measured displacement",
     )
     return Section(
-        title=f"The worst {len(worst)}" if worst else "The worst",
+        title="Worst placements",
         tables=[Table(header=header, rows=rows)] if rows else [],
-        pictures=pictures,
+        figures=figures,
     )
 
 
@@ -180,13 +220,13 @@ def _shift(displacement: list[float] | None) -> str:
 
 
 def _lost(out: Path, placements: Sequence[Placement]) -> Section:
-    """What was not placed, or placed and not measured, and why."""
+    """The placements without an error, and why."""
     rows = [
         [one.part, one.number, one.slot, one.correction, one.reason or f"not measured: {one.unmeasured}"]
         for one in placements
         if one.translation_error is None
     ]
-    header = ("part", "trial", "slot", "correction", "why")
+    header = ("part", "trial", "slot", "correction", "reason")
     return Section(
         title="Not placed or not measured", tables=[Table(header=header, rows=rows)] if rows else []
     )

@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 import torch
 from pydantic import Field, field_validator
-from rich.console import Console
 from tqdm import tqdm
 
 from hal import cell_from_yaml
@@ -24,9 +23,9 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import only_here
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
-from mskgrasp.palletize.placements import CORRECTIONS, Correction, Placement, print_placements
+from mskgrasp.palletize.placements import CORRECTIONS, Correction, Placement
 from mskgrasp.palletize.placer import Placer, Task
-from mskgrasp.palletize.report import write_report
+from mskgrasp.palletize.report import print_report, write_report
 from mskgrasp.palletize.slots import Slot, check_reach, check_room, parse_target, read_slots
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
@@ -136,7 +135,7 @@ def main() -> int:
     """Runs the trials and reports."""
     config = parse(PalletizeConfig, prog="python -m mskgrasp.palletize", description=DESCRIPTION)
     report = palletize(config)
-    print_placements(report, Console(width=None if sys.stdout.isatty() else 110))
+    print_report(report)
     print(f"wrote {config.out}/report.html, report.json, trials.jsonl and a picture of every placement")
     return 0
 

@@ -1,4 +1,4 @@
-"""Pictures for people: a planned grasp, a sheet of attempts."""
+"""Figures of a planned grasp and of grasp attempts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import matplotlib
 import numpy as np
 import torch
 from matplotlib.axes import Axes
@@ -20,32 +19,14 @@ from matplotlib.patches import Ellipse, Rectangle
 from hal.camera import RgbdFrame
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES, MAX_OPENING, centre_in_grasp_frame
+from mskgrasp.core.palette import BLUE, FAINT, GREEN, INK, ORANGE, RED
 from mskgrasp.dataset import Attempts, ShardInfo, u16_to_depth
 from mskgrasp.perception.height_patches import crop_patches, height_image
 from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.reports.style import saved_figure
 
-INK, FAINT = "#22252b", "#8b909a"
-_JAW, _SHIFT, _GOOD, _BAD = "#1f6feb", "#e8590c", "#2b8a3e", "#c92a2a"
-STYLE: dict[Any, Any] = {
-    "font.size": 10,
-    "font.family": "DejaVu Sans",
-    "text.color": INK,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
-    "axes.titlesize": 11,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "savefig.dpi": 150,
-}
 _PAD_WIDTH, _PAD_THICKNESS = 0.020, 0.008  # drawn size of a finger pad seen from above, metres
 _MM = 1e3
-
-
-def make_figure(width: float, height: float) -> Figure:
-    """A figure of inches, its panels set so that nothing overlaps."""
-    return Figure(figsize=(width, height), layout="constrained")  # no pyplot: nothing global, no window
 
 
 def _from_above(
@@ -78,6 +59,7 @@ def _show_heights(
     )
     axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
     axes.tick_params(length=2, labelsize=8)
+    axes.spines[:].set_visible(True)
     return image
 
 
@@ -89,8 +71,8 @@ def _jaw(
     origin = np.asarray(origin[:2]) * _MM
     reach = opening / 2 * _MM
     ends = np.stack([origin - reach * closing, origin + reach * closing])
-    axes.plot(*ends.T, color=_JAW, lw=1.4 * scale, ls=(0, (4, 2)), zorder=6)
-    axes.plot(*origin, "o", color=_JAW, ms=3.5 * scale, zorder=7)
+    axes.plot(*ends.T, color=BLUE, lw=1.4 * scale, ls=(0, (4, 2)), zorder=6)
+    axes.plot(*origin, "o", color=BLUE, ms=3.5 * scale, zorder=7)
     width, thickness = _PAD_WIDTH * _MM, _PAD_THICKNESS * _MM
     for start in (reach, -reach - thickness):
         corner = origin + start * closing - width / 2 * np.array([np.cos(theta), np.sin(theta)])
@@ -100,7 +82,7 @@ def _jaw(
                 width,
                 thickness,
                 angle=np.degrees(theta),
-                fc=_JAW,
+                fc=BLUE,
                 ec="white",
                 lw=0.8,
                 zorder=7,
@@ -116,7 +98,7 @@ def _arrow(axes: Axes, start: np.ndarray, shift: np.ndarray, width: float = 1.8,
         xytext=tuple(start),
         arrowprops={
             "arrowstyle": "-|>",
-            "color": _SHIFT,
+            "color": ORANGE,
             "lw": width,
             "mutation_scale": head,
             "shrinkA": 0,
@@ -132,7 +114,7 @@ def _ellipse(axes: Axes, centre: np.ndarray, covariance: np.ndarray, n_sigma: fl
     angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
     axes.add_patch(
         Ellipse(
-            tuple(centre), diameters[1], diameters[0], angle=angle, fc=_SHIFT, ec=_SHIFT, alpha=0.28, zorder=8
+            tuple(centre), diameters[1], diameters[0], angle=angle, fc=ORANGE, ec=ORANGE, alpha=0.28, zorder=8
         )
     )
 
@@ -145,20 +127,18 @@ def draw_plan(
     Left, the base frame from above, right, the grasp frame; both in millimetres and to scale.
 
     Args:
-        frame: What was seen.
-        plan: What was planned in it.
-        path: Of the picture.
-        measured: (4,) object displacement that came of it, drawn beside the expected one.
-        note: A line under that of the plan.
+        frame: The image planned in.
+        plan: The plan.
+        path: The picture, PNG.
+        measured: (4,) object displacement of its execution, drawn beside the expected one.
+        note: A line of text under the plan's.
     """
-    with matplotlib.rc_context(STYLE):
-        figure = make_figure(11.5, 5.7 + 0.25 * bool(note))
+    with saved_figure(path, 11.5, 5.7 + 0.25 * bool(note)) as figure:
         left, right = figure.subplots(1, 2)
         _draw_candidates(figure, left, frame, plan)
         _draw_chosen(right, frame, plan, measured)
         text = _plan_text(plan) + (f"\n{note}" if note else "")
         figure.suptitle(text, fontsize=11, x=0.01, ha="left")
-        figure.savefig(path)
 
 
 def _plan_text(plan: GraspPlan) -> str:
@@ -192,7 +172,7 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     ends = np.stack([grasps[:, :2] - closing, grasps[:, :2] + closing], axis=1) * _MM
     lines = LineCollection(list(ends), cmap="viridis", linewidths=0.9, zorder=4)
     lines.set_array(plan.qualities[order])
-    # What is not worth considering must not hide the part.
+    # Candidates of low quality must not hide the part.
     lines.set_alpha(list(0.15 + 0.75 * plan.qualities[order].clip(0.0, 1.0)))
     lines.set_clim(0.0, 1.0)
     axes.add_collection(lines)
@@ -203,7 +183,7 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     best = plan.candidates[plan.shortlist]
     axes.plot(*(best[:, :2] * _MM).T, "o", ms=3.2, mfc="none", mec=INK, mew=0.6, zorder=5, label="shortlist")
     _jaw(axes, plan.grasp, float(plan.grasp[3]))
-    axes.legend(loc="lower left", frameon=False, fontsize=8)
+    axes.legend(loc="lower left", fontsize=8)
     axes.set(xlabel="base x, mm", ylabel="base y, mm", title=f"{len(plan.candidates)} candidates")
 
 
@@ -219,12 +199,12 @@ def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.nda
     shift, turn = plan.displacement[:2] * _MM, float(plan.displacement[3])
     _outlines(axes, heights, np.zeros(2), side, centre, shift, turn)
     axes.plot([], [], color=INK, lw=0.9, label="part before")
-    axes.plot([], [], color=_SHIFT, lw=1.3, ls="--", label="part expected in the hand")
+    axes.plot([], [], color=ORANGE, lw=1.3, ls="--", label="part expected in the hand")
     if measured is not None:
-        _outlines(axes, heights, np.zeros(2), side, centre, measured[:2] * _MM, float(measured[3]), _GOOD)
-        axes.plot([], [], color=_GOOD, lw=1.3, ls="--", label="part measured in the hand")
-    axes.legend(loc="upper left", frameon=False, fontsize=8)
-    axes.plot(*centre, "+", color=_SHIFT, ms=8, mew=1.5, zorder=9)
+        _outlines(axes, heights, np.zeros(2), side, centre, measured[:2] * _MM, float(measured[3]), GREEN)
+        axes.plot([], [], color=GREEN, lw=1.3, ls="--", label="part measured in the hand")
+    axes.legend(loc="upper left", fontsize=8)
+    axes.plot(*centre, "+", color=ORANGE, ms=8, mew=1.5, zorder=9)
     known = bool(np.isfinite(plan.displacement_cov).all())
     covariance = plan.displacement_cov[:2, :2] if known else np.zeros((2, 2))
     axes.set(
@@ -234,12 +214,12 @@ def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.nda
     )
     _draw_shift(axes, centre, shift, covariance)
     reach = float(np.hypot(*shift)) + 2 * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])) * _MM
-    came = None if measured is None else measured[:2] * _MM
-    if came is not None:
-        axes.plot(*(centre + came), "x", color=_GOOD, ms=7, mew=1.8, zorder=10)
-        reach = max(reach, float(np.hypot(*came)))
+    moved = None if measured is None else measured[:2] * _MM
+    if moved is not None:
+        axes.plot(*(centre + moved), "x", color=GREEN, ms=7, mew=1.8, zorder=10)
+        reach = max(reach, float(np.hypot(*moved)))
     if reach < 20.0:
-        _inset(axes, shift, covariance, max(1.4 * reach, 1.0), right=bool(centre[0] < 0), measured=came)
+        _inset(axes, shift, covariance, max(1.4 * reach, 1.0), right=bool(centre[0] < 0), measured=moved)
 
 
 def _draw_shift(axes: Axes, start: np.ndarray, shift: np.ndarray, covariance: np.ndarray) -> None:
@@ -255,9 +235,9 @@ def _outlines(
     centre: np.ndarray,
     shift: np.ndarray,
     turn: float,
-    colour: str = _SHIFT,
+    colour: str = ORANGE,
 ) -> None:
-    """The part's outline, and dashed where it ends up, turned about its centre and shifted (mm)."""
+    """The part's outline, and dashed the displaced outline, turned about its centre and shifted (mm)."""
     n = heights.shape[0]
     pixel = (np.arange(n) - (n - 1) / 2) * (side * _MM / n)
     x, y = np.meshgrid(origin[0] + pixel, origin[1] - pixel)
@@ -286,13 +266,12 @@ def _inset(
     inset = axes.inset_axes((0.70 if right else 0.02, 0.02, 0.28, 0.28))
     inset.set(xlim=(-half, half), ylim=(-half, half), xticks=[], yticks=[], aspect="equal")
     inset.set_facecolor("white")
-    for spine in inset.spines.values():
-        spine.set_color(FAINT)
+    inset.spines[:].set_visible(True)
     inset.axhline(0, color=FAINT, lw=0.5)
     inset.axvline(0, color=FAINT, lw=0.5)
     _draw_shift(inset, np.zeros(2), shift, covariance)
     if measured is not None:
-        inset.plot(*measured, "x", color=_GOOD, ms=7, mew=1.8, zorder=10)
+        inset.plot(*measured, "x", color=GREEN, ms=7, mew=1.8, zorder=10)
     bar = next(step for step in (10, 5, 2, 1, 0.5) if step <= 0.8 * half or step == 0.5)
     inset.plot([-0.9 * half, -0.9 * half + bar], [-0.85 * half] * 2, color=INK, lw=2)
     inset.text(-0.9 * half, -0.8 * half, f"{bar:g} mm", fontsize=7, va="bottom")
@@ -302,17 +281,16 @@ def _inset(
 def draw_contact_sheet(
     rows: Sequence[tuple[Attempts, ShardInfo, int]], path: Path, *, title: str = "Grasp attempts"
 ) -> None:
-    """Draws attempts from above: the hand, and where a held part's centre went.
+    """Draws attempts from above: the hand, and the displacement of a held part.
 
     Args:
-        rows: Attempts, what their shard tells of them, and which row of them to draw.
+        rows: Attempts, their shard's information, and the row to draw.
         path: The picture, PNG.
-        title: Stands above it.
+        title: Title of the figure.
     """
     columns = min(6, max(1, len(rows)))
     lines = max(1, -(-len(rows) // columns))
-    with matplotlib.rc_context(STYLE):
-        figure = make_figure(2.1 * columns, 2.45 * lines + 0.5)
+    with saved_figure(path, 2.1 * columns, 2.45 * lines + 0.5) as figure:
         grid = np.atleast_1d(figure.subplots(lines, columns, squeeze=False)).ravel()
         for axes in grid[len(rows) :]:
             axes.axis("off")
@@ -320,7 +298,6 @@ def draw_contact_sheet(
             _draw_attempt(axes, attempts, info, row)
             axes.set_xlabel(info.part, fontsize=8, labelpad=3)
         figure.suptitle(title, fontsize=12, fontweight="bold")
-        figure.savefig(path)
 
 
 def _draw_attempt(axes: Axes, attempts: Attempts, info: ShardInfo, row: int) -> None:
@@ -346,7 +323,7 @@ def _draw_attempt(axes: Axes, attempts: Attempts, info: ShardInfo, row: int) -> 
     else:
         caption = FAILURES[int(attempts.failure[row])]
     axes.set_title(
-        caption, color=_GOOD if success else _BAD, fontsize=9, loc="center", fontweight="normal", pad=3
+        caption, color=GREEN if success else RED, fontsize=9, loc="center", fontweight="normal", pad=3
     )
     for spine in axes.spines.values():
-        spine.set(color=_GOOD if success else _BAD, linewidth=1.2)
+        spine.set(color=GREEN if success else RED, linewidth=1.2)

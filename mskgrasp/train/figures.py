@@ -1,11 +1,10 @@
-"""How a training went, and whether the model knows what it does not know, to look at."""
+"""Figures of a training: learning curves, and calibration of the predicted uncertainty."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 import torch
 from matplotlib.axes import Axes
@@ -14,30 +13,30 @@ from matplotlib.ticker import MaxNLocator
 from mskgrasp.core import metrics
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import to_object_displacement
+from mskgrasp.core.palette import BLUE, FAINT, GREEN, ORANGE
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.learning.held_out import AXES, predict_grasp_displacement, predict_quality
 from mskgrasp.learning.samples import Samples
-from mskgrasp.reports.grasp_figures import FAINT, INK, STYLE, make_figure
+from mskgrasp.reports.style import saved_figure
 
-_COLOURS = ("#1f6feb", "#e8590c", "#8b909a", "#2b8a3e")
+_COLOURS = (BLUE, ORANGE, FAINT, GREEN)
 _BINS = 12
 _MM = 1e3
 
 
 def draw_uncertainty(models: Models, samples: Samples, rows: torch.Tensor, path: Path) -> None:
-    """Draws reliability, coverage, sparsification and error over deviation, on some rows.
+    """Draws reliability, coverage, sparsification and error over deviation on some rows.
 
     Args:
-        models: With variances.
+        models: Networks that predict a variance.
         samples: The dataset.
-        rows: At parts that training never saw, successes among them.
-        path: Where the picture goes.
+        rows: Of held-out parts, successes among them.
+        path: The picture, PNG.
     """
     held = rows[samples.success[rows]]
     mean, variance = predict_grasp_displacement(models, samples, held)
     target = samples.grasp_displacement[held].double().numpy()
-    with matplotlib.rc_context({**STYLE, "axes.spines.top": False, "axes.spines.right": False}):
-        figure = make_figure(11.5, 9.0)
+    with saved_figure(path, 11.5, 9.0) as figure:
         panels = figure.subplots(2, 2)
         _reliability(panels[0, 0], predict_quality(models, samples, rows), samples.success[rows].numpy())
         _coverage(panels[0, 1], mean, variance, target)
@@ -46,7 +45,6 @@ def draw_uncertainty(models: Models, samples: Samples, rows: torch.Tensor, path:
         shift, turn = np.linalg.norm(error[:, :3], axis=1), np.abs(wrap_angle(error[:, 3]))
         _sparsification(panels[1, 0], shift, variance[:, :3].sum(axis=1))
         _error_over_deviation(panels[1, 1], shift, np.sqrt(variance[:, :3].sum(axis=1)), turn, variance)
-        figure.savefig(path)
 
 
 def _reliability(axes: Axes, probability: np.ndarray, success: np.ndarray) -> None:
@@ -55,7 +53,7 @@ def _reliability(axes: Axes, probability: np.ndarray, success: np.ndarray) -> No
     axes.scatter(rows[:, 0], rows[:, 1], s=8 + 200 * rows[:, 2] / rows[:, 2].sum(), color=_COLOURS[0])
     axes.plot(rows[:, 0], rows[:, 1], color=_COLOURS[0], lw=1.5)
     axes.set(xlabel="predicted probability of success", ylabel="share that succeeded", aspect="equal")
-    axes.set_title("Quality: does it happen as often as predicted?")
+    axes.set_title("Quality: calibration")
 
 
 def _coverage(axes: Axes, mean: np.ndarray, variance: np.ndarray, target: np.ndarray) -> None:
@@ -65,8 +63,8 @@ def _coverage(axes: Axes, mean: np.ndarray, variance: np.ndarray, target: np.nda
     for k, name in enumerate(AXES):
         axes.plot(levels, covered[:, k], color=_COLOURS[k], lw=1.5, label=name)
     axes.set(xlabel="central interval of the prediction", ylabel="share of truth inside", aspect="equal")
-    axes.set_title("Displacement: do intervals hold what they say?")
-    axes.legend(frameon=False)
+    axes.set_title("Displacement: coverage of predicted intervals")
+    axes.legend()
 
 
 def _sparsification(axes: Axes, error: np.ndarray, uncertainty: np.ndarray) -> None:
@@ -75,8 +73,8 @@ def _sparsification(axes: Axes, error: np.ndarray, uncertainty: np.ndarray) -> N
     axes.plot(100 * shares, 1e3 * oracle, color=_COLOURS[3], lw=1.5, label="dropped by the true error")
     axes.axhline(1e3 * predicted[0], color=FAINT, lw=1, ls="--", label="dropped at random")
     axes.set(xlabel="grasps dropped, %", ylabel="RMSE of the rest, mm", ylim=(0, None))
-    axes.set_title(f"Translation: AUSE {metrics.ause(error, uncertainty):.2f} of random's")
-    axes.legend(frameon=False, fontsize=8)
+    axes.set_title(f"Translation: AUSE {metrics.ause(error, uncertainty):.2f} of random")
+    axes.legend(fontsize=8)
 
 
 def _error_over_deviation(
@@ -98,35 +96,32 @@ def _error_over_deviation(
     axes.set(
         xscale="log", yscale="log", xlabel="predicted deviation", ylabel="RMSE in a twelfth of the grasps"
     )
-    axes.set_title("Displacement: is a small deviation a small error?")
-    axes.legend(frameon=False)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.label.set_color(INK)
+    axes.set_title("Displacement: error over predicted deviation")
+    axes.legend()
 
 
 def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Path) -> None:
-    """Draws losses and validation metrics by epoch, beside predictors that learned nothing.
+    """Draws losses and validation metrics by epoch, beside trivial predictors.
 
     Args:
         history: One row an epoch, as `mskgrasp.learning.trainer.train` returns them.
         report: The final metrics, with the trivial predictors' errors.
-        path: Where the picture goes.
+        path: The picture, PNG.
     """
-    with matplotlib.rc_context({**STYLE, "axes.spines.top": False, "axes.spines.right": False}):
-        figure = make_figure(11.5, 6.0)
+    with saved_figure(path, 11.5, 6.0) as figure:
         panels = figure.subplots(2, 3)
         for line, name in zip(panels, ("gqn", "gdn"), strict=True):
             rows = [row for row in history if row["stage"] == name]
             _curve(line[0], rows, "train_loss", "training (with noise and dropout)", FAINT)
-            _curve(line[0], rows, "validation_loss", "parts never seen", _COLOURS[0])
+            _curve(line[0], rows, "validation_loss", "held-out parts", _COLOURS[0])
             line[0].set(title=f"{name.upper()} loss", xlabel="epoch")
-            line[0].legend(frameon=False, fontsize=8)
+            line[0].legend(fontsize=8)
         gqn, gdn = report["gqn"], report["gdn"]
         rows = [row for row in history if row["stage"] == "gqn"]
-        _curve(panels[0, 1], rows, "auroc", "parts never seen", _COLOURS[0])
-        panels[0, 1].axhline(0.5, color=FAINT, lw=1, ls="--", label="guessing")
+        _curve(panels[0, 1], rows, "auroc", "held-out parts", _COLOURS[0])
+        panels[0, 1].axhline(0.5, color=FAINT, lw=1, ls="--", label="chance")
         panels[0, 1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.3, 1.02))
-        panels[0, 1].legend(frameon=False, fontsize=8, loc="lower right")
+        panels[0, 1].legend(fontsize=8, loc="lower right")
         bars = {
             "network": (gqn["brier"], _COLOURS[0]),
             "base rate": (gqn["brier_of_base_rate"], FAINT),
@@ -134,7 +129,7 @@ def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Pat
         panels[0, 2].bar(
             list(bars), [v for v, _ in bars.values()], color=[c for _, c in bars.values()], width=0.5
         )
-        panels[0, 2].set(title="Success: Brier score, less is better")
+        panels[0, 2].set(title="Success: Brier score (lower is better)")
         for place, (value, _) in enumerate(bars.values()):
             panels[0, 2].text(place, value, f"{value:.3f}", ha="center", va="bottom")
         rows = [row for row in history if row["stage"] == "gdn"]
@@ -142,15 +137,14 @@ def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Pat
             (panels[1, 1], "translation_rmse", "mm", _MM),
             (panels[1, 2], "rotation_rmse", "degrees", float(np.degrees(1.0))),
         ):
-            _curve(axes, rows, key, "parts never seen", _COLOURS[0], factor)
+            _curve(axes, rows, key, "held-out parts", _COLOURS[0], factor)
             for style, other in (("--", "zero_displacement"), (":", "training_mean")):
                 axes.axhline(
                     gdn[other][key] * factor, color=FAINT, lw=1.2, ls=style, label=other.replace("_", " ")
                 )
             axes.set(title=f"{key.split('_')[0].capitalize()} RMSE, {unit}", xlabel="epoch")
             axes.set_ylim(bottom=0)
-            axes.legend(frameon=False, fontsize=8)
-        figure.savefig(path)
+            axes.legend(fontsize=8)
 
 
 def _curve(

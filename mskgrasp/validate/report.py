@@ -1,4 +1,4 @@
-"""The validation's tables, picture and JSON."""
+"""Tables, figure and JSON of a validation."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
-from rich.console import Console
-from rich.table import Table
 
 from mskgrasp.core.grasp import MAX_DISPLACEMENT
+from mskgrasp.core.palette import GREEN, INK, PALE_GREEN, RED
+from mskgrasp.reports.console import print_sections
+from mskgrasp.reports.section import Section, Table
+from mskgrasp.reports.style import saved_figure
 from mskgrasp.simulation.versions import versions
 from mskgrasp.validate.closed_form import Check
 from mskgrasp.validate.compare import MOST_DISAGREEMENT, MOST_TIMES_FLOOR, Comparison, complaints
@@ -28,7 +28,6 @@ from tasks.attempt.outcome import MAX_PENETRATION, MAX_SPEED
 
 _FLOORS = (FLOOR, CELL_FLOOR)
 _MARKERS = "o^sDvP"
-_GOOD, _BAD, _INK = "#2b8a3e", "#c92a2a", "#22252b"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,9 +36,9 @@ class Impossible:
 
     Attributes:
         attempts: Number of attempts.
-        penetration: Deepest overlap of finger and part in what is kept, m.
-        fastest: Greatest speed of a part in what is kept, m/s.
-        displaced: Largest displacement of what is called a success and kept, m.
+        penetration: Deepest overlap of finger and part in the kept attempts, m.
+        fastest: Greatest speed of a part in the kept attempts, m/s.
+        displaced: Largest displacement of a kept success, m.
         dropped: Number of attempts by reason.
     """
 
@@ -51,7 +50,7 @@ class Impossible:
 
 
 def impossible(outcomes: Outcomes) -> Impossible:
-    """Counts what cannot have happened among outcomes."""
+    """Counts the physically impossible outcomes and the worst values of the others."""
     way = np.linalg.norm(outcomes.displacement[:, :3], axis=1)
     reasons = {
         "penetrated": outcomes.penetration > MAX_PENETRATION,
@@ -69,88 +68,65 @@ def impossible(outcomes: Outcomes) -> Impossible:
     )
 
 
-def console() -> Console:
-    """For tables: as wide as they need where the output is no terminal."""
-    found = Console()
-    return found if found.is_terminal else Console(width=170)
-
-
 def print_checks(checks: Sequence[Check]) -> None:
-    """Closed-form physics, a line each."""
-    table = Table(
-        box=None,
-        pad_edge=False,
-        header_style="bold",
-        title="against closed-form physics",
-        title_justify="left",
-    )
-    table.add_column("", no_wrap=True, min_width=3)
-    for header in ("what", "formula"):
-        table.add_column(header, no_wrap=True)
-    for header in ("expected", "measured", "tolerance", "unit"):
-        table.add_column(header, justify="right", no_wrap=True)
-    for check in checks:
-        table.add_row(
+    """Prints the closed-form physics, a row for each check."""
+    rows = [
+        (
             _mark(check.passed), check.name, check.formula, f"{check.expected:.4g}", f"{check.measured:.4g}",
             f"{check.low:.4g} .. {check.high:.4g}", check.unit,
-        )  # fmt: skip
-    console().print(table)
+        )
+        for check in checks
+    ]  # fmt: skip
+    header = ("", "quantity", "formula", "expected", "measured", "tolerance", "unit")
+    _print("Closed-form physics", Table(header=header, rows=rows))
 
 
 def print_fidelity(found: Sequence[Fidelity]) -> None:
-    """The parts' worst numbers, and every part that fails."""
+    """Prints the worst numbers over all parts, and every part that fails."""
     ratios = [f.volume_ratio for f in found]
-    worst = {
-        "95 % of hull and mesh surfaces within": f"{1e3 * max(f.surface_p95 for f in found):.2f} mm",
-        "volume of hulls by mesh": f"{min(ratios):.3f} .. {max(ratios):.3f}",
-        "mass in the engine off by": f"{max(f.mass_error for f in found):.1e}",
-        "inertia in the engine off by": f"{max(f.inertia_error for f in found):.1e}",
-    }
-    print(f"\n{len(found)} parts as the engine cooked them, against their meshes")
-    for name, value in worst.items():
-        print(f"  {name:40s} {value}")
-    for fidelity in found:
-        if not fidelity.passed:
-            print(f"  {fidelity.part} is not its mesh: {fidelity.as_dict()}")
+    rows = [
+        ("95 % of hull and mesh surfaces within", f"{1e3 * max(f.surface_p95 for f in found):.2f} mm"),
+        ("volume of hulls over volume of mesh", f"{min(ratios):.3f} .. {max(ratios):.3f}"),
+        ("relative error of the engine's mass", f"{max(f.mass_error for f in found):.1e}"),
+        ("relative error of the engine's inertia", f"{max(f.inertia_error for f in found):.1e}"),
+    ]
+    failed = [f"{one.part} differs from its mesh: {one.as_dict()}" for one in found if not one.passed]
+    title = f"{len(found)} parts in the physics engine against their meshes"
+    _print(title, Table(header=("worst over parts", "value"), rows=rows), *failed)
 
 
 def print_convergence(
     config: ValidateConfig, found: dict[str, Comparison], chosen: dict[str, str | None]
 ) -> None:
-    """The settings against the finest, and what each adds to the floors."""
-    table = Table(
-        box=None,
-        pad_edge=False,
-        header_style="bold",
-        title=f"\nagainst {REFERENCE}",
-        title_justify="left",
-    )
-    table.add_column("setting", no_wrap=True)
-    for header in (
-        "success", "S agrees", "shift median, mm", "90 %", "turn median, deg", "90 %", "p", "bias, mm",
-        "its p", "p beyond 0.05 mm", "CPU ms a grasp",
-    ):  # fmt: skip
-        table.add_column(header, justify="right")
-    table.add_column("adds to the floor of 10 um")
+    """Prints the settings against the finest, and what each adds to the floors."""
     floor, reference = found[FLOOR], found[REFERENCE].success_rate
+    rows = []
     for name, c in sorted(found.items(), key=lambda item: (item[0] not in _FLOORS, item[1].cpu_ms)):
-        said = [] if name in (*_FLOORS, REFERENCE) else complaints(c, floor, reference)
-        label = f"{name} (under test)" if name == config.production else name
-        table.add_row(
-            label, f"{c.success_rate:.1%}", f"{c.agreement:.1%}",
-            f"{1e3 * c.shift_median:.3f}", f"{1e3 * c.shift_p90:.2f}",
-            f"{math.degrees(c.turn_median):.3f}", f"{math.degrees(c.turn_p90):.2f}",
-            f"{c.p_value:.2g}", f"{1e3 * c.bias:.3f}", f"{c.bias_p:.1g}", f"{c.p_beyond:.2g}",
-            f"{c.cpu_ms:.0f}", "; ".join(said) or "nothing",
+        reasons = [] if name in (*_FLOORS, REFERENCE) else complaints(c, floor, reference)
+        rows.append(
+            (
+                f"{name} (under test)" if name == config.production else name,
+                f"{c.success_rate:.1%}", f"{c.agreement:.1%}",
+                f"{1e3 * c.shift_median:.3f}", f"{1e3 * c.shift_p90:.2f}",
+                f"{math.degrees(c.turn_median):.3f}", f"{math.degrees(c.turn_p90):.2f}",
+                f"{c.p_value:.2g}", f"{1e3 * c.bias:.3f}", f"{c.bias_p:.1g}", f"{c.p_beyond:.2g}",
+                f"{c.cpu_ms:.0f}", "; ".join(reasons) or "nothing",
+            )
         )  # fmt: skip
-    Console(width=None if console().is_terminal else 230).print(table)
-    for name, cheapest in chosen.items():
-        moved = name.removeprefix("the same, ")
-        print(f"cheapest setting that adds nothing to the floor ({moved}): {cheapest or 'none of these'}")
+    header = (
+        "setting", "success", "same success", "shift median, mm", "90 %", "turn median, deg", "90 %",
+        "p", "bias, mm", "bias p", "p beyond 0.05 mm", "CPU ms per grasp", "adds to the floor of 10 um",
+    )  # fmt: skip
+    cheapest = [
+        f"cheapest setting that adds nothing to the floor ({name.removeprefix('the same, ')}): "
+        f"{setting or 'none of these'}"
+        for name, setting in chosen.items()
+    ]
+    _print(f"Grasps against {REFERENCE}", Table(header=header, rows=rows), *cheapest)
 
 
 def print_impossible(found: Impossible) -> None:
-    """What the collector would drop, and the worst of what it would keep."""
+    """Prints what the collector would drop, and the worst of what it would keep."""
     dropped = ", ".join(f"{count} {name}" for name, count in found.dropped.items() if count) or "none"
     print(
         f"\nof {found.attempts} attempts dropped as impossible: {dropped}; in the others the deepest overlap "
@@ -159,8 +135,12 @@ def print_impossible(found: Impossible) -> None:
     )
 
 
+def _print(title: str, table: Table, *text: str) -> None:
+    print_sections([Section(title=title, text=text, tables=[table])])
+
+
 def write_json(path: Path, config: ValidateConfig, results: dict[str, Any]) -> None:
-    """Everything that was found, for programs."""
+    """Writes settings, versions and results for other programs."""
     record = {"settings": config.model_dump(mode="json"), "versions": versions()} | results
     path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
@@ -168,33 +148,30 @@ def write_json(path: Path, config: ValidateConfig, results: dict[str, Any]) -> N
 def draw(
     path: Path, checks: Sequence[Check], config: ValidateConfig, found: dict[str, Comparison] | None
 ) -> Path:
-    """Left: errors of the closed-form checks in units of their tolerance. Right: what accuracy costs."""
-    figure = Figure(figsize=(13 if found else 7.5, 0.32 * len(checks) + 1.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(
-        1, 3 if found else 1, squeeze=False, width_ratios=(1.3, 1, 1) if found else None
-    )[0]
-    _draw_checks(panels[0], checks)
-    if found:
-        _draw_cost(panels[1], found, config, "agreement", "grasps with the same success, %", 100.0)
-        _draw_cost(panels[2], found, config, "shift_p90", "90 % of displacements differ by less, mm", 1e3)
-        panels[2].set_yscale("log")
-        panels[2].set_yticks([0.5, 1, 2, 4], ["0.5", "1", "2", "4"])
-        panels[2].yaxis.set_minor_formatter(NullFormatter())
-    figure.savefig(path, dpi=140)
+    """Draws the closed-form errors in units of their tolerance and, where compared, accuracy over cost."""
+    with saved_figure(path, 13 if found else 7.5, 0.32 * len(checks) + 1.6) as figure:
+        panels = figure.subplots(
+            1, 3 if found else 1, squeeze=False, width_ratios=(1.3, 1, 1) if found else None
+        )[0]
+        _draw_checks(panels[0], checks)
+        if found:
+            _draw_cost(panels[1], found, config, "agreement", "grasps with the same success, %", 100.0)
+            _draw_cost(panels[2], found, config, "shift_p90", "90 % of displacements differ by less, mm", 1e3)
+            panels[2].set_yscale("log")
+            panels[2].set_yticks([0.5, 1, 2, 4], ["0.5", "1", "2", "4"])
+            panels[2].yaxis.set_minor_formatter(NullFormatter())
     return path
 
 
 def _draw_checks(axes: Any, checks: Sequence[Check]) -> None:
-    axes.axvspan(-1, 1, color="#e3efe5", lw=0)
+    axes.axvspan(-1, 1, color=PALE_GREEN, lw=0)
     for row, check in enumerate(checks):
         middle, half = (check.high + check.low) / 2, (check.high - check.low) / 2
         error = max(-2.0, min(2.0, (check.measured - middle) / half))
-        axes.plot(error, row, "o", ms=6, color=_GOOD if check.passed else _BAD)
+        axes.plot(error, row, "o", ms=6, color=GREEN if check.passed else RED)
     axes.set_yticks(range(len(checks)), [check.name for check in checks], fontsize=7.5)
-    axes.set(xlim=(-2.2, 2.2), ylim=(len(checks) - 0.5, -0.5), xlabel="measured, in units of the tolerance")
-    axes.set_title("closed-form physics", loc="left", fontsize=11)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.set(xlim=(-2.2, 2.2), ylim=(len(checks) - 0.5, -0.5), xlabel="error in units of the tolerance")
+    axes.set_title("Closed-form physics")
 
 
 def _draw_cost(
@@ -202,11 +179,11 @@ def _draw_cost(
 ) -> None:
     floor = scale * getattr(found[FLOOR], column)
     if column == "agreement":
-        axes.axhspan(floor - scale * MOST_DISAGREEMENT, 100, color="#e3efe5", lw=0)
+        axes.axhspan(floor - scale * MOST_DISAGREEMENT, 100, color=PALE_GREEN, lw=0)
     else:
-        axes.axhspan(0, MOST_TIMES_FLOOR * floor, color="#e3efe5", lw=0)
+        axes.axhspan(0, MOST_TIMES_FLOOR * floor, color=PALE_GREEN, lw=0)
     for line, style in ((floor, ":"), (scale * getattr(found[CELL_FLOOR], column), "--")):
-        axes.axhline(line, color=_INK, lw=0.8, ls=style)
+        axes.axhline(line, color=INK, lw=0.8, ls=style)
     rates = sorted({*config.rates_hz, config.physics.rate_hz})
     counts = sorted({*config.iterations, config.physics.position_iterations})
     markers = {rate: _MARKERS[k % len(_MARKERS)] for k, rate in enumerate(rates)}
@@ -219,25 +196,23 @@ def _draw_cost(
             fine = not complaints(found[name], found[FLOOR], found[REFERENCE].success_rate)
             axes.plot(*place, markers[rate], ms=6, color=colour, mfc=colour if fine else "white", zorder=2)
             if name == config.production:
-                axes.plot(*place, "o", ms=13, color=_INK, mfc="none", zorder=3)
+                axes.plot(*place, "o", ms=13, color=INK, mfc="none", zorder=3)
     for rate, marker in markers.items():
-        axes.plot([], [], marker, ms=5, color=_INK, mfc="white", label=f"{rate} Hz")
+        axes.plot([], [], marker, ms=5, color=INK, mfc="white", label=f"{rate} Hz")
     if column == "agreement":
         axes.legend(
             fontsize=7.5,
             loc="lower right",
-            frameon=False,
             title="circled: under test\nfilled: adds nothing",
             title_fontsize=7.5,
         )
-    axes.set(xlabel="processor time of a grasp, ms", ylabel=label, xscale="log")
+    axes.set(xlabel="processor time per grasp, ms", ylabel=label, xscale="log")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(ScalarFormatter())
         axis.set_minor_formatter(NullFormatter())
     axes.set_xticks([50, 100, 200, 400])
-    axes.set_title("floors: 10 um (..), 0.1 mm (--)", loc="left", fontsize=9)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.set_title("Floors: 10 um (dotted), 0.1 mm (dashed)", fontsize=9)
 
 
 def _mark(passed: bool) -> str:
-    return "[green]ok[/]" if passed else "[red]BAD[/]"
+    return "ok" if passed else "FAILED"

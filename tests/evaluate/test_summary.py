@@ -117,8 +117,8 @@ def test_models_are_compared_on_the_same_grasps_and_on_those_they_chose():
     assert one["quality"]["known"]["coverage_90"] == [1.0, 1.0, 1.0, 1.0]
     assert report["models"]["other"]["low_variance"] is None
     assert report["models"]["other"]["quality"]["known"]["translation_rmse"] is None
-    table = next(s for s in sections(report, Path("out")) if s.title == "Displacement in the hand")
-    assert ("one", "high quality", "novel") in [row[:3] for row in table.rows]
+    section = next(s for s in sections(report, Path("out")) if s.title == "Displacement in the hand")
+    assert ("one", "high quality", "novel") in [row[:3] for row in section.tables[0].rows]
 
 
 def test_the_papers_bars_stand_beside_the_models_they_are_of():

@@ -14,9 +14,9 @@ from mskgrasp.palletize.placements import (
     Placement,
     compared,
     gain_lines,
-    print_placements,
     summarise_placements,
 )
+from mskgrasp.palletize.report import print_report
 
 
 def placement(part: str, number: int, correction: Correction, error_mm: float | None, **changes) -> Placement:
@@ -73,7 +73,7 @@ def test_without_a_placement_errors_are_absent_not_zero():
         assert "errors are unknown" in gain_lines(report)[0]
         json.dumps(report, allow_nan=False)
         printed = io.StringIO()
-        print_placements(report, Console(file=printed, width=120))
+        print_report(report, Console(file=printed, width=120))
         assert "0.0 mm" not in printed.getvalue()
 
 

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from mskgrasp.planning.planner import PlannerConfig
-from mskgrasp.reports.html import Link, Picture, Section, Table, settings_section, write_html
+from mskgrasp.reports.html import write_html
+from mskgrasp.reports.section import Figure, Link, Section, Table, settings_section
 from tests.browser import Page
 
 HOSTILE = '<script>document.title="owned"</script> & "quoted" <img src=x onerror=alert(1)>'
+COMMAND = f"python -m mskgrasp.evaluate --out '{HOSTILE}'"
 
 
 def picture(path: Path, width: int = 40) -> Path:
@@ -44,14 +46,14 @@ def report(tmp_path: Path) -> Path:
         ),
         Section(
             title="Pictures",
-            pictures=[
-                Picture(path=picture(tmp_path / "a.png", 1725), caption=HOSTILE, name="worst"),
-                Picture(path=picture(tmp_path / "b.jpg"), caption="A JPEG"),
+            figures=[
+                Figure(path=picture(tmp_path / "a.png", 1725), caption=HOSTILE, name="worst"),
+                Figure(path=picture(tmp_path / "b.jpg"), caption="A JPEG"),
             ],
         ),
-        settings_section(PlannerConfig()),
+        settings_section(PlannerConfig().model_dump()),
     ]
-    write_html(path, title=f"Report {HOSTILE}", sections=sections)
+    write_html(path, title=f"Report {HOSTILE}", conclusion=HOSTILE, sections=sections, command=COMMAND)
     for made in (tmp_path / "a.png", tmp_path / "b.jpg"):
         made.unlink()  # the file needs no other
     return path
@@ -64,8 +66,11 @@ def test_a_browser_shows_every_picture_and_complains_of_nothing(report):
         assert page.evaluate("document.title") == f"Report {HOSTILE}"
         assert page.evaluate("document.scripts.length") == 0
         assert page.evaluate("document.querySelector('section p + p').textContent") == HOSTILE
+        assert page.evaluate("document.querySelector('header p').textContent") == HOSTILE
+        assert page.evaluate("document.querySelector('header code').textContent") == COMMAND
+        assert page.evaluate("document.querySelectorAll('img, table').length") == 5
         assert page.evaluate("[...document.links].every(a => document.querySelector(a.hash) !== null)")
-        assert page.evaluate("getComputedStyle(document.querySelector('td.n')).textAlign") == "right"
+        assert page.evaluate("getComputedStyle(document.querySelector('td.number')).textAlign") == "right"
         assert page.complaints == []
 
 
@@ -86,13 +91,13 @@ def test_it_fits_a_phone(report):
 
 def test_what_cannot_be_shown_is_refused(tmp_path):
     def write(**section: object) -> None:
-        write_html(tmp_path / "r.html", title="t", sections=[Section(title="s", **section)])  # type: ignore[arg-type]
+        write_html(tmp_path / "r.html", title="t", conclusion="c", sections=[Section(title="s", **section)])  # type: ignore[arg-type]
 
     (tmp_path / "drawing.svg").write_text("<svg onload='alert(1)'/>")
     with pytest.raises(ValueError, match="neither PNG nor JPEG"):
-        write(pictures=[Picture(path=tmp_path / "drawing.svg", caption="")])
+        write(figures=[Figure(path=tmp_path / "drawing.svg", caption="")])
     with pytest.raises(FileNotFoundError):
-        write(pictures=[Picture(path=tmp_path / "gone.png", caption="")])
+        write(figures=[Figure(path=tmp_path / "gone.png", caption="")])
     with pytest.raises(ValueError, match="1 cells under a header of 2"):
         write(tables=[Table(header=("a", "b"), rows=[("x",)])])
     with pytest.raises(ValueError, match="'nowhere', which is not in the report"):

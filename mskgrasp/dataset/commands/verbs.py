@@ -9,9 +9,6 @@ from pathlib import Path
 from typing import Annotated, Literal, assert_never
 
 import tyro
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 from tqdm import tqdm
 
 from mskgrasp.core.errors import BadDataset
@@ -19,6 +16,8 @@ from mskgrasp.dataset.card import markdown, read_card, tables
 from mskgrasp.dataset.check import check_dataset, require_dataset
 from mskgrasp.dataset.commands.maniskill import export_maniskill
 from mskgrasp.dataset.export import export_npz
+from mskgrasp.reports.console import print_sections
+from mskgrasp.reports.section import Section, Table
 
 PROG = "python -m mskgrasp.dataset"
 
@@ -121,18 +120,12 @@ def run_info(verb: Info) -> int:
     if verb.markdown:
         print(markdown(card), end="")
         return 0
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=160)  # in a pipe nothing is to be cut off
-    for title, headers, rows in tables(card):
-        table = Table(box=None, pad_edge=False, header_style="bold", show_header=any(headers))
-        for header in headers:
-            table.add_column(header)
-        for row in rows:
-            table.add_row(*map(escape, row))
-        console.print(f"[bold]{title}[/bold]", highlight=False)
-        console.print(table)
-        console.print()
+    print_sections(
+        [
+            Section(title=title, tables=[Table(header=header, rows=rows)])
+            for title, header, rows in tables(card)
+        ]
+    )
     return 0
 
 

@@ -12,12 +12,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mskgrasp.core.geometry import quat_to_matrix
+from mskgrasp.core.palette import INK, SLATE
 from mskgrasp.parts import store
 from mskgrasp.parts.figures.render import Body, render
 from mskgrasp.parts.part import Part
 
 METAL = (0.68, 0.74, 0.81)
-_INK, _GREY = "#1f2933", "#66717d"
 _DPI = 150
 _TILES = 4
 
@@ -37,21 +37,21 @@ def draw_part(part: Part, out: Path) -> None:
     record = store.read_record(part.folder)
     figure = Figure(figsize=(12.8, 7.2), dpi=_DPI, facecolor="white")
     FigureCanvasAgg(figure)
-    figure.text(0.03, 0.945, part.name, fontsize=24, weight="bold", color=_INK, va="center")
-    figure.text(0.03, 0.895, _facts(part), fontsize=11.5, color=_GREY, va="center")
+    figure.text(0.03, 0.945, part.name, fontsize=24, weight="bold", color=INK, va="center")
+    figure.text(0.03, 0.895, _facts(part), fontsize=11.5, color=SLATE, va="center")
 
     upright = mesh.copy()
     upright.vertices = mesh.vertices @ quat_to_matrix(part.resting.quat_wxyz[0]).T
     _tile(figure, (0.02, 0.40, 0.47, 0.46), [Body(mesh=upright, colour=METAL)], table=False)
     _tile(figure, (0.51, 0.40, 0.47, 0.46), _exploded(part), table=False)
-    figure.text(0.255, 0.385, "mesh", fontsize=12, color=_INK, ha="center", weight="bold")
+    figure.text(0.255, 0.385, "mesh", fontsize=12, color=INK, ha="center", weight="bold")
     hulls = f"{part.n_hulls} convex hull{'s' if part.n_hulls > 1 else ''}"
     fit = (
         f"largest error {part.hull_error * 1e3:.2f} mm, 95 % under {record['hull_error_p95'] * 1e3:.2f} mm, "
         f"volume {100 * record['hull_volume_ratio'] - 100:+.1f} %"
     )
-    figure.text(0.745, 0.385, hulls, fontsize=12, color=_INK, ha="center", weight="bold")
-    figure.text(0.745, 0.356, fit, fontsize=10, color=_GREY, ha="center")
+    figure.text(0.745, 0.385, hulls, fontsize=12, color=INK, ha="center", weight="bold")
+    figure.text(0.745, 0.356, fit, fontsize=10, color=SLATE, ha="center")
 
     classes = resting_classes(part)
     shown = classes[:_TILES]
@@ -65,8 +65,8 @@ def draw_part(part: Part, out: Path) -> None:
         _tile(figure, (left, 0.075, span, 0.265), [Body(mesh=pose, colour=METAL)], table=True)
         alike = "one pose" if found.count == 1 else f"{found.count} poses alike"
         figure.text(left + span / 2, 0.048, f"{100 * found.probability:.0f} %", fontsize=14, weight="bold",
-                    color=_INK, ha="center", va="center")  # fmt: skip
-        figure.text(left + span / 2, 0.019, alike, fontsize=9.5, color=_GREY, ha="center",
+                    color=INK, ha="center", va="center")  # fmt: skip
+        figure.text(left + span / 2, 0.019, alike, fontsize=9.5, color=SLATE, ha="center",
                     va="center")  # fmt: skip
     figure.savefig(out, dpi=_DPI, metadata={"Software": None} if out.suffix.lower() == ".png" else None)
 

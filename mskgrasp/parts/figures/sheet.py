@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mskgrasp.core.geometry import quat_to_matrix
+from mskgrasp.core.palette import INK, SLATE
 from mskgrasp.parts import store
 from mskgrasp.parts.catalogue import Entry, Index, spread
 from mskgrasp.parts.figures.render import Body, render
@@ -20,7 +21,6 @@ from mskgrasp.parts.part import Part
 _DPI = 120
 _TILE = (1.12, 1.06)  # inches
 _COLUMNS = 16
-_INK, _GREY = "#1f2933", "#66717d"
 
 _MATERIALS = (
     (2000.0, (0.33, 0.45, 0.58)),  # plastics
@@ -47,9 +47,9 @@ def draw_sheet(index: Index, out: Path, parts: int, report_progress: Callable[[i
     FigureCanvasAgg(figure)
     counts = index.families()
     figure.text(0.15 / width, 1 - 0.3 / height, f"{len(index.parts)} parts of {len(counts)} families",
-                fontsize=17, weight="bold", color=_INK, va="center")  # fmt: skip
+                fontsize=17, weight="bold", color=INK, va="center")  # fmt: skip
     figure.text(1 - 0.15 / width, 1 - 0.3 / height, "longest axis below each part; colour by density",
-                fontsize=10, color=_GREY, va="center", ha="right")  # fmt: skip
+                fontsize=10, color=SLATE, va="center", ha="right")  # fmt: skip
     for number, entry in enumerate(chosen):
         report_progress(number, len(chosen))
         row, column = divmod(number, _COLUMNS)
@@ -58,10 +58,10 @@ def draw_sheet(index: Index, out: Path, parts: int, report_progress: Callable[[i
         axes.set_axis_off()
         axes.imshow(_picture(entry, int(_TILE[0] * _DPI), int(0.80 * _DPI)), interpolation="nearest")
         middle = (left + _TILE[0] / 2) / width
-        figure.text(middle, (top - 0.86) / height, entry.family.replace("_", " "), fontsize=6.3, color=_INK,
+        figure.text(middle, (top - 0.86) / height, entry.family.replace("_", " "), fontsize=6.3, color=INK,
                     ha="center", va="center")  # fmt: skip
         figure.text(middle, (top - 0.96) / height, f"{1e3 * entry.longest_axis:.0f} mm", fontsize=5.6,
-                    color=_GREY, ha="center", va="center")  # fmt: skip
+                    color=SLATE, ha="center", va="center")  # fmt: skip
     report_progress(len(chosen), len(chosen))
     metadata = {"Software": None} if out.suffix.lower() == ".png" else None
     figure.savefig(out, dpi=_DPI, metadata=metadata)
