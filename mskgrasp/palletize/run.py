@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 from pydantic import Field, field_validator
 from rich.console import Console
 from tqdm import tqdm
@@ -21,6 +20,7 @@ from hal.operator import Operator
 from mskgrasp.core.config import Config, read_yaml
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import only_here
+from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.palletize.pick_and_place import PickAndPlace, Task
@@ -203,7 +203,8 @@ def _pallets(
     """What belongs together: the slots of a pallet, or a trial of a part under every correction."""
 
     def task(name: str, number: int, index: int, correction: Correction) -> Task:
-        seed = int(np.random.SeedSequence([config.seed, number, index]).generate_state(1)[0] >> 1)
+        # A part may fill several slots of a pallet, each of them another scene.
+        seed, _ = scene_seeds(config.seed, find_part(name).name, number * len(slots) + index)
         return Task(
             part=name, number=number, index=index, slot=slots[index], correction=correction, seed=seed,
             keep=index > 0,
@@ -255,7 +256,7 @@ def _place_all(config: PalletizeConfig, pallets: list[list[Task]], asks: bool) -
 def pallet_bench(config: PalletizeConfig) -> Iterator[Callable[[Pallet], Iterator[Placement]]]:
     """A connected cell with its planner, and the function that fills a pallet."""
     with connected_engine(
-        config.cell, yes=config.yes, picture=config.out / "next.png", tape=config.squares(), as_stored=False
+        config.cell, yes=config.yes, picture=config.out / "next.png", tape=config.squares()
     ) as engine:
         check_reach(engine.cell, config.all_slots())
         planner = make_planner(config.models, config.planner, engine.cell)

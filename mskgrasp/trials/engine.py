@@ -100,7 +100,6 @@ class TrialEngine:
         operator: Is asked before the arm moves and after a contact, if the cell has one.
         picture: File for the picture of the next grasp, drawn for the operator.
         tape: Sizes of the squares of tape to measure by; None: the cell's tracker measures, if it has one.
-        as_stored: Round captured depth to the datasets' steps of 0.1 mm.
     """
 
     def __init__(
@@ -110,13 +109,11 @@ class TrialEngine:
         *,
         picture: Path = Path("next.png"),
         tape: Tape | None = None,
-        as_stored: bool = True,
     ):
         self.cell = cell
         self.tape = tape
         self._operator = operator
         self._picture = picture
-        self._as_stored = as_stored
 
     def home(self) -> None:
         """Brings the arm home, out of the camera's sight; after a contact on the way it tries once more.
@@ -142,9 +139,10 @@ class TrialEngine:
         self._operator.recover(self.cell, str(error))
 
     def capture(self) -> RgbdFrame:
-        """A frame, its depth as a file holds it: a plan can be made again from the stored frame."""
+        """A frame, its depth as a file holds it: what is planned on it can be planned again from the file."""
         frame = self.cell.camera.capture()
-        return as_stored(frame) if self._as_stored else frame
+        depth = np.where(frame.depth > _MAX_DEPTH, np.nan, frame.depth)
+        return replace(frame, depth=u16_to_depth(depth_to_u16(depth)))
 
     def present(
         self,
@@ -243,9 +241,7 @@ class TrialEngine:
 
 
 @contextmanager
-def connected_engine(
-    path: Path, *, yes: bool, picture: Path, tape: Tape | None, as_stored: bool = True
-) -> Iterator[TrialEngine]:
+def connected_engine(path: Path, *, yes: bool, picture: Path, tape: Tape | None) -> Iterator[TrialEngine]:
     """An engine on the cell of a YAML file, connected until the end of the block.
 
     Raises:
@@ -260,15 +256,9 @@ def connected_engine(
         torch.set_num_threads(1)
     try:
         with cell.connected():
-            yield TrialEngine(cell, operator, picture=picture, tape=tape, as_stored=as_stored)
+            yield TrialEngine(cell, operator, picture=picture, tape=tape)
     finally:
         torch.set_num_threads(n_threads)
-
-
-def as_stored(frame: RgbdFrame) -> RgbdFrame:
-    """The frame with depth in the datasets' steps of 0.1 mm; what they cannot hold is NaN."""
-    depth = np.where(frame.depth > _MAX_DEPTH, np.nan, frame.depth)
-    return replace(frame, depth=u16_to_depth(depth_to_u16(depth)))
 
 
 def _failure(result: GraspResult, before: Pose | None, after: Pose | None, lift: float) -> str:

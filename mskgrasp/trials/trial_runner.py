@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 
-import numpy as np
-
 from hal.errors import HalError
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
@@ -81,12 +79,6 @@ class Setup:
     yes: bool = False
 
 
-def scene_seed(seed: int, part: str, number: int) -> int:
-    """The seed of a trial, which the part's place, the camera's errors and the candidates follow from."""
-    words = [seed, zlib.crc32(part.encode()), number]
-    return int(np.random.SeedSequence(words).generate_state(1)[0] >> 1)
-
-
 class TrialRunner:
     """Makes trials on a connected cell.
 
@@ -120,7 +112,7 @@ class TrialRunner:
             HalError: The cell was lost.
             StoppedByOperator: The operator ended the run.
         """
-        seed = scene_seed(task.seed, task.part, task.number)
+        seed, _ = scene_seeds(task.seed, task.part, task.number)
         planned = self._engine.present(task.source, seed, self._chooser(task), name=task.key)
         record = run_trial(self._engine, planned, part=task.part, number=task.number, seed=seed)
         trial = replace(
