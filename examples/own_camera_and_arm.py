@@ -1,4 +1,5 @@
 """A camera and an arm of your own in a cell: ``python examples/own_camera_and_arm.py``."""
+
 import time
 
 import numpy as np

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any, Literal
 
-import torch
 from pydantic import Field, field_validator
 from tqdm import tqdm
 
@@ -227,7 +226,8 @@ def _make_trials(
         mininterval=0.5 if sys.stderr.isatty() else 15.0,
     )  # fmt: skip
     n_lifted = 0
-    with _made(config, cell, setup, missing) as made, bar:
+    n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
+    with closing(run_trials(setup, missing, n_workers)) as made, bar:
         for k, trial in enumerate(made, 1):
             append(config.out / TRIALS, trial.to_json())
             trials[trial.key] = trial
@@ -237,23 +237,6 @@ def _make_trials(
     # In the order of their names, whoever was first.
     rewrite(config.out / TRIALS, (trials[key].to_json() for key in sorted(trials)))
     return trials
-
-
-@contextmanager
-def _made(
-    config: EvaluateConfig, cell: CellFile, setup: Setup, missing: Sequence[tuple[TrialTask, ...]]
-) -> Iterator[Iterator[Trial]]:
-    """The missing trials, in this process or, of simulated cells, in several."""
-    n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
-    n_threads = torch.get_num_threads()
-    if cell.simulated:
-        torch.set_num_threads(1)  # as in a process of its own: the same sums
-    made = run_trials(setup, missing, n_workers)
-    try:
-        yield made
-    finally:
-        made.close()
-        torch.set_num_threads(n_threads)
 
 
 def _with_predictions(

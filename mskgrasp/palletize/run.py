@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
-import torch
 from pydantic import Field, field_validator
 from tqdm import tqdm
 
@@ -21,10 +19,11 @@ from hal.operator import Operator
 from mskgrasp.core.config import Config, read_yaml
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import only_here
+from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.palletize.pick_and_place import PickAndPlace, Task
 from mskgrasp.palletize.placements import CORRECTIONS, Correction, Placement
-from mskgrasp.palletize.placer import Placer, Task
 from mskgrasp.palletize.report import print_report, write_report
 from mskgrasp.palletize.slots import Slot, check_reach, check_room, parse_target, read_slots
 from mskgrasp.parts import find_part
@@ -36,6 +35,7 @@ from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.options import parse
 from mskgrasp.runtime.run_folder import TRIALS, append, begin, file_digest, read
 from mskgrasp.runtime.worker_pool import Work, results
+from mskgrasp.trials.engine import connected_engine
 
 DESCRIPTION = """Grasps parts, puts each where it shall lie, and measures how far from that it lies then.
 
@@ -203,7 +203,8 @@ def _pallets(
     """What belongs together: the slots of a pallet, or a trial of a part under every correction."""
 
     def task(name: str, number: int, index: int, correction: Correction) -> Task:
-        seed = int(np.random.SeedSequence([config.seed, number, index]).generate_state(1)[0] >> 1)
+        # A part may fill several slots of a pallet, each of them another scene.
+        seed, _ = scene_seeds(config.seed, find_part(name).name, number * len(slots) + index)
         return Task(
             part=name, number=number, index=index, slot=slots[index], correction=correction, seed=seed,
             keep=index > 0,
@@ -239,7 +240,7 @@ def _place_all(config: PalletizeConfig, pallets: list[list[Task]], asks: bool) -
     ]
     left = sum(key not in found for key in keys)
     if missing:
-        work = Work(placing_bench, config, name=lambda one: one.title, rest=Pallet.after)
+        work = Work(pallet_bench, config, name=lambda one: one.title, rest=Pallet.after)
         placed = results(work, missing, config.workers)
         bar = tqdm(total=left, unit="placement", file=sys.stderr, disable=asks)
         with contextlib.closing(placed), bar:
@@ -252,28 +253,25 @@ def _place_all(config: PalletizeConfig, pallets: list[list[Task]], asks: bool) -
 
 
 @contextmanager
-def placing_bench(config: PalletizeConfig) -> Iterator[Callable[[Pallet], Iterator[Placement]]]:
+def pallet_bench(config: PalletizeConfig) -> Iterator[Callable[[Pallet], Iterator[Placement]]]:
     """A connected cell with its planner, and the function that fills a pallet."""
-    cell = cell_from_yaml(config.cell)
-    operator = Operator(cell, yes=config.yes)
-    if cell.arm.simulated:
-        # Networks round by the number of threads, and near-equal grasps would change places.
-        torch.set_num_threads(1)
-    with cell.connected():
-        check_reach(cell, config.all_slots())
-        planner = make_planner(config.models, config.planner, cell)
-        placer = Placer(cell, planner, operator, config.out / "placements", tape=config.squares())
+    with connected_engine(
+        config.cell, yes=config.yes, picture=config.out / "next.png", tape=config.squares()
+    ) as engine:
+        check_reach(engine.cell, config.all_slots())
+        planner = make_planner(config.models, config.planner, engine.cell)
+        worker = PickAndPlace(engine, planner, config.out / "placements")
 
         def fill(pallet: Pallet) -> Iterator[Placement]:
             for number, task in enumerate(pallet.tasks, 1):
                 # A real pallet is as it was left; a simulated one is filled anew from its first slot.
-                if task.key in pallet.done and (cell.feeder is None or not pallet.name):
+                if task.key in pallet.done and (engine.cell.feeder is None or not pallet.name):
                     continue
                 where = f"slot {number} of {len(pallet.tasks)}" if pallet.name else f"trial {task.number + 1}"
-                yield placer.run(task, f"{where}, correction {task.correction}")
-            placer.home()
+                yield worker.run(task, f"{where}, correction {task.correction}")
+            engine.home()
             if pallet.name:
-                image = placer.look(config.all_slots())
+                image = worker.picture(config.all_slots())
                 cv2.imwrite(str(config.out / "placements" / f"{pallet.name}.png"), image[..., ::-1])
 
         yield fill

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import zlib
 from collections import Counter
 from collections.abc import Generator, Iterator
 from pathlib import Path
@@ -15,6 +14,7 @@ import torch
 
 from mskgrasp.core.errors import NoPartFound
 from mskgrasp.core.grasp import MAX_DISPLACEMENT, sample_grasps
+from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
 from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, u16_to_depth, write_shard
 from mskgrasp.perception.part_detection import view_part
@@ -122,9 +122,8 @@ def draw_attempt(
         The depth image (h, w), uint16 in 0.1 mm, and the grasp (1, 4), float32, base frame; None where the
         camera does not see the part.
     """
-    sequence = np.random.SeedSequence([seed, zlib.crc32(part.encode()), attempt])
-    episode_seed, grasp_seed = sequence.generate_state(2) >> 1
-    env.lay(int(episode_seed))
+    episode_seed, grasp_seed = scene_seeds(seed, part, attempt)
+    env.lay(episode_seed)
     depth = depth_to_u16(env.capture_depth()[0].cpu().numpy())
     try:
         view = view_part(

@@ -34,13 +34,38 @@ class Candidates:
         Raises:
             NoPartFound: The frame shows none.
         """
-        key = frame.depth.tobytes() + repr(rng.bit_generator.state).encode()
+        key = _frame_key(frame, rng)
         if self._last is None or self._last[0] != key:
             planner, started = self.planner, time.perf_counter()
             view, candidates = planner.sample(frame, rng)
             scene = Scene.of(frame, view, planner.table_z, planner.models.device)
             found = qualities(planner.models, scene, candidates, planner.config.chunk_size)
             self._last = key, (view, candidates, found, time.perf_counter() - started)
+        return self._last[1]
+
+
+def _frame_key(frame: RgbdFrame, rng: np.random.Generator) -> bytes:
+    """Equal for equal inputs of a planner."""
+    return frame.depth.tobytes() + repr(rng.bit_generator.state).encode()
+
+
+class RepeatedPlanner:
+    """A planner that returns its last plan for the same frame and candidates, as under other corrections."""
+
+    def __init__(self, planner: Planner):
+        self._planner = planner
+        self._last: tuple[bytes, GraspPlan] | None = None
+
+    def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
+        """Plans a grasp of the part that a frame shows.
+
+        Raises:
+            NoPartFound: The frame shows none.
+            NoGraspFound: No candidate is of the demanded quality.
+        """
+        key = _frame_key(frame, rng)
+        if self._last is None or self._last[0] != key:
+            self._last = key, self._planner.plan(frame, rng)
         return self._last[1]
 
 

@@ -1,31 +1,28 @@
-"""The trials of an experiment on one cell, one after another: what a process does, alone or beside others."""
+"""Runner of an experiment's trials, in one process or several."""
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 
-import numpy as np
-
-from hal import Cell, RgbdFrame, open_cell
 from hal.errors import HalError
-from hal.operator import Operator
-from mskgrasp.core.errors import TapeDoesNotFit, UsageError
+from mskgrasp.core.errors import UsageError
+from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
 from mskgrasp.planning.for_cell import make_planner
-from mskgrasp.planning.planner import GraspPlan, Planner, PlannerConfig
-from mskgrasp.reports.grasp_figures import draw_plan
+from mskgrasp.planning.planner import Planner, PlannerConfig
 from mskgrasp.runtime.worker_pool import Work, results
+from mskgrasp.trials.engine import TrialEngine, connected_engine
 from mskgrasp.trials.lowess import Lowess
+from mskgrasp.trials.measurement import finish, run_trial
 from mskgrasp.trials.policies import Candidates, Chooser
 from mskgrasp.trials.predictors import LOWESS, LowessPredictor, NetworkPredictor, Predictor
-from mskgrasp.trials.trial import Policy, Trial, clear, finish, run_trial, trial_key
+from mskgrasp.trials.trial import Policy, Trial, trial_key
 from mskgrasp.trials.trial_files import trial_file, write_trial
 
 
@@ -82,30 +79,23 @@ class Setup:
     yes: bool = False
 
 
-def scene_seed(seed: int, part: str, number: int) -> int:
-    """The seed of a trial, which the part's place, the camera's errors and the candidates follow from."""
-    words = [seed, zlib.crc32(part.encode()), number]
-    return int(np.random.SeedSequence(words).generate_state(1)[0] >> 1)
-
-
 class TrialRunner:
     """Makes trials on a connected cell.
 
     Raises:
-        UsageError: The cell does not tell what the trials need to know, or somebody must be asked and is not
-            there.
+        UsageError: The cell lacks a tracker that the trials need.
     """
 
-    def __init__(self, cell: Cell, setup: Setup):
+    def __init__(self, engine: TrialEngine, setup: Setup):
+        cell = engine.cell
         if cell.tracker is None and setup.must_measure and setup.tape is None:
             raise UsageError("nothing in this cell tracks the part: measure by tape, --measure markers")
         if cell.tracker is None and setup.lowess:
             raise UsageError(
-                "LOWESS needs the part's pose and nothing here tells it: leave --lowess-data away"
+                "LOWESS needs the part's pose and nothing in this cell tracks it: leave --lowess-data away"
             )
-        self._cell = cell
+        self._engine = engine
         self._setup = setup
-        self._operator = Operator(cell, yes=setup.yes)
         planner = make_planner(setup.models, setup.planner, cell)
         chunk, device = setup.planner.chunk_size, planner.models.device
         self._candidates = Candidates(planner)
@@ -120,46 +110,20 @@ class TrialRunner:
 
         Raises:
             HalError: The cell was lost.
-            StoppedByOperator: The operator said so.
+            StoppedByOperator: The operator ended the run.
         """
-        seed = scene_seed(task.seed, task.part, task.number)
-        record, no_tape = None, ""
-        while record is None:
-            clear(self._cell, self._recover)
-            try:
-                self._operator.lay(self._cell, task.source, seed, name=task.key)
-            except TapeDoesNotFit as error:
-                no_tape = f"no room for tape: {error}"  # it lies there all the same, and may be grasped
-            record = run_trial(
-                self._cell,
-                self._chooser(task),
-                part=task.part,
-                number=task.number,
-                seed=seed,
-                tape=self._setup.tape,
-                may_move=self._may_move,
-                recover=self._recover,
-            )
-            if record is not None and record.plan is None and self._operator.asks:
-                self._operator.tell(f"{record.trial.reason}: no grasp was planned; lay the part down anew")
-                record = None
+        seed, _ = scene_seeds(task.seed, task.part, task.number)
+        planned = self._engine.present(task.source, seed, self._chooser(task), name=task.key)
+        record = run_trial(self._engine, planned, part=task.part, number=task.number, seed=seed)
         trial = replace(
             record.trial,
             family=find_part(task.source).family,
             policy=task.policy,
             chosen_by=task.chosen_by,
         )
-        if trial.unmeasured and no_tape:
-            trial = replace(trial, unmeasured=no_tape)
         write_trial(trial_file(self._setup.out, trial.key), record.frame, record.plan, record.after)
         yield trial
-        finish(self._cell, record, self._recover)
-
-    def _may_move(self, frame: RgbdFrame, plan: GraspPlan) -> bool:
-        picture = self._setup.out / "next.png"
-        if self._operator.asks:
-            draw_plan(frame, plan, picture)
-        return self._operator.may_move(picture, plan.summary)
+        finish(self._engine, record)
 
     def _chooser(self, task: TrialTask) -> Chooser | Planner:
         planner = self._candidates.planner
@@ -170,30 +134,23 @@ class TrialRunner:
             self._predictors[task.chosen_by],
             task.policy,
             task.part,
-            self._cell.tracker,
+            self._engine.cell.tracker,
         )
 
-    def _recover(self, reason: str) -> None:
-        self._operator.recover(self._cell, reason)
 
-    def close(self) -> None:
-        """Brings the arm home."""
-        clear(self._cell, self._recover)
+SceneTasks = tuple[TrialTask, ...]
+"""Trials on one scene: one process makes them, and predicts the qualities of its candidates once."""
 
 
-Scene = tuple[TrialTask, ...]
-"""Trials that see the same: one process makes them, and looks at the scene once."""
+def run_trials(setup: Setup, scenes: Sequence[SceneTasks], n_workers: int) -> Generator[Trial, None, None]:
+    """Makes the trials of scenes, each yielded once its file is written; closing it stops all.
 
-
-def run_trials(setup: Setup, scenes: Sequence[Scene], n_workers: int) -> Generator[Trial, None, None]:
-    """Makes the trials of scenes, each told of once its file lies there; closing it stops all.
-
-    What comes of a trial depends neither on the number of processes nor on which of them makes it. A trial
+    The outcome of a trial depends neither on the number of processes nor on which of them makes it. A trial
     whose process dies, or whose simulated cell is lost, is made again by another.
 
     Raises:
         HalError: The one cell was lost; a real one may not be built again behind its operator's back.
-        WorkerFailed: A trial failed for a reason that trying again will not mend.
+        WorkerFailed: A trial failed for a reason that another try cannot remove.
     """
     work = Work(
         _trial_bench,
@@ -207,15 +164,9 @@ def run_trials(setup: Setup, scenes: Sequence[Scene], n_workers: int) -> Generat
 
 
 @contextmanager
-def _trial_bench(setup: Setup) -> Iterator[Callable[[Scene], Iterator[Trial]]]:
-    with trial_runner(setup) as runner:
+def _trial_bench(setup: Setup) -> Iterator[Callable[[SceneTasks], Iterator[Trial]]]:
+    picture = setup.out / "next.png"
+    with connected_engine(setup.cell, yes=setup.yes, picture=picture, tape=setup.tape) as engine:
+        runner = TrialRunner(engine, setup)
         yield lambda scene: chain.from_iterable(map(runner.run, scene))
-
-
-@contextmanager
-def trial_runner(setup: Setup) -> Iterator[TrialRunner]:
-    """A runner on the cell of a setup, connected until the end of the block."""
-    with open_cell(setup.cell) as cell:
-        runner = TrialRunner(cell, setup)
-        yield runner
-        runner.close()
+        engine.home()

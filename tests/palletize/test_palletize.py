@@ -20,11 +20,12 @@ from hal.sim import SapienCellConfig, sapien_cell
 from mskgrasp.core.errors import BadModel, UsageError
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED
-from mskgrasp.palletize.placer import Placer, Task
+from mskgrasp.palletize.pick_and_place import PickAndPlace, Task
 from mskgrasp.palletize.run import PalletizeConfig, main, palletize
 from mskgrasp.palletize.slots import Slot
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.trials.engine import TrialEngine
 from tests.browser import Page
 from tests.hal.test_operator import REAL
 
@@ -60,7 +61,7 @@ def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_pa
         return execute_grasp(cell, grasp)
 
     with monkeypatch.context() as patch, pytest.raises(CommunicationLost):
-        patch.setattr("mskgrasp.palletize.placer.execute_grasp", pulled_cable)
+        patch.setattr("mskgrasp.trials.engine.execute_grasp", pulled_cable)
         palletize(config(out))
     kept = (out / "trials.jsonl").read_text()
     assert len(kept.splitlines()) == 1
@@ -159,10 +160,11 @@ def test_a_cell_without_feeder_and_tracker_is_served_by_its_operator_and_measure
     (tmp_path / "placements").mkdir()
     with cell.connected():
         planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=100), cell)
-        placer = Placer(cell, planner, operator, tmp_path / "placements", tape=tape)
-        placed = placer.run(task)
+        picture = tmp_path / "next.png"
+        taped = TrialEngine(cell, operator, picture=picture, tape=tape)
+        placed = PickAndPlace(taped, planner, tmp_path / "placements").run(task)
         true = tracker.part_pose()
-        bare = Placer(cell, planner, operator, tmp_path / "placements")
+        bare = PickAndPlace(TrialEngine(cell, operator, picture=picture), planner, tmp_path / "placements")
         unknown = bare.run(task)
         with pytest.raises(StoppedByOperator):
             bare.run(task)

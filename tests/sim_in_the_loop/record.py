@@ -7,10 +7,13 @@ from pathlib import Path
 
 import torch
 
-from hal import go_home, open_cell
+from hal import open_cell
+from hal.operator import Operator
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.planning.planner import Planner, PlannerConfig
-from mskgrasp.trials.trial import Trial, run_trial
+from mskgrasp.trials.engine import TrialEngine
+from mskgrasp.trials.measurement import finish, run_trial
+from mskgrasp.trials.trial import Trial
 
 HERE = Path(__file__).parent
 RECORDED = HERE / "recorded.json"
@@ -40,17 +43,13 @@ def run_scenario() -> list[Trial]:
             table_z=cell.workspace.table_z,
             region=cell.workspace.region,
         )
-        assert cell.feeder is not None
+        engine = TrialEngine(cell, Operator(cell))
         for part in PARTS:
             for number, seed in enumerate(SEEDS):
-                cell.feeder.present(part, seed)
-                record = run_trial(cell, planner, part=part, number=number, seed=seed)
-                assert record is not None
-                trial = record.trial
-                trials.append(trial)
-                if trial.reason == "collided":
-                    cell.arm.recover()
-                go_home(cell)
+                planned = engine.present(part, seed, planner)
+                record = run_trial(engine, planned, part=part, number=number, seed=seed)
+                trials.append(record.trial)
+                finish(engine, record)
     return trials
 
 

@@ -11,6 +11,7 @@ import torch
 
 from hal import Cell, execute_grasp, go_home, put_down
 from hal.errors import MotionAborted
+from hal.operator import Operator
 from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.geometry import quat_rotate, wrap_half_turn
 from mskgrasp.core.grasp import object_displacement, pose_base_tcp
@@ -19,7 +20,8 @@ from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.parts import find_part
 from mskgrasp.perception.markers import planar_displacement
 from mskgrasp.planning.planner import Planner, PlannerConfig
-from mskgrasp.trials import trial
+from mskgrasp.trials import measurement
+from mskgrasp.trials.engine import PlannedGrasp, TrialEngine
 from tests.hal.sim.marked_parts import (
     GREY_NOISE,
     PARTS,
@@ -89,19 +91,21 @@ def test_a_hand_that_meets_something_as_it_lets_go_measures_nothing(cell: Cell, 
         table_z=workspace.table_z,
         region=workspace.region,
     )
-    let_go, recovered = trial.let_go, []
+    let_go, recovered = measurement.let_go, []
 
     def met(cell: Cell, place: np.ndarray, *, opening: float) -> None:
         let_go(cell, place, opening=opening)
         raise MotionAborted("contact")
 
-    monkeypatch.setattr(trial, "let_go", met)
+    monkeypatch.setattr(measurement, "let_go", met)
+    monkeypatch.setattr(Operator, "recover", lambda self, cell, reason: recovered.append(reason))
+    engine = TrialEngine(cell, Operator(cell), tape=TAPE)
     with cell.arm:
         go_home(cell)
-        record = trial.run_trial(
-            cell, planner, part="key", number=0, seed=0, tape=TAPE, recover=recovered.append
-        )
-    assert record is not None and record.trial.success and record.trial.measured is None
+        frame = engine.capture()
+        planned = PlannedGrasp(frame=frame, plan=planner.plan(frame, np.random.default_rng(0)))
+        record = measurement.run_trial(engine, planned, part="key", number=0, seed=0)
+    assert record.trial.success and record.trial.measured is None
     assert record.trial.unmeasured.startswith("touched") and recovered == ["contact"] and not record.in_hand
 
 
@@ -113,7 +117,7 @@ def test_the_fingers_have_as_much_room_as_the_displacement_leaves(displacement, 
     plan = SimpleNamespace(
         displacement=np.array([0.03, displacement, 0.0, 0.0]), displacement_std=np.full(4, deviation)
     )
-    assert trial.room(plan) == pytest.approx(room)  # type: ignore[arg-type]  # all that it reads
+    assert measurement.safe_opening(plan) == pytest.approx(room)  # type: ignore[arg-type]  # all that it reads
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,22 @@
+"""Seeds of scenes: the one formula from a run's seed, a part and a number."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+
+
+def scene_seeds(seed: int, part: str, number: int) -> tuple[int, int]:
+    """Seeds of one scene with a part, the same for attempts, trials and placements.
+
+    Args:
+        seed: Of the run.
+        part: Name of the part.
+        number: Index of the attempt or trial among those of the part.
+
+    Returns:
+        The seed of the part's place and turn, and that of a grasp drawn at random.
+    """
+    words = np.random.SeedSequence([seed, zlib.crc32(part.encode()), number]).generate_state(2) >> 1
+    return int(words[0]), int(words[1])

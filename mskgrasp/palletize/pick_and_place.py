@@ -1,0 +1,200 @@
+"""Pick and place of one part, on any cell, with the placed part's error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from hal import RgbdFrame
+from hal.errors import MotionAborted, OutOfWorkspace
+from mskgrasp.core.errors import MarkersNotFound
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.settings import Region
+from mskgrasp.palletize.figures import draw_placement, pallet_image
+from mskgrasp.palletize.placements import Correction, Placement
+from mskgrasp.palletize.slots import SEEN_TOLERANCE, Slot, first_reachable
+from mskgrasp.palletize.views import take_views, write_views
+from mskgrasp.parts import find_part
+from mskgrasp.perception.footprint import seen_footprint
+from mskgrasp.perception.markers import planar_displacement
+from mskgrasp.planning.placing import Target, place, place_error, place_pose, turned_by
+from mskgrasp.planning.planner import GraspPlan, Planner
+from mskgrasp.trials.engine import TrialEngine
+from mskgrasp.trials.policies import RepeatedPlanner
+
+_NEAR = 0.001
+"""Half a side of the region in which a placed part's tape is sought, m; `find_markers` adds its margin."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A part to be put into a slot.
+
+    Attributes:
+        part: Name or folder.
+        number: Which trial of the part, or which pallet.
+        index: Of the slot, from 0.
+        slot: The slot.
+        correction: What is corrected by.
+        seed: Determines its place and turn, and the planner's candidates.
+        keep: What is on the pallet stays there.
+    """
+
+    part: str
+    number: int
+    index: int
+    slot: Slot
+    correction: Correction
+    seed: int
+    keep: bool
+
+    @property
+    def key(self) -> tuple[str, int, int, Correction]:
+        """As `Placement.key`."""
+        return find_part(self.part).name, self.number, self.index, self.correction
+
+
+class PickAndPlace:
+    """Puts parts into slots.
+
+    Args:
+        engine: On a connected cell.
+        planner: For that cell.
+        pictures: Folder for the picture and the views of every placement.
+    """
+
+    def __init__(self, engine: TrialEngine, planner: Planner, pictures: Path):
+        self._engine = engine
+        self._cell = engine.cell
+        self._planner = RepeatedPlanner(planner)
+        self._pictures = pictures
+        self._tops: dict[int, float] = {}
+
+    def run(self, task: Task, name: str = "") -> Placement:
+        """Puts one part into its slot and measures it; writes its picture.
+
+        Args:
+            task: The part and its slot.
+            name: Title for the operator, such as "placement 3 of 20".
+
+        Raises:
+            HalError: The cell was lost; nothing of this placement is kept.
+            StoppedByOperator: The operator ended the run.
+        """
+        slot = task.slot
+        failed = Placement(
+            part=find_part(task.part).name, number=task.number, slot=task.index, correction=task.correction,
+            target=(slot.x, slot.y, slot.theta), placed=False, reason="",
+        )  # fmt: skip
+        planned = self._engine.present(
+            task.part, task.seed, self._planner, name=name, keep=task.keep,
+            then=f"then to x {slot.x:.3f}, y {slot.y:.3f} m",
+        )  # fmt: skip
+        frame, plan = planned.frame, planned.plan
+        if plan is None:
+            return replace(failed, reason=planned.reason)
+        known = replace(failed, grasp=plan.grasp.tolist(), predicted=plan.displacement.tolist())
+        workspace = self._cell.workspace
+        footprint = seen_footprint(
+            frame, table_z=workspace.table_z, region=workspace.region, min_height=workspace.min_height
+        )
+        if not slot.fits(footprint, SEEN_TOLERANCE):
+            return replace(known, reason="slot too small")
+        done, target, after = self._carry(frame, plan, slot.targets(footprint), known)
+        if not task.keep:
+            self._tops = {}
+        if done.placed:
+            self._tops[task.index] = float(plan.view.size[2])
+        views = take_views(frame, after, plan, target, slot.theta)
+        write_views(views, self._pictures / f"{done.name}.npz")
+        draw_placement(views, done, self._pictures / f"{done.name}.png")
+        return done
+
+    def picture(self, slots: list[Slot]) -> np.ndarray:
+        """A picture (h, w, 3) of the pallet as it is now, the arm at home."""
+        return pallet_image(self._cell.camera.capture(), slots, self._cell.workspace.table_z, self._tops)
+
+    def _carry(
+        self, frame: RgbdFrame, plan: GraspPlan, targets: Sequence[Target], known: Placement
+    ) -> tuple[Placement, Target, RgbdFrame | None]:
+        """Grasps, places at the first target that the arm reaches, and measures.
+
+        Returns:
+            The outcome, the target, and the frame afterwards; None where nothing was placed.
+        """
+        engine, target = self._engine, targets[0]
+        try:
+            # Before anything moves, and not only when the part hangs in the hand.
+            first_reachable(self._cell, [self._pose(plan, np.zeros(4), target) for target in targets])
+        except OutOfWorkspace:
+            return replace(known, reason="OutOfWorkspace"), target, None
+        grasped = engine.grasp(plan)
+        if grasped.aborted:
+            engine.recover(MotionAborted(grasped.aborted))
+        if grasped.reason:
+            return replace(known, reason=grasped.reason), target, None
+        measured = grasped.displacement_of_centre(plan)
+        if measured is not None:
+            known = replace(known, measured=measured.tolist())
+        by = {"none": np.zeros(4), "predicted": plan.displacement, "truth": measured}[known.correction]
+        assert by is not None  # truth is refused where nothing tracks the part
+        for target in targets:
+            try:
+                place(self._cell, self._pose(plan, by, target), engine.recover)
+            except OutOfWorkspace:
+                continue  # the other way round, perhaps
+            except MotionAborted as error:
+                engine.recover(error)
+                return replace(known, reason="collided"), target, None
+            engine.home()
+            after = engine.capture()
+            done = self._measured(frame, after, plan, grasped.before, target, replace(known, placed=True))
+            return done, target, after
+        engine.put_back(plan)
+        return replace(known, reason="OutOfWorkspace"), target, None
+
+    def _pose(self, plan: GraspPlan, displacement: np.ndarray, target: Target) -> np.ndarray:
+        table_z = self._cell.workspace.table_z
+        return place_pose(plan.grasp, displacement, plan.view.centre_base, target, table_z)
+
+    def _measured(
+        self,
+        frame: RgbdFrame,
+        after: RgbdFrame,
+        plan: GraspPlan,
+        before: Pose | None,
+        target: Target,
+        done: Placement,
+    ) -> Placement:
+        """The placement with its errors, by tape where the part carries it, else by the tracker."""
+        centre, pose = plan.view.centre_base, self._engine.part_pose()
+        if self._engine.tape is not None:
+            try:
+                moved, turn = self._tape_motion(frame, after, centre, target)
+            except MarkersNotFound as error:
+                return replace(done, unmeasured=str(error))
+            distance = float(np.hypot(*(centre[:2] + moved - [target.x, target.y])))
+            angle = turned_by(turn, target)
+        elif before is not None and pose is not None:
+            distance, angle = place_error(before, pose, centre[:2] - before.position[:2], target)
+        else:
+            return replace(done, unmeasured="nothing tracks the part, and it carries no tape (--tape)")
+        return replace(done, translation_error=distance, rotation_error=angle)
+
+    def _tape_motion(
+        self, frame: RgbdFrame, after: RgbdFrame, centre: np.ndarray, target: Target
+    ) -> tuple[np.ndarray, float]:
+        """Motion of the part's centre along base x and y, and its turn, by its tape.
+
+        Raises:
+            MarkersNotFound: Both squares are not seen, before or after.
+        """
+        first = self._engine.find_tape(frame)
+        around: Region = (target.x - _NEAR, target.x + _NEAR, target.y - _NEAR, target.y + _NEAR)
+        second = self._engine.find_tape(after, around)
+        # With no turn the grasp frame has the base's axes.
+        dx, dy, turn = planar_displacement(first, second, np.zeros(4), centre)
+        return np.array([dx, dy]), float(turn)

@@ -1,0 +1,276 @@
+"""Engine of trials on any cell: presents a part, captures, plans, grasps, measures, recovers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import torch
+
+from hal import Cell, GraspResult, RgbdFrame, cell_from_yaml, execute_grasp, go_home, put_down
+from hal.errors import MotionAborted, OutOfWorkspace, Stopped
+from hal.operator import Operator
+from mskgrasp.core.errors import NoGraspFound, NoPartFound, TapeDoesNotFit
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import (
+    EJECTED_DISTANCE,
+    MIN_RISE,
+    centre_in_grasp_frame,
+    object_displacement,
+    pose_base_tcp,
+)
+from mskgrasp.core.settings import Region, Tape
+from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
+from mskgrasp.perception.markers import Markers, find_markers
+from mskgrasp.planning.placing import displacement_of_point
+from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.reports.grasp_figures import draw_plan
+
+_MAX_DEPTH = np.iinfo(np.uint16).max * DEPTH_UNIT
+
+
+class PlansGrasps(Protocol):
+    """Chooses a grasp in a frame: `mskgrasp.planning.planner.Planner`, or another."""
+
+    def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
+        """Plans a grasp of the part that a frame shows."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedGrasp:
+    """A part on the table as it was seen, and the grasp planned for it.
+
+    Attributes:
+        frame: The part before the grasp.
+        plan: None where no grasp was found.
+        reason: Name of the error where no grasp was found; else empty.
+        no_tape: Why the part carries no tape although tape measures; else empty.
+    """
+
+    frame: RgbdFrame
+    plan: GraspPlan | None
+    reason: str = ""
+    no_tape: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExecutedGrasp:
+    """Outcome of a grasp.
+
+    Attributes:
+        reason: Why the part was not lifted and held; empty where it was.
+        result: The arm's own measurements; None where it refused the grasp before it moved.
+        before: ``T_base_obj`` before the grasp; None without a tracker.
+        displacement: (4,) object displacement; None where the grasp failed or without a tracker.
+        tilt: The same of the tilt, radians.
+    """
+
+    reason: str
+    result: GraspResult | None = None
+    before: Pose | None = None
+    displacement: np.ndarray | None = None
+    tilt: float | None = None
+
+    @property
+    def aborted(self) -> str:
+        """Why the arm stopped on the way and must recover; empty where it did not."""
+        return "" if self.result is None else self.result.aborted or ""
+
+    def displacement_of_centre(self, plan: GraspPlan) -> np.ndarray | None:
+        """The displacement (4,) of the part's seen centre; its tilt is left out."""
+        if self.displacement is None or self.before is None:
+            return None
+        origin, centre = (
+            centre_in_grasp_frame(point, plan.grasp)
+            for point in (self.before.position, plan.view.centre_base)
+        )
+        return displacement_of_point(self.displacement, origin, centre)
+
+
+class TrialEngine:
+    """Steps that all trials on a connected cell share.
+
+    Args:
+        cell: Connected.
+        operator: Is asked before the arm moves and after a contact, if the cell has one.
+        picture: File for the picture of the next grasp, drawn for the operator.
+        tape: Sizes of the squares of tape to measure by; None: the cell's tracker measures, if it has one.
+    """
+
+    def __init__(
+        self,
+        cell: Cell,
+        operator: Operator,
+        *,
+        picture: Path = Path("next.png"),
+        tape: Tape | None = None,
+    ):
+        self.cell = cell
+        self.tape = tape
+        self._operator = operator
+        self._picture = picture
+
+    def home(self) -> None:
+        """Brings the arm home, out of the camera's sight; after a contact on the way it tries once more.
+
+        Raises:
+            MotionAborted: Something still holds it.
+        """
+        try:
+            go_home(self.cell)
+        except MotionAborted as error:
+            self.recover(error)
+            go_home(self.cell)
+
+    def recover(self, error: MotionAborted) -> None:
+        """Lets the arm move again after a contact; where an operator is asked, when they agree.
+
+        Raises:
+            Stopped: The contact was somebody's stop.
+            StoppedByOperator: The operator ended the run.
+        """
+        if isinstance(error, Stopped):
+            raise error
+        self._operator.recover(self.cell, str(error))
+
+    def capture(self) -> RgbdFrame:
+        """A frame, its depth as a file holds it: what is planned on it can be planned again from the file."""
+        frame = self.cell.camera.capture()
+        depth = np.where(frame.depth > _MAX_DEPTH, np.nan, frame.depth)
+        return replace(frame, depth=u16_to_depth(depth_to_u16(depth)))
+
+    def present(
+        self,
+        part: str,
+        seed: int,
+        planner: PlansGrasps,
+        *,
+        name: str = "",
+        keep: bool = False,
+        then: str = "",
+    ) -> PlannedGrasp:
+        """Has a part placed on the table, captures it and plans its grasp.
+
+        Where an operator is asked, this repeats until a grasp is planned and they let the arm move.
+
+        Args:
+            part: Name or folder.
+            seed: Determines a feeder's placement and the candidates.
+            planner: Chooses the grasp.
+            name: Title of the trial for the operator.
+            keep: Parts outside the region stay, as on a pallet.
+            then: For the operator: what follows the grasp.
+
+        Raises:
+            HalError: The cell was lost.
+            StoppedByOperator: The operator ended the run.
+        """
+        while True:
+            self.home()
+            no_tape = ""
+            try:
+                self._operator.lay(self.cell, part, seed, name=name, keep=keep)
+            except TapeDoesNotFit as error:
+                no_tape = f"no room for tape: {error}"  # the part is on the table and can be grasped
+            frame = self.capture()
+            try:
+                plan = planner.plan(frame, np.random.default_rng(seed))
+            except (NoPartFound, NoGraspFound) as error:
+                if self._operator.asks:
+                    self._operator.tell(f"no grasp was planned: {error}; place the part again")
+                    continue
+                return PlannedGrasp(frame=frame, plan=None, reason=type(error).__name__, no_tape=no_tape)
+            if self._operator.asks:
+                draw_plan(frame, plan, self._picture)
+            if self._operator.may_move(self._picture, f"{plan.summary}; {then}" if then else plan.summary):
+                return PlannedGrasp(frame=frame, plan=plan, no_tape=no_tape)
+
+    def grasp(self, plan: GraspPlan) -> ExecutedGrasp:
+        """Executes a planned grasp and measures the part in the hand by the cell's tracker, if it has one.
+
+        Raises:
+            HalError: The cell was lost.
+        """
+        before = self.part_pose()
+        try:
+            result = execute_grasp(self.cell, plan.grasp)
+        except OutOfWorkspace as error:
+            return ExecutedGrasp(reason=type(error).__name__, before=before)
+        after = self.part_pose()
+        reason = _failure(result, before, after, self.cell.workspace.lift_height)
+        if reason or before is None or after is None:
+            return ExecutedGrasp(reason=reason, result=result, before=before)
+        displacement, swing = object_displacement(
+            pose_base_tcp(plan.grasp).inverse() @ before, result.T_base_tcp.inverse() @ after
+        )
+        return ExecutedGrasp(
+            reason="", result=result, before=before, displacement=np.asarray(displacement), tilt=float(swing)
+        )
+
+    def put_back(self, plan: GraspPlan) -> None:
+        """Puts a lifted part down where it was grasped; a contact on the way ends that, and no trial."""
+        try:
+            put_down(self.cell, plan.grasp)
+        except MotionAborted as error:
+            self.recover(error)
+
+    def part_pose(self) -> Pose | None:
+        """``T_base_obj`` by the cell's tracker; None where it has none."""
+        return None if self.cell.tracker is None else self.cell.tracker.part_pose()
+
+    def find_tape(self, frame: RgbdFrame, region: Region | None = None) -> Markers:
+        """Both squares of tape in a frame.
+
+        Args:
+            frame: At home.
+            region: Where the part is; None: the cell's region.
+
+        Raises:
+            MarkersNotFound: They are not both seen.
+        """
+        assert self.tape is not None
+        workspace = self.cell.workspace
+        return find_markers(
+            frame, self.tape, table_z=workspace.table_z, region=workspace.region if region is None else region
+        )
+
+
+@contextmanager
+def connected_engine(path: Path, *, yes: bool, picture: Path, tape: Tape | None) -> Iterator[TrialEngine]:
+    """An engine on the cell of a YAML file, connected until the end of the block.
+
+    Raises:
+        UsageError: An operator must be asked, and standard input is no terminal.
+        HalError: The cell cannot be connected.
+    """
+    cell = cell_from_yaml(path)
+    operator = Operator(cell, yes=yes)
+    n_threads = torch.get_num_threads()
+    if cell.arm.simulated:
+        # Networks round by the number of threads, and near-equal grasps would change places.
+        torch.set_num_threads(1)
+    try:
+        with cell.connected():
+            yield TrialEngine(cell, operator, picture=picture, tape=tape)
+    finally:
+        torch.set_num_threads(n_threads)
+
+
+def _failure(result: GraspResult, before: Pose | None, after: Pose | None, lift: float) -> str:
+    if result.aborted is not None:
+        return "collided"
+    if before is not None and after is not None:
+        moved = after.position - before.position
+        if result.holding and moved[2] >= MIN_RISE * lift:
+            return ""
+        if np.linalg.norm(moved[:2]) > EJECTED_DISTANCE:
+            return "ejected"
+        return "slipped" if result.lifted else "missed"
+    if result.holding:
+        return ""
+    return "slipped" if result.lifted else "missed"

@@ -1,0 +1,138 @@
+"""Trial of one planned grasp: the grasp, and the displacement measured by tracker or by tape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hal import RgbdFrame, let_go, lower
+from hal.errors import MotionAborted
+from mskgrasp.core.errors import MarkersNotFound
+from mskgrasp.core.grasp import MAX_OPENING, centre_in_grasp_frame
+from mskgrasp.perception.markers import check_between_pads, planar_displacement
+from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.trials.engine import PlannedGrasp, TrialEngine
+from mskgrasp.trials.trial import Trial
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialRecord:
+    """A trial and what it was made from.
+
+    Attributes:
+        trial: The outcome.
+        frame: The part before the grasp.
+        plan: None where no grasp was found.
+        after: The part put down again, where tape was looked for.
+        in_hand: The hand still holds the part.
+        aborted: Why the arm stopped and must recover; empty where it did not.
+    """
+
+    trial: Trial
+    frame: RgbdFrame
+    plan: GraspPlan | None
+    after: RgbdFrame | None = None
+    in_hand: bool = False
+    aborted: str = ""
+
+
+def run_trial(
+    engine: TrialEngine, planned: PlannedGrasp, *, part: str, number: int, seed: int
+) -> TrialRecord:
+    """Executes a planned grasp and measures it; `finish` then frees the hand.
+
+    Where tape measures, the part is put down where it was grasped and the arm goes home.
+
+    Args:
+        engine: On the cell where the part was presented.
+        planned: As `TrialEngine.present` returned it.
+        part: Name of the part, for the record.
+        number: Index of the trial among those of the part, for the record.
+        seed: Of the scene, for the record.
+
+    Raises:
+        HalError: The cell was lost.
+    """
+    frame, plan = planned.frame, planned.plan
+    trial = Trial(part=part, number=number, seed=seed, success=False, reason=planned.reason)
+    if plan is None:
+        return TrialRecord(trial=trial, frame=frame, plan=None)
+    done = engine.grasp(plan)
+    trial = replace(
+        trial,
+        success=not done.reason,
+        reason=done.reason,
+        grasp=plan.grasp.tolist(),
+        quality=plan.quality,
+        predicted=plan.displacement.tolist(),
+        predicted_std=plan.displacement_std.tolist(),
+        planning_s=plan.seconds["total"],
+        pose_base_obj=None if done.before is None else np.asarray(done.before.as_vector()).tolist(),
+        tilt=done.tilt,
+    )
+    if done.reason:
+        return TrialRecord(trial=trial, frame=frame, plan=plan, aborted=done.aborted)
+    if engine.tape is None:
+        if done.displacement is None:
+            trial = replace(trial, unmeasured="no tracker: measure by tape (--measure markers)")
+        else:
+            trial = replace(trial, measured=done.displacement.tolist())
+        return TrialRecord(trial=trial, frame=frame, plan=plan, in_hand=True)
+    true = done.displacement_of_centre(plan)
+    trial = replace(trial, true=None if true is None else true.tolist())
+    assert done.result is not None  # it succeeded
+    record = _measure_by_tape(engine, trial, frame, plan, done.result.width)
+    if record.trial.unmeasured and planned.no_tape:
+        return replace(record, trial=replace(record.trial, unmeasured=planned.no_tape))
+    return record
+
+
+def finish(engine: TrialEngine, record: TrialRecord) -> None:
+    """Frees the hand after a trial: recovers from a contact, or puts a lifted part down again."""
+    if record.aborted:
+        engine.recover(MotionAborted(record.aborted))
+    elif record.in_hand and record.plan is not None:
+        engine.put_back(record.plan)
+
+
+def _measure_by_tape(
+    engine: TrialEngine, trial: Trial, frame: RgbdFrame, plan: GraspPlan, width: float
+) -> TrialRecord:
+    """Puts the part down where it was grasped and measures its tape; a doubtful measurement is refused."""
+    after, in_hand = None, True
+    try:
+        before = engine.find_tape(frame)
+        try:
+            # To the very place: a part that falls shifts.
+            lower(engine.cell, plan.grasp)
+        except MotionAborted as error:
+            engine.recover(error)
+            raise MarkersNotFound("not put down: the part hangs lower in the hand than it lay") from error
+        in_hand = False
+        try:
+            let_go(engine.cell, plan.grasp, opening=safe_opening(plan))
+        except MotionAborted as error:
+            engine.recover(error)
+            raise MarkersNotFound("touched: the hand met something as it let go and rose") from error
+        engine.home()
+        after = engine.capture()
+        moved = planar_displacement(before, engine.find_tape(after), plan.grasp, plan.view.centre_base)
+        check_between_pads(moved, centre_in_grasp_frame(plan.view.centre_base, plan.grasp), width)
+    except MarkersNotFound as error:
+        return TrialRecord(
+            trial=replace(trial, unmeasured=str(error)), frame=frame, plan=plan, after=after,
+            in_hand=in_hand,
+        )  # fmt: skip
+    measured = [float(moved[0]), float(moved[1]), float("nan"), float(moved[2])]
+    return TrialRecord(trial=replace(trial, measured=measured), frame=frame, plan=plan, after=after)
+
+
+def safe_opening(plan: GraspPlan) -> float:
+    """How far the fingers may open about the part once it is displaced as planned, metres.
+
+    The fully open fingers cleared the part on the way down; since then it has moved towards one of them. Its
+    turn is left out.
+    """
+    aside = abs(plan.displacement[1]) + 2 * np.nan_to_num(plan.displacement_std[1])
+    return max(0.0, MAX_OPENING - 2 * float(aside))
