@@ -22,7 +22,7 @@ class NoTrajectory(errors.MotionAborted):
     """The driver's own solver gave up on a motion; the robot saw no fault."""
 
 
-MESSAGES: dict[str, type[errors.HalError]] = {
+ERRORS: dict[str, type[errors.HalError]] = {
     kind.__name__: kind
     for kind in (
         errors.CommunicationLost,
@@ -34,7 +34,7 @@ MESSAGES: dict[str, type[errors.HalError]] = {
         NoTrajectory,
     )
 }
-"""The errors that may come out of a driver's process, by name."""
+"""Errors that a driver's process may raise, by name."""
 
 
 def explain(error: BaseException, driver: DriverName, host: str) -> errors.HalError:
