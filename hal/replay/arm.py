@@ -109,7 +109,7 @@ class ReplayArm(Arm):
         following = self._playback.peek()
         error = following.error[0] if following is not None and following.error is not None else None
         if self._fault is not None and error != NeedsRecovery.__name__:
-            raise NeedsRecovery(f"the arm stopped before ({self._fault}); look at it, then call recover()")
+            raise NeedsRecovery(f"the arm stopped before ({self._fault}); check the arm, then call recover()")
         # A recorded stop ended a recorded motion; one that comes now ends this one.
         if self._stop.is_set() and error is None:
             self._fault, self._astray = "stop() was called", True

@@ -100,13 +100,13 @@ class Placer:
             self.home()
             # It lies there all the same; without tape its error is unmeasured, which is said below.
             with contextlib.suppress(TapeDoesNotFit):
-                self._operator.lay(self._cell, task.part, task.seed, name=name, keep=task.keep)
+                self._operator.present(self._cell, task.part, task.seed, name=name, keep=task.keep)
             frame = self._cell.camera.capture()
             try:
                 plan = self._plan(frame, task.seed)
             except (NoPartFound, NoGraspFound) as error:
                 if self._operator.asks:
-                    self._operator.tell(str(error))
+                    self._operator.inform(str(error))
                     continue
                 return replace(failed, reason=type(error).__name__)
             if self._agreed(frame, plan, task):

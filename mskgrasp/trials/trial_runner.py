@@ -127,7 +127,7 @@ class TrialRunner:
         while record is None:
             clear(self._cell, self._recover)
             try:
-                self._operator.lay(self._cell, task.source, seed, name=task.key)
+                self._operator.present(self._cell, task.source, seed, name=task.key)
             except TapeDoesNotFit as error:
                 no_tape = f"no room for tape: {error}"  # it lies there all the same, and may be grasped
             record = run_trial(
@@ -141,7 +141,7 @@ class TrialRunner:
                 recover=self._recover,
             )
             if record is not None and record.plan is None and self._operator.asks:
-                self._operator.tell(f"{record.trial.reason}: no grasp was planned; lay the part down anew")
+                self._operator.inform(f"{record.trial.reason}: no grasp was planned; lay the part down anew")
                 record = None
         trial = replace(
             record.trial,
