@@ -43,12 +43,12 @@ class CalibrateConfig(Config):
     settle_s: float = Field(default=0.5, ge=0, le=10)
     """Rest before each picture, s."""
     camera_at: tuple[float, float, float] | None = None
-    """Where the camera is, measured by tape, base frame, m: needed where there is no calibration file yet."""
+    """Position of the camera measured by tape, base frame, m; required before a first calibration."""
     seed: int = Field(default=0, ge=0)
-    """The poses follow from it."""
+    """Determines the poses."""
 
     def T_tcp_board(self) -> Pose:
-        """How the board is held, about."""
+        """Approximate pose of the board in the hand."""
         half = np.radians(self.board_turn_deg) / 2
         return Pose(
             position=np.array(self.board_at), quat_wxyz=np.array([np.cos(half), 0.0, 0.0, np.sin(half)])

@@ -1,4 +1,4 @@
-"""What a calibration found, in words and pictures."""
+"""Report of a calibration: text and figures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _DEPTH_MATTERS = 0.003
 
 @dataclass(frozen=True, kw_only=True)
 class DepthOffset:
-    """How much too far the camera measures the board.
+    """Offset of the camera's depth on the board.
 
     Attributes:
         metres: Median over the board, measured less true.
@@ -92,7 +92,7 @@ def describe(found: HandEye, views: Sequence[View], before: Pose, offset: DepthO
 
 
 def describe_table(plane: TablePlane | None, offset: DepthOffset | None, table_z: float | None) -> str:
-    """Where the table is, in a line; ``table_z`` is what the cell file says, if one was given."""
+    """Height of the table, in a line; ``table_z`` is that of the cell file, if given."""
     if plane is None:
         return "table       not seen: too little depth over the region"
     # A camera that measures too far puts the table too low.
@@ -107,7 +107,7 @@ def describe_table(plane: TablePlane | None, offset: DepthOffset | None, table_z
 def draw_corners(
     board: Board, pictures: Sequence[Picture], views: Sequence[View], found: HandEye | None, path: Path
 ) -> None:
-    """A few pictures with the corners found (circles) and expected (crosses)."""
+    """Draws some pictures with detected (circles) and expected corners (crosses)."""
     chosen = np.unique(np.linspace(0, len(pictures) - 1, min(_SHOWN, len(pictures))).round().astype(int))
     figure = Figure(figsize=(12, 4.2 * ((len(chosen) + 2) // 3)), layout="constrained")
     FigureCanvasAgg(figure)
@@ -128,7 +128,7 @@ def draw_corners(
 
 
 def draw_residuals(views: Sequence[View], found: HandEye, path: Path) -> None:
-    """What is left in each picture, in pixels, millimetres and degrees."""
+    """Residuals of each picture, in pixels, millimetres and degrees."""
     figure = Figure(figsize=(10, 6), layout="constrained")
     FigureCanvasAgg(figure)
     rows = (

@@ -1,4 +1,4 @@
-"""Program: find out where the camera is. Run ``python -m hal.calibrate --help``."""
+"""Program: hand-eye calibration of a camera. Run ``python -m hal.calibrate --help``."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.runtime.cli import make_folder, parse
 
-DESCRIPTION = """Finds out where the camera over the table is, with a ChArUco board held by the gripper.
+DESCRIPTION = """Estimates the pose of the camera over the table with a ChArUco board held by the gripper.
 
 Print the board with --print-board board.pdf. The arm closes its fingers on the board, shows it to the camera
 from many sides, and brings it back; keep a hand on the emergency stop. Ctrl-C stops the arm, and the pictures
@@ -43,7 +43,7 @@ _MARGIN = 0.01
 _PLATE = 0.02
 """Distance of the pads on the handle of the simulated board, metres."""
 LOOKING_DOWN = np.array([0.0, 1.0, -1.0, 0.0]) / np.sqrt(2)
-"""Quaternion wxyz of a camera that looks straight down, the top of its image away from the base."""
+"""Quaternion wxyz of a camera that points straight down, the top of its image away from the base."""
 
 
 def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
@@ -95,7 +95,7 @@ def solve(config: CalibrateConfig, folder: Path, board: Board, workspace: Worksp
         The result, line by line.
 
     Raises:
-        BadCalibrationSet: The pictures do not determine where the camera is.
+        BadCalibrationSet: The pictures do not determine the camera's pose.
         UsageError: There are no pictures, they are damaged, or from several cameras.
     """
     paths = picture_paths(folder)
@@ -149,7 +149,7 @@ def _with_camera_at(values: dict[str, Any], config: CalibrateConfig, cell_file: 
     if not isinstance(camera, dict) or "calibration" not in camera:
         if config.camera_at is None:
             return values
-        cell_from_values(values, cell_file)  # what is wrong with the file itself is told first
+        cell_from_values(values, cell_file)  # faults of the file itself are reported first
         raise UsageError(
             f"--camera-at is for a camera with a calibration file; that of {cell_file} knows where it is"
         )
@@ -201,7 +201,7 @@ def _ask(prompt: str) -> None:
     try:
         input(prompt + " ")
     except EOFError:
-        raise UsageError("somebody must put the board into the hand; run this in a terminal") from None
+        raise UsageError("an operator must put the board into the hand; run this in a terminal") from None
 
 
 def _now() -> str:

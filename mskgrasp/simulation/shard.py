@@ -124,7 +124,7 @@ def draw_attempt(
     """
     sequence = np.random.SeedSequence([seed, zlib.crc32(part.encode()), attempt])
     episode_seed, grasp_seed = sequence.generate_state(2) >> 1
-    env.lay(int(episode_seed))
+    env.begin_episode(int(episode_seed))
     depth = depth_to_u16(env.capture_depth()[0].cpu().numpy())
     try:
         view = view_part(
