@@ -41,13 +41,13 @@ class Playback:
         self._lock = threading.Lock()
         self._users = 0
         self._next = 0
-        self._given: dict[str, int] = {}
+        self._answered: dict[str, int] = {}
 
     def open(self) -> None:
         """Registers a user; the first one rewinds the recording."""
         with self._lock:
             if self._users == 0:
-                self._next, self._given = 0, {}
+                self._next, self._answered = 0, {}
             self._users += 1
 
     def close(self) -> None:
@@ -82,7 +82,7 @@ class Playback:
                     f"{_words(event.call, event.arguments)}; the program asks for {_words(call, arguments)}"
                 )
             self._next += 1
-            self._given = {}
+            self._answered = {}
         if event.error is not None:
             raise rebuild(event.error)
         return event
@@ -102,8 +102,8 @@ class Playback:
             found = [event for event in events[begin:end] if event.call == call]
             if not found:
                 return None
-            index = self._given.get(call, 0)
-            self._given[call] = index + 1
+            index = self._answered.get(call, 0)
+            self._answered[call] = index + 1
             event = found[min(index, len(found) - 1)]
         if event.error is not None:
             raise rebuild(event.error)
