@@ -1,4 +1,4 @@
-"""Hardware abstraction: cameras, arms and cells; a YAML file chooses what stands behind them."""
+"""Hardware abstraction: cameras, arms and cells; a YAML file chooses their backends."""
 
 from hal.arm import Arm, ArmState, GraspOutcome
 from hal.camera import Camera, RgbdFrame

@@ -1,4 +1,4 @@
-"""What an arm with a parallel gripper is, whatever stands behind it."""
+"""Abstract arm with a parallel gripper."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ STOPPED = "stop() was called; call recover() when it is safe"
 
 @dataclass(frozen=True, kw_only=True)
 class ArmState:
-    """Where the arm is.
+    """State of an arm.
 
     Attributes:
         joints: (7,) radians.
         T_base_tcp: Measured pose of the TCP in the base.
         gripper_width: Distance between the pads, metres.
-        timestamp_s: When it was measured, seconds on the monotonic clock of this machine.
+        timestamp_s: Time of the measurement, seconds on the monotonic clock of this machine.
     """
 
     joints: np.ndarray
@@ -47,7 +47,7 @@ class ArmState:
 
 @dataclass(frozen=True, kw_only=True)
 class GraspOutcome:
-    """What the fingers met.
+    """Outcome of closing the fingers.
 
     Attributes:
         width: Distance between the pads, metres.
@@ -61,13 +61,13 @@ class GraspOutcome:
 class Arm(Device):
     """A seven-axis arm with a parallel gripper; SI units, poses in the base frame.
 
-    Commands block until the motion is over; one that another thread gives meanwhile waits for its end. The
+    Commands block until the motion is over; a command of another thread waits for that, too. The
     base class checks limits before a motion and arrival after it; a backend only moves. A command that is
     refused (`OutOfWorkspace`) changes nothing. After any other error nothing moves until `recover` is
     called. Construction neither connects nor moves.
 
     Attributes:
-        simulated: Nothing moves in the real world, so that nobody need be asked.
+        simulated: Nothing moves in the real world, so no operator needs to confirm.
     """
 
     simulated: bool = False
@@ -81,10 +81,10 @@ class Arm(Device):
     # ------------------------------------------------------------------ commands
 
     def state(self) -> ArmState:
-        """Measures where the arm is.
+        """Measures joints, TCP and gripper width.
 
         Raises:
-            NotConnected, CommunicationLost: There is no arm to ask.
+            NotConnected, CommunicationLost: The arm is not connected or does not answer.
         """
         self._require_connection()
         return self._state()
@@ -129,11 +129,11 @@ class Arm(Device):
                 )
 
     def move_gripper(self, width: float) -> None:
-        """Moves the pads to a distance in metres; for holding something use `grasp`.
+        """Moves the pads to a distance in metres; to hold something use `grasp`.
 
         Raises:
             OutOfWorkspace: The width is outside 0 .. 0.08 m; nothing moved.
-            MotionAborted: Stopped, or something is in the fingers' way.
+            MotionAborted: Stopped, or an obstacle blocks the fingers.
             NeedsRecovery: An earlier error was not acknowledged.
         """
         if not 0 <= width <= MAX_OPENING:
@@ -143,8 +143,8 @@ class Arm(Device):
             reached = self._state().gripper_width
             if not self._stop.is_set() and abs(reached - width) > WIDTH_TOLERANCE:
                 raise MotionAborted(
-                    f"the pads stopped at {reached:.4f} m instead of {width:.4f} m; see what is in their "
-                    "way, then call recover()"
+                    f"the pads stopped at {reached:.4f} m instead of {width:.4f} m; remove "
+                    "the obstacle, then call recover()"
                 )
 
     def grasp(self, force: float) -> GraspOutcome:
@@ -165,7 +165,7 @@ class Arm(Device):
         """Holds still for a time, seconds of the cell's own clock.
 
         Raises:
-            OutOfWorkspace: It is no time from 0 to an hour.
+            OutOfWorkspace: The time is outside 0 .. 3600 s.
             MotionAborted: Stopped.
             NeedsRecovery: An earlier error was not acknowledged.
         """
@@ -175,7 +175,7 @@ class Arm(Device):
             self._wait(seconds)
 
     def stop(self) -> None:
-        """Stops the motion in progress, from any thread; it ends with `MotionAborted`."""
+        """Stops the motion in progress, which ends with `Stopped`; safe from any thread."""
         self._stop.set()
         if self._connected():
             self._halt()
@@ -184,12 +184,12 @@ class Arm(Device):
         """Acknowledges an error so that the arm may move again; waits for a motion in progress.
 
         Raises:
-            NeedsRecovery: Whatever stopped the arm is still there, such as a pressed user stop.
-            NotConnected, CommunicationLost: There is no arm to recover.
+            NeedsRecovery: The cause is still present, such as a pressed user stop.
+            NotConnected, CommunicationLost: The arm is not connected or does not answer.
         """
         self._require_connection()
         with self._busy:
-            # Before and not after: a stop() that comes while the arm recovers must not be forgotten.
+            # Cleared before, not after: a stop() during the recovery must stay in force.
             self._stop.clear()
             try:
                 self._recover()
@@ -204,7 +204,7 @@ class Arm(Device):
         """Refuses a target outside the workspace, out of reach or too near the table; moves nothing.
 
         Raises:
-            OutOfWorkspace: Says what is wrong with it.
+            OutOfWorkspace: Names the limit that the target violates.
         """
         check_target_pose(self.limits, T_base_tcp)
         if not self._reachable(T_base_tcp):
@@ -222,7 +222,7 @@ class Arm(Device):
         with self._busy:
             if self._fault is not None:
                 raise NeedsRecovery(
-                    f"the arm stopped before ({self._fault}); look at it, then call recover()"
+                    f"the arm stopped before ({self._fault}); check the arm, then call recover()"
                 )
             if self._stop.is_set():
                 raise NeedsRecovery("stop() was called; call recover() before the next motion")
@@ -231,16 +231,16 @@ class Arm(Device):
                 if self._stop.is_set():
                     raise Stopped(STOPPED)
             except OutOfWorkspace:
-                raise  # found out before anything moved
+                raise  # raised before anything moved
             except BaseException as error:
                 self._fault = str(error) or type(error).__name__
                 self._halt()
                 if self._stop.is_set() and isinstance(error, MotionAborted):
-                    # Whatever the backend says of how the motion ended, somebody has stopped it.
+                    # stop() caused the end, whichever fault the backend reports.
                     raise Stopped(STOPPED) from error
                 raise
 
-    # ------------------------------------------------------------------ what a backend does
+    # ------------------------------------------------------------------ interface of a backend
 
     @abstractmethod
     def _connected(self) -> bool: ...
@@ -254,7 +254,7 @@ class Arm(Device):
 
     @abstractmethod
     def _reachable(self, T_base_tcp: Pose) -> bool:
-        """Whether some joints within their limits put the TCP there."""
+        """Whether joints within their limits reach the pose."""
 
     @abstractmethod
     def _move_to_joints(self, joints: np.ndarray, speed: float) -> None: ...

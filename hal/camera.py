@@ -1,4 +1,4 @@
-"""What a camera is, whatever stands behind it."""
+"""Abstract depth camera."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class RgbdFrame:
             integer coordinates.
         T_base_camera: Pose of the camera's optical frame (x right, y down, z forward) in the base.
         timestamp_s: Time of the exposure, seconds on the monotonic clock of this machine.
-        serial: Which camera took it.
+        serial: Serial number of the camera.
         fine_colour: (k h, k w, 3) uint8, RGB, or None: the same exposure with k x k pixels of colour for
-            every pixel of depth, where a camera has them and its settings ask for them.
+            every pixel of depth, if the camera provides them and its settings request them.
     """
 
     colour: np.ndarray

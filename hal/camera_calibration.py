@@ -1,4 +1,4 @@
-"""Where a camera hangs, as a file: written by ``python -m hal.calibrate``, read by the camera's driver."""
+"""Calibration file of a camera, written by ``python -m hal.calibrate`` and read by the camera's driver."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _SCHEMA = 1
 
 @dataclass(frozen=True, kw_only=True)
 class Calibration:
-    """Where a camera hangs and how well that is known.
+    """Pose of a camera and its uncertainty.
 
     Attributes:
-        serial: Which camera.
+        serial: Serial number of the camera.
         T_base_camera: Pose of its optical frame (x right, y down, z forward) in the robot's base.
-        intrinsics: (3, 3) pinhole matrix in pixels that goes before the factory's; None: the factory's.
-        rms_translation_m: What was left between the poses of the board and the arm, RMS, metres.
-        rms_rotation_rad: The same of the rotations, radians.
-        n_poses: Poses of the arm it was made from; 0: measured by hand, good for a first look only.
+        intrinsics: (3, 3) pinhole matrix in pixels that overrides the factory's; None: the factory's.
+        rms_translation_m: RMS residual between the poses of the board and the arm, metres.
+        rms_rotation_rad: RMS residual of the rotations, radians.
+        n_poses: Number of poses of the arm; 0: measured by hand, rough.
         made: When, as ISO 8601.
     """
 

@@ -1,4 +1,4 @@
-"""A cell: a camera over a table, an arm beside it, and what is known about both."""
+"""Cell: an arm and a camera at a table, and the workspace they share."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Workspace:
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
         home: (7,) joints at which the arm is out of the camera's sight, radians.
-        min_height: What rises less over the table is taken for table, metres.
-        lift_height: How far a grasped part is lifted, metres.
-        grasp_force: N.
+        min_height: Points lower than this over the table count as table, metres.
+        lift_height: Height by which a grasped part is lifted, metres.
+        grasp_force: Gripper force, N.
     """
 
     table_z: float
@@ -36,52 +36,52 @@ class Workspace:
 
 
 class PartFeeder(Protocol):
-    """Lays parts on the table: a simulator by itself, on a real cell an operator."""
+    """Places parts on the table; a simulator does so by itself."""
 
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """Lays the part, by name or folder, at a place and turn that follow from the seed.
+        """Places a part at a position and turn determined by the seed.
 
         Args:
             part: Name or folder.
-            seed: Its place and turn follow from it.
-            keep: What was put outside the region, as on a pallet, stays there; else the table is cleared.
+            seed: Determines position and turn.
+            keep: Parts outside the region, such as on a pallet, stay; else the table is cleared.
         """
         ...
 
 
 class PartTracker(Protocol):
-    """Knows where the part is: the simulator's truth, or markers on a real part."""
+    """Measures the part's pose: the simulator's ground truth, or markers on a real part."""
 
     def part_pose(self) -> Pose:
-        """``T_base_obj`` now."""
+        """Current ``T_base_obj``."""
         ...
 
 
 class BoardHolder(Protocol):
-    """Puts a calibration board into the hand: a simulator by itself, on a real cell an operator."""
+    """Attaches a calibration board to the hand; on a real cell an operator does."""
 
     def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
         """Fixes a flat board to the hand until the next part is presented.
 
         Args:
-            image: (h, w) grey levels of its printed side, uint8.
+            image: (h, w) uint8 grey levels of the printed side.
             size: Its width and height, metres.
-            T_tcp_board: Origin in its middle, x right and y down as it is read, z into it.
+            T_tcp_board: Board in the tcp frame: origin in its middle, x right and y down as read, z into it.
         """
         ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """Everything a program needs; a context manager that connects camera and arm.
+    """Camera, arm and workspace, and what a backend adds to them.
 
     Attributes:
-        camera: Looks down on the table.
-        arm: Stands beside it.
-        workspace: The table.
-        feeder: Lays parts on the table; None where nobody does.
-        tracker: Knows the part's pose; None where nothing does.
-        board_holder: Puts a calibration board into the hand; None where an operator does.
+        camera: Camera over the table.
+        arm: Arm beside the table.
+        workspace: Table and default settings.
+        feeder: Places parts on the table; None if an operator does.
+        tracker: Measures the part's pose; None if nothing does.
+        board_holder: Attaches a calibration board to the hand; None if an operator does.
     """
 
     camera: Camera
@@ -93,6 +93,6 @@ class Cell:
 
     @contextmanager
     def connected(self) -> Iterator[Cell]:
-        """Connects camera and arm, and releases both however the block ends."""
+        """Connects camera and arm; releases both at the end of the block."""
         with self.camera, self.arm:
             yield self

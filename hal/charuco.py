@@ -1,4 +1,4 @@
-"""The calibration board: what it is, how it is drawn, and where it is in an image. Pure functions.
+"""ChArUco calibration board: geometry, drawing, detection and pose. Pure functions.
 
 The board's frame has its origin in the middle of the squares, x right and y down as the pattern is read,
 z into the board, metres; seen face to face it is turned like the camera's optical frame.
@@ -16,9 +16,9 @@ from mskgrasp.core.config import Config
 from mskgrasp.core.geometry import Pose
 
 MIN_CORNERS = 6
-"""A view with fewer corners than half a small board's says little about the board's pose."""
+"""Least corners in a view: with fewer the pose of the board is uncertain."""
 MIN_SQUARE_PX = 9.0
-"""Markers in smaller squares are rarely read, and their corners lie half a pixel off."""
+"""Markers in smaller squares are rarely read, and their corners are off by half a pixel."""
 _ZOOM = 2
 _N_MARKERS = 50
 
@@ -79,7 +79,7 @@ class Board(Config):
 
 @dataclass(frozen=True, kw_only=True)
 class Corners:
-    """The corners of the board that were found in one image.
+    """Corners of the board detected in one image.
 
     Attributes:
         ids: (k,) their numbers.
@@ -91,11 +91,11 @@ class Corners:
 
 
 def detect(board: Board, colour: np.ndarray) -> Corners:
-    """Finds the board's corners in (h, w, 3) RGB or (h, w) grey, uint8; there may be none."""
+    """Detects the board's corners in (h, w, 3) RGB or (h, w) grey, uint8; there may be none."""
     grey = colour if colour.ndim == 2 else cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY)
     parameters = cv2.aruco.DetectorParameters()
     # Small markers are blurred into each other: only the middle of each module is read, in smaller steps than
-    # by default, and a single wrong module is put right (the codes differ in four).
+    # by default, and a single wrong module is corrected (the codes differ in four).
     parameters.perspectiveRemovePixelPerCell = 8
     parameters.perspectiveRemoveIgnoredMarginPerCell = 0.25
     parameters.errorCorrectionRate = 1.0
@@ -113,17 +113,17 @@ def detect(board: Board, colour: np.ndarray) -> Corners:
 
 
 def board_pose(board: Board, corners: Corners, intrinsics: np.ndarray) -> Pose | None:
-    """``T_camera_board`` from one view; None where the corners do not fix it (too few, or in a row).
+    """``T_camera_board`` from one view; None if the corners do not determine it (too few, or collinear).
 
     Args:
-        board: What is looked at.
-        corners: Where its corners are.
+        board: The board in view.
+        corners: Its detected corners.
         intrinsics: (3, 3) pinhole matrix; the image has no distortion.
     """
     points = board.corners()[corners.ids]
     if len(points) < MIN_CORNERS or np.linalg.svd(points - points.mean(0), compute_uv=False)[1] < 1e-6:
         return None
-    # A flat board has two poses that look alike; the one that fits better is refined.
+    # A flat board has two poses of similar appearance; the one that fits better is refined.
     n_found, turns, shifts, errors = cv2.solvePnPGeneric(
         points, corners.pixels, intrinsics, None, flags=cv2.SOLVEPNP_IPPE
     )
@@ -144,7 +144,7 @@ def project(points_camera: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
 
 
 def square_px(corners: Corners, board: Board) -> float:
-    """Median distance of neighbouring corners in the image, pixels; 0 where no two are neighbours."""
+    """Median distance of neighbouring corners in the image, pixels; 0 if no two are neighbours."""
     where = {int(i): pixel for i, pixel in zip(corners.ids, corners.pixels, strict=True)}
     across = board.columns - 1
     distances = [
@@ -159,7 +159,7 @@ def square_px(corners: Corners, board: Board) -> float:
 def draw(
     colour: np.ndarray, corners: Corners, expected: np.ndarray | None = None, zoom: int = 4
 ) -> np.ndarray:
-    """The image enlarged, found corners as green circles, expected ones (k, 2) as red crosses; RGB."""
+    """The image enlarged, detected corners as green circles, expected ones (k, 2) as red crosses; RGB."""
     picture = cv2.resize(colour, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_NEAREST)
     for pixel in corners.pixels:
         cv2.circle(picture, _enlarged(pixel, zoom), 2 * zoom, (0, 200, 0), 1, cv2.LINE_AA)

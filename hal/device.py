@@ -1,4 +1,4 @@
-"""What arms and cameras share: they are connected and released, as context managers."""
+"""Base class of arms and cameras: context managers that connect and release."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Self
 
 
 class Device(ABC):
-    """Something to connect to. Construction neither connects nor moves; ``with`` does."""
+    """A device. Construction neither connects nor moves; ``with`` does."""
 
     @abstractmethod
     def connect(self) -> None:

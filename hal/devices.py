@@ -1,4 +1,4 @@
-"""A cell put together from an arm and a camera, each chosen by its ``driver``, and the table between."""
+"""Cell of an arm and a camera, each chosen by its ``driver``."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Seven = tuple[float, float, float, float, float, float, float]
 
 
 class WorkspaceConfig(Config):
-    """The table in front of the arm, and where the arm may be."""
+    """Table in front of the arm and limits of the TCP."""
 
     table_z: float = Field(ge=-0.5, le=0.5)
     """Height of the table in the robot's base frame, m; measure it: touch the table with closed fingers."""
@@ -40,11 +40,11 @@ class WorkspaceConfig(Config):
     box_upper: Three = (0.75, 0.4, 0.75)
     """The other corner, m."""
     min_height: float = Field(default=0.006, gt=0)
-    """What rises less over the table is taken for table, m: real tables are not level, and cameras drift."""
+    """Points lower than this over the table count as table, m: real tables are not level, cameras drift."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
-    """How far a grasped part is lifted, m."""
+    """Height by which a grasped part is lifted, m."""
     grasp_force: float = Field(default=20.0, gt=0, le=70)
-    """N."""
+    """Gripper force, N."""
 
     @model_validator(mode="after")
     def _check(self) -> WorkspaceConfig:
@@ -68,7 +68,7 @@ class WorkspaceConfig(Config):
 
 
 class DevicesConfig(Config):
-    """The sections of the file; ``arm`` and ``camera`` are checked by what their ``driver`` names."""
+    """Sections of the file; the ``driver`` of ``arm`` and ``camera`` decides how each is checked."""
 
     type: Literal["devices"]
     arm: dict[str, Any]
@@ -80,7 +80,7 @@ def devices_cell(values: dict[str, Any], path: Path) -> Cell:
     """Builds the cell that a file of this type describes; nothing is connected yet.
 
     Raises:
-        BadConfig: The file is not valid, or its parts do not fit each other.
+        BadConfig: The file is not valid, or its sections do not fit each other.
     """
     config = check_config(DevicesConfig, values, str(path))
     table = config.workspace
@@ -126,7 +126,7 @@ def _arm(values: dict[str, Any], table: WorkspaceConfig, workspace: Workspace, p
         case "replay":
             from hal.replay import ReplayArm, ReplayArmConfig
 
-            # Checked when it was recorded; now it knows the poses alone that it was asked for then.
+            # The fit was checked when it was recorded; a replay accepts the recorded poses alone.
             return ReplayArm(check_config(ReplayArmConfig, values, source))
         case _:
             assert_never(driver)
@@ -159,7 +159,7 @@ def _camera(values: dict[str, Any], workspace: Workspace, path: Path) -> tuple[C
 
 
 def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
-    """Refuses what the arm would refuse later, with a part in its hand."""
+    """Refuses a workspace whose grasps or home the arm would refuse later, with a part in its hand."""
     if workspace.grasp_force > arm.limits.max_force:
         raise BadConfig(
             f"{path}: workspace.grasp_force {workspace.grasp_force:g} N is over the arm's "
@@ -185,6 +185,6 @@ def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
                     arm.check_pose(pose)
                 except OutOfWorkspace as error:
                     raise BadConfig(
-                        f"{path}: workspace.region {list(workspace.region)} cannot be grasped in whole, hand "
-                        f"turned by {theta:.2f} rad: {error}"
+                        f"{path}: workspace.region {list(workspace.region)} cannot be grasped everywhere, "
+                        f"hand turned by {theta:.2f} rad: {error}"
                     ) from error

@@ -1,4 +1,4 @@
-"""What can go wrong with a cell; every error says what to do."""
+"""Errors of arms, cameras and cells; each message names the remedy."""
 
 from mskgrasp.core.errors import MskgraspError
 
@@ -36,11 +36,11 @@ class MotionAborted(HalError):
 
 
 class Stopped(MotionAborted):
-    """Somebody called stop(): whatever was going on shall not go on by itself."""
+    """stop() was called: no program may resume the motion by itself."""
 
 
 class NeedsRecovery(HalError):
-    """An error happened before; nothing moves until recover() is called."""
+    """An earlier error was not acknowledged; nothing moves until recover() is called."""
 
 
 class BadRecording(HalError):
@@ -48,4 +48,4 @@ class BadRecording(HalError):
 
 
 class NotRecorded(HalError):
-    """A replayed cell is asked for something that did not happen at this point of its recording."""
+    """A call on a replayed cell does not match the recording at this point."""

@@ -1,4 +1,4 @@
-"""The motion of a grasp, written against the interfaces alone."""
+"""Motions of a grasp on any cell."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ APPROACH = 0.12
 """Height over the table from which the straight descent begins, m."""
 
 RETREAT = 0.05
-"""How far the open hand first rises on its way home, so that it does not drag the part along, m."""
+"""Height by which the open hand first rises on its way home, so that it does not drag the part along, m."""
 
 PUT_DOWN = 0.002
-"""A part is let go this much above the height at which it was grasped, m."""
+"""A part is released this much above the height at which it was grasped, m."""
 
 RELEASE = 0.02
-"""By how much the fingers open at least to let go of a part, m."""
+"""Least opening of the fingers that releases a part, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GraspResult:
-    """What the arm itself knows of a grasp.
+    """Outcome of a grasp as the arm measures it.
 
     Attributes:
         lifted: The fingers closed on something and the arm lifted it.
         holding: The fingers hold something after lift and hold.
         width: Distance of the pads then, metres.
         T_base_tcp: Measured TCP then.
-        aborted: Why the motion ended early; None where it did not. The arm then needs `recover`.
+        aborted: Reason if the motion ended early, else None; the arm then needs `recover`.
     """
 
     lifted: bool
@@ -48,13 +48,12 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
     """Opens, approaches, descends, closes, lifts and holds.
 
     Args:
-        cell: Connected, the arm fit to move.
+        cell: Connected, without an error in force.
         grasp: (4,) x, y, z, theta, base frame.
 
     Raises:
         OutOfWorkspace: The grasp is refused before anything moves.
-        HalError: The arm was lost, or somebody stopped it; a motion that met resistance is a result, not an
-            error.
+        HalError: The arm was lost or stopped; a motion that met resistance is a result, not an error.
     """
     arm, lift = cell.arm, cell.workspace.lift_height
     grasp = np.asarray(grasp, dtype=np.float64)
@@ -93,7 +92,7 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
 
 
 def above_grasp(cell: Cell, grasp: np.ndarray) -> Pose:
-    """From where the hand descends straight to a grasp (4,), and to where it rises from it."""
+    """Pre-grasp: from here the hand descends straight to a grasp (4,), and here it returns."""
     height = max(cell.workspace.table_z + APPROACH, grasp[2] + 0.02)
     return pose_base_tcp(np.array([grasp[0], grasp[1], height, grasp[3]]))
 
@@ -101,27 +100,27 @@ def above_grasp(cell: Cell, grasp: np.ndarray) -> Pose:
 def put_down(
     cell: Cell, grasp: np.ndarray, *, height: float = PUT_DOWN, opening: float = MAX_OPENING
 ) -> None:
-    """Lowers what was lifted to where it was grasped, opens the fingers and rises.
+    """Lowers a lifted part to where it was grasped, opens the fingers and rises.
 
     Args:
         cell: The hand holds the part over the table.
         grasp: (4,) at which it was grasped.
-        height: How much above that it is let go, metres; falling 2 mm, a part may shift by half of one.
+        height: Of the release above the grasp, metres; falling 2 mm, a part may shift by 1 mm.
         opening: As in `let_go`.
 
     Raises:
-        MotionAborted: The part met the table early, because it hangs lower in the hand than it lay; or the
-            hand met something as it let go and rose.
+        MotionAborted: The part met the table early, because it hangs lower in the hand than before; or the
+            hand touched something as it released the part and rose.
     """
     lower(cell, grasp, height=height)
     let_go(cell, grasp, opening=opening)
 
 
 def lower(cell: Cell, grasp: np.ndarray, *, height: float = 0.0) -> None:
-    """Lowers what was lifted to where it was grasped, or ``height`` metres above.
+    """Lowers a lifted part to where it was grasped, or ``height`` metres above.
 
     Raises:
-        MotionAborted: The part met the table early, because it hangs lower in the hand than it lay.
+        MotionAborted: The part met the table early, because it hangs lower in the hand than before.
     """
     place = np.asarray(grasp, dtype=np.float64) + np.array([0.0, 0.0, height, 0.0])
     cell.arm.move_to_pose(pose_base_tcp(place), speed=0.15)
@@ -131,14 +130,14 @@ def let_go(cell: Cell, place: np.ndarray, *, opening: float) -> None:
     """Opens the fingers and rises straight.
 
     Args:
-        cell: The hand stands at ``place`` and holds a part.
-        place: (4,) x, y, z, theta, base frame; the hand may stand a little higher.
-        opening: How far apart the pads are then, metres; 0 for no farther than they must, which is by
-            `RELEASE`. The fingers had room on the way down to the grasp, but since then the part has moved
-            between them: one that stands in a bore may push it on as it opens all the way.
+        cell: The hand is at ``place`` and holds a part.
+        place: (4,) x, y, z, theta, base frame; the hand may be a little higher.
+        opening: Distance of the pads afterwards, metres; 0 for the least that releases the part, which is
+            `RELEASE` more than now. The fingers had room on the way down to the grasp, but since then the
+            part has moved between them: one inside a bore may push it as it opens all the way.
 
     Raises:
-        MotionAborted: The hand met something.
+        MotionAborted: The hand touched something.
         ValueError: The hand does not open so far.
     """
     if not 0 <= opening <= MAX_OPENING:

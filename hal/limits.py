@@ -1,4 +1,4 @@
-"""What an arm may be told to do, checked before anything moves. Pure functions."""
+"""Limits of an arm's commands, checked before anything moves. Pure functions."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from mskgrasp.core.geometry import Pose, straight_line
 from mskgrasp.core.grasp import PAD_REACH, TABLE_CLEARANCE, lowest_grasp_z
 
 _CHECKS = 33
-"""Points of a motion that are looked at; on a motion of 2 m they are 6 cm apart."""
+"""Checked points of a motion; on a motion of 2 m they are 6 cm apart."""
 _SLACK = 1e-3
-"""Along the way, metres: an arm rests as exactly as its drives hold it."""
+"""Tolerance along a path, metres: an arm rests as exactly as its drives hold it."""
 _UNIT = 1e-3
 # Corners of the pads and of the palm in the tcp frame, metres (collision boxes of the Panda's hand).
 _HAND_CORNERS = np.array(
@@ -29,7 +29,7 @@ _HAND_CORNERS = np.array(
 
 @dataclass(frozen=True, kw_only=True)
 class ArmLimits:
-    """What every command is checked against before anything moves.
+    """Limits that every command is checked against before anything moves.
 
     Attributes:
         joint_lower: (7,) radians.
@@ -57,7 +57,7 @@ def check_target_joints(limits: ArmLimits, joints: np.ndarray) -> None:
     """Refuses joints (7,) outside their limits.
 
     Raises:
-        OutOfWorkspace: Says which, and what is legal.
+        OutOfWorkspace: Names the joint and its limits.
     """
     lower, upper = limits.joint_lower, limits.joint_upper
     if joints.shape != (7,) or not np.isfinite(joints).all():
@@ -74,7 +74,7 @@ def check_target_pose(limits: ArmLimits, T_base_tcp: Pose) -> None:
     """Refuses a pose outside the box or too near the table.
 
     Raises:
-        OutOfWorkspace: Says what is wrong with it, and what is legal.
+        OutOfWorkspace: Names the value and its limits.
     """
     position, quat_wxyz = np.asarray(T_base_tcp.position), np.asarray(T_base_tcp.quat_wxyz)
     numbers = [*position.ravel(), *quat_wxyz.ravel()]
@@ -94,10 +94,10 @@ def check_target_pose(limits: ArmLimits, T_base_tcp: Pose) -> None:
 
 
 def check_line(limits: ArmLimits, start: Pose, goal: Pose) -> None:
-    """Refuses a straight motion on whose way a tilting hand would meet the table.
+    """Refuses a straight motion on which a tilting hand would touch the table.
 
     Raises:
-        OutOfWorkspace: Says where.
+        OutOfWorkspace: Names the place.
     """
     line = straight_line(start, goal, np.linspace(0, 1, _CHECKS))
     _check_way(
@@ -110,16 +110,16 @@ def check_line(limits: ArmLimits, start: Pose, goal: Pose) -> None:
 def check_joint_path(
     limits: ArmLimits, forward: Callable[[np.ndarray], Pose], start: np.ndarray, goal: np.ndarray
 ) -> None:
-    """Refuses a joint motion whose end, or way, brings the hand to the table or out of the box.
+    """Refuses a joint motion that brings the hand to the table or out of the box.
 
     Args:
         limits: Of the arm.
         forward: ``T_base_tcp`` at joints (7,).
-        start: (7,) radians, where the arm is.
+        start: (7,) current joints, radians.
         goal: (7,) radians, within their limits.
 
     Raises:
-        OutOfWorkspace: Says where.
+        OutOfWorkspace: Names the place.
     """
     end = forward(goal).position
     if _outside(limits, end) > 0:
@@ -133,7 +133,7 @@ def check_joint_path(
 
 
 def _check_way(limits: ArmLimits, poses: list[Pose], what: str) -> None:
-    """An arm that was guided out of its limits may come back, and go no farther out on its way."""
+    """Refuses a path that leads out; an arm guided out of its limits may come back, but go no farther."""
     heights = np.array([lowest_point(pose) for pose in poses])
     if heights.min() < min(heights[0], limits.table_z + TABLE_CLEARANCE) - _SLACK:
         raise OutOfWorkspace(
@@ -143,17 +143,17 @@ def _check_way(limits: ArmLimits, poses: list[Pose], what: str) -> None:
     if excess.max() > excess[0] + _SLACK:
         worst = poses[int(excess.argmax())].position
         raise OutOfWorkspace(
-            f"{what} leads past {shown(worst)} m, outside the workspace {_box(limits)}; go there in steps"
+            f"{what} passes {shown(worst)} m, outside the workspace {_box(limits)}; move there in steps"
         )
 
 
 def _outside(limits: ArmLimits, position: np.ndarray) -> float:
-    """How far a position is out of the box, metres; 0 inside."""
+    """Distance of a position from the box, metres; 0 inside."""
     return max(0.0, float(np.maximum(limits.box_lower - position, position - limits.box_upper).max()))
 
 
 def shown(position: np.ndarray) -> str:
-    """A position for people, metres."""
+    """A position as text for messages, metres."""
     return "(" + ", ".join(f"{value:.3f}" for value in position) + ")"
 
 

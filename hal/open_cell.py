@@ -1,4 +1,4 @@
-"""From a YAML file to a cell: the one place that knows which backends there are."""
+"""Cells from YAML files; the only module that knows all backends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The person at a real cell: lays parts down, looks at a plan, says whether the arm may move."""
+"""Dialogue with the operator of a real cell: placing parts, confirming motions, recovering."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from mskgrasp.core.errors import MskgraspError, UsageError
 
 
 class StoppedByOperator(MskgraspError):
-    """The operator ended the run, or is no longer there to be asked."""
+    """The operator ended the run, or standard input ended."""
 
     exit_code = 130
 
 
 class Operator:
-    """Asks before a real arm moves, and stands in for the feeder that a real cell has not.
+    """Asks before a real arm moves, and asks for parts on a cell without a feeder.
 
-    A simulated cell is never held up by questions, and neither is any cell with ``yes``.
+    Nothing is asked on a simulated cell, nor on any cell with ``yes``.
 
     Args:
         cell: Connected or not.
-        yes: Ask nothing: parts are taken to lie there, the arm moves as soon as a grasp is planned.
-        answers: Where answers are read, a line each; standard input by default.
-        prompts: Where questions go; standard error by default, so that it may be told from results.
+        yes: Ask nothing: parts are assumed to be in place, the arm moves as soon as a grasp is planned.
+        answers: Stream of answers, a line each; standard input by default.
+        prompts: Stream of questions; standard error by default, apart from results.
 
     Attributes:
-        asks: Whether anybody is asked.
+        asks: Whether the operator is asked.
 
     Raises:
-        UsageError: Somebody must be asked, and standard input is no terminal.
+        UsageError: An operator must be asked, and standard input is no terminal.
     """
 
     def __init__(
@@ -46,18 +46,18 @@ class Operator:
         self._answers = answers or sys.stdin
         self._prompts = prompts or sys.stderr
 
-    def lay(self, cell: Cell, part: str, seed: int, *, name: str = "", keep: bool = False) -> None:
-        """Has a part laid on the table, arm at home: by the cell's feeder, else by the operator.
+    def present(self, cell: Cell, part: str, seed: int, *, name: str = "", keep: bool = False) -> None:
+        """Has a part placed on the table, arm at home: by the cell's feeder, else by the operator.
 
         Args:
             cell: Connected.
             part: Name or folder.
-            seed: A feeder's place and turn follow from it; an operator shakes the part's box.
-            name: What is about to come, for the operator, such as "trial 3 of 20".
-            keep: What was put outside the region, as on a pallet, stays there; else the table is cleared.
+            seed: Determines a feeder's position and turn; an operator shakes the part's box.
+            name: Title for the operator, such as "trial 3 of 20".
+            keep: Parts outside the region, such as on a pallet, stay; else the table is cleared.
 
         Raises:
-            StoppedByOperator: The operator said so.
+            StoppedByOperator: The operator ended the run.
             HalError: The cell was lost.
         """
         if cell.feeder is not None:
@@ -65,7 +65,7 @@ class Operator:
             cell.feeder.present(part, seed, **settings)
             return
         others = "leave the pallet as it is" if keep else "clear everything else away"
-        self.tell(f"{name}: '{Path(part).name}'".removeprefix(": "))
+        self.inform(f"{name}: '{Path(part).name}'".removeprefix(": "))
         if self.asks:
             self._ask(
                 f"Shake the part in its box, tip it out into the region, {others}. Enter when your hands are "
@@ -74,43 +74,43 @@ class Operator:
             )
 
     def may_move(self, picture: Path, summary: str) -> bool:
-        """Whether the arm may move; True without a question where nobody is asked.
+        """Whether the arm may move; True without a question if no operator is asked.
 
         Args:
-            picture: Of what is planned; written already, and opened by nobody but the operator.
-            summary: The same in a line.
+            picture: File that shows the plan, for the operator to open.
+            summary: The plan in a line.
 
         Returns:
-            False where the operator wants the part laid down anew.
+            False if the operator wants to place the part again.
 
         Raises:
-            StoppedByOperator: The operator said so.
+            StoppedByOperator: The operator ended the run.
         """
         if not self.asks:
             return True
-        self.tell(f"{summary}\npicture: {picture}")
+        self.inform(f"{summary}\npicture: {picture}")
         return self._ask(
-            "May the arm move? y: yes, n: no, lay the part anew, q: stop: ", {"y": True, "n": False}
+            "May the arm move? y: yes, n: no, place the part again, q: stop: ", {"y": True, "n": False}
         )
 
     def recover(self, cell: Cell, reason: str) -> None:
-        """Lets the arm move again after a contact; where somebody is asked, when they say so.
+        """Recovers the arm after a contact, once the operator confirms.
 
         Raises:
-            StoppedByOperator: The operator said so; the arm stays stopped.
-            HalError: It cannot be recovered.
+            StoppedByOperator: The operator ended the run; the arm stays stopped.
+            HalError: The arm cannot be recovered.
         """
         if self.asks:
-            self.tell(f"The arm stopped: {reason}")
+            self.inform(f"The arm stopped: {reason}")
             self._ask(
-                "Look at it, clear its way. Enter to go on (it may open its fingers, moves up and home), "
-                "q to stop: ",
+                "Check it and remove obstacles. Enter to continue (it may open its fingers, moves up and "
+                "home), q to stop: ",
                 {"": True},
             )
         cell.arm.recover()
 
-    def tell(self, text: str) -> None:
-        """Lets the operator know."""
+    def inform(self, text: str) -> None:
+        """Prints a line for the operator."""
         print(text, file=self._prompts, flush=True)
 
     def _ask(self, question: str, legal: dict[str, bool]) -> bool:
@@ -119,11 +119,9 @@ class Operator:
             line = self._answers.readline()
             word = line.strip().lower()
             if not line or word in ("q", "quit"):
-                why = (
-                    "stopped by the operator" if line else "nobody is there to answer (standard input ended)"
-                )
+                why = "stopped by the operator" if line else "no answer (standard input ended)"
                 raise StoppedByOperator(f"{why}; what was finished is kept, the same command goes on")
             answer = legal.get(word if word != "yes" else "y")
             if answer is not None:
                 return answer
-            self.tell(f"{word!r} is no answer.")
+            self.inform(f"{word!r} is no valid answer.")

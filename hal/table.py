@@ -1,4 +1,4 @@
-"""The table as a depth camera sees it. Pure functions."""
+"""Plane of the table in a depth image. Pure functions."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 from mskgrasp.core.geometry import Pose
 
 _INLIER = 0.012
-"""What lies nearer to the plane is table, metres: some five times the noise of a Kinect v2."""
+"""Greatest distance of the table's points from the plane, metres: about five times a Kinect v2's noise."""
 _LEAST_POINTS = 200
 _ROUNDS = 60
 
 
 @dataclass(frozen=True, kw_only=True)
 class TablePlane:
-    """A plane through what the camera sees of the table.
+    """Plane fitted to the table.
 
     Attributes:
         z: Its height in the middle of the region, base frame, metres.
         tilt_rad: Its angle against the base's x-y plane.
         noise: RMS distance of the table's points from it, metres.
-        share: Of the points in the region, how many are table.
-        valid: Of the region's pixels, how many have a depth.
+        share: Fraction of the region's points on the plane.
+        valid: Fraction of the region's pixels with a depth.
     """
 
     z: float
@@ -47,20 +47,20 @@ def fit_table(
     region: tuple[float, float, float, float],
     table_z: float,
 ) -> TablePlane | None:
-    """The plane that most points over the region lie in, parts on it left out.
+    """Fits the plane of most points in the region; parts on it are outliers.
 
     Args:
         depth: (h, w) metres, NaN where invalid.
         intrinsics: (3, 3) pinhole matrix in pixels.
         T_base_camera: The camera's optical frame in the base.
         region: x_min, x_max, y_min, y_max, base frame, metres.
-        table_z: Where the table should be: decides which pixels look at the region, metres.
+        table_z: Expected height of the table, metres; it decides which pixels see the region.
 
     Returns:
-        None where too little of the region has a depth.
+        None if too little of the region has a depth.
     """
-    looking = _looking_at(depth.shape, intrinsics, T_base_camera, region, table_z)
-    points = points_in_base(depth, intrinsics, T_base_camera)[looking]
+    seeing = _pixels_of(depth.shape, intrinsics, T_base_camera, region, table_z)
+    points = points_in_base(depth, intrinsics, T_base_camera)[seeing]
     valid = np.isfinite(points).all(axis=-1)
     points = points[valid]
     if len(points) < _LEAST_POINTS:
@@ -93,7 +93,7 @@ def fit_table(
     )
 
 
-def _looking_at(
+def _pixels_of(
     shape: tuple[int, ...],
     intrinsics: np.ndarray,
     T_base_camera: Pose,

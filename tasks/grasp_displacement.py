@@ -66,7 +66,7 @@ class GraspDisplacementEnv(BaseEnv):
 
     **Additional Notes:**
     - ``obs_mode`` renders nothing by itself; `capture_depth` takes the overhead image in float metres
-    - ``reset(options=dict(pose_base_obj=...))`` lays the part as told, ``options=dict(parts=[...],
+    - ``reset(options=dict(pose_base_obj=...))`` places the part at this pose, ``options=dict(parts=[...],
       reconfigure=True)`` loads other parts
     """
 
@@ -94,7 +94,7 @@ class GraspDisplacementEnv(BaseEnv):
             physics: Overrides of `mskgrasp.core.settings.Physics`.
             camera: Overrides of `mskgrasp.core.settings.Overhead`.
             noise: Overrides of `mskgrasp.core.settings.ExecutionNoise`, all of which is off.
-            region: Where parts lie, base frame.
+            region: Bounds of the parts' positions, base frame.
             robot_uids: Only ``panda_grasp``.
             num_envs: Sub-scenes; more than one needs PhysX on a GPU.
             **kwargs: Passed to ManiSkill.
@@ -114,7 +114,7 @@ class GraspDisplacementEnv(BaseEnv):
         self.T_base_camera = self.overhead.T_base_camera(self.region_centre)
         self._part_names = list(parts) if parts else None
         self._n_scenes = num_envs
-        # Which part comes where may be drawn later: room for the most complex one everywhere.
+        # Parts may be assigned later: every sub-scene has room for the most complex one.
         names = self._part_names or []
         self._most_hulls = max((find_part(name).n_hulls for name in names), default=MOST_HULLS)
         self.parts: list[Part] = []
@@ -183,8 +183,8 @@ class GraspDisplacementEnv(BaseEnv):
         mu = self.physics.friction_table
         builder.add_box_collision(pose, half, material=PhysxMaterial(mu, mu, 0.0))
         if self.scene.can_render():
-            look = sapien.render.RenderMaterial(base_color=(0.33, 0.35, 0.38, 1.0), roughness=0.9)
-            builder.add_box_visual(pose, half, material=look)
+            material = sapien.render.RenderMaterial(base_color=(0.33, 0.35, 0.38, 1.0), roughness=0.9)
+            builder.add_box_visual(pose, half, material=material)
         builder.initial_pose = sapien.Pose()
         builder.build_static(name="table")
 
@@ -225,8 +225,8 @@ class GraspDisplacementEnv(BaseEnv):
                 self._errors[i] = self.noise.draw(self._batched_episode_rng[i])
             self._apply(self._errors[0])
 
-    def lay(self, seed: int) -> None:
-        """Begins the episode of ``reset(seed=seed)`` for `try_grasp`, without the rest of what that does.
+    def begin_episode(self, seed: int) -> None:
+        """Begins the episode of ``reset(seed=seed)`` for `try_grasp`, without its other work.
 
         A reset takes as long as twenty steps of the simulation. No observation is made, the controllers of
         the other control modes are not reset, nor is torch's generator seeded: nothing here is drawn from it.
@@ -299,7 +299,7 @@ class GraspDisplacementEnv(BaseEnv):
         """One whole attempt in every sub-scene; see `tasks.attempt.attempt.Attempt.run`.
 
         Args:
-            grasp: (n, 4) commanded x, y, z, theta, base frame; where the hand truly goes, ``noise`` says.
+            grasp: (n, 4) commanded x, y, z, theta, base frame; ``noise`` sets the true target of the hand.
         """
         return self.attempt.run(grasp, self._executed(grasp))
 

@@ -27,9 +27,9 @@ class Episode:
         part: Name of the part.
         grasp: (4,) the action: x, y, z, theta, base frame.
         depth: (h, w) float32 before the grasp, metres, 0 where invalid.
-        T_base_obj: (2, 7) x y z qw qx qy qz of the part before and after; NaN where it is not known.
+        T_base_obj: (2, 7) x y z qw qx qy qz of the part before and after; NaN if unknown.
         success: Whether the part was lifted.
-        info: What else is known of the outcome; goes into the JSON file.
+        info: Further outcome, for the JSON file.
     """
 
     part: str
@@ -57,10 +57,10 @@ def write_trajectories(
         env_kwargs: With which ``gymnasium.make`` rebuilds the task.
         intrinsics: (3, 3) of the overhead camera, integer coordinates at a pixel's centre.
         T_base_camera: Pose of its optical frame.
-        description: How the data came about.
+        description: Origin of the data.
 
     Returns:
-        How many episodes were written.
+        Number of episodes written.
 
     Raises:
         OSError: The disk is full or not writable.

@@ -1,4 +1,4 @@
-"""Where the hand must go so that the camera sees a board in it from many sides. Pure functions."""
+"""Poses of the hand that show a board in it to the camera from many sides. Pure functions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hal.charuco import Board, project
 from mskgrasp.core.geometry import Pose, straight_line
 
 TABLE_MARGIN = 0.04
-"""No corner of the board comes nearer to the table than this, metres."""
+"""Least height of the board's corners over the table, metres."""
 _EDGE_PX = 6
 _SIZE_PX = 14.0
 _TRIES = 3000
@@ -20,7 +20,7 @@ _TRIES = 3000
 
 @dataclass(frozen=True, kw_only=True)
 class Sight:
-    """What is known beforehand of the camera: enough to bring the board before it.
+    """Rough pose and optics of the camera, known before the calibration.
 
     Attributes:
         T_base_camera: Where it hangs, to some centimetres.
@@ -47,7 +47,7 @@ def candidate_poses(
     rng: np.random.Generator,
     possible: Callable[[Pose], bool],
 ) -> Iterator[Pose]:
-    """``T_base_tcp`` with the board in the camera's sight, tilted to all sides, over the table.
+    """``T_base_tcp`` with the board in the camera's view, tilted to all sides, over the table.
 
     Args:
         board: What the hand holds.

@@ -1,4 +1,4 @@
-"""The calibration board on paper, at its true size."""
+"""Printable calibration board at true scale."""
 
 from __future__ import annotations
 

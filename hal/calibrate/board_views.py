@@ -1,4 +1,4 @@
-"""Pictures of the board in the hand: taken with an arm and a camera, kept in a folder, read again."""
+"""Pictures of the board in the hand: capture, storage and reading."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SPARE = 2
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """One frame and where the hand was.
+    """One frame and the pose of the hand.
 
     Attributes:
         colour: (h, w, 3) uint8, RGB.
@@ -48,7 +48,7 @@ class Picture:
 
     @classmethod
     def of(cls, frame: RgbdFrame, state: ArmState) -> Picture:
-        """What a frame and a state say."""
+        """The picture of a frame and a state."""
         return cls(
             colour=frame.colour,
             depth=frame.depth,
@@ -59,7 +59,7 @@ class Picture:
         )
 
     def view(self, board: Board) -> View:
-        """What the board looks like in it."""
+        """Detects the board in it."""
         return View(
             T_base_tcp=self.T_base_tcp, corners=detect(board, self.colour), intrinsics=self.intrinsics
         )
@@ -78,7 +78,7 @@ def take_pictures(
     rng: np.random.Generator,
     keep: Callable[[int, Picture, int], None],
 ) -> int:
-    """Moves the board before the camera and takes pictures, then brings the hand back to where it was.
+    """Moves the board before the camera, takes pictures, and returns the hand.
 
     Args:
         cell: Connected, the board in the hand.
@@ -121,7 +121,7 @@ def take_pictures(
         try:
             arm.move_to_pose(target, speed=speed)
         except OutOfWorkspace:
-            continue  # no straight way there: found out before anything moved
+            continue  # no straight path there: refused before anything moved
         here = target
         arm.wait(settle_s)
         picture = _still_picture(cell)
@@ -132,7 +132,7 @@ def take_pictures(
         if found == 0 and taken == _HOPELESS:
             arm.move_to_pose(start, speed=speed)
             raise BadCalibrationSet(
-                f"the board was not found in any of the first {taken} pictures (look at them in the "
+                f"the board was not found in any of the first {taken} pictures (see those in the "
                 "folder); it must be this board, printed side up, held as --board-at says, and lit evenly"
             )
         if found == n or taken == _SPARE * n:

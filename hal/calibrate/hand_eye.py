@@ -1,4 +1,4 @@
-"""From views of a board in the hand to the place of a camera beside the arm (eye-to-hand). Pure functions.
+"""Hand-eye calibration of a camera beside the arm (eye-to-hand). Pure functions.
 
 The closed form (Park and Martin, IEEE T-RO 1994, through OpenCV) starts a least-squares fit of where every
 corner of every view is seen, over the camera's pose in the base and the board's pose in the hand.
@@ -19,24 +19,24 @@ from hal.errors import HalError
 from mskgrasp.core.geometry import Pose, pose_distance
 
 MIN_VIEWS = 8
-"""Fewer views with the board in them are no calibration."""
+"""Least number of views with the board."""
 MIN_SPREAD_RAD = np.radians(8.0)
 """Least spread (RMS) of the hand's turns about its second most used axis; with less, errors are large."""
 MAX_RMS_PX = 1.5
-"""Corners that fit worse than this do not come from one camera and one rigidly held board."""
+"""Greatest reprojection error of one camera and one rigidly held board."""
 MAX_SCALE_ERROR = 0.015
-"""A board whose squares seem larger or smaller than said by more than this share is another board."""
+"""Greatest relative error of the size of the squares; more means another board."""
 _OUTLIER_PX = 3.0
 _LOSS_PX = 0.5
 
 
 class BadCalibrationSet(HalError):
-    """The views do not determine where the camera is; the message says what to do."""
+    """The views do not determine where the camera is; the message names the remedy."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """One look at the board in the hand.
+    """View of the board in the hand.
 
     Attributes:
         T_base_tcp: Where the hand was, measured.
@@ -51,7 +51,7 @@ class View:
 
 @dataclass(frozen=True, kw_only=True)
 class HandEye:
-    """Where the camera is, and how well the views agree on it.
+    """Pose of the camera, and the residuals of the views.
 
     Attributes:
         T_base_camera: The camera's optical frame in the base.
@@ -88,7 +88,7 @@ class HandEye:
 
 
 def solve_hand_eye(board: Board, views: Sequence[View]) -> HandEye:
-    """Where the camera is in the base.
+    """Estimates the pose of the camera in the base.
 
     Raises:
         BadCalibrationSet: Too few views with the board, too little tilt, a board too small in the image,

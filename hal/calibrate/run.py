@@ -1,18 +1,17 @@
-"""Program: find out where the camera is. Run ``python -m hal.calibrate --help``."""
+"""Program: hand-eye calibration of a camera. Run ``python -m hal.calibrate --help``."""
 
 from __future__ import annotations
 
 import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import tyro
-from pydantic import Field
 
 from hal.calibrate.board_print import print_board
 from hal.calibrate.board_views import Picture, picture_paths, read_picture, take_pictures, write_picture
-from hal.calibrate.hand_eye import MIN_VIEWS, BadCalibrationSet, solve_hand_eye
+from hal.calibrate.config import CalibrateConfig
+from hal.calibrate.hand_eye import BadCalibrationSet, solve_hand_eye
 from hal.calibrate.report import (
     DepthOffset,
     depth_offset,
@@ -26,14 +25,14 @@ from hal.cell import Cell, Workspace
 from hal.charuco import Board
 from hal.open_cell import cell_from_values, cell_from_yaml
 from hal.table import fit_table
-from mskgrasp.core.config import Config, read_config, read_yaml, write_config
+from mskgrasp.core.config import read_config, read_yaml, write_config
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.options import parse
 
-DESCRIPTION = """Finds out where the camera over the table is, with a ChArUco board held by the gripper.
+DESCRIPTION = """Estimates the pose of the camera over the table with a ChArUco board held by the gripper.
 
 Print the board with --print-board board.pdf. The arm closes its fingers on the board, shows it to the camera
 from many sides, and brings it back; keep a hand on the emergency stop. Ctrl-C stops the arm, and the pictures
@@ -45,47 +44,7 @@ _MARGIN = 0.01
 _PLATE = 0.02
 """Distance of the pads on the handle of the simulated board, metres."""
 LOOKING_DOWN = np.array([0.0, 1.0, -1.0, 0.0]) / np.sqrt(2)
-"""Quaternion wxyz of a camera that looks straight down, the top of its image away from the base."""
-
-
-class CalibrateConfig(Config):
-    """Settings of one calibration."""
-
-    cell: Path | None = None
-    """YAML file of the cell, for example configs/cells/panda_kinect2.yaml."""
-    out: Path = Path("out/calibration")
-    """Folder for the calibration and the pictures; one calibration, one folder."""
-    source: Annotated[Path | None, tyro.conf.arg(name="from")] = None
-    """Solve again from the pictures in this folder; no arm and no camera is needed."""
-    print_board: Path | None = None
-    """Only write the board for printing to this file, .pdf or .png, at its true size."""
-    board: Board = Board()
-    """The board, as it was printed and measured."""
-    poses: int = Field(default=24, ge=MIN_VIEWS, le=200)
-    """Pictures of the board to take."""
-    tilt_deg: float = Field(default=30.0, ge=10, le=50)
-    """Greatest tilt of the board against the camera's line of sight, degrees."""
-    board_at: tuple[float, float, float] = (0.16, 0.0, 0.0)
-    """Middle of the board in the tcp frame, m, to 1 cm: x across the thin side of the hand, z out of it."""
-    board_turn_deg: float = Field(default=0.0, ge=-180, le=180)
-    """Turn of the board about the hand's axis; 0: x as printed is the hand's x, print to the wrist."""
-    nearest: float = Field(default=0.5, ge=0.2, le=2)
-    """The board stays at least this far from the camera, m; a Kinect v2 sees nothing nearer than 0.5 m."""
-    speed: float = Field(default=0.1, gt=0, le=0.5)
-    """Of the hand, m/s; the cell file may allow less."""
-    settle_s: float = Field(default=0.5, ge=0, le=10)
-    """Rest before each picture, s."""
-    camera_at: tuple[float, float, float] | None = None
-    """Where the camera is, measured by tape, base frame, m: needed where there is no calibration file yet."""
-    seed: int = Field(default=0, ge=0)
-    """The poses follow from it."""
-
-    def T_tcp_board(self) -> Pose:
-        """How the board is held, about."""
-        half = np.radians(self.board_turn_deg) / 2
-        return Pose(
-            position=np.array(self.board_at), quat_wxyz=np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
-        )
+"""Quaternion wxyz of a camera that points straight down, the top of its image away from the base."""
 
 
 def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
@@ -137,7 +96,7 @@ def solve(config: CalibrateConfig, folder: Path, board: Board, workspace: Worksp
         The result, line by line.
 
     Raises:
-        BadCalibrationSet: The pictures do not determine where the camera is.
+        BadCalibrationSet: The pictures do not determine the camera's pose.
         UsageError: There are no pictures, they are damaged, or from several cameras.
     """
     paths = picture_paths(folder)
@@ -191,7 +150,7 @@ def _with_camera_at(values: dict[str, Any], config: CalibrateConfig, cell_file: 
     if not isinstance(camera, dict) or "calibration" not in camera:
         if config.camera_at is None:
             return values
-        cell_from_values(values, cell_file)  # what is wrong with the file itself is told first
+        cell_from_values(values, cell_file)  # faults of the file itself are reported first
         raise UsageError(
             f"--camera-at is for a camera with a calibration file; that of {cell_file} knows where it is"
         )
@@ -243,7 +202,7 @@ def _ask(prompt: str) -> None:
     try:
         input(prompt + " ")
     except EOFError:
-        raise UsageError("somebody must put the board into the hand; run this in a terminal") from None
+        raise UsageError("an operator must put the board into the hand; run this in a terminal") from None
 
 
 def _now() -> str:

@@ -1,4 +1,4 @@
-"""What can be wrong with a cell, each checked by one function that says how to mend it."""
+"""Checks of a cell, one function each; every finding names the remedy."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ Level = Literal["ok", "warn", "fail"]
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """One line of the doctor's.
+    """Result of one check.
 
     Attributes:
-        level: Whether the cell can be used like this.
-        subject: What was looked at.
-        text: What was found and, where it is not good, how to mend it.
+        level: Whether the cell is usable.
+        subject: Subject of the check.
+        text: Finding and, unless ok, the remedy.
     """
 
     level: Level
@@ -59,7 +59,7 @@ _RMS_OK = (0.005, np.radians(3.0))  # of single pictures: a flat board seen alon
 _ENOUGH_POSES = 12
 _N_FRAMES = 10
 _STEP = 0.03
-"""How far a joint is moved to see whether it arrives, radians."""
+"""Step by which each joint is moved, radians."""
 
 
 # ---------------------------------------------------------------------- without any device
@@ -109,7 +109,7 @@ def _driver_fits(name: str, package: str, version: str, settings: dict[str, Any]
 
 
 def check_disk(folder: Path) -> Finding:
-    """Whether datasets and recordings find room."""
+    """Whether the disk has room for datasets and recordings."""
     free = shutil.disk_usage(folder).free
     if free < _LOW_DISK:
         return Finding(
@@ -119,7 +119,7 @@ def check_disk(folder: Path) -> Finding:
 
 
 def check_renderer() -> Finding:
-    """Whether the simulated camera can draw."""
+    """Whether the simulated camera can render."""
     from tasks.scene.renderer import NoRenderer, render_backend
 
     try:
@@ -129,7 +129,7 @@ def check_renderer() -> Finding:
 
 
 def check_calibration(values: dict[str, Any], cell_file: Path, workspace: Workspace) -> Finding | None:
-    """Whether the calibration file is there, good and plausible; None where the camera needs none."""
+    """Whether the calibration file exists, is accurate and plausible; None if the camera needs none."""
     camera = values.get("camera")
     if not isinstance(camera, dict) or "calibration" not in camera:
         return None
@@ -142,7 +142,7 @@ def check_calibration(values: dict[str, Any], cell_file: Path, workspace: Worksp
 
 
 def judge_calibration(calibration: Calibration, path: Path, workspace: Workspace) -> Finding:
-    """Whether a calibration can be true."""
+    """Whether a calibration is plausible."""
     problem = implausible(calibration.T_base_camera, workspace)
     if problem:
         return Finding(
@@ -172,7 +172,7 @@ def judge_calibration(calibration: Calibration, path: Path, workspace: Workspace
 
 
 def implausible(T_base_camera: Pose, workspace: Workspace) -> str:
-    """Why a camera over the table cannot be there; empty where it can."""
+    """Reason why a camera pose is implausible; empty if it is plausible."""
     x, y, z = np.asarray(T_base_camera.position, dtype=np.float64)
     height = z - workspace.table_z
     if not 0.3 <= height <= 3.0:
@@ -191,7 +191,7 @@ def implausible(T_base_camera: Pose, workspace: Workspace) -> str:
 
 
 def check_arm(arm: Arm, connect_s: float) -> Iterator[Finding]:
-    """Whether the connected arm answers, and where it is."""
+    """Whether the connected arm answers, and its state."""
     before = time.monotonic()
     state = arm.state()
     took = time.monotonic() - before
@@ -233,7 +233,7 @@ def check_reach(arm: Arm, workspace: Workspace) -> Finding:
 
 
 def check_motion(arm: Arm) -> Iterator[Finding]:
-    """Moves every joint a little and back, and the fingers: does it arrive, and how exactly?"""
+    """Moves every joint by a small step and back, and the fingers, and reports the errors."""
     start = arm.state().joints
     try:
         target = start + _STEP
@@ -275,7 +275,7 @@ def check_motion(arm: Arm) -> Iterator[Finding]:
 
 
 def check_stream(camera: Camera, frames: list[RgbdFrame], *, timeout_s: float = 5.0) -> Iterator[Finding]:
-    """Takes frames, which are appended to ``frames``: how fast, how fresh, how complete?"""
+    """Takes frames, which are appended to ``frames``: reports their rate, age and completeness."""
     ages = []
     try:
         camera.capture(timeout_s=timeout_s)  # the first may take its time
@@ -304,7 +304,7 @@ def check_stream(camera: Camera, frames: list[RgbdFrame], *, timeout_s: float = 
 
 
 def check_view(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
-    """Whether the camera sees the region whole, up to the height of a lift."""
+    """Whether the camera sees the whole region, up to the height of a lift."""
     problem = implausible(frame.T_base_camera, workspace)
     if problem:
         yield Finding(
@@ -328,7 +328,7 @@ def check_view(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
 
 
 def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
-    """Whether the table in the depth image is where the cell file says."""
+    """Whether the table in the depth image is at the height that the cell file states."""
     plane = fit_table(frame.depth, frame.intrinsics, frame.T_base_camera, workspace.region, workspace.table_z)
     if plane is None:
         yield Finding(
@@ -354,7 +354,7 @@ def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
         yield Finding(
             level="fail",
             subject="table",
-            text=f"{said}: no part is looked for where the table seems that far off; touch the table with "
+            text=f"{said}: parts are not detected with an error this large; touch the table with "
             f"closed fingers: if table_z holds, add {off:+.4f} to camera.depth_offset (the camera measures "
             f"{'short' if off > 0 else 'too far'}), else correct table_z",
         )
@@ -369,7 +369,7 @@ def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
 
 
 def attempt(subject: str, action: Any) -> Finding | None:
-    """Runs something that may fail; the failure as a finding."""
+    """Runs an action; returns its failure as a finding."""
     try:
         action()
     except MskgraspError as error:

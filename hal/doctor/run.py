@@ -1,4 +1,4 @@
-"""Program: what is wrong with a cell, and how to mend it. Run ``python -m hal.doctor --help``."""
+"""Program: diagnosis of a cell. Run ``python -m hal.doctor --help``."""
 
 from __future__ import annotations
 
@@ -24,35 +24,27 @@ from hal.doctor.checks import (
     check_table,
     check_view,
 )
+from hal.doctor.config import DoctorConfig
 from hal.open_cell import cell_from_values
-from mskgrasp.core.config import Config, read_yaml
+from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.runtime.options import parse
 
-DESCRIPTION = """Looks a cell over and prints one line for each thing: ok, warn or fail, and how to mend it.
+DESCRIPTION = """Checks a cell and prints one line a check: ok, warn or fail, and the remedy.
 
 Drivers, connection, camera stream, calibration, workspace, the table's height in the depth image. Nothing
-moves without --move. Ends with 0 where nothing failed, with 1 otherwise."""
-
-
-class DoctorConfig(Config):
-    """Settings of one examination."""
-
-    cell: Path
-    """YAML file of the cell, for example configs/cells/panda_kinect2.yaml."""
-    move: bool = False
-    """Also move every joint by 0.03 rad and back, and the fingers (they drop what they hold)."""
+moves without --move. The exit code is 0 if nothing failed, else 1."""
 
 
 def examine(path: Path, *, move: bool) -> Iterator[Finding]:
-    """Everything that is found, as it is found.
+    """Findings of all checks, as they are made.
 
     Args:
         path: The cell file.
-        move: Also move the arm a little.
+        move: Also move the arm by small steps.
 
     Raises:
-        BadConfig: The file cannot be read at all.
+        BadConfig: The file cannot be read.
     """
     values = read_yaml(path)
     yield from check_drivers(values)
@@ -69,26 +61,26 @@ def examine(path: Path, *, move: bool) -> Iterator[Finding]:
     if calibration is not None:
         yield calibration
     if _driver(values, "arm") == "replay":
-        yield Finding(level="ok", subject="workspace", text="not checked: a recorded arm goes where it went")
+        yield Finding(level="ok", subject="workspace", text="not checked: a recorded arm repeats its motions")
     else:
         yield check_reach(cell.arm, cell.workspace)
-    with contextlib.ExitStack() as opened:
-        opened.callback(cell.camera.close)
-        yield from _look(cell)
-        opened.callback(cell.arm.close)
+    with contextlib.ExitStack() as devices:
+        devices.callback(cell.camera.close)
+        yield from _check_camera(cell)
+        devices.callback(cell.arm.close)
         begin = time.monotonic()
         failed = attempt("arm", cell.arm.connect)
         if failed is not None:
             yield failed
             if move:
-                yield Finding(level="fail", subject="motion", text="not tried: there is no arm")
+                yield Finding(level="fail", subject="motion", text="not checked: the arm is not connected")
             return
         yield from check_arm(cell.arm, time.monotonic() - begin)
         if move:
             yield from check_motion(cell.arm)
 
 
-def _look(cell: Cell) -> Iterator[Finding]:
+def _check_camera(cell: Cell) -> Iterator[Finding]:
     failed = attempt("camera", cell.camera.connect)
     frames: list[RgbdFrame] = []
     if failed is None:
@@ -97,7 +89,7 @@ def _look(cell: Cell) -> Iterator[Finding]:
         yield failed
     if not frames:
         yield Finding(
-            level="warn", subject="table", text="not looked at, there is no picture: mend the camera first"
+            level="warn", subject="table", text="not checked, there is no image: repair the camera first"
         )
         return
     yield from check_view(frames[-1], cell.workspace)
@@ -110,7 +102,7 @@ def _driver(values: dict[str, Any], section: str) -> Any:
 
 
 def main() -> int:
-    """Examines and prints."""
+    """Checks the cell and prints the findings."""
     config = parse(DoctorConfig, prog="python -m hal.doctor", description=DESCRIPTION)
     counts = dict.fromkeys(("ok", "warn", "fail"), 0)
     for finding in examine(config.cell, move=config.move):

@@ -1,4 +1,4 @@
-"""Franka arms, Panda and FR3, driven by franky or by panda_py; neither is imported before it connects."""
+"""Franka arms, Panda and FR3, driven by franky or panda_py, which are imported in a process of their own."""
 
 from hal.franka.arm import FrankaArm
 from hal.franka.config import FrankaArmConfig, FrankyArmConfig, PandaPyArmConfig

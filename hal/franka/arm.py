@@ -1,4 +1,4 @@
-"""A Panda or FR3 with the Franka Hand behind the interface of an arm, whichever driver moves it."""
+"""Arm backend for a Panda or FR3 with the Franka Hand, on either driver."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ from mskgrasp.core.panda_kinematics import forward_pose, reachable
 TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
 _GRIPPER_S = 10.0
-"""Homing, and what the hand takes besides its way, are over in this, s."""
+"""Time limit of homing, and of a gripper command beyond its motion, s."""
 _RECOVERY_S = 2.0
-"""The robot's mode may follow its recovery this much later, s."""
+"""The robot's mode may lag behind its recovery by this, s."""
 _STILL_WIDTH = 1e-4
 _STILL_JOINT, _STANDING_S = 1e-4, 0.4
-"""An arm that comes by less than so many radians nearer to its goal in so many seconds has arrived there."""
+"""An arm that approaches its goal by less than this angle, rad, in this time, s, is at rest."""
 _POLL_S = 0.05
 _TRIES = 3
-"""Ruckig, which franky uses, was seen to find no trajectory on one path in a thousand."""
+"""Attempts at a motion: Ruckig, which franky uses, finds no trajectory on one path in a thousand."""
 
 
 class FrankaArm(Arm):
-    """Moves the arm through a driver in a process of its own; nothing recovers by itself.
+    """Moves the arm through a driver in a process of its own; nothing recovers automatically.
 
     Args:
-        config: Which driver, which robot, how fast, how firm.
-        limits: What every command is checked against.
+        config: Driver, robot, speeds and forces.
+        limits: Limits of every command.
     """
 
     def __init__(self, config: FrankyArmConfig | PandaPyArmConfig, limits: ArmLimits):
@@ -153,7 +153,7 @@ class FrankaArm(Arm):
         )
 
     def _travel(self, path_from: Callable[[np.ndarray], JointPath]) -> None:
-        """Follows a path from joints (7,); from where the arm then stands, where its driver found no way."""
+        """Follows a path from the current joints (7,); plans again if the driver finds no trajectory."""
         for left in reversed(range(_TRIES)):
             path = path_from(np.array(self._ready().joints))
             try:
@@ -163,7 +163,7 @@ class FrankaArm(Arm):
                     raise
 
     def _stand_still(self) -> DriverState:
-        """Waits until the arm stands, or might by now; what is measured then."""
+        """Waits until the arm is at rest or the time is over; returns the last state."""
         state, deadline = self._measure(), time.monotonic() + self._config.settle_s
         while time.monotonic() < deadline:
             time.sleep(_STANDING_S)
@@ -173,7 +173,7 @@ class FrankaArm(Arm):
         return state
 
     def _follow(self, path: JointPath) -> None:
-        # A motion that its driver neither ends nor fails in several times its duration hangs.
+        # A driver that takes several times the duration of a motion hangs.
         timeout_s = 4 * path.duration_s + self._config.settle_s + self._config.patience_s
         values = {name: array.tolist() for name, array in asdict(path).items()}
         try:
@@ -182,8 +182,8 @@ class FrankaArm(Arm):
             self._raise_aborted(error)
         goal = path.joints[-1]
         deadline = time.monotonic() + self._config.settle_s
-        # Nearer than the base class asks for, so that its check does not depend on the moment; an arm that
-        # comes no nearer stands as near as it gets.
+        # Closer than the base class requires, so that its check has a margin; an arm that approaches no
+        # further is as close as it gets.
         nearest, since = math.inf, time.monotonic()
         while (error := np.abs(np.array(self._measure().joints) - goal).max()) > JOINT_TOLERANCE / 4:
             now = time.monotonic()
@@ -199,12 +199,12 @@ class FrankaArm(Arm):
             self._ready()
 
     def _halt(self) -> None:
-        # The motion in progress reports what came of it; a link that is gone has stopped the robot.
+        # The motion in progress reports its own outcome; a lost link has stopped the robot.
         with contextlib.suppress(HalError):
             self._ask("stop", timeout_s=self._config.patience_s)
 
     def _recover(self) -> None:
-        # Not waited for: a release must not set an arm in motion whose program was recovering meanwhile.
+        # Does not wait for the release: it must not start a motion of a program that is recovering.
         state = self._measure()
         if state.mode == "user_stopped":
             self._refuse(state)
@@ -217,7 +217,7 @@ class FrankaArm(Arm):
         self._refuse_unless_idle(state)
 
     def _ready(self) -> DriverState:
-        """A fresh state of an arm that may move: the drivers themselves would recover silently."""
+        """Current state, refused unless the robot is idle: the drivers themselves would recover silently."""
         state = self._measure()
         self._refuse_unless_idle(state)
         return state
@@ -230,10 +230,10 @@ class FrankaArm(Arm):
         remedies = {
             "user_stopped": "release the user stop (external activation device)",
             "guiding": "let go of the guiding button",
-            "reflex": "free the arm and look at it",
+            "reflex": "free the arm and check it",
         }
         errors = f" with {state.errors}" if state.errors not in ("", "[]") else ""
-        remedy = remedies.get(state.mode, "look at Desk")
+        remedy = remedies.get(state.mode, "see Desk")
         raise NeedsRecovery(
             f"the robot is in mode {state.mode}{errors}, not idle: {remedy}, then call recover()"
         )
@@ -259,7 +259,7 @@ class FrankaArm(Arm):
 
     def _move_gripper(self, width: float) -> None:
         # Homing finds a greatest width some tenths of a millimetre off the datasheet's 80 mm; the hand
-        # refuses more than it found.
+        # refuses anything wider.
         target = min(width, self._homed().max_width)
         try:
             self._ask(
@@ -282,13 +282,13 @@ class FrankaArm(Arm):
                 force=force,
             )
         except MotionAborted:
-            # "Command failed!" and "Command aborted!" are how some firmware reports that it met nothing.
+            # "Command failed!" and "Command aborted!" are how some firmware reports an empty grasp.
             gripped = False
         width = self._still_width()
         return GraspOutcome(width=width, holding=bool(gripped) and width > self._config.closed_width)
 
     def _still_width(self) -> float:
-        """The width once the fingers are at rest; the hand reports success a moment before."""
+        """Width once the fingers are at rest; the hand reports success slightly earlier."""
         deadline = time.monotonic() + self._config.settle_s
         width, quiet = self._measure().width, 0
         while quiet < 2 and time.monotonic() < deadline and not self._stop.is_set():

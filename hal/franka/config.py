@@ -1,4 +1,4 @@
-"""What a cell's file says about a Franka arm."""
+"""Configuration of a Franka arm."""
 
 from __future__ import annotations
 
@@ -27,47 +27,47 @@ JOINT_SPEED = np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61])
 
 
 class FrankaArmConfig(Config):
-    """Settings of a Panda or FR3 with the Franka Hand; the defaults are meant for a first day."""
+    """Settings of a Panda or FR3 with the Franka Hand; the defaults are cautious."""
 
     host: str = Field(min_length=1)
-    """Name or address of the robot's control, as in Desk."""
+    """Host name or address of the robot's controller, as in Desk."""
     robot: Robot = "panda"
-    """Whose joint limits hold."""
+    """Model, which decides the joint limits."""
     joint_margin: float = Field(default=0.05, ge=0, le=0.5)
-    """The arm keeps this far from its joint limits, rad."""
+    """Margin to the joint limits, rad."""
     max_speed: float = Field(default=0.25, gt=0, le=1.0)
-    """The TCP is never faster on a straight line, whatever a program asks for, m/s."""
+    """Greatest speed of the TCP on a straight line, also if a program requests more, m/s."""
     max_joint_speed: float = Field(default=0.3, gt=0, le=1.0)
-    """No joint is ever faster, as a share of its greatest speed."""
+    """Greatest joint speed, as a fraction of the joint's limit."""
     acceleration: float = Field(default=1.0, gt=0, le=5.0)
     """Of the TCP on a straight line, m/s^2."""
     joint_acceleration: float = Field(default=2.0, gt=0, le=7.5)
     """Of each joint, and of the hand's turn, rad/s^2."""
     contact_torque: float = Field(default=20.0, gt=0, le=80)
-    """Torque from outside on a joint that stops the arm by the robot's own reflex, N m."""
+    """External torque on a joint at which the robot's reflex stops the arm, N m."""
     contact_force: float = Field(default=20.0, gt=0, le=80)
-    """Force at the TCP that does the same, N."""
+    """External force at the TCP at which the reflex stops the arm, N."""
     max_grasp_force: float = Field(default=40.0, gt=0, le=70)
-    """Greatest grip, N (Franka Hand: 70 N continuously)."""
+    """Greatest gripper force, N (Franka Hand: 70 N continuously)."""
     gripper_speed: float = Field(default=0.05, gt=0, le=0.1)
     """Of the pads, m/s."""
     closed_width: float = Field(default=1e-3, ge=0, le=0.01)
-    """Pads that report this distance or less hold nothing, m."""
+    """Pads at this distance or less hold nothing, m."""
     connect_timeout_s: float = Field(default=10.0, gt=0, le=120)
-    """A robot that another program holds never answers: given up after this, s."""
+    """Time a robot has to accept the connection, s; one that another program holds never answers."""
     patience_s: float = Field(default=5.0, ge=1, le=120)
-    """A driver whose answer is overdue by this hangs, and is ended, s."""
+    """A driver whose answer is overdue by this is killed, s."""
     settle_s: float = Field(default=1.5, gt=0, le=10)
-    """The arm may take this long to come to rest at a goal, s."""
+    """Time the arm has to come to rest at a goal, s."""
     realtime: bool = False
-    """Insist on real-time scheduling: true on a PREEMPT_RT kernel, false elsewhere."""
+    """Require real-time scheduling: true on a PREEMPT_RT kernel, false elsewhere."""
 
     def joint_lower(self) -> np.ndarray:
-        """(7,) radians, the margin taken off."""
+        """(7,) radians, less the margin."""
         return np.array(_JOINT_LOWER[self.robot]) + self.joint_margin
 
     def joint_upper(self) -> np.ndarray:
-        """(7,) radians, the margin taken off."""
+        """(7,) radians, less the margin."""
         return np.array(_JOINT_UPPER[self.robot]) - self.joint_margin
 
 

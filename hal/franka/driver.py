@@ -1,8 +1,8 @@
-"""What the two vendor drivers have in common, and the names of what passes between the processes.
+"""Interface of the vendors' drivers, and the messages between the processes.
 
 A driver runs in a process of its own (`hal.franka.worker`), because both packages hold Python's global
-lock while they connect, and a robot that another program holds never answers: in this process that would
-freeze the whole program, Ctrl-C included. A process can be killed; the robot stops when its link closes.
+lock while they connect, and a robot that another program holds never answers: in the program's process that
+would block everything, Ctrl-C included. A process can be killed; the robot stops when its link closes.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ MODES: tuple[Mode, ...] = ("other", "idle", "move", "guiding", "reflex", "user_s
 
 @dataclass(frozen=True, kw_only=True)
 class DriverSettings:
-    """What a driver is told when it connects.
+    """Settings sent to a driver when it connects.
 
     Attributes:
         host: Name or address of the robot.
-        realtime: Insist on real-time scheduling.
+        realtime: Require real-time scheduling.
         contact_torque: (7,) N m over which a joint's reflex stops the arm.
         contact_force: N (and N m for turns) at the TCP over which the reflex stops the arm.
-        stiffness: (7,) N m/rad, of drivers that control torques themselves.
-        damping: (7,) N m s/rad, of the same.
+        stiffness: (7,) N m/rad, for drivers that control torques.
+        damping: (7,) N m s/rad, for the same drivers.
         settle_s: Greatest time to come to rest at the goal of a motion, s.
     """
 
@@ -105,7 +105,7 @@ class Driver(Protocol):
         """Acknowledges the robot's errors, and a stop.
 
         Returns:
-            False where a stopped gripper never answered: its link must be made anew.
+            False where a stopped gripper never answered: its link must be opened again.
         """
         ...
 

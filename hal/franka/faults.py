@@ -1,4 +1,4 @@
-"""What the vendors' exceptions mean: the name of one of our errors and one line.
+"""Translation of the vendors' exceptions into errors of `hal`, each in one line.
 
 libfranka's texts are matched, because panda_py raises plain ``RuntimeError`` for most faults and franky
 for some; the texts are those of libfranka 0.9.2 and 0.21.2, and the tests provoke each with the real wheel.
@@ -19,10 +19,10 @@ _NO_TRAJECTORY = "motion planner failed"
 
 
 class NoTrajectory(errors.MotionAborted):
-    """The driver's own solver gave up on a motion; the robot saw no fault."""
+    """The driver's solver found no trajectory; the robot reports no fault."""
 
 
-MESSAGES: dict[str, type[errors.HalError]] = {
+ERRORS: dict[str, type[errors.HalError]] = {
     kind.__name__: kind
     for kind in (
         errors.CommunicationLost,
@@ -34,11 +34,11 @@ MESSAGES: dict[str, type[errors.HalError]] = {
         NoTrajectory,
     )
 }
-"""The errors that may come out of a driver's process, by name."""
+"""Errors that a driver's process may raise, by name."""
 
 
 def explain(error: BaseException, driver: DriverName, host: str) -> errors.HalError:
-    """Our error for what a driver raised, one line with the remedy."""
+    """Error of `hal` for a driver's exception: one line with the remedy."""
     if isinstance(error, errors.HalError):
         return error
     text = " ".join(str(error).removeprefix("libfranka:").split())
@@ -64,4 +64,4 @@ def explain(error: BaseException, driver: DriverName, host: str) -> errors.HalEr
             "then open the cell again"
         )
     kind = NoTrajectory if _NO_TRAJECTORY in low else errors.MotionAborted
-    return kind(f"{text.rstrip('.') or name}; look at the arm, then call recover()")
+    return kind(f"{text.rstrip('.') or name}; check the arm, then call recover()")

@@ -1,7 +1,7 @@
-"""The one place where libfranka's poses become ours.
+"""Conversion of libfranka's poses.
 
 libfranka writes homogeneous matrices as 16 numbers, columns first, in metres; its Python wrappers give
-quaternions as x y z w, which are not used: a matrix has no order to mistake.
+quaternions as x y z w, which are not used: a matrix has no ambiguous order.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ def pose_from_columns(values: Sequence[float]) -> Pose:
 
 
 def check_end_effector(f_t_ee: Sequence[float]) -> None:
-    """Refuses a robot whose end effector is not the Franka Hand's: every pose would be wrong by it.
+    """Refuses a robot whose end effector is not the Franka Hand's: every pose would be wrong.
 
     Raises:
-        NotConnected: Says what is configured, and where to change it.
+        NotConnected: Names the configured end effector and where to change it.
     """
     found = matrix_from_columns(f_t_ee)
     distance = float(np.abs(found[:3, 3] - F_T_EE[:3, 3]).max())

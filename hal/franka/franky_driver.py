@@ -1,4 +1,4 @@
-"""franky behind the verbs of a driver; runs in a driver's process."""
+"""Driver on franky; runs in a driver's process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""panda_py behind the verbs of a driver; runs in a driver's process."""
+"""Driver on panda_py; runs in a driver's process."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _POLL_S = 0.02
 _OWED_S = 0.5
 _SILENCE_S = 2.0
 _CORRECTION_HZ = 4.0
-"""How fast the error that is left at the goal is taken out, 1/s: well under the arm's own time constant."""
+"""Rate of the correction at the goal, 1/s: slow against the arm's own time constant."""
 _MAX_CORRECTION = 0.05
 """Radians; more than friction and gravity explain means that something holds the arm."""
 _ARRIVED = 1e-3
 
 
-class LinkLost(RuntimeError):
-    """The robot does not answer any more."""
+class RobotSilent(RuntimeError):
+    """The robot no longer answers."""
 
 
 class PandaPyDriver:
@@ -35,7 +35,7 @@ class PandaPyDriver:
 
     The controller runs in C++ at 1 kHz; a late target here makes the arm lag, not stumble. It has no
     integral part and friction leaves an error (panda-py issue 49), so the goal is shifted slowly until the
-    arm stands where it should. ``Panda.move_to_pose`` is not used: Cartesian impedance is off by millimetres.
+    arm is at the goal. ``Panda.move_to_pose`` is not used: Cartesian impedance is off by millimetres.
     """
 
     def __init__(self) -> None:
@@ -79,7 +79,7 @@ class PandaPyDriver:
         )
 
     def move(self, path: JointPath) -> None:
-        """Follows a path, then corrects what friction has left."""
+        """Follows a path, then corrects the error that friction leaves."""
         self._check()
         controller = self._panda_py.controllers.JointPosition(
             np.array(self._settings.stiffness), np.array(self._settings.damping)
@@ -91,15 +91,15 @@ class PandaPyDriver:
             self._moving = True
         self._ticks = (0.0, time.monotonic())
         try:
-            # The robot's own clock: it knows of no pause of this process.
+            # The robot's own clock, which runs on while this process pauses.
             while (now := controller.get_time()) < path.duration_s:
                 self._check()
                 self._check_clock(now)
                 controller.set_control(wanted(now), speed(now))
                 time.sleep(_PERIOD_S)
             self._settle(controller, path.joints[-1])
-        except LinkLost:
-            raise  # whoever asks a robot that is gone to stop waits for ever
+        except RobotSilent:
+            raise  # a stop command to a robot that is gone blocks for ever
         except BaseException:
             self._end()
             raise
@@ -130,22 +130,22 @@ class PandaPyDriver:
             self._moving = False
 
     def _raise_error(self) -> None:
-        """A reflex or a lost link ends the control loop; panda_py keeps the reason until asked."""
+        """A reflex or a lost link ends the control loop; panda_py keeps the reason until then."""
         try:
             self._panda.raise_error()
         except RuntimeError as error:
             fault = explain(error, "panda_py", self._settings.host)
             if isinstance(fault, CommunicationLost):
-                raise LinkLost(str(error)) from error
+                raise RobotSilent(str(error)) from error
             raise
 
     def _check_clock(self, now: float) -> None:
-        """The robot's clock stands still with its link, before libfranka gives up and without its word."""
+        """Detects a lost link by the robot's clock, before libfranka reports it."""
         seen, when = self._ticks
         if now > seen:
             self._ticks = (now, time.monotonic())
         elif time.monotonic() - when > _SILENCE_S:
-            raise LinkLost(f"no state from the robot for {_SILENCE_S:g} s: timeout")
+            raise RobotSilent(f"no state from the robot for {_SILENCE_S:g} s: timeout")
 
     def _check(self) -> None:
         self._raise_error()
@@ -182,7 +182,7 @@ class PandaPyDriver:
         return answered
 
     def _wait(self, command: Callable[[], bool]) -> bool:
-        """Runs a command of the gripper, which stops it when asked to."""
+        """Runs a command of the gripper until it ends or `stop` is called."""
         if self._stopped.is_set():
             return False
         result: Future[bool] = Future()

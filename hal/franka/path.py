@@ -1,4 +1,4 @@
-"""Paths of the arm: joint angles over time, without speed or acceleration at their ends."""
+"""Paths of the arm: joint angles over time, minimum jerk."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ PERIOD_S = 0.05
 """Time between two knots of a path, s: a cubic between them is off by less than 0.1 mm at 0.5 m/s."""
 
 CREEP_RAD = 2e-5
-"""A joint that moves by less over a whole path stands, rad: 0.02 mm at the hand."""
+"""A joint that moves by less over a whole path is held, rad: 0.02 mm at the hand."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointPath:
-    """Knots of a motion, evenly spaced in time; the first is where the arm stands.
+    """Knots of a motion, evenly spaced in time; the first is the current position.
 
     Attributes:
         seconds: (k,) since the start.
@@ -39,10 +39,10 @@ class JointPath:
         return float(self.seconds[-1])
 
     def without_creep(self) -> JointPath:
-        """The same path with joints that move by next to nothing standing where they are.
+        """The same path with joints held that move by less than `CREEP_RAD`.
 
         A profile over a millionth of a radian is at the end of a trajectory solver's accuracy: Ruckig, which
-        franky uses, was seen to find none on such a path (-111), which aborts the motion.
+        franky uses, sometimes finds none on such a path (error -111), which aborts the motion.
         """
         still = np.ptp(self.joints, axis=0) < CREEP_RAD
         return JointPath(
@@ -84,9 +84,9 @@ def straight_path(
         turn_speed: Of the hand, rad/s at most.
         acceleration: Of the TCP, m/s^2 at most.
         turn_acceleration: Of the hand, rad/s^2 at most.
-        joint_speed: (7,) no joint is faster, rad/s; the motion takes longer instead.
+        joint_speed: (7,) greatest joint speeds, rad/s; the motion takes longer instead.
         lower: (7,) joint limits, radians.
-        upper: (7,) the others.
+        upper: (7,) joint limits, radians.
 
     Raises:
         OutOfWorkspace: The line leaves the arm's reach or its joint limits; nothing moved.
@@ -119,7 +119,7 @@ def _along(
 
 
 def _profile(seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of the way and their rate at knots: minimum jerk."""
+    """Fractions of the path and their rate at the knots: minimum jerk."""
     n = max(4, math.ceil(seconds / PERIOD_S))
     t = np.arange(n + 1) / n
     return minimum_jerk(t), minimum_jerk_rate(t) / seconds

@@ -1,4 +1,4 @@
-"""The Kinect v2 behind the interface of a camera; the vendor's package is imported in its own process."""
+"""Kinect v2 as a camera; the vendor's package is imported in a process of its own."""
 
 from hal.kinect2.camera import Kinect2Camera
 from hal.kinect2.config import Kinect2Config, PinholeIntrinsics

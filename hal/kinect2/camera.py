@@ -11,18 +11,31 @@ import numpy as np
 
 from hal.camera import Camera, RgbdFrame
 from hal.camera_calibration import Calibration, read_calibration
-from hal.errors import CaptureFailed, CommunicationLost, NotConnected
+from hal.driver_process import DriverProcess, ProcessEnded
+from hal.errors import (
+    CaptureFailed,
+    CommunicationLost,
+    DriverMissing,
+    HalError,
+    IncompatibleDriver,
+    NotConnected,
+)
 from hal.kinect2.config import Kinect2Config
 from hal.kinect2.driver import Kinect2Settings
 from hal.kinect2.images import HEIGHT, WIDTH, metric_depth, rgb_colour, unmirrored_intrinsics
-from hal.kinect2.link import ProcessEnded, WorkerLink
 from mskgrasp.core.geometry import Pose
 
 _log = logging.getLogger(__name__)
+_ERRORS: dict[str, type[HalError]] = {
+    kind.__name__: kind
+    for kind in (CaptureFailed, CommunicationLost, DriverMissing, IncompatibleDriver, NotConnected)
+}
+_EXIT_S = 3.0
+"""Time the driver has to stop the stream, s; then its process is killed."""
 _GRACE_S = 1.0
-"""The driver ends a request itself; if it has not this much later it hangs, s."""
+"""The driver ends a request itself; if it has not this much after the timeout, it hangs, s."""
 _ORPHAN_S = 3.0
-"""Where nobody is left to end a driver that hangs, it ends itself this much later, s."""
+"""A driver that hangs after its program died is ended by the kernel this much later, s."""
 
 
 class Kinect2Camera(Camera):
@@ -35,7 +48,7 @@ class Kinect2Camera(Camera):
     def __init__(self, config: Kinect2Config):
         self._config = config
         self._lock = threading.Lock()
-        self._link: WorkerLink | None = None
+        self._process: DriverProcess | None = None
         self._lost: str | None = None
         self._serial = ""
         self._intrinsics = np.eye(3)
@@ -50,7 +63,7 @@ class Kinect2Camera(Camera):
             NotConnected: No such camera, or another program holds it.
             CaptureFailed: It is open, but no frame came within ``connect_timeout_s``.
         """
-        if self._link is not None:
+        if self._process is not None:
             return
         config = self._config
         # Before the camera is opened, so that a wrong file does not cost its starting time.
@@ -64,26 +77,28 @@ class Kinect2Camera(Camera):
         )
         # Opening and starting take up to ten seconds of their own.
         opening_s = config.connect_timeout_s + 10
-        link = WorkerLink()
+        process = DriverProcess(["hal.kinect2.worker"], _ERRORS, _EXIT_S)
         try:
-            reply, _ = link.ask(
-                {"op": "connect", "settings": asdict(settings), "alarm_s": _alarm_s(opening_s)},
+            reply = process.ask(
+                "connect",
                 timeout_s=opening_s,
-            )
+                settings=asdict(settings),
+                alarm_s=_alarm_s(opening_s),
+            ).result
             self._serial = reply["serial"]
             if config.serial is None:
                 self._calibration = read_calibration(config.calibration, serial=self._serial)
         except ProcessEnded as error:
-            link.close()
+            process.close()
             name = f"camera {config.serial}" if config.serial else "the camera"
             raise NotConnected(
                 f"{name} could not be opened: {error}; end other programs that use it, check its cable, and "
                 "try again"
             ) from error
         except BaseException:
-            link.close()
+            process.close()
             raise
-        self._link, self._lost = link, None
+        self._process, self._lost = process, None
         self._intrinsics = self._choose_intrinsics(unmirrored_intrinsics(**reply["intrinsics"]))
         if config.warm_up_s > 0:
             _log.warning(
@@ -95,9 +110,9 @@ class Kinect2Camera(Camera):
     def close(self) -> None:
         """Stops the stream and releases the camera, once a capture of another thread is over."""
         with self._lock:
-            if self._link is not None:
-                link, self._link = self._link, None
-                link.close()
+            if self._process is not None:
+                process, self._process = self._process, None
+                process.close()
 
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
         """Takes a frame that is exposed after this call.
@@ -108,7 +123,7 @@ class Kinect2Camera(Camera):
             CommunicationLost: The camera was unplugged, or its driver crashed or hung; open it again.
         """
         with self._lock:
-            if self._link is None or self._calibration is None:
+            if self._process is None or self._calibration is None:
                 raise NotConnected("Kinect2Camera is not connected; use it inside its context (with ...)")
             if self._lost is not None:
                 raise CommunicationLost(self._lost)
@@ -116,10 +131,11 @@ class Kinect2Camera(Camera):
                 raise CaptureFailed(f"timeout {timeout_s:g} s is outside 0 .. 3600 s")
             n_pixels = WIDTH * HEIGHT
             try:
-                reply, data = self._link.ask(
-                    {"op": "capture", "timeout_s": timeout_s, "alarm_s": _alarm_s(timeout_s)},
+                answer = self._process.ask(
+                    "capture",
                     timeout_s=timeout_s + _GRACE_S,
-                    n_bytes=8 * n_pixels,
+                    capture_timeout_s=timeout_s,
+                    alarm_s=_alarm_s(timeout_s),
                 )
             except ProcessEnded as error:
                 self._lost = f"camera {self._serial} was lost: {error}; open the cell again"
@@ -127,6 +143,7 @@ class Kinect2Camera(Camera):
             except CommunicationLost as error:
                 self._lost = str(error)
                 raise
+        data = answer.payload[0]
         depth = metric_depth(
             np.frombuffer(data, np.float32, n_pixels).reshape(HEIGHT, WIDTH), self._config.depth_offset
         )
@@ -143,7 +160,7 @@ class Kinect2Camera(Camera):
             depth=depth,
             intrinsics=self._intrinsics.copy(),
             T_base_camera=Pose.from_vector(self._calibration.T_base_camera.as_vector()),
-            timestamp_s=reply["exposed_s"],
+            timestamp_s=answer.result["exposed_s"],
             serial=self._serial,
         )
 

@@ -1,4 +1,4 @@
-"""What a cell's file says about a Kinect v2."""
+"""Configuration of a Kinect v2."""
 
 from __future__ import annotations
 
@@ -46,20 +46,20 @@ class Kinect2Config(Config):
     calibration: Path
     """File with T_base_camera, as hal.calibrate writes it."""
     serial: Serial | None = None
-    """Which camera, in quotes; may be left away where only one is connected."""
+    """Serial number, in quotes; optional if only one camera is connected."""
     pipeline: Pipeline = "cpu"
-    """What decodes the depth. OpenCL and CUDA mark a bad frame with a status that pylibfreenect2 hides."""
+    """Decoder of depth. OpenCL and CUDA mark a bad frame with a status that pylibfreenect2 hides."""
     depth_offset: float = Field(default=0.0, ge=-0.1, le=0.1)
-    """Added to every depth, m; Kinects measure some 0.02 to 0.03 m too far, each by its own constant."""
+    """Added to every depth, m; Kinects measure some 0.02 to 0.03 m too far, each by a constant of its own."""
     intrinsics: dict[Serial, PinholeIntrinsics] = {}
-    """By serial; goes before those of the calibration file, which go before the factory's."""
+    """By serial; override those of the calibration file, which override the factory's."""
     warm_up_s: float = Field(default=1200.0, ge=0)
-    """How long the depth drifts once the camera streams, s; said when it starts. 0 says nothing."""
+    """Time for which the depth drifts once the camera streams, s, for a warning at the start; 0: none."""
     latency_s: float = Field(default=0.1, gt=0, le=1.0)
-    """A frame is never longer on its way from the exposure to here, s; one that was counts as late."""
+    """Greatest time from a frame's exposure to its arrival, s; a slower frame counts as late."""
     max_skew_s: float = Field(default=0.1, gt=0)
-    """Colour and depth of a frame are exposed at most this far apart, s."""
+    """Greatest time between the exposures of colour and depth of a frame, s."""
     min_valid: float = Field(default=0.05, gt=0, le=1.0)
-    """A depth image with a smaller share of valid pixels is no frame."""
+    """Least fraction of valid pixels in a depth image."""
     connect_timeout_s: float = Field(default=20.0, gt=0, le=120)
-    """How long the camera may take from opening to its first frame, s."""
+    """Time the camera has from opening to its first frame, s."""

@@ -1,4 +1,4 @@
-"""pylibfreenect2 in its own process: opens the camera without crashing, and hands out fresh frames."""
+"""Driver of a Kinect v2 on pylibfreenect2: opens the camera without crashing and returns fresh frames."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ _NAMES = {
     "CpuPacketPipeline", "Frame", "FrameType", "Freenect2", "Registration", "SyncMultiFrameListener",
 }  # fmt: skip
 _SLICE_S = 0.2
-"""How long one call into the driver may wait, s."""
+"""Longest wait of one call into the vendor's driver, s."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Kinect2Settings:
-    """What the driver's process is told.
+    """Settings sent to the driver's process.
 
     Attributes:
-        serial: Which camera; None for the only one.
-        pipeline: What decodes the depth.
-        latency_s: A frame is never longer on its way, s.
-        max_skew_s: Colour and depth are exposed at most this far apart, s.
-        timeout_s: How long the camera may take from opening to its first frame, s.
+        serial: Serial number; None for the only camera.
+        pipeline: Decoder of depth.
+        latency_s: Greatest delay from exposure to arrival, s.
+        max_skew_s: Greatest time between the exposures of colour and depth, s.
+        timeout_s: Time the camera has from opening to its first frame, s.
     """
 
     serial: str | None
@@ -45,12 +45,12 @@ class Kinect2Settings:
 
 @dataclass(frozen=True, kw_only=True)
 class RawFrame:
-    """Copies of what the driver delivered, mirrored as it comes.
+    """Copies of the images that libfreenect2 delivered, mirrored.
 
     Attributes:
         depth_mm: (424, 512) float32, undistorted.
         colour_bgrx: (424, 512, 4) uint8, registered to depth.
-        exposed_s: Exposed then or later, monotonic clock, s.
+        exposed_s: Earliest time of the exposure, monotonic clock, s.
     """
 
     depth_mm: np.ndarray
@@ -62,7 +62,7 @@ class Kinect2Driver:
     """An open, streaming Kinect v2.
 
     Args:
-        settings: Which camera, and what a good frame is.
+        settings: Which camera, and the bounds of a valid frame.
 
     Raises:
         DriverMissing: pylibfreenect2 cannot be imported.
@@ -94,7 +94,7 @@ class Kinect2Driver:
         self._registered = self._vendor.Frame(WIDTH, HEIGHT, 4)
 
     def capture(self, timeout_s: float) -> RawFrame:
-        """A frame that was exposed after this call.
+        """Captures a frame exposed after this call.
 
         Raises:
             CaptureFailed: None came in time.
@@ -119,7 +119,7 @@ class Kinect2Driver:
         self._explain(timeout_s, refused)
 
     def _read(self, frames: Any, asked_s: float) -> RawFrame | str:
-        """The frame, or why it is none; empty where only the next one can be exposed late enough."""
+        """The frame, or why it is refused; empty if it was exposed before the request."""
         arrived_s = time.monotonic()
         depth, colour = frames["depth"], frames["color"]
         if not self._clock.advance_s(depth.timestamp) > 0:

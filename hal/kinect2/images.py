@@ -1,4 +1,4 @@
-"""From libfreenect2's images to those of `hal.camera.RgbdFrame`: pure functions."""
+"""Conversion of libfreenect2's images to those of `hal.camera.RgbdFrame`. Pure functions."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ WIDTH, HEIGHT = 512, 424
 
 
 def metric_depth(undistorted_mm: np.ndarray, offset_m: float) -> np.ndarray:
-    """Depth in metres, not mirrored, NaN where libfreenect2 measured nothing.
+    """Depth in metres, not mirrored, NaN where invalid.
 
     Args:
         undistorted_mm: (424, 512) float32; zero, negative, NaN and infinity are invalid.
-        offset_m: Added to what is valid.
+        offset_m: Added to valid depths.
     """
     flipped = undistorted_mm[:, ::-1]  # libfreenect2's images are mirrored (its issue 172)
     valid = np.isfinite(flipped) & (flipped > 0)

@@ -1,4 +1,4 @@
-"""Recordings of cells, and cells that play them back: a run at the cell, debugged at a desk."""
+"""Recordings of cells and cells that replay them, for debugging a run away from the cell."""
 
 from hal.replay.arm import ReplayArm
 from hal.replay.camera import ReplayCamera

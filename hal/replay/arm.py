@@ -1,4 +1,4 @@
-"""An arm that answers as the recorded one did."""
+"""Arm that replays a recording."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from mskgrasp.core.geometry import Pose
 
 
 class ReplayArm(Arm):
-    """Compares each command with the recorded one and gives the recorded answer, errors included.
+    """Compares each command with the recorded one and returns the recorded answer, errors included.
 
-    A command that differs by more than the tolerances is refused (`NotRecorded`): nobody knows what the
+    A command that differs by more than the tolerances is refused (`NotRecorded`): it is unknown what the
     arm would have done. What the recorded arm checked, it checked then; nothing moves here.
 
     Args:
-        config: Which recording, and how exact.
+        config: Recording and tolerances.
         playback: Shared with the camera of the same recording, so that both stay in step.
 
     Raises:
-        BadRecording: The file cannot be used.
+        BadRecording: The file is missing, damaged or of another version.
     """
 
     simulated = True
@@ -89,7 +89,7 @@ class ReplayArm(Arm):
         self._replay("wait", seconds=seconds)
 
     def recover(self) -> None:
-        """Acknowledges a recorded error, or that the program did something else than was recorded."""
+        """Acknowledges a recorded error, or a command that differed from the recording."""
         self._require_connection()
         if not self._astray:
             self._step("recover", {})
@@ -100,7 +100,7 @@ class ReplayArm(Arm):
 
         Raises:
             OutOfWorkspace: It did.
-            NotRecorded: It was not asked.
+            NotRecorded: The recording holds no such call.
         """
         self._playback.same_question("check_pose", {"T_base_tcp": plain(T_base_tcp)})
 
@@ -109,7 +109,7 @@ class ReplayArm(Arm):
         following = self._playback.peek()
         error = following.error[0] if following is not None and following.error is not None else None
         if self._fault is not None and error != NeedsRecovery.__name__:
-            raise NeedsRecovery(f"the arm stopped before ({self._fault}); look at it, then call recover()")
+            raise NeedsRecovery(f"the arm stopped before ({self._fault}); check the arm, then call recover()")
         # A recorded stop ended a recorded motion; one that comes now ends this one.
         if self._stop.is_set() and error is None:
             self._fault, self._astray = "stop() was called", True
@@ -133,7 +133,7 @@ class ReplayArm(Arm):
         return self._open
 
     def _halt(self) -> None:
-        """Nothing moves."""
+        """Does nothing: nothing moves."""
 
     def _beneath(self, *_: Any, **__: Any) -> Any:
         raise AssertionError("a recording answers above the backend")

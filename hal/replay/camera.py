@@ -1,4 +1,4 @@
-"""A camera that plays back recorded frames."""
+"""Camera that replays recorded frames."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ class ReplayCamera(Camera):
     """Delivers the recorded frames one after the other, errors included.
 
     Args:
-        config: Which recording.
+        config: Recording.
         playback: Shared with the arm of the same recording, so that both stay in step.
 
     Raises:
-        BadRecording: The file cannot be used.
+        BadRecording: The file is missing, damaged or of another version.
     """
 
     def __init__(self, config: ReplayCameraConfig, playback: Playback | None = None):

@@ -1,4 +1,4 @@
-"""Cells that are recorded, and cells that are played back."""
+"""Cells that are recorded and cells that are replayed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mskgrasp.core.geometry import Pose
 
 
 def recorded_cell(cell: Cell, out: Path) -> Cell:
-    """A cell, not connected yet, on which everything that happens is written down.
+    """A cell, not connected yet, whose calls are recorded.
 
     Raises:
         UsageError: The file exists already.
@@ -35,10 +35,10 @@ def recorded_cell(cell: Cell, out: Path) -> Cell:
 
 
 def replay_cell(config: ReplayCellConfig) -> Cell:
-    """A cell that answers as the recorded one did, as long as the program does the same.
+    """A cell that replays a recording to a program that gives the same commands.
 
     Raises:
-        BadRecording: The file cannot be used.
+        BadRecording: The file is missing, damaged or of another version.
     """
     recording = read_recording(config.recording)
     playback = Playback(recording, tolerances=config.tolerances)
@@ -53,7 +53,7 @@ def replay_cell(config: ReplayCellConfig) -> Cell:
 
 
 class ReplayFeeder:
-    """Lays nothing on the table: the part lies there in the recorded frames."""
+    """Feeder of a replay: the part is already in the recorded frames."""
 
     def __init__(self, playback: Playback):
         self._playback = playback
@@ -69,7 +69,7 @@ class ReplayFeeder:
 
 
 class ReplayTracker:
-    """Knows the poses that were read at this point of the recording."""
+    """Tracker that returns the poses recorded at this point."""
 
     def __init__(self, playback: Playback):
         self._playback = playback
@@ -78,7 +78,7 @@ class ReplayTracker:
         """``T_base_obj`` as recorded.
 
         Raises:
-            NotRecorded: It was not asked for at this point.
+            NotRecorded: The recording holds no pose at this point.
         """
         event = self._playback.answer("part_pose")
         if event is None:

@@ -1,4 +1,4 @@
-"""What a cell's file says about recordings."""
+"""Configurations of recorded and replayed cells, cameras and arms."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mskgrasp.core.config import Config
 
 
 class Tolerances(Config):
-    """How far a command may be from the recorded one and still count as the same."""
+    """Greatest differences between a command and the recorded one."""
 
     position: float = Field(default=1e-3, ge=0)
     """Of the TCP, m."""
@@ -26,40 +26,40 @@ class Tolerances(Config):
 
 
 class ReplayCameraConfig(Config):
-    """A camera that plays back the frames of a recording, in their order."""
+    """A camera that replays the frames of a recording in order."""
 
     driver: Literal["replay"]
     recording: Path
     """File that hal.record wrote."""
     loop: bool = False
-    """After the last frame begin again; otherwise one more is an error."""
+    """Restart after the last frame; otherwise a further capture is an error."""
 
 
 class ReplayArmConfig(Config):
-    """An arm that answers as the recorded one did, as long as it is commanded the same."""
+    """An arm that replays a recording to the same commands."""
 
     driver: Literal["replay"]
     recording: Path
     """File that hal.record wrote."""
     tolerances: Tolerances = Tolerances()
-    """How much the same."""
+    """Greatest differences between a command and the recorded one."""
 
 
 class ReplayCellConfig(Config):
-    """A whole cell from one recording: camera, arm, table, feeder and tracker, in step with each other."""
+    """A whole cell from one recording: camera, arm, table, feeder and tracker, synchronised."""
 
     type: Literal["replay"]
     recording: Path
     """File that hal.record wrote."""
     tolerances: Tolerances = Tolerances()
-    """How far a command may be from the recorded one."""
+    """Greatest differences between a command and the recorded one."""
 
 
 class RecordedCellConfig(Config):
-    """Any other cell, with everything that happens on it written down."""
+    """Any other cell, whose calls are recorded."""
 
     type: Literal["recorded"]
     cell: Path
-    """YAML file of the cell that is used."""
+    """YAML file of the cell to record."""
     out: Path
     """The recording; must not exist yet."""

@@ -1,4 +1,4 @@
-"""One call on a cell, as plain values: what was asked, what came of it."""
+"""Calls on a cell as plain values: arguments, results, errors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Command = Literal[
 ]  # fmt: skip
 Query = Literal["state", "check_pose", "part_pose", "stop"]
 COMMANDS: tuple[str, ...] = get_args(Command)
-"""Calls that happen one after the other; what comes between them only asks."""
+"""Calls that act, in sequence; the calls between them are queries."""
 
 _ERRORS: dict[str, type[MskgraspError]] = {
     name: kind
@@ -37,13 +37,13 @@ class Event:
     """One call.
 
     Attributes:
-        call: Which.
-        arguments: What was asked, plain values; poses as x y z qw qx qy qz.
-        result: What came of it, plain values; of a capture the index of the frame.
-        error: Type and message of what was raised; None where nothing was.
-        at_s: When it was called, seconds since the recording began.
-        took_s: How long it took, s.
-        after: The arm's state after a command; None where it could not be read.
+        call: Name.
+        arguments: Plain values; poses as x y z qw qx qy qz.
+        result: Plain values; for a capture, the index of the frame.
+        error: Type and message of the raised error, or None.
+        at_s: Time of the call, seconds since the recording began.
+        took_s: Its duration, s.
+        after: The arm's state after a command; None if it could not be read.
     """
 
     call: str
@@ -56,7 +56,7 @@ class Event:
 
 
 def plain(value: Any) -> Any:
-    """Plain values of what goes in and out of a cell's verbs."""
+    """Plain values of the arguments and results of a cell's methods."""
     match value:
         case Pose():
             return np.asarray(value.as_vector(), dtype=np.float64).tolist()

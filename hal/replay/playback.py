@@ -1,4 +1,4 @@
-"""Where a recording is: which call comes next, and whether the program does the same."""
+"""Position in a recording, and comparison of the program's calls with the recorded ones."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from mskgrasp.core.geometry import pose_distance
 
 
 class Playback:
-    """Steps through the commands of a recording; questions are answered from between two commands.
+    """Steps through the commands of a recording; queries are answered from those between two commands.
 
     Args:
-        recording: What happened.
-        calls: The commands that are played back; the others are left out.
-        tolerances: How far a command may be from the recorded one.
-        loop: After the last command begin again.
+        recording: Recorded calls.
+        calls: Names of the commands to replay; others are skipped.
+        tolerances: Greatest differences between a command and the recorded one.
+        loop: Restart after the last command.
     """
 
     def __init__(
@@ -41,17 +41,17 @@ class Playback:
         self._lock = threading.Lock()
         self._users = 0
         self._next = 0
-        self._asked: dict[str, int] = {}
+        self._answered: dict[str, int] = {}
 
     def open(self) -> None:
-        """Goes to the beginning, for the first user."""
+        """Registers a user; the first one rewinds the recording."""
         with self._lock:
             if self._users == 0:
-                self._next, self._asked = 0, {}
+                self._next, self._answered = 0, {}
             self._users += 1
 
     def close(self) -> None:
-        """One user less."""
+        """Unregisters a user."""
         with self._lock:
             self._users = max(0, self._users - 1)
 
@@ -82,7 +82,7 @@ class Playback:
                     f"{_words(event.call, event.arguments)}; the program asks for {_words(call, arguments)}"
                 )
             self._next += 1
-            self._asked = {}
+            self._answered = {}
         if event.error is not None:
             raise rebuild(event.error)
         return event
@@ -95,22 +95,22 @@ class Playback:
             return self.recording.events[self._commands[self._next]]
 
     def answer(self, call: str) -> Event | None:
-        """The answer to a question at this point: those recorded in their order, then the last again."""
+        """The answer to a query at this point: those recorded in their order, then the last again."""
         with self._lock:
             events = self.recording.events
             begin, end = self._window()
             found = [event for event in events[begin:end] if event.call == call]
             if not found:
                 return None
-            index = self._asked.get(call, 0)
-            self._asked[call] = index + 1
+            index = self._answered.get(call, 0)
+            self._answered[call] = index + 1
             event = found[min(index, len(found) - 1)]
         if event.error is not None:
             raise rebuild(event.error)
         return event
 
     def last_state(self) -> dict[str, Any] | None:
-        """The latest known state of the arm before this point; None where there is none."""
+        """The latest known state of the arm before this point; None if there is none."""
         with self._lock:
             for event in reversed(self.recording.events[: self._window()[1]]):
                 if event.call == "state" and event.error is None:
@@ -120,10 +120,10 @@ class Playback:
             return None
 
     def same_question(self, call: str, arguments: dict[str, Any]) -> Event:
-        """The answer to a question that does not depend on when it is asked; raises what it raised.
+        """The answer to a query that does not depend on its time; raises what it raised.
 
         Raises:
-            NotRecorded: It was never asked.
+            NotRecorded: The recording holds no such query.
         """
         for event in self.recording.events:
             if event.call == call and self._same(event.arguments, arguments):
@@ -138,21 +138,21 @@ class Playback:
         end = self._commands[self._next] if self._next < len(self._commands) else len(self.recording.events)
         return begin, end
 
-    def _same(self, recorded: dict[str, Any], asked: dict[str, Any]) -> bool:
-        return recorded.keys() == asked.keys() and all(
-            self._same_value(key, recorded[key], asked[key]) for key in recorded
+    def _same(self, recorded: dict[str, Any], given: dict[str, Any]) -> bool:
+        return recorded.keys() == given.keys() and all(
+            self._same_value(key, recorded[key], given[key]) for key in recorded
         )
 
-    def _same_value(self, key: str, recorded: Any, asked: Any) -> bool:
+    def _same_value(self, key: str, recorded: Any, given: Any) -> bool:
         limit = self._tolerances
         if key == "T_base_tcp":
-            if not np.isfinite([*recorded, *asked]).all():
-                return bool(np.array_equal(recorded, asked, equal_nan=True))
-            distance, angle = pose_distance(pose(recorded), pose(asked))
+            if not np.isfinite([*recorded, *given]).all():
+                return bool(np.array_equal(recorded, given, equal_nan=True))
+            distance, angle = pose_distance(pose(recorded), pose(given))
             return distance <= limit.position and angle <= limit.rotation
-        if isinstance(recorded, str) or isinstance(asked, str):
-            return recorded == asked
-        one, other = np.asarray(recorded, dtype=np.float64), np.asarray(asked, dtype=np.float64)
+        if isinstance(recorded, str) or isinstance(given, str):
+            return recorded == given
+        one, other = np.asarray(recorded, dtype=np.float64), np.asarray(given, dtype=np.float64)
         allowed = {"joints": limit.joints, "width": limit.width, "seed": 0.0}.get(key, limit.other)
         return one.shape == other.shape and bool(
             np.allclose(one, other, rtol=0, atol=allowed, equal_nan=True)

@@ -1,4 +1,4 @@
-"""Reads a recording; whatever is wrong with the file is one line."""
+"""Reader of recordings; every fault of a file is an error in one line."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from hal.replay.events import KIND, SCHEMA, Event, pose
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:
-    """What happened on a cell; frames are read from the file when they are asked for.
+    """Recorded calls on a cell; frames are read from the file on demand.
 
     Attributes:
         path: The file.
-        made: When it was recorded, local time.
+        made: Time of the recording, local time.
         workspace: The cell's table.
         limits: The arm's limits.
         events: All calls, in the order in which they ended.
-        n_frames: How many frames it holds.
+        n_frames: Number of frames.
     """
 
     path: Path
@@ -62,7 +62,7 @@ class Recording:
 
 
 def read_recording(path: Path) -> Recording:
-    """Reads all of a recording but its images.
+    """Reads a recording except its images.
 
     Raises:
         BadRecording: The file is missing, damaged, no recording, or of another version.

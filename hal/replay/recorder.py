@@ -1,4 +1,4 @@
-"""Devices that pass everything on and write it down."""
+"""Devices that record the calls they pass on."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from mskgrasp.core.geometry import Pose
 
 
 class RecordingCamera(Camera):
-    """A camera whose frames are written down.
+    """A camera whose frames are recorded.
 
     Args:
-        camera: The one that takes them.
-        writer: Where they go.
+        camera: The recorded camera.
+        writer: Of the recording.
     """
 
     def __init__(self, camera: Camera, writer: RecordingWriter):
@@ -56,11 +56,11 @@ class RecordingCamera(Camera):
 
 
 class RecordingArm(Arm):
-    """An arm whose commands and answers are written down.
+    """An arm whose commands and answers are recorded.
 
     Args:
-        arm: The one that moves, and checks.
-        writer: Where they go.
+        arm: The recorded arm.
+        writer: Of the recording.
     """
 
     def __init__(self, arm: Arm, writer: RecordingWriter):
@@ -114,7 +114,7 @@ class RecordingArm(Arm):
         self._record("wait", seconds=seconds)
 
     def stop(self) -> None:
-        """See `Arm.stop`: first stopped, then written down."""
+        """See `Arm.stop`: stops first, then records."""
         self._arm.stop()
         self._writer.call("stop", {}, lambda: None)
 
@@ -147,7 +147,7 @@ class RecordingArm(Arm):
 
 
 class RecordingFeeder:
-    """A feeder whose presentations are written down."""
+    """A feeder whose presentations are recorded."""
 
     def __init__(self, feeder: PartFeeder, writer: RecordingWriter):
         self._feeder, self._writer = feeder, writer
@@ -163,7 +163,7 @@ class RecordingFeeder:
 
 
 class RecordingTracker:
-    """A tracker whose poses are written down."""
+    """A tracker whose poses are recorded."""
 
     def __init__(self, tracker: PartTracker, writer: RecordingWriter):
         self._tracker, self._writer = tracker, writer

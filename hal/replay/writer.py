@@ -1,4 +1,4 @@
-"""Writes a recording: one HDF5 file, described in docs/replay.md."""
+"""Writer of recordings, HDF5 files described in docs/replay.md."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class RecordingWriter:
         return self._path.with_name(self._path.name + ".part")
 
     def open(self) -> None:
-        """Begins the file for its first user."""
+        """Creates the file for its first user."""
         self._users += 1
         if self._file is None:
             try:
@@ -79,7 +79,7 @@ class RecordingWriter:
             self._file.flush()
 
     def close(self) -> None:
-        """Ends the file after its last user; one without any call, of a cell that did not open, goes away."""
+        """Finishes the file after its last user; deletes one without calls (the cell did not open)."""
         self._users = max(0, self._users - 1)
         if self._users == 0 and self._file is not None:
             with self._lock:
@@ -101,7 +101,7 @@ class RecordingWriter:
         result: Callable[[T], Any] = plain,
         after: Callable[[], dict[str, Any] | None] = lambda: None,
     ) -> T:
-        """Does something and writes down what came of it, an error too.
+        """Performs a call and records its result or error.
 
         Args:
             name: The verb.

@@ -1,4 +1,4 @@
-"""The simulated cell: a Panda and an overhead camera in SAPIEN, behind the interfaces of ``hal``."""
+"""The simulated cell: a Panda and an overhead camera in SAPIEN, as a backend of ``hal``."""
 
 from hal.sim.alone import SapienCameraConfig, sapien_camera
 from hal.sim.arm import SapienArm

@@ -1,4 +1,4 @@
-"""The simulated camera beside another arm: tests and dry runs of a real arm over an empty table."""
+"""Simulated camera with another arm, for tests and dry runs of a real arm over an empty table."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from mskgrasp.core.settings import Overhead, Physics, Region
 
 
 class SapienCameraConfig(Config):
-    """A rendered table with a part on it; what the arm does, the part does not notice."""
+    """A rendered table with a part on it, which the arm does not move."""
 
     driver: Literal["sapien"]
     part: str = "hex_nut_m30"
-    """What lies on the rendered table at first: a name or a folder."""
+    """First part on the rendered table: a name or a folder."""
     seed: int = Field(default=0, ge=0)
-    """Its place and turn follow from it."""
+    """Determines the position and turn of the part."""
     overhead: Overhead = Overhead()
-    """Where the camera hangs and what it sees."""
+    """Pose and optics of the camera."""
     noise: SensorNoise = SensorNoise()
-    """How it errs: off, iid (3 mm) or kinect2; see docs/sensor_noise.md."""
+    """Noise model: off, iid (3 mm) or kinect2; see docs/sensor_noise.md."""
 
 
 def sapien_camera(
     config: SapienCameraConfig, *, region: Region, home: np.ndarray
 ) -> tuple[SapienCamera, SapienWorld]:
-    """A rendered camera over the middle of a region, and its world, which lays parts on the table.
+    """A rendered camera over the middle of a region, and its world, which places parts on the table.
 
     Args:
         config: What it shows.

@@ -33,14 +33,14 @@ JOINT_ACCELERATION = 5.0
 TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
 SETTLE_S = 0.15
-"""How long the drives may settle at the end of a motion, s."""
-LOOK_S = 0.004
-"""Time between two looks at the force on a hand that moves, s."""
+"""Settling time of the drives at the end of a motion, s."""
+CHECK_S = 0.004
+"""Time between two checks of the force on a moving hand, s."""
 _WAYPOINT_M = 0.01
 
 
 class SapienArm(Arm):
-    """Moves the Panda of a `SapienWorld`; a contact force over the reflex's ends a motion."""
+    """Moves the Panda of a `SapienWorld`; a contact force over the reflex limit ends a motion."""
 
     simulated = True
 
@@ -51,13 +51,13 @@ class SapienArm(Arm):
         self._force = 0.0
 
     def connect(self) -> None:
-        """Builds the world, if the camera has not."""
+        """Builds the world unless the camera has built it."""
         if not self._open:
             self._world.open()
             self._open = True
 
     def close(self) -> None:
-        """Frees the world, if the camera has."""
+        """Frees the world unless the camera still uses it."""
         if self._open:
             self._open = False
             self._world.close()
@@ -109,30 +109,30 @@ class SapienArm(Arm):
         motion, contacts = self._world.env.motion, self._world.env.contacts
         limit = self._world.physics.reflex_force
 
-        def felt() -> float:
-            # What a hand holds is pressed by its fingers: no surprise, and not felt by the arm.
+        def load() -> float:
+            # The grip on a held part is internal to the hand and does not load the arm.
             return float((contacts.outer_force() if self._force else contacts.hand_force())[0])
 
         # Pads that close on a groove press the part on the table; that eases as the hand rises.
-        pressed = last = felt() if self._force else 0.0
+        pressed = last = load() if self._force else 0.0
 
         def check(_: int) -> bool:
             nonlocal pressed, last
-            # In the mean of two looks: a part that is set down meets the table within a step, with a force
-            # that is the higher the shorter the step.
-            force = felt()
+            # Mean of two checks: a part that is set down meets the table within a step, with a force that is
+            # the higher the shorter the step.
+            force = load()
             mean, last = (last + force) / 2, force
             pressed = min(pressed, force)
             return self._stop.is_set() or mean - pressed > limit
 
-        if not motion.follow(path[:, None], check=check, check_every=motion.n_steps(LOOK_S)):
+        if not motion.follow(path[:, None], check=check, check_every=motion.n_steps(CHECK_S)):
             raise MotionAborted(
                 f"contact force over {limit:.0f} N: the arm stopped; call recover() when it is safe"
             )
         motion.step(motion.n_steps(SETTLE_S))
 
     def _target(self) -> Tensor:
-        """(7,) where the drives point: a motion starts there, so that nothing jumps."""
+        """(7,) drive targets, radians: a motion starts there, so that they do not jump."""
         drives = [joint._objs[0].drive_target for joint in self._world.env.agent.arm_joints]
         return torch.tensor(
             [float(np.asarray(value).reshape(-1)[0]) for value in drives], dtype=torch.float64
@@ -170,14 +170,14 @@ class SapienArm(Arm):
         """The drives hold their last targets; a motion in progress sees the stop flag."""
 
     def _recover(self) -> None:
-        """Nothing to reset in a simulator; the drives start again from where the arm is."""
+        """Nothing to reset in a simulator; the drives restart from the current joints."""
         env = self._world.env
         joints = env.agent.robot.get_qpos()[:, :7].double()
         env.motion.set_arm(joints, torch.zeros_like(joints))
 
 
 def _interpolate(waypoints: Tensor, share: Tensor) -> Tensor:
-    """(steps, 7) joints at shares in [0, 1] of evenly spaced waypoints (k, 7)."""
+    """(steps, 7) joints at fractions in [0, 1] of evenly spaced waypoints (k, 7)."""
     where = share * (len(waypoints) - 1)
     index = where.floor().long().clamp(max=len(waypoints) - 2)
     rest = (where - index)[:, None]

@@ -1,4 +1,4 @@
-"""A printed board in the simulated hand."""
+"""Printed board in the simulated hand."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sapien
 from mskgrasp.core.geometry import Pose
 
 _WHITE = 0.8
-"""Share of the light that paper returns; more, and the picture would be overexposed."""
+"""Reflectance of paper; more would overexpose the image."""
 
 
 def show_board(entity: sapien.Entity, image: np.ndarray, size: tuple[float, float], pose: Pose) -> None:

@@ -14,7 +14,7 @@ from tasks.scene.camera import FAR
 
 
 class SapienCamera(Camera):
-    """Renders what a camera over the table would see, the arm included.
+    """Renders the view of a camera over the table, the arm included.
 
     Args:
         world: What stands on the table.
@@ -29,14 +29,14 @@ class SapienCamera(Camera):
         self._open = False
 
     def connect(self) -> None:
-        """Builds the world, if the arm has not; the sensor's errors begin anew."""
+        """Builds the world unless the arm has built it, and restarts the sensor's noise."""
         if not self._open:
             self._world.open()
             self._presented = 0
             self._open = True
 
     def close(self) -> None:
-        """Frees the world, if the arm has."""
+        """Frees the world unless the arm still uses it."""
         if self._open:
             self._open = False
             self._world.close()
@@ -51,7 +51,7 @@ class SapienCamera(Camera):
             raise NotConnected("SapienCamera is not connected; use it inside its context (with ...)")
         env = self._world.env
         if self._presented != self._world.presented:
-            # With every part anew: what it looks like must not depend on how many came before.
+            # Reset with every part: its image must not depend on the number of parts before.
             self._presented = self._world.presented
             self._rng = np.random.default_rng([self._noise.seed, self._world.presented_seed])
         taken = time.monotonic()

@@ -1,4 +1,4 @@
-"""The simulated cell as a YAML file describes it."""
+"""Simulated cell and its configuration."""
 
 from __future__ import annotations
 
@@ -27,29 +27,29 @@ class SapienCellConfig(Config):
 
     type: Literal["sapien"]
     part: str = "hex_nut_m30"
-    """What lies on the table when the cell is opened: a name or a folder."""
+    """Part on the table when the cell is opened: a name or a folder."""
     seed: int = Field(default=0, ge=0)
-    """Its place and turn follow from it."""
+    """Determines the position and turn of the part."""
     region: tuple[float, float, float, float] = REGION
     """x_min, x_max, y_min, y_max where parts lie, base frame, m."""
     home: tuple[float, float, float, float, float, float, float] = READY
     """Joints at which the arm is out of the camera's sight, rad."""
     min_height: float | None = Field(default=None, gt=0)
-    """What rises less over the table is taken for table, m; null: 2 mm, or 3 mm where the camera errs."""
+    """Points lower than this over the table count as table, m; null: 2 mm, or 3 mm with camera noise."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
-    """How far a grasped part is lifted, m."""
+    """Height by which a grasped part is lifted, m."""
     grasp_force: float = Field(default=20.0, gt=0, le=70)
-    """N."""
+    """Gripper force, N."""
     physics: Physics = Physics()
-    """The simulation."""
+    """Settings of the physics."""
     camera: Overhead = Overhead()
     """The overhead depth camera."""
     noise: SensorNoise = SensorNoise()
-    """How the camera errs: off, iid (3 mm) or kinect2; see docs/sensor_noise.md."""
+    """Noise model of the camera: off, iid (3 mm) or kinect2; see docs/sensor_noise.md."""
     tape: Tape | None = None
-    """Two squares of white tape on top of every part, to measure by; null: none. See docs/markers.md."""
+    """Two squares of white tape on top of every part, as markers; null: none. See docs/markers.md."""
     colour_scale: int = Field(default=1, ge=1, le=6)
-    """Over 1, frames also hold a colour image so much finer than depth; a Kinect v2's is 3 times so."""
+    """Above 1, frames also hold a colour image finer than depth by this factor (a Kinect v2: 3)."""
 
     @model_validator(mode="after")
     def _check(self) -> SapienCellConfig:

@@ -1,4 +1,4 @@
-"""A finer colour image beside the overhead camera's depth, as a Kinect v2 has one."""
+"""Colour image finer than the overhead camera's depth, as a Kinect v2 has."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class FineColour:
         without_reflection_table(self._camera)
 
     def capture(self) -> np.ndarray:
-        """(scale h, scale w, 3) uint8, RGB, of all that is there, the robot too."""
-        # Else the first picture of a new camera is black.
+        """(scale h, scale w, 3) uint8, RGB, of the whole scene with the robot."""
+        # Without it the first image of a new camera is black.
         self._env.scene.update_render(update_sensors=True, update_human_render_cameras=False)
         self._camera.capture()
         rays = self._camera.get_obs(rgb=True, depth=False, position=False, segmentation=False)["rgb"][0]
@@ -44,7 +44,7 @@ def _config(overhead: Overhead, centre_xy: tuple[float, float], factor: int) -> 
     config.uid = "fine_colour"
     config.width *= factor
     config.height *= factor
-    # With a pixel's corner at integer coordinates, as SAPIEN has it, all of the matrix scales alike.
+    # With a pixel's corner at integer coordinates, as in SAPIEN, the whole matrix scales uniformly.
     intrinsics = np.array(config.intrinsic) * factor
     intrinsics[2, 2] = 1.0
     config.intrinsic = intrinsics.astype(np.float32)

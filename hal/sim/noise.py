@@ -1,4 +1,4 @@
-"""What a depth sensor makes of a perfect depth image: pure functions, seeded by an explicit generator."""
+"""Noise models of depth sensors. Pure functions with an explicit generator."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ NoiseModel = Literal["off", "iid", "kinect2"]
 
 
 class SensorNoise(Config):
-    """How the simulated camera errs; a cell's file may name the model alone, ``noise: kinect2``."""
+    """Noise of the simulated camera; a cell file may name the model alone, ``noise: kinect2``."""
 
     model: NoiseModel = "off"
-    """off: perfect. iid: every pixel by itself, the paper's. kinect2: as a Kinect v2 does."""
+    """off: perfect. iid: independent pixels, as in the paper. kinect2: a model of the Kinect v2."""
     seed: int = Field(default=0, ge=0)
-    """The errors of all frames follow from it and the seed with which the part was laid down."""
+    """Determines the noise of all frames, with the seed of the part's placement."""
     iid_sigma: float = Field(default=0.003, ge=0, le=0.05)
     """Standard deviation of the model iid, m (the paper's: 3 mm)."""
     offset: float = Field(default=0.002, ge=-0.05, le=0.05)
-    """What a kinect2 measures too far everywhere, m: some 0.024 as it comes, a few mm once corrected."""
+    """Offset of a kinect2's depth, m: about 0.024 uncorrected, a few mm once corrected."""
     edge_jump: float = Field(default=0.01, gt=0, le=0.5)
     """Neighbouring pixels of a kinect2 that differ by more than this, and by more than their slope, m."""
     flying: float = Field(default=0.5, ge=0, le=1)
@@ -35,7 +35,7 @@ class SensorNoise(Config):
     @model_validator(mode="before")
     @classmethod
     def _by_name(cls, values: Any) -> Any:
-        if values is False:  # what YAML makes of a bare `off`
+        if values is False:  # YAML reads a bare `off` as false
             return {"model": "off"}
         return {"model": values} if isinstance(values, str) else values
 
@@ -49,7 +49,7 @@ class SensorNoise(Config):
 
     @property
     def least_height(self) -> float:
-        """What rises less over a table may be noise, metres, once heights are smoothed (`part_detection`).
+        """Height over a table that may be noise, metres, once heights are smoothed (`part_detection`).
 
         Higher, and flat parts are lost; lower, and noise around a part counts to it.
         """
@@ -97,7 +97,7 @@ def incidence_angles(depth: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
     """Angles (h, w) between rays and surface normals, radians in [0, pi/2]; NaN where there is no depth.
 
     The slope in each direction is that towards the nearer of both neighbours in depth, so that the edge of
-    a part does not make its top look steep.
+    a part does not make its top appear steep.
     """
     rays = _rays(depth.shape, intrinsics)
     points = rays * depth[..., None]

@@ -1,4 +1,4 @@
-"""Parts that were put down and stay where they are while the next one is grasped."""
+"""Parts that stay on the pallet while the next one is grasped."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def outside(region: Region, bodies: list[Lying]) -> list[tuple[Lying, sapien.Pos
     return found
 
 
-def lay_again(scene: ManiSkillScene, lying: Lying, pose: sapien.Pose, number: int, friction: float) -> Lying:
-    """Puts a part into a new scene where it lay in the last one; it can be pushed, as any other.
+def restore(scene: ManiSkillScene, lying: Lying, pose: sapien.Pose, number: int, friction: float) -> Lying:
+    """Adds a part to a new scene at its pose in the last one, as a dynamic body.
 
     Args:
         scene: The new one.

@@ -1,4 +1,4 @@
-"""Two squares of white tape on the simulated part: seen, but neither felt nor weighed."""
+"""Two squares of white tape on the simulated part, visual only."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from mskgrasp.parts import Part
 CELL = 0.0005
 """Distance of the rays from above, m."""
 MARGIN = 0.0005
-"""How far a square stays from the edge of the face, m: the line between tape and table is no tape's edge."""
+"""How far a square stays from the edge of the face, m: a border of tape and table is no tape edge."""
 RELIEF = 0.0015
 """Tape bridges steps, and bends over curves, up to this, m."""
 GAP = 0.004
 """Least distance between both squares, m: nearer, a camera sees one."""
 SIGHT = np.radians(75.0)
-"""Nothing may stand higher than this over the horizon as seen from a square: the camera looks down there."""
+"""Greatest elevation of obstacles as seen from a square, so that the camera sees it."""
 THICKNESS = 0.00015
 """Of cloth tape, m."""
 _WHITE = [1.0, 1.0, 1.0, 1.0]
@@ -103,7 +103,7 @@ def heights_from_above(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     heights = np.full(size, -np.inf)
     for a, b, c in vertices[faces]:
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        if area <= 1e-9:  # looks down, or is a wall
+        if area <= 1e-9:  # faces down, or is a wall
             continue
         low = np.ceil(np.minimum(np.minimum(a, b), c)[:2]).astype(int)
         high = np.floor(np.maximum(np.maximum(a, b), c)[:2]).astype(int) + 1

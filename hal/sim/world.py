@@ -1,4 +1,4 @@
-"""The simulated world that camera, arm, feeder and tracker of one cell share."""
+"""Simulated world shared by camera, arm, feeder and tracker of a cell."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import torch
 from hal.errors import NotConnected
 from hal.sim.board import show_board
 from hal.sim.colour import FineColour
-from hal.sim.pallet import Lying, lay_again, outside
+from hal.sim.pallet import Lying, outside, restore
 from hal.sim.tape import stick_tape
 from mskgrasp.core.errors import TapeDoesNotFit
 from mskgrasp.core.geometry import Pose
@@ -29,7 +29,7 @@ class SapienWorld:
         physics: Settings of the simulation.
         overhead: Settings of the camera.
         region: Where parts lie, base frame, metres.
-        home: (7,) joints of the arm when a part is laid down.
+        home: (7,) joints of the arm while a part is placed.
         part: What lies on the table at first.
         seed: Its place and turn follow from it.
         tape: Squares of tape that are stuck on top of a part once it lies; none where None.
@@ -60,9 +60,9 @@ class SapienWorld:
         self._users = 0
         self._gym: gymnasium.Env | None = None
         self.presented = 0
-        """How many parts have been laid down so far."""
+        """Number of parts placed so far."""
         self.presented_seed = seed
-        """The place and turn of the last one follow from it."""
+        """Seed of the last placement."""
 
     @property
     def env(self) -> GraspDisplacementEnv:
@@ -97,7 +97,7 @@ class SapienWorld:
             render_backend=render_backend(),
         )
         try:
-            # Programs lay down parts of their own: that this one has no room for tape must not stop them.
+            # Programs place parts of their own: a first part without room for tape must not stop them.
             with contextlib.suppress(TapeDoesNotFit):
                 self.present(part, seed)
         except BaseException:
@@ -118,7 +118,7 @@ class SapienWorld:
             self._gym = None
 
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """Lays a part on the table, arm at home, everything at rest.
+        """Places a part on the table, arm at home, everything at rest.
 
         Args:
             part: Name or folder.
@@ -137,7 +137,7 @@ class SapienWorld:
         # A fresh scene each time, so that a trial does not depend on those before it.
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
         self._beside = [
-            lay_again(self.env.scene, lying, pose, number, self.physics.friction_pad_part)
+            restore(self.env.scene, lying, pose, number, self.physics.friction_pad_part)
             for number, (lying, pose) in enumerate(staying)
         ]
         self.env.motion.place(self._home)
@@ -147,7 +147,7 @@ class SapienWorld:
             stick_tape(entity, self.env.parts[0], self.part_pose().quat_wxyz, self._tape)
 
     def fine_colour(self) -> np.ndarray | None:
-        """The fine colour image of what the camera has just seen; None where none is asked for."""
+        """Fine colour image of the current scene; None if the settings request none."""
         if self._colour_scale == 1:
             return None
         if self._fine_colour is None:
@@ -155,7 +155,7 @@ class SapienWorld:
         return self._fine_colour.capture()
 
     def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
-        """Fixes a flat board to the hand, to be looked at: it weighs nothing and touches nothing.
+        """Attaches a flat board to the hand, visual only.
 
         Args:
             image: (h, w) grey levels of its printed side, uint8.
@@ -167,7 +167,7 @@ class SapienWorld:
         show_board(hand._objs[0].entity, image, size, T_tcp_board)
 
     def part_pose(self) -> Pose:
-        """``T_base_obj`` of the part, the simulator's truth."""
+        """``T_base_obj`` of the part, the simulator's ground truth."""
         pose = self.env.part_pose()
         return Pose(
             position=pose.position[0].cpu().numpy().astype(np.float64),

@@ -123,7 +123,7 @@ def draw_attempt(
         camera does not see the part.
     """
     episode_seed, grasp_seed = scene_seeds(seed, part, attempt)
-    env.lay(episode_seed)
+    env.begin_episode(episode_seed)
     depth = depth_to_u16(env.capture_depth()[0].cpu().numpy())
     try:
         view = view_part(

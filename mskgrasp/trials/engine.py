@@ -174,7 +174,7 @@ class TrialEngine:
             self.home()
             no_tape = ""
             try:
-                self._operator.lay(self.cell, part, seed, name=name, keep=keep)
+                self._operator.present(self.cell, part, seed, name=name, keep=keep)
             except TapeDoesNotFit as error:
                 no_tape = f"no room for tape: {error}"  # the part is on the table and can be grasped
             frame = self.capture()
@@ -182,7 +182,7 @@ class TrialEngine:
                 plan = planner.plan(frame, np.random.default_rng(seed))
             except (NoPartFound, NoGraspFound) as error:
                 if self._operator.asks:
-                    self._operator.tell(f"no grasp was planned: {error}; place the part again")
+                    self._operator.inform(f"no grasp was planned: {error}; place the part again")
                     continue
                 return PlannedGrasp(frame=frame, plan=None, reason=type(error).__name__, no_tape=no_tape)
             if self._operator.asks:

@@ -35,25 +35,25 @@ from tasks.scene.frames import own_pose
 SPEED_WINDOW_S = 0.02
 """The last part of the hold, over which the part's speed in the hand is measured, s."""
 AFTERMATH_S = 0.3
-"""How long a part that was not lifted may fall, roll and come to rest before it is judged, s."""
+"""Time a part that was not lifted has to fall, roll and come to rest before it is judged, s."""
 REST_WINDOW_S = 0.06
-"""A part that did not move for so long has come to rest, s."""
+"""A part that has not moved for this time is at rest, s."""
 AHEAD = 0.003
-"""Least distance from the part, m, at which fingers begin that have only air before them: more than a part
-moves that settles and yet counts as at rest."""
+"""Least distance from the part, m, at which fingers in free air begin to close: more than a settling part
+may move and still count as at rest."""
 TAKE_OFF = 0.012
-"""The first part of the lift, m, which is as fine as the closing: what turns in the hand does so while the
-table lets go of it, within the first centimetre."""
+"""First part of the lift, m, simulated as finely as the closing: a part turns in the hand while it leaves the
+table, within the first centimetre."""
 REFLEX_S = 0.008
-"""Time between two looks at the force on a hand that descends, s."""
+"""Time between two checks of the force on a descending hand, s."""
 ARRIVAL_S = 0.024
-"""How long a hand that has descended may take to come to a stop, s."""
+"""Time a hand has to come to rest after its descent, s."""
 LEFT_BEHIND = 0.02
-"""The hand this much farther from the part than a success may be has lost it, m."""
+"""A hand farther from the part than a success allows by this has lost it, m."""
 
 
 class Attempt:
-    """Executes grasps and measures what they did to the parts.
+    """Executes grasps and measures the motion of the parts.
 
     Args:
         agent: The Panda of n sub-scenes.
@@ -83,14 +83,14 @@ class Attempt:
         self._run_up = run_up(physics)
         self._arrays = motion.arrays
         self._speed = SpeedWatch(part, motion.arrays)
-        motion.watch = self._speed.look
+        motion.watch = self._speed.update
 
     def run(self, commanded: Tensor, executed: Tensor | None = None) -> dict[str, Tensor]:
         """Executes one grasp in every sub-scene; all of them wait for the slowest.
 
         Args:
             commanded: (n, 4) x, y, z, theta, base frame.
-            executed: (n, 4) where the hand truly goes; as commanded by default.
+            executed: (n, 4) true target of the hand; as commanded by default.
 
         Returns:
             success (n) bool; failure (n) uint8; displacement (n, 4) and tilt (n), NaN where not
@@ -112,18 +112,18 @@ class Attempt:
         check_grasps(xp.concat([grasp, start, lifted]))
         began = motion.seconds
         empty = free & (reach == 0)
-        # Fingers that would have only air to close through, and room for their run-up, begin near the part.
+        # Fingers that would close through free air, with room for their run-up, begin near the part.
         room = max(self._run_up, AHEAD + physics.finger_speed / motion.rate_hz)
         running = free & ~empty & (reach + room <= MAX_OPENING / 2)
         width = xp.where(running, 2 * self._beginning(reach), xp.full_like(reach, MAX_OPENING))
         down = None if bool(free.all()) else self._line(start, grasp, physics.descend_speed)
         motion.place(top_down(_double(grasp))[0] if down is None else down[0], width)
         self._speed.start(motion.seconds)
-        laid = self._part_pose()
+        placed = self._part_pose()
         # Finely: a part lies some micrometres deep in the table, and how many depends on the step.
         motion.step(motion.n_steps(physics.settle_s))
         rest = self._part_pose()
-        settled = at_rest(laid, rest)
+        settled = at_rest(placed, rest)
         collided, touched = xp.zeros_like(settled), xp.zeros_like(settled)
 
         def reflex(_: int) -> bool:
@@ -133,12 +133,12 @@ class Attempt:
             return bool((collided | ~settled | free).all())
 
         if down is not None:
-            look = motion.n_steps(REFLEX_S)
-            if motion.follow(down, check=reflex, check_every=look, frozen=collided):
+            every = motion.n_steps(REFLEX_S)
+            if motion.follow(down, check=reflex, check_every=every, frozen=collided):
                 for _ in range(round(ARRIVAL_S / REFLEX_S)):
-                    motion.step(look)
+                    motion.step(every)
                     reflex(0)
-            # A hand that rests on something yields: it is not where it was sent.
+            # A hand in contact yields: it must not be moved to its target.
             motion.arrive(frozen=collided | ~settled | (self._contacts.hand_force() > 0))
         # A part that moved although nothing touched it was still toppling.
         settled = settled & (touched | at_rest(rest, self._part_pose()))
@@ -169,7 +169,7 @@ class Attempt:
         return own_pose(self._agent.tcp, self._arrays)
 
     def _approach(self, grasp: Array) -> tuple[Array, Array, Array]:
-        """Where the descent begins (n, 4), whether it meets nothing (n,), and what stands between the pads.
+        """Where the descent begins (n, 4), whether it is free (n,), and the reach of the part.
 
         Returns:
             start: The grasp itself where the hand can be put there; else over it, pads clear of the part's
@@ -205,7 +205,7 @@ class Attempt:
         return first - self._arrays.xp.floor((first - reach - AHEAD) / step) * step
 
     def _wait_for_rest(self) -> None:
-        """Lets parts that were not lifted fall and roll: in flight, a look would call them by its moment."""
+        """Lets parts that were not lifted fall and roll: in flight, the moment would decide."""
         motion = self._motion
         before = self._part_pose()
         for _ in range(round(AFTERMATH_S / REST_WINDOW_S)):
@@ -243,8 +243,8 @@ class Attempt:
         times = times[: 1 + int(np.searchsorted(physics.lift_height * minimum_jerk(times), TAKE_OFF))]
         if not rise(times):
             return False, deepest
-        # What the fingers and the table do to the part is done: what follows needs no such fine steps. The
-        # last look does: a part trembles between the pads, and more in coarse steps.
+        # What the fingers and the table do to the part is done: the rest needs no such fine steps. The last
+        # measurement does: a part trembles between the pads, and more in coarse steps.
         with motion.coarsely():
             rest = 1 - times[-1]
             if rest > 0 and not rise(times[-1] + rest * _moments(motion.n_steps(rest * seconds))):
@@ -331,7 +331,7 @@ class Attempt:
 
 
 def at_rest(before: Pose, after: Pose) -> Array:
-    """(n,) whether the parts neither moved nor turned between two looks, beyond the bounds of rest."""
+    """(n,) whether the parts neither moved nor turned between two poses, beyond the bounds of rest."""
     cosine = abs((before.quat_wxyz * after.quat_wxyz).sum(-1))
     moved = _length(after.position - before.position)
     return (moved < MAX_DRIFT) & (cosine > math.cos(MAX_TURN / 2))

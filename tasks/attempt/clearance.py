@@ -1,4 +1,4 @@
-"""Where the hand can be without touching a part: what need not be simulated.
+"""Clearance between the open hand and a part: motions in free air need no simulation.
 
 A descent beside which nothing stands, and the first way of fingers that close through air, change nothing
 but the time that they take. Both are read off the part's hulls: exact seen from above, careful in height.
@@ -19,12 +19,12 @@ MARGIN = 0.002
 
 @dataclass(frozen=True)
 class Clearance:
-    """How an open hand stands to a part.
+    """Clearance of an open hand.
 
     Attributes:
-        free: The hand can be put at the grasp, open, without a descent.
+        free: The open hand can be placed at the grasp without a descent.
         reach: Greatest distance from the middle of what stands between the pads, m; 0 where nothing does.
-            Only told where ``free``.
+            Valid only if ``free``.
     """
 
     free: bool
@@ -32,7 +32,7 @@ class Clearance:
 
 
 def hand_clearance(hulls: Sequence[np.ndarray]) -> Clearance:
-    """How the open hand at a grasp stands to a part.
+    """Clearance of the open hand at a grasp.
 
     Args:
         hulls: Corners (k, 3) of each of the part's hulls in the grasp frame, metres.

@@ -1,4 +1,4 @@
-"""When an attempt is a success, and why it failed otherwise; batched, for numpy and torch alike."""
+"""Success and failure of attempts; batched, for numpy and torch alike."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MAX_RELATIVE_SPEED = 0.05
 MAX_PENETRATION = 1e-3
 """Deeper overlap of finger and part makes a label worthless, m."""
 MIN_PAD_FORCE = 0.05
-"""Less force is no touch, N."""
+"""Least force of a contact, N."""
 MAX_SPEED = 3.0
 """No grasp makes a part faster than this, m/s: a faster one was flung out of an overlap by the solver."""
 MAX_DRIFT = 1e-3
@@ -27,7 +27,7 @@ CODE = {name: i for i, name in enumerate(FAILURES)}
 
 @dataclass(frozen=True, kw_only=True)
 class Observed:
-    """What was seen of n attempts; every field has shape (n,).
+    """Measurements of n attempts; every field has shape (n,).
 
     Attributes:
         settled: The part was at rest before the grasp.
@@ -35,10 +35,10 @@ class Observed:
         held_closed: Both pads touched the part, and there was a gap, when the fingers had closed.
         pads_touch: Both pads touch the part after the hold.
         gap: Distance of the pads after the hold, m.
-        rise: How far the part has risen, as a share of the lift.
+        rise: Rise of the part, as a fraction of the lift.
         relative_speed: Speed of the part against the hand after the hold, m/s.
         penetration: Deepest overlap of finger and part seen, m; NaN where it is not known.
-        wandered: Horizontal distance of the part from where it lay, m.
+        wandered: Horizontal distance of the part from its resting place, m.
     """
 
     settled: Array

@@ -1,4 +1,4 @@
-"""How fast the parts become in an attempt."""
+"""Greatest speeds of the parts in an attempt."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class SpeedWatch:
 
     Args:
         part: The part of each of n sub-scenes.
-        arrays: The kind in which the speeds are told.
+        arrays: Kind of array of the speeds.
     """
 
     def __init__(self, part: Actor, arrays: Arrays):
@@ -25,12 +25,12 @@ class SpeedWatch:
         self.start(0.0)
 
     def start(self, seconds: float) -> None:
-        """Forgets what was seen; ``seconds`` is the simulated time."""
+        """Resets the speeds; ``seconds`` is the simulated time."""
         self._last, self._seconds = self._position(), seconds
         self._fastest: Array = 0.0 if self._entity else self._arrays.full(len(self._last), 0.0)
 
-    def look(self, seconds: float) -> None:
-        """Compares with the look before."""
+    def update(self, seconds: float) -> None:
+        """Compares the poses with the last ones."""
         now, passed = self._position(), seconds - self._seconds
         self._seconds, last, self._last = seconds, self._last, now
         if passed <= 0:
@@ -46,5 +46,5 @@ class SpeedWatch:
         return self._arrays.full(1, self._fastest) if self._entity else self._fastest
 
     def _position(self) -> Array:
-        # One sub-scene: plain numbers, as there are forty looks an attempt.
+        # One sub-scene: plain numbers, as there are forty updates an attempt.
         return self._part.pose.p.clone() if self._entity is None else self._entity.pose.p.tolist()

@@ -1,4 +1,4 @@
-"""What touches the hand: forces and penetration, batched over sub-scenes."""
+"""Contacts of the hand: forces and penetration, batched over sub-scenes."""
 
 from __future__ import annotations
 

@@ -28,17 +28,17 @@ STILL_S = 0.03
 PEAK_ACCELERATION = 1.5
 """Of the hand on straight lines, m/s^2: the drives then overshoot by less than 0.4 mm."""
 FINGER_TIMEOUT_S = 0.5
-"""Fingers that never come to rest (the part slides through them) are given up after this, s."""
+"""Fingers that never come to rest (the part slides through them) stop being waited for after this, s."""
 FINGER_MASS = 0.015
 """Of a finger of the Panda without its motor, kg."""
 CHECK_S = 0.02
-"""Time between two looks at fingers that close, and at the part's speed, s."""
+"""Time between two checks of closing fingers, and of the part's speed, s."""
 
 
 def run_up(physics: Physics) -> float:
-    """Way after which closing fingers lag behind their ramp as they always will, to a hundredth, m.
+    """Distance after which the lag of closing fingers is stationary, to a hundredth, m.
 
-    The slowest pole of a finger's drive, a mass on a spring and a damper, tells how soon; where two poles are
+    The slowest pole of a finger's drive, a mass on a spring and a damper, decides it; where two poles are
     equal, that takes 6.6 of its times instead of 4.6.
     """
     mass = physics.finger_armature + FINGER_MASS
@@ -49,7 +49,7 @@ def run_up(physics: Physics) -> float:
 
 
 def finger_lag(physics: Physics) -> float:
-    """How far a closing finger is behind its ramp in the long run, m: its drive has no speed as a target."""
+    """Stationary lag of a closing finger behind its ramp, m: its drive has no target speed."""
     return physics.finger_speed * physics.finger_damping / physics.finger_stiffness
 
 
@@ -60,7 +60,7 @@ class PandaMotion:
         scene: The scene of all n sub-scenes.
         agent: The Panda in them.
         physics: Rate, finger speed and force.
-        coarse_hz: Simulation steps a second where it is told to be coarse.
+        coarse_hz: Coarse rate, simulation steps a second.
     """
 
     def __init__(self, scene: ManiSkillScene, agent: GraspPanda, physics: Physics, coarse_hz: int):
@@ -77,11 +77,11 @@ class PandaMotion:
         self._finger_drives = [joint._objs[0] for joint in agent.finger_joints]
         self.finger_target = self.arrays.full(self.n, MAX_OPENING / 2)
         self.watch: Callable[[float], None] | None = None
-        """Told of the simulated time, s, every ``CHECK_S``."""
+        """Called with the simulated time, s, every ``CHECK_S``."""
         self.seconds = 0.0
-        """Simulated so far."""
+        """Simulated time, s."""
         self.rate_hz = physics.rate_hz
-        """Simulation steps a second, now."""
+        """Current rate, simulation steps a second."""
         # A step holds its target, and its iterations are equal shares of it: aimed at the end of the step,
         # a drive would be ahead of its path, the more the longer a step. Aimed at the mean, it is not.
         self._within = (1 - 1 / physics.position_iterations) / 2
@@ -90,7 +90,7 @@ class PandaMotion:
         self._commanded: Array = None
 
     def n_steps(self, seconds: float) -> int:
-        """Simulation steps in a time at the rate of now, at least one."""
+        """Simulation steps in a time at the current rate, at least one."""
         return max(1, round(seconds * self.rate_hz))
 
     @contextmanager
@@ -119,7 +119,7 @@ class PandaMotion:
         return self.fingers().sum(-1)
 
     def place(self, q: Array, width: Array | None = None) -> None:
-        """Puts the arm at joints (n, 7) at once, at rest, fingers open by ``width`` (n,) metres or wholly."""
+        """Sets the arm to joints (n, 7) at once, at rest, fingers open by ``width`` (n,) metres or wholly."""
         xp, arrays = self.arrays.xp, self.arrays
         opening = arrays.full(self.n, MAX_OPENING) if width is None else arrays.of(width)
         fingers = xp.astype(opening, xp.float32) / 2
@@ -196,19 +196,19 @@ class PandaMotion:
             self.seconds += 1 / self.rate_hz
             self._unwatched += 1
             if not self.gpu and self._unwatched >= self._watch_every:
-                self._look()
+                self._call_watch()
         if self.gpu:
             self._scene._gpu_fetch_all()
             if self._unwatched >= self._watch_every:
-                self._look()
+                self._call_watch()
 
-    def _look(self) -> None:
+    def _call_watch(self) -> None:
         self._unwatched = 0
         if self.watch is not None:
             self.watch(self.seconds)
 
     def arrive(self, frozen: Array) -> None:
-        """Puts arms that have come to a stop, but for the frozen ones (n,), exactly where they were sent.
+        """Puts arms that have come to a stop, but for the frozen ones (n,), exactly at their targets.
 
         The drives leave an arm some tens of micrometres short, the more the finer the steps: a joint turns
         in float32, and what a slow one turns in one iteration is rounded away. The real controller integrates
@@ -246,7 +246,7 @@ class PandaMotion:
         Args:
             path: (steps, n, 7) radians, at the end of each step; it begins where the arms were sent before.
             check: Called every ``check_every`` steps with the index of the step; True ends the motion.
-            check_every: How often, steps.
+            check_every: Number of steps between two checks.
             frozen: (n,) bool, arms that stay where their targets are; read at every step.
 
         Returns:
@@ -302,7 +302,7 @@ class PandaMotion:
         Args:
             target: Of each finger, negative to press.
             force: The drives' force limit, N; that of the physics settings by default.
-            check: Asked every few steps; True ends the motion, the fingers stay where they are.
+            check: Called every few steps; True ends the motion, the fingers stay where they are.
             frozen: (n,) bool, hands whose fingers do not move.
 
         Returns:

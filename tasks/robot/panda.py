@@ -1,4 +1,4 @@
-"""The Panda of the task: ManiSkill's, with pads, fingers and arm as the real ones behave."""
+"""The Panda of the task: ManiSkill's, with pads, fingers and arm modelled on the real ones."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class GraspPanda(Panda):
             lower=(x_min, y_min, lowest_grasp_z(0.0), -math.pi / 2),
             upper=(x_max, y_max, 0.15, math.pi / 2),
         )
-        # First is the default: this agent exists to grasp.
+        # The first mode is the default.
         return dict(grasp=grasp, **configs)
 
     def _after_init(self) -> None:
@@ -142,7 +142,7 @@ class GraspPanda(Panda):
         return np.array([*HOME, MAX_OPENING / 2, MAX_OPENING / 2], dtype=np.float32)
 
     def show(self, visible: bool) -> None:
-        """Shows or hides the robot in rendered images; an overhead camera looks before the arm enters."""
+        """Shows or hides the robot in rendered images; the overhead image is taken before the arm enters."""
         for body in self._seen:
             body.visibility = 1.0 if visible else 0.0
 

@@ -1,4 +1,4 @@
-"""The kind of array that a simulation computes with.
+"""Arrays of the kind that a simulation computes with: numpy or torch.
 
 On the CPU, where there is one sub-scene, PhysX hands out numpy arrays, and an operation on so few numbers
 takes numpy a third of the time that it takes torch. On a GPU everything is a tensor. What is written with
@@ -51,5 +51,5 @@ class Arrays:
 
 
 def arrays_for(scene: ManiSkillScene) -> Arrays:
-    """The kind that a scene's simulation hands out."""
+    """The kind of a scene's simulation."""
     return Arrays(scene.device if scene.gpu_sim_enabled else None)

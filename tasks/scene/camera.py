@@ -35,7 +35,7 @@ def without_reflection_table(camera: Camera) -> None:
     """Gives a camera an empty table of how glossy surfaces reflect an environment, of which there is none.
 
     SAPIEN otherwise computes that table before the first picture of every process: 11 s on a software
-    renderer, for a term that no environment map makes zero. Pictures stay the same to the bit.
+    renderer, for a term that no environment map makes zero. Images stay the same to the bit.
     """
     empty = sapien.render.RenderTexture(np.zeros((1, 1, 4), np.float32), 2, "r32g32b32a32sfloat")
     for one in camera.camera._render_cameras:

@@ -1,4 +1,4 @@
-"""How a part becomes a simulated body whose shape, mass and inertia are those of its mesh."""
+"""Simulated bodies with the shape, mass and inertia of a part's mesh."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def build_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: fl
 
 
 def _check_cooked(part: Part, body: PhysxRigidDynamicComponent | None) -> None:
-    """Refuses a body that is not the part: PhysX drops hulls and corners, and clamps, without a word."""
+    """Refuses a body that differs from the part: PhysX silently drops hulls and corners, and clamps."""
     shapes = body.collision_shapes if body is not None else []
     volume = sum(ConvexHull(shape.vertices * shape.scale).volume for shape in shapes)
     if len(shapes) != part.n_hulls or not np.isclose(volume, part.hulls_volume, rtol=LEAST_KEPT):

@@ -16,7 +16,7 @@ PATCHES_A_HULL = 16
 
 
 def gpu_memory(n_hulls: int) -> GPUMemoryConfig:
-    """Buffers for PhysX on a GPU, which drops contacts without a word where they are too small.
+    """Buffers for PhysX on a GPU, which silently drops contacts if they are too small.
 
     Args:
         n_hulls: Hulls of all parts of all sub-scenes together.

@@ -1,4 +1,4 @@
-"""Which device draws the depth images, and what to do where none can."""
+"""Choice of the device that renders depth images."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def render_backend() -> str:
     """ManiSkill's name of the device to render on: a CUDA GPU where there is one, else any Vulkan CPU device.
 
     Raises:
-        NoRenderer: Neither is there; the message names the package to install.
+        NoRenderer: Neither exists; the message names the package to install.
     """
     problem = ""
-    sapien.render.set_log_level("off")  # one line from us instead of three from Vulkan
+    sapien.render.set_log_level("off")  # one line of ours in place of three of Vulkan
     try:
         for backend, device in (("sapien_cuda", "cuda"), ("cpu", "cpu")):
             try:

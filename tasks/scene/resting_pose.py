@@ -1,4 +1,4 @@
-"""Where a part lies at the start of an episode: a resting pose at a random place and turn."""
+"""Initial pose of a part: a resting pose at a random position and turn."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from mskgrasp.parts import Part
 def random_resting_pose(
     part: Part, vertices: np.ndarray, region: Region, rng: np.random.RandomState
 ) -> np.ndarray:
-    """Draws how a part lies on the table, wholly inside the region where it fits.
+    """Draws a part's pose on the table, wholly inside the region if it fits.
 
     Args:
         part: Its resting poses are drawn by their probabilities.
         vertices: (k, 3) vertices of its hulls, obj frame, metres.
-        region: Where the part may lie.
+        region: Bounds of the part's position.
         rng: ManiSkill's generator of the episode.
 
     Returns:

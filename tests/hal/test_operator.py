@@ -43,7 +43,7 @@ def test_the_arm_moves_only_after_a_yes(real):
     assert asked.may_move(Path("out/next.png"), "grasp at x 0.5")
     text = prompts.getvalue()
     assert text.count("May the arm move?") == 4
-    assert "'perhaps' is no answer" in text and "picture: out/next.png" in text
+    assert "'perhaps' is no valid answer" in text and "picture: out/next.png" in text
 
 
 @pytest.mark.parametrize(

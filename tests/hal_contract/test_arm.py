@@ -51,7 +51,7 @@ def test_a_joint_motion_that_leaves_the_box_between_its_ends_is_refused(arm: Toy
 
     monkeypatch.setattr(arm, "_forward", about_the_base)
     arm._joints = joints_at(-0.9, 0.0, 0.5)
-    with pytest.raises(OutOfWorkspace, match=r"leads past \(1.200, .*go there in steps"):
+    with pytest.raises(OutOfWorkspace, match=r"passes \(1.200, .*move there in steps"):
         arm.move_to_joints(joints_at(0.9, 0.0, 0.5))
     assert arm.moves == 0
 

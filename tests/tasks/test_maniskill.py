@@ -52,7 +52,7 @@ def test_laying_begins_the_very_episode_of_a_reset(boxes):
     env = make(boxes, obs_mode="none", noise=dict(arm_position_std=0.001, friction_pad_part=(0.4, 0.5)))
     base = env.unwrapped
     found = []
-    for begin, seed in itertools.product((lambda seed: base.reset(seed=seed), base.lay), (7, 8)):
+    for begin, seed in itertools.product((lambda seed: base.reset(seed=seed), base.begin_episode), (7, 8)):
         begin(seed)
         pose = base.part_pose().as_vector()
         x, y, _ = pose[0, :3].tolist()

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from hal.calibrate.board_views import Picture, picture_paths, read_picture
+from hal.calibrate.config import CalibrateConfig
 from hal.calibrate.hand_eye import HandEye, solve_hand_eye
-from hal.calibrate.run import CalibrateConfig, capture, solve
+from hal.calibrate.run import capture, solve
 from hal.camera_calibration import read_calibration
 from hal.charuco import Board
 from mskgrasp.core.errors import UsageError

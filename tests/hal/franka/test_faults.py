@@ -214,7 +214,7 @@ def test_a_driver_process_that_dies_is_told_and_the_arm_stops(
         link = arm._link
         assert link is not None
         with once_moving(robot, lambda: os.kill(link.pid, signal.SIGKILL)):
-            with pytest.raises(CommunicationLost, match="ended by signal 9"):
+            with pytest.raises(CommunicationLost, match="ended by SIGKILL"):
                 slow(arm)
         assert_at_rest(robot)
     with arm_at(tmp_path, driver, robot.host) as arm:
@@ -324,10 +324,10 @@ def test_a_driver_that_hangs_is_ended_and_told_even_where_it_reads_no_request(tm
         assert link is not None
         os.kill(link.pid, signal.SIGSTOP)
         begin = time.monotonic()
-        with pytest.raises(CommunicationLost, match="no answer from .* to 'move' within 1.0 s"):
+        with pytest.raises(CommunicationLost, match="did not answer 'move' within 1.0 s"):
             link.ask("move", timeout_s=1.0, seconds=[0.0] * 100_000)  # more than a pipe holds
         assert time.monotonic() - begin < 30
-        with pytest.raises(CommunicationLost, match="ended by signal 9"):
+        with pytest.raises(CommunicationLost, match="ended by SIGKILL"):
             arm.state()
 
 

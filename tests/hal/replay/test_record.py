@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from hal.record import main
+from hal.record.run import main
 from hal.replay import read_recording, recorded_cell
 from tests.hal.replay.toy import toy_cell
 from tests.programs import Ended, run_here, running
@@ -100,8 +100,8 @@ def wait_for_frame(recording: Path) -> None:
     ("arguments", "code", "message"),
     [
         (["--frames", "0"], 2, "greater than or equal to 1"),
-        (["--run", "rm -r x"], 2, "begin with a program of this project"),
-        (["--run", "mskgrasp.plan --cell a.yaml"], 2, "leave --cell away"),
+        (["--run", "rm -r x"], 2, "the first word must be a program of this project"),
+        (["--run", "mskgrasp.plan --cell a.yaml"], 2, "leave out --cell"),
         (["--cell", "none.yaml"], 2, "none.yaml"),
         (["--out", "{cell}"], 2, "exists already"),
         (["--out", "/proc/x.h5"], 2, "choose another file"),

@@ -55,7 +55,7 @@ def run_on(cell: Cell, log: list[object]) -> None:
     log += [result.width, result.holding, result.T_base_tcp.position.tolist()]
     with pytest.raises(MotionAborted, match="contact force"):
         cell.arm.move_to_pose(at(0.03))
-    with pytest.raises(NeedsRecovery, match="look at it"):
+    with pytest.raises(NeedsRecovery, match="check the arm"):
         cell.arm.move_gripper(0.05)
     cell.arm.recover()
     cell.arm.move_to_joints(cell.workspace.home, speed=0.2)

@@ -1,4 +1,4 @@
-"""Program: write down what happens on a cell. Run ``python -m hal.record --help``."""
+"""Program: recording of a cell. Run ``python -m hal.record --help``."""
 
 from __future__ import annotations
 
@@ -12,46 +12,29 @@ import time
 from pathlib import Path
 
 import yaml
-from pydantic import Field
 
 from hal.open_cell import cell_from_yaml
+from hal.record.config import RecordConfig
 from hal.replay import read_recording
 from hal.replay.cell import recorded_cell
-from mskgrasp.core.config import Config
 from mskgrasp.core.errors import UsageError
-from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.options import parse
 
 DESCRIPTION = """Writes the frames of a cell's camera, or a whole run on the cell, into one file.
 
 The file plays back as a cell (type: replay), a camera or an arm (driver: replay): see docs/replay.md.
-Without --run the arm is asked for its state with every frame and does not move."""
+Without --run the arm's state is read with every frame and the arm does not move."""
 
-_OWN_S = 2.0
-"""A program that has heard Ctrl-C itself ends in less, s."""
-
-
-class RecordConfig(Config):
-    """Settings of a recording."""
-
-    cell: Path
-    """YAML file of the cell, for example configs/cells/sapien.yaml."""
-    out: Path
-    """The recording, an HDF5 file; must not exist yet."""
-    frames: int = Field(default=10, ge=1, le=100_000)
-    """How many frames are taken."""
-    interval: float = Field(default=0.5, ge=0, le=3600)
-    """Time from one frame to the next, s."""
-    run: str | None = None
-    """A program and its options instead, without --cell: "mskgrasp.evaluate --models models/demo"."""
+_INTERRUPTED_S = 2.0
+"""A program that received Ctrl-C itself has stopped the arm and ended after this, s."""
 
 
 def main() -> int:
-    """Records, and says what is in the file."""
+    """Records, and prints what the file holds."""
     config = parse(RecordConfig, prog="python -m hal.record", description=DESCRIPTION)
     code = _frames(config) if config.run is None else _run(config, config.run)
     if not config.out.exists():
-        return code or 1  # the program has said why
+        return code or 1  # the program has reported why
     recording = read_recording(config.out)
     moved = sum(event.after is not None for event in recording.events)
     print(
@@ -62,7 +45,7 @@ def main() -> int:
 
 
 def _frames(config: RecordConfig) -> int:
-    """Takes frames; each with the arm's state, so that they can be brought together later."""
+    """Captures frames, each with the arm's state, so that both can be related later."""
     with recorded_cell(cell_from_yaml(config.cell), config.out).connected() as cell:
         due_s = time.monotonic()
         for _ in range(config.frames):
@@ -77,10 +60,12 @@ def _run(config: RecordConfig, command: str) -> int:
     """Runs a program of this project on the recorded cell, and returns its exit code."""
     words = shlex.split(command)
     if not words or words[0].split(".")[0] not in ("mskgrasp", "hal"):
-        raise UsageError(f"--run {command!r}: begin with a program of this project, such as mskgrasp.plan")
+        raise UsageError(
+            f"--run {command!r}: the first word must be a program of this project, such as mskgrasp.plan"
+        )
     if any(word.split("=")[0] == "--cell" for word in words):
-        raise UsageError("--run: leave --cell away, the recorded cell takes its place")
-    cell_from_yaml(config.cell)  # a wrong file is told here, not by the program
+        raise UsageError("--run: leave out --cell, the recorded cell takes its place")
+    cell_from_yaml(config.cell)  # an invalid file is reported here, not by the program
     if config.out.exists():
         raise UsageError(f"{config.out} exists already; move it away or choose another --out")
     with tempfile.TemporaryDirectory() as folder:
@@ -93,16 +78,12 @@ def _run(config: RecordConfig, command: str) -> int:
             try:
                 return process.wait()
             except KeyboardInterrupt:
-                _hand_on(process)
+                _pass_interrupt(process)
 
 
-def _hand_on(process: subprocess.Popen[bytes]) -> None:
-    """A terminal sends Ctrl-C to the program, too, which stops the arm and ends; kill and IDEs do not."""
+def _pass_interrupt(process: subprocess.Popen[bytes]) -> None:
+    """Passes Ctrl-C on to a program that did not get it: terminals send it to both, kill does not."""
     with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(_OWN_S)
+        process.wait(_INTERRUPTED_S)
         return
     process.send_signal(signal.SIGINT)
-
-
-if __name__ == "__main__":
-    run(main)

@@ -1,0 +1,1 @@
+"""Program: recording of a cell. Run ``python -m hal.record --help``."""

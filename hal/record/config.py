@@ -1,0 +1,24 @@
+"""Configuration of a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import Field
+
+from mskgrasp.core.config import Config
+
+
+class RecordConfig(Config):
+    """Settings of a recording."""
+
+    cell: Path
+    """YAML file of the cell, for example configs/cells/sapien.yaml."""
+    out: Path
+    """The recording, an HDF5 file; must not exist yet."""
+    frames: int = Field(default=10, ge=1, le=100_000)
+    """Number of frames."""
+    interval: float = Field(default=0.5, ge=0, le=3600)
+    """Time from one frame to the next, s."""
+    run: str | None = None
+    """Record a program and its options instead, without --cell: "mskgrasp.evaluate --models models/demo"."""
