@@ -93,7 +93,7 @@ class Run:
 
 @pytest.fixture
 def importing(tmp_path, monkeypatch, capsys) -> Callable[..., Run]:
-    """Runs the verb in this process and in an empty folder."""
+    """Runs the command in this process and in an empty folder."""
     monkeypatch.chdir(tmp_path)
 
     def run(*files: str, **options: Any) -> Run:

@@ -88,12 +88,12 @@ def ring_with_lap(lap: float) -> Surface:
     return Surface(vertices=points.reshape(-1, 3), faces=np.concatenate([sides, ends[:, ::-1]]))
 
 
-def test_a_crossing_too_small_to_matter_is_kept_and_told():
+def test_a_crossing_too_small_to_matter_is_kept_and_reported():
     share = 0.01 / (2 * np.pi)
     ring = ring_with_lap(0.01)
     assert abs(ring.volume) == pytest.approx(5 * np.pi * 300 * (1 + share), rel=2e-3)
-    told = one(ring).notes
-    assert told[-1].startswith("crosses itself in ") and told[-1].endswith(" % of its volume (kept)")
-    assert 50 * share < float(told[-1].split()[3]) < 200 * share
+    notes = one(ring).notes
+    assert notes[-1].startswith("crosses itself in ") and notes[-1].endswith(" % of its volume (kept)")
+    assert 50 * share < float(notes[-1].split()[3]) < 200 * share
     with pytest.raises(BadPart, match="crosses itself"):
         one(ring_with_lap(0.1))
