@@ -1,4 +1,4 @@
-"""Datasets of grasp attempts: one HDF5 file a shard, and the program ``python -m mskgrasp.dataset``."""
+"""Datasets of grasp attempts in HDF5 shards, and the program ``python -m mskgrasp.dataset``."""
 
 from mskgrasp.dataset.attempts import DEPTH_UNIT, Attempts, ShardInfo, depth_to_u16, u16_to_depth
 from mskgrasp.dataset.dataset import Dataset, open_dataset

@@ -1,4 +1,4 @@
-"""What a dataset is made of: grasp attempts, what those of a shard share, and the rules both obey."""
+"""Grasp attempts, the properties that those of a shard share, and the schema of both."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES
 
 DEPTH_UNIT = 1e-4
-"""Metres that one step of a stored depth stands for."""
+"""Resolution of a stored depth, metres."""
 _POSE = "m m m 1 1 1 1 (x y z qw qx qy qz)"
 
 
 @dataclass(frozen=True)
 class Column:
-    """How an array of a shard is stored."""
+    """Storage of one array of a shard."""
 
     dtype: str
     shape: tuple[int, ...] | None  # after the leading n; None: an image of any size
@@ -75,7 +75,7 @@ class Attempts:
 
     @classmethod
     def concatenate(cls, pieces: Sequence[Attempts]) -> Attempts:
-        """The rows of all pieces, in order.
+        """Join the rows of all pieces, in order.
 
         Raises:
             BadDataset: No piece, or depth images of different sizes.
@@ -92,22 +92,22 @@ class Attempts:
 
 @dataclass(frozen=True, kw_only=True)
 class ShardInfo:
-    """What all attempts of one shard share.
+    """Properties that all attempts of one shard share.
 
     Attributes:
-        part: Name of the part, also the beginning of the file's name.
-        part_hash: Content hash of the part that was grasped.
+        part: Name of the part, with which the file's name begins.
+        part_hash: Content hash of the part.
         family: Kind of part.
-        index: Which shard of the part this is.
-        seed: Everything random in the shard follows from it.
+        index: Number of the shard among those of the part.
+        seed: Seed of all random numbers in the dataset.
         intrinsics: (3, 3) pinhole matrix of the depth camera, pixels.
         T_base_camera: Pose of the camera's optical frame in the base.
         table_z: Height of the table, base frame, metres.
-        region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
+        region: x_min, x_max, y_min, y_max of the parts' centres, base frame, metres.
         physics: Settings of the simulation.
         versions: Software versions.
-        discarded: Why and how often an attempt was thrown away.
-        noise: Errors of the cell that the attempts met; empty: none.
+        discarded: Number of discarded attempts by reason.
+        noise: Simulated errors of the cell; empty: none.
     """
 
     part: str
@@ -126,7 +126,7 @@ class ShardInfo:
 
 
 def depth_to_u16(depth: np.ndarray) -> np.ndarray:
-    """Metres (float, NaN = invalid) to 0.1 mm (uint16, 0 = invalid).
+    """Convert metres (float, NaN = invalid) to 0.1 mm (uint16, 0 = invalid).
 
     Raises:
         BadDataset: A depth is negative or above 6.5535 m.
@@ -140,13 +140,13 @@ def depth_to_u16(depth: np.ndarray) -> np.ndarray:
 
 
 def u16_to_depth(depth_u16_dmm: np.ndarray) -> np.ndarray:
-    """0.1 mm (uint16, 0 = invalid) to metres (float32, NaN = invalid)."""
+    """Convert 0.1 mm (uint16, 0 = invalid) to metres (float32, NaN = invalid)."""
     depth = depth_u16_dmm.astype(np.float32) * np.float32(DEPTH_UNIT)
     return np.where(depth_u16_dmm == 0, np.float32(np.nan), depth)
 
 
 def shape_problems(arrays: Mapping[str, np.ndarray]) -> Iterator[str]:
-    """What is wrong with the types and shapes of a shard's arrays, or of some of them, a sentence each."""
+    """Find wrong types and shapes in arrays of a shard, a sentence each."""
     lengths = [len(array) for array in arrays.values() if array.ndim]
     n = max(set(lengths), key=lengths.count) if lengths else 0
     for name, array in arrays.items():
@@ -160,12 +160,12 @@ def shape_problems(arrays: Mapping[str, np.ndarray]) -> Iterator[str]:
 
 
 def problems(attempts: Attempts) -> Iterator[str]:
-    """What in some attempts contradicts the schema, a sentence each."""
+    """Find contradictions of the schema in attempts, a sentence each."""
     n = len(attempts)
     wrong = list(shape_problems({name: getattr(attempts, name) for name in COLUMNS}))
     yield from wrong
     if wrong:
-        return  # nothing more can be told of arrays that do not belong together
+        return  # values of arrays with wrong shapes cannot be compared
     for name, column in COLUMNS.items():
         array = getattr(attempts, name)
         rows = np.ones(n, bool) if column.finite == "all" else attempts.success
@@ -179,9 +179,9 @@ def problems(attempts: Attempts) -> Iterator[str]:
     if len(odd):
         code, held = attempts.failure[odd[0]], bool(attempts.success[odd[0]])
         yield f"attempt {odd[0]} has success {held} with failure {code} ({FAILURES[code]})"
-    told = np.flatnonzero(~attempts.success & ~np.isnan(attempts.displacement).all(axis=1))
-    if len(told):
-        yield f"displacement of attempt {told[0]} is given though it failed, must be NaN"
+    given = np.flatnonzero(~attempts.success & ~np.isnan(attempts.displacement).all(axis=1))
+    if len(given):
+        yield f"displacement of attempt {given[0]} is given though it failed, must be NaN"
     for name in ("pose_base_obj", "pose_tcp_obj_before", "pose_tcp_obj_after"):
         rows = attempts.success if COLUMNS[name].finite == "successful" else np.ones(n, bool)
         length = np.linalg.norm(getattr(attempts, name)[:, 3:], axis=1)

@@ -1,4 +1,4 @@
-"""A dataset's card: what it holds, how it was made, how large it is; for a terminal and for a page."""
+"""Card of a dataset: contents, provenance and size, as tables for a terminal and as Markdown."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Family:
 
 @dataclass(frozen=True, kw_only=True)
 class Card:
-    """A dataset in numbers.
+    """Statistics of a dataset.
 
     Attributes:
         name: Of its folder.
@@ -37,13 +37,13 @@ class Card:
         parts: Different parts.
         families: By name, sorted.
         failures: Attempts that failed, by reason.
-        discarded: Attempts that were thrown away, by reason; not among the attempts.
+        discarded: Discarded attempts, by reason; not among the attempts.
         displacement: Median and 90th percentile of the translation over successes, metres; None without.
         turn: The same of |dtheta|, radians.
         image: Height and width of a depth image, pixels.
-        seed: Everything random follows from it.
+        seed: Seed of all random numbers.
         physics: Settings of the simulation.
-        noise: Errors of the cell that the attempts met; empty: none were asked about.
+        noise: Simulated errors of the cell; empty: none.
         versions: Sets of software versions, and how many shards were made with each.
         size: Bytes on disk.
     """
@@ -65,21 +65,21 @@ class Card:
 
     @property
     def attempts(self) -> int:
-        """All attempts."""
+        """Number of attempts."""
         return sum(family.attempts for family in self.families.values())
 
     @property
     def successes(self) -> int:
-        """Those that lifted the part."""
+        """Number of attempts that lifted the part."""
         return sum(family.successes for family in self.families.values())
 
 
 def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = iter) -> Card:
-    """Sums up a dataset without reading its images.
+    """Summarise a dataset without reading its images.
 
     Args:
         folder: Of the dataset.
-        watch: Given the files that will be read, yields each: the place for a progress bar.
+        watch: Yields each of the files that will be read; may show a progress bar.
 
     Raises:
         BadDataset: There is no shard, or one is damaged.
@@ -111,8 +111,8 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
         families={family: Family(parts=len(parts[family]), **counts[family]) for family in sorted(counts)},
         failures={FAILURES[code]: n for code, n in failures.most_common()},
         discarded=dict(discarded.most_common()),
-        displacement=_middle_and_tail(np.linalg.norm(held[:, :3], axis=1)),
-        turn=_middle_and_tail(np.abs(held[:, 3])),
+        displacement=_median_and_tail(np.linalg.norm(held[:, :3], axis=1)),
+        turn=_median_and_tail(np.abs(held[:, 3])),
         image=image,
         seed=info.seed,
         physics=dict(info.physics),
@@ -123,7 +123,7 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
 
 
 def image_size(path: Path) -> tuple[int, int]:
-    """Height and width of a shard's depth images, pixels.
+    """Read height and width of a shard's depth images, pixels.
 
     Raises:
         BadDataset: The shard is damaged.
@@ -132,15 +132,15 @@ def image_size(path: Path) -> tuple[int, int]:
     return depth.shape[1], depth.shape[2]
 
 
-def _middle_and_tail(values: np.ndarray) -> tuple[float, float] | None:
+def _median_and_tail(values: np.ndarray) -> tuple[float, float] | None:
     if not len(values):
         return None
-    middle, tail = np.quantile(values, (0.5, 0.9))
-    return float(middle), float(tail)
+    median, tail = np.quantile(values, (0.5, 0.9))
+    return float(median), float(tail)
 
 
 def tables(card: Card) -> list[Table]:
-    """The card as tables of text."""
+    """Format the card as tables of text."""
     n, won = card.attempts, card.successes
     facts = [
         ("attempts", f"{n}"),
@@ -185,7 +185,7 @@ def tables(card: Card) -> list[Table]:
 
 
 def markdown(card: Card) -> str:
-    """The card as a page."""
+    """Format the card as Markdown."""
     blocks = []
     for level, (title, headers, rows) in enumerate(tables(card)):
         # A name is text here, whatever it contains.

@@ -1,4 +1,4 @@
-"""Whether a dataset is whole and sound: what is wrong, file by file."""
+"""Check of a dataset for missing, damaged and contradictory shards, file by file."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from mskgrasp.dataset.shards import read_unchecked, shard_path
 from mskgrasp.parts import store
 
 SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise")
-"""What all shards of a dataset have in common."""
+"""Properties that all shards of a dataset share."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """Something that makes a dataset unfit for use.
+    """Fault that makes a dataset unfit for use.
 
     Attributes:
         path: The file, in the dataset's folder.
-        reason: What is wrong with it, without its name.
+        reason: The fault, without the file's name.
     """
 
     path: Path
@@ -38,13 +38,13 @@ class Fault:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """What a check has found.
+    """Result of a check.
 
     Attributes:
         n_shards: Files that could be read as shards.
         n_attempts: Attempts in them.
         faults: By file, in the order of their names; a file may have several.
-        notes: What is worth knowing and no fault.
+        notes: Remarks that are no faults.
     """
 
     n_shards: int
@@ -62,11 +62,11 @@ class _Shard:
 
 
 def check_dataset(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = iter) -> Report:
-    """Reads all of a dataset and looks for whatever is wrong with it; changes nothing.
+    """Read all of a dataset and report every fault; change nothing.
 
     Args:
         folder: Of the dataset.
-        watch: Given the files that will be read, yields each: the place for a progress bar.
+        watch: Yields each of the files that will be read; may show a progress bar.
 
     Raises:
         UsageError: The folder is no dataset: it does not exist or has no folder ``shards``.
@@ -103,7 +103,7 @@ def check_dataset(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]
 
 
 def require_dataset(folder: Path) -> None:
-    """Refuses a folder that cannot be a dataset.
+    """Refuse a folder that cannot be a dataset.
 
     Raises:
         UsageError: It does not exist, is a file, or has no folder ``shards``.
@@ -128,7 +128,7 @@ def _examine(path: Path) -> tuple[_Shard | None, list[str]]:
 
 
 def _settings(folder: Path, faults: list[Fault]) -> dict[str, Any]:
-    """The dataset's config.yaml, as plain values: its schema is the collector's, which is not imported."""
+    """Read the dataset's config.yaml as plain values: its schema belongs to the collector, a higher room."""
     path = folder / "config.yaml"
     try:
         return read_yaml(path)
@@ -172,7 +172,7 @@ def _shared_faults(shards: list[_Shard], settings: dict[str, Any]) -> Iterator[F
                 yield Fault(path=shard.path, reason=reason)
     physics = settings.get("physics")
     if isinstance(physics, dict):
-        # Settings that came later than the dataset are in one of the two alone.
+        # Settings that are newer than the dataset are in only one of the two.
         for name, value in shards[0].info.physics.items():
             if name in physics and physics[name] != value:
                 reason = f"physics.{name} is {physics[name]!r}, the shards were made with {value!r}"
@@ -210,7 +210,7 @@ def _hash_faults(shards: list[_Shard], notes: list[str]) -> Iterator[Fault]:
     for part, found in sorted(counts.items()):
         ready = _in_parts_folder(part, "content_hash")
         foreign = {h for other, its in counts.items() if other != part for h in its}
-        # A hash that another part has as well is the likelier one to be wrong.
+        # A hash that another part has, too, is more likely to be wrong.
         right[part] = min(found, key=lambda h: (h != ready, h in foreign, -found[h], h))
         if ready is not None and ready not in found:
             changed.append(part)
@@ -231,7 +231,7 @@ def _hash_faults(shards: list[_Shard], notes: list[str]) -> Iterator[Fault]:
 
 
 def _in_parts_folder(part: str, key: str) -> str | None:
-    """What this machine's part of that name says; None where it has none."""
+    """Read a value of the local part of that name; None if there is no such part."""
     try:
         return str(store.read_record(store.parts_folder() / part).get(key))
     except BadPart:
@@ -241,7 +241,7 @@ def _in_parts_folder(part: str, key: str) -> str | None:
 def _missing(
     folder: Path, paths: list[Path], shards: list[_Shard], settings: dict[str, Any]
 ) -> Iterator[Fault]:
-    """Shards that should be there, and those with too few attempts."""
+    """Find missing shards, and those with too few attempts."""
     plan = _plan(settings)
     names = {path.name for path in paths}
     highest: dict[str, int] = {}
@@ -267,13 +267,13 @@ def _missing(
             try:
                 path = shard_path(folder, part, index)
             except BadDataset:
-                break  # the name of a part that cannot be: told where its shard is read
+                break  # an illegal name of a part is reported with its shard
             if path.name not in names:
                 yield Fault(path=path, reason="is missing; run the collection again to make it")
 
 
 def _plan(settings: dict[str, Any]) -> tuple[int, int] | None:
-    """Attempts on a part, and in a shard; None where the settings do not tell."""
+    """Get the attempts per part and per shard; None if the settings lack them."""
     per_part, size = settings.get("attempts_per_part"), settings.get("shard_size")
     if isinstance(per_part, int) and isinstance(size, int) and per_part > 0 and size > 0:
         return per_part, size

@@ -20,17 +20,17 @@ from mskgrasp.dataset.attempts import COLUMNS, ShardInfo
 from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
 
 Watch = Callable[[Sequence[Path]], Iterable[Path]]
-"""Given the files that will be read, yields each: the place for a progress bar."""
+"""Yields each of the files that will be read; may show a progress bar."""
 SMALL = tuple(name for name in COLUMNS if name != "depth")
 _SHARED = ("region", "table_z", "intrinsics", "T_base_camera", "physics", "noise")
 
 
 def check_export_path(folder: Path, path: Path, suffix: str) -> list[Path]:
-    """The files that an export of the dataset in ``folder`` will write.
+    """List the files that an export of the dataset in ``folder`` will write.
 
     Raises:
-        UsageError: The name has another ending, a file is there already, it lies among the shards, or its
-            folder cannot be made.
+        UsageError: The name has another suffix, a file exists, it is among the shards, or its folder cannot
+            be made.
     """
     if path.resolve().is_relative_to((folder / "shards").resolve()):
         raise UsageError(f"--out {path} lies among the dataset's shards; choose another folder")
@@ -52,13 +52,13 @@ def check_export_path(folder: Path, path: Path, suffix: str) -> list[Path]:
 
 
 def export_npz(folder: Path, out: Path, watch: Watch = iter) -> int:
-    """Writes all attempts of a dataset into one .npz file that numpy reads without pickle.
+    """Write all attempts of a dataset into one .npz file that numpy reads without pickle.
 
     The arrays of the shards are joined in the order of the shards' names; docs/dataset.md has the layout.
-    Images pass through memory a shard at a time.
+    Only the images of one shard are in memory at a time.
 
     Returns:
-        How many attempts were written.
+        The number of attempts.
 
     Raises:
         BadDataset: A shard is damaged, or the shards do not belong together.
@@ -101,7 +101,7 @@ def _images(paths: Iterable[Path], counts: dict[Path, int], size: tuple[int, ...
 
 
 def _about(infos: list[ShardInfo], counts: list[int]) -> dict[str, np.ndarray]:
-    """The arrays of an .npz that are not columns of shards."""
+    """Make the arrays of an .npz that are not columns of shards."""
     parts = parts_of(infos)
     names, info = sorted(parts), infos[0]
     return dict(
@@ -139,7 +139,7 @@ class _Part:
 
 
 def parts_of(infos: list[ShardInfo]) -> dict[str, _Part]:
-    """Content hash and family of every part, by name."""
+    """Collect content hash and family of every part, by name."""
     parts: dict[str, _Part] = {}
     for info in infos:
         own = _Part(hash=info.part_hash, family=info.family)
@@ -149,7 +149,11 @@ def parts_of(infos: list[ShardInfo]) -> dict[str, _Part]:
 
 
 def same_settings(path: Path, info: ShardInfo, first: Sequence[ShardInfo]) -> None:
-    """Raises BadDataset where a shard was made with other settings than the first."""
+    """Check that a shard was made with the settings of the first.
+
+    Raises:
+        BadDataset: It was not.
+    """
     for other in first:
         for name in _SHARED:
             one, two = (_comparable(getattr(each, name)) for each in (info, other))
@@ -166,7 +170,7 @@ def _comparable(value: Any) -> Any:
 
 
 class renamed_at_the_end:  # noqa: N801 (reads as a verb where it is used)
-    """A folder for files that take their place beside it when all of them are written."""
+    """Temporary folder whose files are moved beside it when all of them are written."""
 
     def __init__(self, folder: Path, files: list[Path]):
         self._folder = folder / f".export-{uuid.uuid4().hex[:12]}.tmp"

@@ -1,4 +1,4 @@
-"""How easily parts are grasped: success of random grasps by part, and an estimate for those not tried."""
+"""Ratings of parts: success rate of random grasps, and an estimate for parts without attempts."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from mskgrasp.parts.catalogue import Entry, Index, Rating
 NEIGHBOURS = 7
 _MOST_COLUMNS = 4
 _SAME_FAMILY = 0.35
-"""Added to the distance of parts of another family: as much as edges that differ by 40 %."""
+"""Penalty in the distance to parts of another family: that of edges which differ by 40 %."""
 
 
 def rate_parts(folder: Path) -> dict[str, Rating]:
-    """The rating of every part in a dataset.
+    """Rate every part in a dataset.
 
     Raises:
         BadDataset: The folder holds no dataset, or a part changed while it was collected.
     """
-    tried: dict[str, list[np.ndarray]] = defaultdict(list)
+    outcomes: dict[str, list[np.ndarray]] = defaultdict(list)
     hashes: dict[str, str] = {}
     for path in list_shards(folder):
         success, info = read_success(path)
         if hashes.setdefault(info.part, info.part_hash) != info.part_hash:
             raise BadDataset(f"{path}: part {info.part!r} changed while it was collected; collect it again")
-        tried[info.part].append(success)
+        outcomes[info.part].append(success)
     ratings = {}
-    for name, pieces in sorted(tried.items()):
-        n, won = sum(map(len, pieces)), int(sum(piece.sum() for piece in pieces))
-        low, high = wilson_interval(won, n)
+    for name, pieces in sorted(outcomes.items()):
+        n, n_success = sum(map(len, pieces)), int(sum(piece.sum() for piece in pieces))
+        low, high = wilson_interval(n_success, n)
         ratings[name] = Rating(
             attempts=n,
-            successes=won,
+            successes=n_success,
             interval=(float(low), float(high)),
             part_hash=hashes[name],
             dataset=str(folder),
@@ -52,18 +52,18 @@ def rate_parts(folder: Path) -> dict[str, Rating]:
 
 
 def estimate(parts: Sequence[Entry], rated: Sequence[Entry], low: float, high: float) -> np.ndarray:
-    """Chance (n,) that the success of random grasps at parts lies between two bounds.
+    """Estimate the probability (n,) that the success rate of parts lies between two bounds.
 
-    The share among the rated parts that are most alike: nearest in the logarithms of the three sorted edges,
-    the own family first, weighted by distance. A rated part is not its own neighbour, so that the estimate
-    can be held against what was measured.
+    The share among the nearest rated parts in the logarithms of the three sorted edges, preferably of the
+    same family, weighted by distance. A rated part is not its own neighbour, so that the estimate can be
+    compared with the measurement.
 
     Raises:
         BadDataset: Fewer than two parts are rated.
     """
     if len(rated) < 2:
         raise BadDataset("fewer than two parts are rated; collect a dataset of the catalogue first")
-    chances = np.empty(len(parts))
+    probability = np.empty(len(parts))
     edges = np.log([entry.extents for entry in rated])
     rates = np.array([entry.rating.rate if entry.rating else np.nan for entry in rated])
     inside = (rates >= low) & (rates <= high)
@@ -73,16 +73,16 @@ def estimate(parts: Sequence[Entry], rated: Sequence[Entry], low: float, high: f
         distance[[other.name == entry.name for other in rated]] = np.inf
         nearest = np.argsort(distance, kind="stable")[:NEIGHBOURS]
         weight = 1 / (0.05 + distance[nearest])
-        chances[number] = (weight * inside[nearest]).sum() / weight.sum()
-    return chances
+        probability[number] = (weight * inside[nearest]).sum() / weight.sum()
+    return probability
 
 
 def passing(index: Index, low: float, high: float) -> tuple[int, float, float]:
-    """How many rated parts lie between the bounds, how many of all are expected to, and how sure that is.
+    """Count the rated parts between the bounds, and estimate the number of all parts there.
 
     Returns:
         The number of rated parts inside, the expected number of all parts of the catalogue, and the standard
-        error of the latter: the spread of the estimate's error over the rated parts, scaled to the others.
+        error of the latter: the deviation of the estimate's error over the rated parts, scaled to the others.
     """
     rated = [entry for entry in index.parts.values() if entry.rating is not None]
     others = [entry for entry in index.parts.values() if entry.rating is None]
@@ -90,14 +90,14 @@ def passing(index: Index, low: float, high: float) -> tuple[int, float, float]:
     expected = float(inside.sum())
     error = 0.0
     if others:
-        missed = inside - estimate(rated, rated, low, high)
-        expected += float(estimate(others, rated, low, high).sum()) + len(others) * float(missed.mean())
-        error = len(others) * float(missed.std(ddof=1)) * np.sqrt(1 / len(rated) + 1 / len(others))
+        residual = inside - estimate(rated, rated, low, high)
+        expected += float(estimate(others, rated, low, high).sum()) + len(others) * float(residual.mean())
+        error = len(others) * float(residual.std(ddof=1)) * np.sqrt(1 / len(rated) + 1 / len(others))
     return int(inside.sum()), expected, error
 
 
 def report(index: Index, bounds: tuple[float, float]) -> None:
-    """Prints the rated families, and how many parts of the catalogue lie between the bounds."""
+    """Print the rated families, and the number of parts between the bounds."""
     low, high = bounds
     families: dict[str, list[Entry]] = defaultdict(list)
     for entry in index.parts.values():
@@ -131,7 +131,7 @@ def report(index: Index, bounds: tuple[float, float]) -> None:
 
 
 def draw_ratings(index: Index, bounds: tuple[float, float], path: Path) -> Path:
-    """Success of random grasps over the longest axis, a dot a part; below, the same by family."""
+    """Draw the success rate of each part over its longest axis, and by family below."""
     rated = [entry for entry in index.parts.values() if entry.rating is not None]
     by_family: dict[str, list[float]] = defaultdict(list)
     for entry in rated:
@@ -157,7 +157,7 @@ def draw_ratings(index: Index, bounds: tuple[float, float], path: Path) -> Path:
     above.set_title(f"{len(rated)} rated parts, bars: 95 % intervals", loc="left", fontsize=11)
     above.spines[["top", "right"]].set_visible(False)
     for column in range(columns):
-        # The hardest families stand at the top of the first column.
+        # The families of lowest success are at the top of the first column.
         shown = families[column * rows : (column + 1) * rows]
         axes = figure.add_subplot(grid[1, column])
         axes.axvspan(100 * low, 100 * high, color=PALE_GREEN, lw=0)

@@ -1,4 +1,4 @@
-"""Grasp attempts on disk: one HDF5 file a shard, written whole or not at all, checked when read."""
+"""Storage of grasp attempts: one HDF5 file for each shard, written atomically, checked when read."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from mskgrasp.dataset.attempts import COLUMNS, Attempts, ShardInfo, problems, sh
 SCHEMA_VERSION = 1
 _FORMAT = "mskgrasp-shard"
 _MOST_BYTES = 2**32
-"""More than 10,000 images of the largest camera."""
+"""Largest plausible array: more than 10,000 images of the largest camera."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
 def shard_path(folder: Path, part: str, index: int) -> Path:
-    """Where a shard of a dataset lies.
+    """Get the path of a shard.
 
     Raises:
         BadDataset: The part's name cannot begin a file name.
@@ -36,7 +36,7 @@ def shard_path(folder: Path, part: str, index: int) -> Path:
 
 
 def list_shards(folder: Path) -> list[Path]:
-    """The finished shards of a dataset in the order of their names.
+    """List the finished shards of a dataset, sorted by name.
 
     Raises:
         BadDataset: No such folder, or no finished shard in it.
@@ -55,7 +55,7 @@ def list_shards(folder: Path) -> list[Path]:
 
 
 def write_shard(path: Path, attempts: Attempts, info: ShardInfo) -> None:
-    """Writes a shard so that either all of it or nothing is ever seen under its name.
+    """Write a shard atomically.
 
     The same attempts and info give the same bytes.
 
@@ -73,7 +73,7 @@ def write_shard(path: Path, attempts: Attempts, info: ShardInfo) -> None:
 
 
 def _file_image(attempts: Attempts, info: ShardInfo) -> bytes:
-    # Built in memory: HDF5 that runs into a full disk leaves a handle that can no longer be closed.
+    # Built in memory: on a full disk HDF5 leaves a handle that cannot be closed.
     with h5py.File("shard", "w", driver="core", backing_store=False) as file:
         for name, column in COLUMNS.items():
             array = getattr(attempts, name)
@@ -102,7 +102,7 @@ def _file_image(attempts: Attempts, info: ShardInfo) -> bytes:
 
 
 def read_shard(path: Path) -> tuple[Attempts, ShardInfo]:
-    """Reads and checks a shard.
+    """Read and check a shard.
 
     Raises:
         BadDataset: The file is missing, truncated, foreign, of another schema, or contradicts it.
@@ -164,7 +164,7 @@ def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], Sh
         TypeError,
         AttributeError,
     ) as error:
-        # h5py reports damage with whichever of these its call stack ends in.
+        # h5py reports damage with any of these, depending on where it is found.
         problem = " ".join(str(error).split()).strip("'\"")
         raise BadDataset(
             f"{path} is damaged or no HDF5 file ({problem}); delete it and collect again"
@@ -173,12 +173,12 @@ def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], Sh
 
 def _array(file: h5py.File, name: str) -> np.ndarray:
     stored = file[name]
-    assert isinstance(stored, h5py.Dataset)  # _check_header has seen to it
-    # What a shard says must be in the shard: a foreign file must not make us read others.
+    assert isinstance(stored, h5py.Dataset)  # checked by _check_header
+    # The data must be in the shard itself: a foreign file must not make us read other files.
     link = file.get(name, getlink=True)
     if not isinstance(link, h5py.HardLink) or stored.external or stored.is_virtual:
         raise ValueError(f"{name} lies in another file")
-    # Damage can make an array look as large as anything: that must not be tried.
+    # In a damaged file an array can claim any size, which must not be allocated.
     if stored.size * stored.dtype.itemsize > _MOST_BYTES:
         raise ValueError(f"{name} claims the shape {stored.shape}")
     return np.asarray(stored)

@@ -1,4 +1,4 @@
-"""What a training run needs to go on where it was stopped, in one file without pickle."""
+"""Checkpoint of a training run, from which it resumes exactly: one file without pickle."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Checkpoint:
     """State after a finished epoch.
 
     Attributes:
-        fingerprint: Of the data; training does not go on with other data.
-        stage: Network that was being trained.
+        fingerprint: Of the data; training does not resume with other data.
+        stage: Network that is being trained.
         epoch: Epochs of that stage that are finished.
         history: One row an epoch of all stages so far.
         weights: Of both networks.
@@ -43,46 +43,46 @@ _GROUPS = ("weights", "best", "optimiser")
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
-    """Replaces the checkpoint at ``path``, so that a kill at any moment leaves the old or the new one."""
+    """Replace the checkpoint at ``path``: a kill at any moment leaves the old or the new one."""
     tensors = {
         f"{group}/{name}": value.detach().cpu().contiguous().clone()
         for group in _GROUPS
         for name, value in getattr(checkpoint, group).items()
     }
-    about = {name: getattr(checkpoint, name) for name in ("fingerprint", "stage", "epoch", "history")}
+    progress = {name: getattr(checkpoint, name) for name in ("fingerprint", "stage", "epoch", "history")}
     temporary = path.with_name(path.name + ".tmp")
-    save_file(tensors, temporary, metadata={"progress": json.dumps(about)})
-    temporary.chmod(0o644)  # safetensors makes it readable for its owner alone
+    save_file(tensors, temporary, metadata={"progress": json.dumps(progress)})
+    temporary.chmod(0o644)  # safetensors creates it readable by its owner only
     os.replace(temporary, path)
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """Reads a checkpoint.
+    """Read a checkpoint.
 
     Raises:
         BadModel: It is damaged.
     """
     try:
         with safe_open(path, framework="pt") as file:
-            about: dict[str, Any] = json.loads(file.metadata()["progress"])
+            progress: dict[str, Any] = json.loads(file.metadata()["progress"])
             groups: dict[str, dict[str, Tensor]] = {group: {} for group in _GROUPS}
             for key in file.keys():  # noqa: SIM118 - not a dict
                 group, name = key.split("/", 1)
                 groups[group][name] = file.get_tensor(key)
-        values: dict[str, Any] = about | groups
+        values: dict[str, Any] = progress | groups
         return Checkpoint(**values)
     except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
         raise BadModel(f"{path} is damaged ({error}); delete it to train from the beginning") from error
 
 
 def optimiser_tensors(optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
-    """An optimiser's state as named tensors."""
+    """Named tensors of an optimiser's state."""
     state = optimiser.state_dict()["state"]
     return {f"{index}/{name}": value for index, values in state.items() for name, value in values.items()}
 
 
 def restore(checkpoint: Checkpoint, networks: dict[str, nn.Module], optimiser: torch.optim.Optimizer) -> None:
-    """Puts a checkpoint's weights and optimiser state back, in place.
+    """Restore a checkpoint's weights and optimiser state, in place.
 
     Raises:
         BadModel: They do not fit the networks.

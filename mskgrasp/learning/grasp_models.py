@@ -1,4 +1,4 @@
-"""A trained pair of networks: what is stored of it, and what it predicts."""
+"""A trained pair of networks: its predictions, and its description and weights on disk."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mskgrasp.learning.networks import GraspDisplacementNetwork, GraspQualityNet
 from mskgrasp.learning.symmetry import views
 
 PRETRAINED = Path(__file__).parent / "pretrained"
-"""The model that ships."""
+"""Folder of the model that ships."""
 
 SCHEMA_VERSION = 1
 WEIGHTS = "model.safetensors"
@@ -34,17 +34,17 @@ _FORMER_FIELDS = {
 
 
 class Calibration(Config):
-    """Corrections measured on parts that training never saw; the defaults change nothing."""
+    """Corrections measured on held-out parts; the defaults change nothing."""
 
     quality_slope: float = Field(default=1.0, gt=0.0)
     quality_offset: float = 0.0
-    """Of the quality's log odds (Platt 1999): slope * odds + offset."""
+    """Platt scaling of the quality (1999): its log odds become slope * log odds + offset."""
     variance_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     """Factor of each variance, so that the central 90 % interval holds 90 %."""
 
 
 class ModelMeta(Config):
-    """What ``model.json`` says about the weights beside it."""
+    """Description in ``model.json`` of the weights beside it."""
 
     schema_version: int = SCHEMA_VERSION
     network: NetworkConfig
@@ -67,7 +67,7 @@ class ModelMeta(Config):
 
 @dataclass(frozen=True)
 class Models:
-    """A trained pair of networks, in evaluation mode, with their description."""
+    """Trained pair of networks, in evaluation mode, with their description."""
 
     gqn: GraspQualityNetwork
     gdn: GraspDisplacementNetwork
@@ -75,7 +75,7 @@ class Models:
 
     @property
     def device(self) -> torch.device:
-        """Where the weights lie."""
+        """Device of the weights."""
         return next(self.gqn.parameters()).device
 
     @torch.inference_mode()
@@ -83,7 +83,7 @@ class Models:
         """Probability of success (n,) of grasps.
 
         Args:
-            patches: (n, 1, r, c) metres above the table, around the grasps and turned with them, of the
+            patches: (n, 1, r, c) metres above the table, centred on the grasps and rotated with them, of the
                 network's ``quality_shape``.
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
             height: (n,) of the grasps above the table, metres.
@@ -98,8 +98,8 @@ class Models:
         """Mean and variance (n, 4) of the grasp displacement, of patches (n, 1, r, c) in metres.
 
         Args:
-            patches: Around the grasps and turned with them; around the part and not turned where the network
-                has ``image: object``.
+            patches: Centred on the grasps and rotated with them; with ``image: object`` centred on the part
+                and not rotated.
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
             height: (n,) of the grasps above the table, metres.
             theta: (n,) the grasps' angles, for ``image: object``.
@@ -109,20 +109,20 @@ class Models:
         if not self.meta.network.symmetric_views:
             return self._calibrated(*self.gdn(patches, centre_grasp, height, theta))
         means, variances = [], []
-        for seen, centre, signs in views(patches, centre_grasp):
-            mean, variance = self.gdn(seen, centre, height)
+        for view, centre, signs in views(patches, centre_grasp):
+            mean, variance = self.gdn(view, centre, height)
             means.append(signs * mean)
             variances.append(variance)
-        said = torch.stack(means)
-        mean = said.mean(0)
+        each = torch.stack(means)
+        mean = each.mean(0)
         if variances[0] is None:
             return mean, None
-        return self._calibrated(mean, torch.stack(variances).mean(0) + (said - mean).square().mean(0))
+        return self._calibrated(mean, torch.stack(variances).mean(0) + (each - mean).square().mean(0))
 
     def _probability(self, logits: Tensor) -> Tensor:
-        found = self.meta.calibration
+        calibration = self.meta.calibration
         odds = torch.logit(self.gqn.quality(logits).double(), eps=1e-12)
-        return torch.sigmoid(found.quality_slope * odds + found.quality_offset).to(logits.dtype)
+        return torch.sigmoid(calibration.quality_slope * odds + calibration.quality_offset).to(logits.dtype)
 
     def _calibrated(self, mean: Tensor, variance: Tensor | None) -> tuple[Tensor, Tensor | None]:
         scale = mean.new_tensor(self.meta.calibration.variance_scale)
@@ -137,7 +137,7 @@ class Models:
 
 
 def build_models(meta: ModelMeta, device: torch.device | str = "cpu") -> Models:
-    """Networks with fresh weights, in evaluation mode."""
+    """Build networks with fresh weights, in evaluation mode."""
     gqn = GraspQualityNetwork(meta.network, meta.normalisation)
     gdn = GraspDisplacementNetwork(meta.network, meta.normalisation)
     for network in (gqn, gdn):
@@ -146,7 +146,7 @@ def build_models(meta: ModelMeta, device: torch.device | str = "cpu") -> Models:
 
 
 def save_model(folder: Path, models: Models) -> None:
-    """Writes ``model.safetensors`` and ``model.json``, each whole or not at all.
+    """Write ``model.safetensors`` and ``model.json``, each atomically.
 
     Raises:
         BadModel: A weight is not finite.
@@ -157,7 +157,7 @@ def save_model(folder: Path, models: Models) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     temporary = folder / (WEIGHTS + ".tmp")
     save_file({name: value.contiguous().cpu() for name, value in weights.items()}, temporary)
-    temporary.chmod(0o644)  # safetensors makes it readable for its owner alone
+    temporary.chmod(0o644)  # safetensors creates it readable by its owner only
     os.replace(temporary, folder / WEIGHTS)
     temporary = folder / (DESCRIPTION + ".tmp")
     temporary.write_text(json.dumps(models.meta.model_dump(mode="json"), indent=2) + "\n", encoding="utf-8")
@@ -168,7 +168,7 @@ def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -
     """Reads a model folder.
 
     Raises:
-        BadModel: It is missing, damaged, of another schema, or the weights do not fit the description.
+        BadModel: It is missing, damaged or of another schema, or the weights do not fit the description.
     """
     folder = Path(folder)
     for name in (DESCRIPTION, WEIGHTS):

@@ -1,4 +1,4 @@
-"""How good trained networks are on parts they never saw, beside predictors that learned nothing."""
+"""Metrics of trained networks on held-out parts beside constant predictors, and their calibration."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from mskgrasp.learning.samples import Samples
 _CHUNK = 64
 AXES = ("x", "y", "z", "theta")
 _REPEATS = 200
-"""Draws of parts for an interval of scores that take a sort each."""
+"""Bootstrap repeats for the intervals of the scores, some of which sort."""
 _RADIUS = 0.03
-"""Radius of gyration of a typical part, metres, where a variance score is taken without a picture."""
+"""Radius of gyration of a typical part, metres: variance scores here use one for all parts."""
 _LEAST_TO_SCALE = 50
-"""Successes under which a 90 % quantile is chance."""
+"""Fewest successes from which a 90 % quantile is estimated."""
 
 
 def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.ndarray:
-    """Predicted probabilities of success (n,)."""
+    """Predict probabilities of success (n,)."""
     pieces = [
         models.quality(
             samples.quality_patches_of(r, models.device, models.meta.network),
@@ -42,7 +42,7 @@ def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.
 def predict_grasp_displacement(
     models: Models, samples: Samples, rows: torch.Tensor
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Predicted mean and variance (n, 4) of the grasp displacement; NaN variance where none is predicted."""
+    """Predict mean and variance (n, 4) of the grasp displacement; without a variance it is NaN."""
     means, variances = [], []
     for r in rows.split(_CHUNK):
         mean, variance = models.grasp_displacement(
@@ -57,10 +57,11 @@ def predict_grasp_displacement(
 
 
 def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> Calibration:
-    """Corrections that make probabilities and 90 % intervals true of these rows.
+    """Fit the corrections that make probabilities and 90 % intervals correct on these rows.
 
     The quality's log odds are stretched and shifted (Platt 1999); each variance is scaled by
-    (q / 1.645)^2, q the 90 % quantile of |error| / deviation, so that heavy tails do not widen the whole.
+    (q / 1.645)^2, q the 90 % quantile of |error| / deviation, so that heavy tails do not widen the whole
+    distribution.
     """
     quality = predict_quality(models, samples, rows)
     slope, offset = _platt(logit(np.clip(quality, 1e-9, 1 - 1e-9)), samples.success[rows].numpy())
@@ -69,13 +70,13 @@ def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> Calibrati
     mean, variance = predict_grasp_displacement(models, samples, held)
     if np.isfinite(variance).all() and len(held) >= _LEAST_TO_SCALE:
         target = samples.grasp_displacement[held].double().numpy()
-        off = np.quantile(np.abs(metrics.standardised_error(mean, variance, target)), 0.9, axis=0)
-        scale = tuple(np.maximum((off / norm.ppf(0.95)) ** 2, 1e-6))
+        quantile = np.quantile(np.abs(metrics.standardised_error(mean, variance, target)), 0.9, axis=0)
+        scale = tuple(np.maximum((quantile / norm.ppf(0.95)) ** 2, 1e-6))
     return Calibration(quality_slope=slope, quality_offset=offset, variance_scale=scale)
 
 
 def _platt(odds: np.ndarray, success: np.ndarray) -> tuple[float, float]:
-    """Slope and offset of the log odds, of greatest likelihood; Platt's targets keep away from 0 and 1."""
+    """Fit slope and offset of the log odds by maximum likelihood; Platt's targets avoid 0 and 1."""
     n_success, n_failure = int(success.sum()), int((~success).sum())
     target = np.where(success, (n_success + 1) / (n_success + 2), 1 / (n_failure + 2))
 
@@ -90,7 +91,7 @@ def _platt(odds: np.ndarray, success: np.ndarray) -> tuple[float, float]:
 def report(
     models: Models, samples: Samples, training_rows: torch.Tensor, rows: torch.Tensor
 ) -> dict[str, Any]:
-    """All metrics of both networks on some rows."""
+    """Compute all metrics of both networks on some rows."""
     return {
         "gqn": quality_metrics(models, samples, rows),
         "gdn": displacement_metrics(models, samples, training_rows, rows),
@@ -98,10 +99,10 @@ def report(
 
 
 def quality_metrics(models: Models, samples: Samples, rows: torch.Tensor) -> dict[str, Any]:
-    """Balanced accuracy, AUROC and Brier score of the GQN, and the Brier score of saying the base rate.
+    """Compute balanced accuracy, AUROC and Brier score of the GQN, and the base rate's Brier score.
 
-    A grasp counts as told to succeed where its probability exceeds the training data's base rate: with
-    balanced data, that is one half. Intervals are of 95 %, over parts.
+    A grasp counts as predicted to succeed if its probability exceeds the training data's base rate: with
+    balanced data, one half. Intervals are 95 % bootstrap intervals over parts.
     """
     success = samples.success[rows].numpy()
     probability = predict_quality(models, samples, rows)
@@ -130,29 +131,33 @@ def quality_metrics(models: Models, samples: Samples, rows: torch.Tensor) -> dic
 def displacement_metrics(
     models: Models, samples: Samples, training_rows: torch.Tensor, rows: torch.Tensor
 ) -> dict[str, Any]:
-    """Errors of the GDN on successful grasps, and of predicting zero and the training data's mean.
+    """Compute errors of the GDN on successful grasps, and of predicting zero and the training mean.
 
     RMSE is over the object displacement, likelihood and coverage over the grasp displacement.
     """
     training_rows = training_rows[samples.success[training_rows]]
     rows = rows[samples.success[rows]]
     mean, variance = predict_grasp_displacement(models, samples, rows)
-    seen = samples.grasp_displacement[training_rows].double().numpy()
+    training = samples.grasp_displacement[training_rows].double().numpy()
     floor = 1e-12
     constants = {
-        "zero_displacement": (np.zeros(4), np.maximum((seen**2).mean(axis=0), floor)),
-        "training_mean": (seen.mean(axis=0), np.maximum(seen.var(axis=0), floor)),
+        "zero_displacement": (np.zeros(4), np.maximum((training**2).mean(axis=0), floor)),
+        "training_mean": (training.mean(axis=0), np.maximum(training.var(axis=0), floor)),
     }
     report: dict[str, Any] = {"n": len(rows)} | displacement_errors(samples, rows, mean, variance)
-    report |= _spread(samples, rows, mean, variance)
-    for name, (constant, spread) in constants.items():
+    report |= _uncertainty_metrics(samples, rows, mean, variance)
+    for name, (constant, constant_variance) in constants.items():
         repeated = np.tile(constant, (len(rows), 1))
-        report[name] = displacement_errors(samples, rows, repeated, np.tile(spread, (len(rows), 1)))
+        report[name] = displacement_errors(
+            samples, rows, repeated, np.tile(constant_variance, (len(rows), 1))
+        )
     return report
 
 
-def _spread(samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray) -> dict[str, Any]:
-    """Intervals of the errors over parts, and whether the predicted deviations can be believed."""
+def _uncertainty_metrics(
+    samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
+) -> dict[str, Any]:
+    """Compute the errors' intervals over parts, and metrics of the predicted variances."""
     centre_grasp = samples.centre_grasp[rows].double().numpy()
     displacement = samples.displacement[rows].double().numpy()
     predicted = to_object_displacement(mean, centre_grasp)
@@ -187,7 +192,7 @@ def _spread(samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np
 
 
 def _errors_of_least(shift: np.ndarray, turn: np.ndarray, variance: np.ndarray, share: float) -> list[float]:
-    """RMSE of translation and rotation over the share of samples that the network is surest of."""
+    """Compute RMSE of translation and rotation over the share of samples of least predicted variance."""
     score = variance[:, :3].sum(axis=1) + _RADIUS**2 * variance[:, 3]
     kept = np.argsort(score, kind="stable")[: max(1, round(share * len(score)))]
     return [_root_mean(values[kept] ** 2) for values in (shift, turn)]
@@ -198,7 +203,7 @@ def _root_mean(squared: np.ndarray) -> float:
 
 
 def _by_part(samples: Samples, rows: torch.Tensor, values: np.ndarray) -> list[np.ndarray]:
-    """The values of each part's rows."""
+    """Group values by the part of their row."""
     part = samples.part[rows].numpy()
     return [values[part == number] for number in np.unique(part)]
 
@@ -206,7 +211,7 @@ def _by_part(samples: Samples, rows: torch.Tensor, values: np.ndarray) -> list[n
 def displacement_errors(
     samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
 ) -> dict[str, Any]:
-    """RMSE over the object displacement; likelihood and coverage over the grasp displacement."""
+    """Compute RMSE over the object displacement, likelihood and coverage over the grasp displacement."""
     centre_grasp = samples.centre_grasp[rows].double().numpy()
     predicted = to_object_displacement(mean, centre_grasp)
     displacement = samples.displacement[rows].double().numpy()

@@ -1,4 +1,4 @@
-"""What a model was made of and how far it can be trusted, as a page beside its weights."""
+"""Model card: training data, settings, held-out metrics and limits of a model, as Markdown."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LIMITS = """\
 
 
 def model_card(meta: ModelMeta) -> str:
-    """Markdown: data, network, metrics on parts never seen, limits.
+    """Write the card of a model.
 
     Args:
         meta: Of a trained model.

@@ -1,4 +1,4 @@
-"""The two networks: how likely a grasp lifts the part, and how the part shifts when it does."""
+"""Grasp quality network, grasp displacement network, and the loss of the latter."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.learning.hand_features import HandFeatures, learning_in_bfloat16
+from mskgrasp.learning.hand_features import HandFeatures, image_autocast
 from mskgrasp.learning.network_config import NetworkConfig, Normalisation, PatchNetworkConfig
 
 STANDARDISE_EPSILON = 1e-4
@@ -16,18 +16,18 @@ _LOG_VARIANCE_LIMIT = 12.0
 
 
 def with_noise(patches: Tensor, std: float, generator: torch.Generator) -> Tensor:
-    """Patches (n, 1, p, p) with uncorrelated noise of a standard deviation in their unit, for training."""
+    """Add uncorrelated Gaussian noise to patches (n, 1, r, c), for training; ``std`` in their unit."""
     return patches + torch.empty_like(patches).normal_(0.0, std, generator=generator)
 
 
 def standardise(patches: Tensor) -> Tensor:
-    """Each patch (n, 1, p, p) with zero mean and about unit standard deviation (paper, section 4.2)."""
+    """Scale each patch (n, 1, p, p) to zero mean and about unit deviation (paper, section 4.2)."""
     centred = patches - patches.mean(dim=(1, 2, 3), keepdim=True)
     return centred / (centred.square().mean(dim=(1, 2, 3), keepdim=True).sqrt() + STANDARDISE_EPSILON)
 
 
 class PatchFeatures(nn.Module):
-    """The paper's (figure 3): a patch and an action become one vector."""
+    """Feature vector of a patch and an action (paper, figure 3)."""
 
     def __init__(self, config: PatchNetworkConfig, normalisation: Normalisation, n_action: int = 3):
         super().__init__()
@@ -57,12 +57,12 @@ class PatchFeatures(nn.Module):
         self.register_buffer("action_scale", torch.tensor(scale[:n_action]), persistent=False)
 
     def prepare(self, patches: Tensor, height: Tensor) -> Tensor:  # noqa: ARG002
-        """What the network takes of patches (n, 1, p, p) in metres above the table, whatever the height."""
+        """Standardise patches (n, 1, p, p) in metres above the table; the grasp's height is not used."""
         return standardise(patches)
 
     def forward(self, prepared: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:  # noqa: ARG002
-        """Features (n, f) of prepared patches (n, 1, p, p) and object centres (n, 3), metres."""
-        with learning_in_bfloat16(self):
+        """Compute features (n, f) of prepared patches (n, 1, p, p) and object centres (n, 3), metres."""
+        with image_autocast(self):
             image = self.image(self.convolutions(prepared))
         return torch.cat([image.float(), self.action(centre_grasp / self.action_scale)], dim=-1)
 
@@ -70,7 +70,7 @@ class PatchFeatures(nn.Module):
 def make_features(
     config: NetworkConfig, normalisation: Normalisation, *, quality: bool
 ) -> PatchFeatures | HandFeatures:
-    """The first part of the quality network, or of the displacement network."""
+    """Build the features of the quality or the displacement network."""
     if isinstance(config, PatchNetworkConfig):
         n_action = 4 if config.sees_object and not quality else 3
         return PatchFeatures(config, normalisation, n_action)
@@ -101,14 +101,14 @@ class GraspQualityNetwork(nn.Module):
         """Logits (n, 2) of failure and success among balanced data.
 
         Args:
-            patches: (n, 1, r, c) metres above the table, turned to the grasps.
+            patches: (n, 1, r, c) metres above the table, rotated with the grasps.
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
             height: (n,) of the grasps above the table, metres.
         """
         return self.head(self.features(_prepared(self.features, patches, height), centre_grasp, height))
 
     def quality(self, logits: Tensor) -> Tensor:
-        """Probabilities (n,) of success, corrected from balanced data to the true share of successes."""
+        """Compute probabilities of success (n,), corrected from balanced data to the true base rate."""
         return torch.sigmoid(logits[:, 1] - logits[:, 0] + self.log_prior_odds)
 
 
@@ -139,22 +139,22 @@ class GraspDisplacementNetwork(nn.Module):
     ) -> tuple[Tensor, Tensor | None]:
         """Mean (n, 4) and variance (n, 4) of the grasp displacement, in metres and radians (squared).
 
-        A network that predicts the mean alone gives None for the variance.
+        The variance is None where the network predicts the mean alone.
 
         Args:
-            patches: (n, 1, r, c) metres above the table, turned to the grasps.
+            patches: (n, 1, r, c) metres above the table, rotated with the grasps.
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
             height: (n,) of the grasps above the table, metres.
-            theta: (n,) the grasps' angles, for ``image: object``, whose patches are not turned.
+            theta: (n,) the grasps' angles, for ``image: object``, whose patches are not rotated.
         """
         prepared = _prepared(self.features, patches, height)
         if not self.sees_object:
             return self.outputs(self.features(prepared, centre_grasp, height))
-        assert theta is not None, "a picture that is not turned needs the grasps' angles"
-        # Within, all is along the picture's axes.
-        centre = torch.cat([_turned(centre_grasp, theta), theta[:, None]], dim=-1)
+        assert theta is not None, "image: object needs the grasps' angles"
+        # The network works along the image's axes.
+        centre = torch.cat([_rotated(centre_grasp, theta), theta[:, None]], dim=-1)
         mean, variance = self.outputs(self.features(prepared, centre, height))
-        mean = torch.cat([_turned(mean[:, :3], -theta), mean[:, 3:]], dim=-1)
+        mean = torch.cat([_rotated(mean[:, :3], -theta), mean[:, 3:]], dim=-1)
         if variance is None:
             return mean, None
         cos, sin = theta.cos().square(), theta.sin().square()
@@ -163,20 +163,20 @@ class GraspDisplacementNetwork(nn.Module):
         return mean, torch.cat([along, variance[:, 2:]], dim=-1)
 
     def outputs(self, features: Tensor) -> tuple[Tensor, Tensor | None]:
-        """The same from the features (n, f)."""
+        """Compute mean and variance (n, 4) from features (n, f), along the axes of the patch."""
         mean = self.target_mean + self.target_std * self.mean_head(features)
         if self.variance_head is None:
             return mean, None
-        # The bound keeps one odd batch from driving the exponential to infinity or to zero.
+        # The bound keeps a single outlier from driving the exponential to infinity or to zero.
         log_variance = self.variance_head(features).clamp(-_LOG_VARIANCE_LIMIT, _LOG_VARIANCE_LIMIT)
         return mean, self.target_std.square() * log_variance.exp() + self.least_variance
 
     def start_from(self, gqn: GraspQualityNetwork) -> None:
-        """Copies the convolutions' weights of a trained GQN (paper, figure 3)."""
+        """Copy the convolutions' weights of a trained GQN (paper, figure 3)."""
         if self.sees_object:
-            return  # other pictures: the paper starts these at random
+            return  # another input: the paper initialises these at random
         if isinstance(self.features, HandFeatures):
-            return  # its layers and pixels are others
+            return  # its layers and resolution differ
         self.features.convolutions.load_state_dict(gqn.features.convolutions.state_dict())
 
 
@@ -184,19 +184,19 @@ def _prepared(features: PatchFeatures | HandFeatures, patches: Tensor, height: T
     prepared = features.prepare(patches, height)
     if isinstance(features, HandFeatures):
         return prepared
-    # Measured on a CPU: with its many channels, channels last takes about 40 % off the convolutions' time.
+    # Measured on a CPU: channels last makes these convolutions about 40 % faster.
     return prepared.contiguous(memory_format=torch.channels_last)
 
 
-def _turned(vectors: Tensor, angle: Tensor) -> Tensor:
-    """Vectors (n, 3) turned about z by angles (n,)."""
+def _rotated(vectors: Tensor, angle: Tensor) -> Tensor:
+    """Rotate vectors (n, 3) about z by angles (n,)."""
     cos, sin = angle.cos(), angle.sin()
     x, y = vectors[:, 0], vectors[:, 1]
     return torch.stack([cos * x - sin * y, sin * x + cos * y, vectors[:, 2]], dim=-1)
 
 
 def displacement_error(mean: Tensor, target: Tensor) -> Tensor:
-    """Target minus mean (n, 4), the angle wrapped."""
+    """Compute target minus mean (n, 4), the angle wrapped."""
     error = target - mean
     return torch.cat([error[..., :3], wrap_angle(error[..., 3:])], dim=-1)
 
@@ -204,18 +204,18 @@ def displacement_error(mean: Tensor, target: Tensor) -> Tensor:
 def displacement_loss(
     mean: Tensor, variance: Tensor | None, target: Tensor, target_std: Tensor, *, beta: float = 0.0
 ) -> Tensor:
-    """Equation 5 of the paper, averaged over the batch: sum of log variance + squared error / variance.
+    """Compute equation 5 of the paper: sum of log variance + squared error / variance, batch mean.
 
-    Both are taken in normalised units (a constant apart, the same), so that a loss near 4 means "no
-    better than the training mean". Without variances it is the squared error.
+    Both are in normalised units, which adds a constant: a loss near 4 means "no better than the training
+    mean". Without variances it is the squared error.
 
     Args:
         mean: (n, 4) predicted grasp displacement.
         variance: (n, 4) or None.
         target: (n, 4).
         target_std: (4,) the training data's deviation.
-        beta: 0 is the paper's loss; 0.5 weighs each term by its variance's square root, which fits the
-            mean better where it is hard (Seitzer et al. 2022, arXiv 2203.09168).
+        beta: 0 is the paper's loss; 0.5 weights each term by the square root of its variance, which fits
+            the mean better where the variance is large (Seitzer et al. 2022, arXiv 2203.09168).
     """
     squared = (displacement_error(mean, target) / target_std).square()
     if variance is None:

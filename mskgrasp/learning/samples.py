@@ -1,4 +1,4 @@
-"""A dataset as the networks see it: one patch and one action an attempt, split by parts."""
+"""Training samples of a dataset: a patch and an action for each attempt, and the split by parts."""
 
 from __future__ import annotations
 
@@ -25,29 +25,29 @@ from mskgrasp.perception.part_detection import view_part
 from mskgrasp.runtime.worker_pool import Work, results
 
 HEIGHT_STEP = 1e-4
-"""Metres; what depth is stored in."""
+"""Resolution of stored patches, metres: that of a stored depth."""
 SHARDS_A_WORKER = 100
-"""Fewer are read before a process more has started: a shard of 40 attempts takes 60 ms, a start 4 s."""
+"""Fewer are read faster than another process starts: a shard of 40 attempts takes 60 ms, a start 4 s."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Samples:
-    """n attempts.
+    """Samples of n attempts.
 
     Attributes:
-        patches: (n, 1, r, c) int16, 0.1 mm above the table, each turned to its grasp.
-        object_patches: (n, 1, r, c) int16, around the part and not turned; None where no network sees them.
+        patches: (n, 1, r, c) int16, 0.1 mm above the table, each rotated with its grasp.
+        object_patches: (n, 1, r, c) int16, centred on the part and not rotated; None unless the
+            network sees them.
         theta: (n,) float32 angle of the grasp.
         centre_grasp: (n, 3) float32 object centre, estimated from the image, in the grasp frame, metres.
         height: (n,) float32 of the grasp above the table, metres.
         success: (n,) bool.
         displacement: (n, 4) float32 true object displacement, NaN where the grasp failed.
-        grasp_displacement: (n, 4) float32, the same as grasp displacement: what is learned.
+        grasp_displacement: (n, 4) float32, the same as grasp displacement: the training target.
         part: (n,) int64, index into ``parts``.
         parts: Names of the parts.
-        skipped: Why and how many attempts could not be used: at run time, too, the planner would find
-            no part in them.
-        fingerprint: Hex digest of grasps and outcomes: two equal ones are the same data.
+        skipped: Number of unusable attempts by reason: the planner would find no part in them either.
+        fingerprint: Hex digest of grasps and outcomes; equal digests mean equal data.
     """
 
     patches: Tensor
@@ -67,27 +67,27 @@ class Samples:
         return len(self.success)
 
     def patches_of(self, rows: Tensor, device: torch.device | str) -> Tensor:
-        """Patches (n, 1, r, c) of some rows in metres on a device."""
+        """Get patches (n, 1, r, c) of some rows in metres on a device."""
         return self.patches[rows].to(device).float() * HEIGHT_STEP
 
     def quality_patches_of(self, rows: Tensor, device: torch.device | str, network: NetworkConfig) -> Tensor:
-        """What the quality network sees of some rows, (n, 1, r, c) metres."""
+        """Get the quality network's patches of some rows, (n, 1, r, c) metres."""
         stride, columns = network.quality_stride, network.quality_shape[1]
         spare = (-(-self.patches.shape[-1] // stride) - columns) // 2
         coarse = self.patches[rows, :, ::stride, spare * stride :: stride][..., :columns]
         return coarse.to(device).float() * HEIGHT_STEP
 
     def displacement_patches_of(self, rows: Tensor, device: torch.device | str) -> Tensor:
-        """What the displacement network sees of some rows, (n, 1, r, c) metres."""
+        """Get the displacement network's patches of some rows, (n, 1, r, c) metres."""
         if self.object_patches is None:
             return self.patches_of(rows, device)
         return self.object_patches[rows].to(device).float() * HEIGHT_STEP
 
     def of_parts_between(self, low: float, high: float) -> Samples:
-        """The samples of the parts of which a share in [low, high] of the grasps succeeded.
+        """Select the parts whose success rate lies in [low, high].
 
         Raises:
-            BadDataset: No part is left.
+            BadDataset: No part has such a rate.
         """
         rates = [float(self.success[self.part == i].float().mean()) for i in range(len(self.parts))]
         kept = [i for i, rate in enumerate(rates) if low <= rate <= high]
@@ -119,16 +119,16 @@ def read_samples(
     advance: Callable[[int, int], None] = lambda done, total: None,
     workers: int | None = None,
 ) -> Samples:
-    """Reads all shards of a dataset and crops every attempt's patch.
+    """Read all shards of a dataset and crop every attempt's patch.
 
-    Only the patches stay in memory (8 kB an attempt of 64 pixels), never the images of more shards than there
-    are processes: many shards are read by several, and make the same samples.
+    Only the patches stay in memory (8 kB for an attempt of 64 x 64 pixels), and the images of one shard for
+    each process. The samples do not depend on the number of processes.
 
     Args:
         folder: The dataset.
-        network: What will learn from them: it decides the patches' size.
+        network: Gives the patches' size and resolution.
         advance: Called with the shards done and their number.
-        workers: Processes; None: one a core, where there are shards enough.
+        workers: Processes; None: one for each core, if there are enough shards.
 
     Raises:
         BadDataset: A shard cannot be read, or no attempt shows a part.
@@ -150,13 +150,13 @@ def read_samples(
 
 @dataclass(frozen=True, kw_only=True)
 class _Piece:
-    """What a shard gives; plain arrays, as processes send them to each other.
+    """Samples of one shard, as plain arrays that processes can exchange.
 
     Attributes:
-        part: Its part.
-        raw: The bytes that make the fingerprint.
-        arrays: By the names of the samples' attributes; empty where no attempt shows a part.
-        skipped: Why and how many attempts could not be used.
+        part: Name of its part.
+        raw: Bytes that enter the fingerprint.
+        arrays: By the names of the samples' attributes; empty if no attempt shows a part.
+        skipped: Number of unusable attempts by reason.
     """
 
     part: str
@@ -169,7 +169,7 @@ class _Piece:
 def _reader(
     network: NetworkConfig,
 ) -> Iterator[Callable[[tuple[int, Path]], Iterator[tuple[int, _Piece | BadDataset]]]]:
-    """Reads a shard; what is wrong with it is an answer, so that it stays the error that it is."""
+    """Make a reader of shards; it yields an error as a result, so that its type survives the worker pool."""
 
     def read(job: tuple[int, Path]) -> Iterator[tuple[int, _Piece | BadDataset]]:
         index, path = job
@@ -178,13 +178,13 @@ def _reader(
         except BadDataset as error:
             yield index, error
             return
-        told = (attempts.grasp, attempts.success, attempts.displacement)
+        outcomes = (attempts.grasp, attempts.success, attempts.displacement)
         arrays, skipped = _shard_samples(attempts, info, network)
         yield (
             index,
             _Piece(
                 part=info.part,
-                raw=b"".join(np.ascontiguousarray(array).tobytes() for array in told),
+                raw=b"".join(np.ascontiguousarray(array).tobytes() for array in outcomes),
                 arrays=arrays,
                 skipped=dict(skipped),
             ),
@@ -199,20 +199,20 @@ def _joined(pieces: list[_Piece], folder: Path, network: NetworkConfig) -> Sampl
         skipped.update(piece.skipped)
     parts = tuple(dict.fromkeys(piece.part for piece in pieces))
     digest = hashlib.sha256(b"".join(piece.raw for piece in pieces)).hexdigest()
-    seen = [piece for piece in pieces if piece.arrays]
-    if not seen:
+    usable = [piece for piece in pieces if piece.arrays]
+    if not usable:
         reason = f": {skipped.most_common(1)[0][0]}" if skipped else ""
         raise BadDataset(f"no usable attempt in {folder}{reason}; collect again")
     number = {name: index for index, name in enumerate(parts)}
     arrays = {
-        name: torch.from_numpy(np.concatenate([piece.arrays[name] for piece in seen]))
-        for name in seen[0].arrays
+        name: torch.from_numpy(np.concatenate([piece.arrays[name] for piece in usable]))
+        for name in usable[0].arrays
     }
-    around = arrays.pop("object_patches")
+    object_patches = arrays.pop("object_patches")
     return Samples(
         **arrays,
-        object_patches=around if network.sees_object else None,
-        part=torch.cat([torch.full((len(piece.arrays["success"]),), number[piece.part]) for piece in seen]),
+        object_patches=object_patches if network.sees_object else None,
+        part=torch.cat([torch.full((len(piece.arrays["success"]),), number[piece.part]) for piece in usable]),
         parts=parts,
         skipped=dict(skipped),
         fingerprint=digest,
@@ -231,7 +231,7 @@ def _shard_samples(
                 image, info.intrinsics, info.T_base_camera, table_z=info.table_z, region=info.region
             )
         except NoPartFound as error:
-            # The message without its numbers: what is counted is the reason.
+            # The message without its numbers is the reason, which is counted.
             skipped[str(error).split(" (")[0]] += 1
             continue
         rows.append(row)
@@ -257,10 +257,10 @@ def _shard_samples(
         )
         return (patches / HEIGHT_STEP).round().clamp(-32768, 32767).to(torch.int16).numpy()
 
-    around = np.column_stack([np.array(centres), np.zeros(len(rows))])
+    around_part = np.column_stack([np.array(centres), np.zeros(len(rows))])
     return {
         "patches": crop(grasp),
-        "object_patches": crop(around) if network.sees_object else np.zeros((len(rows), 0)),
+        "object_patches": crop(around_part) if network.sees_object else np.zeros((len(rows), 0)),
         "theta": grasp[:, 3].astype(np.float32),
         "centre_grasp": centre_grasp.astype(np.float32),
         "height": (grasp[:, 2] - info.table_z).astype(np.float32),
@@ -271,15 +271,15 @@ def _shard_samples(
 
 
 def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "catalogue"]) -> dict[str, Split]:
-    """The side of each part: training, validation, or test.
+    """Assign each part to training, validation or test.
 
-    A part stays on its side when other parts join the dataset. By name, at least one part is on either side.
+    A part keeps its side when other parts join the dataset. Training and validation get one at least.
 
     Args:
         parts: Names.
-        fraction: Share of the validation parts, by name.
-        by: A hash of the name; or the catalogue, which keeps near-duplicates together. Parts that are not in
-            it are then split by name.
+        fraction: Share of validation parts, for a split by name.
+        by: name: a hash of the part's name; catalogue: the catalogue's split, which keeps near-duplicates
+            together, and the name for parts that are not in it.
 
     Raises:
         BadDataset: There are fewer than two parts, or no catalogue.

@@ -1,7 +1,7 @@
-"""What a parallel jaw cannot tell apart: half a turn about its approach, and the part's mirror image.
+"""Symmetries of a parallel jaw: half a turn about its approach direction, and mirroring.
 
-After half a turn the same fingers close on the same places; a part mirrored along the closing direction is as
-good a part, and moves as the mirrored part would.
+After half a turn the fingers close on the same places; a part mirrored along the closing direction moves as
+the mirror image of the part.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from torch import Tensor
 def mirror_and_turn(
     patches: Tensor, centre_grasp: Tensor, target: Tensor, generator: torch.Generator
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Turns a random half of the samples by half a turn, and mirrors a random half of them.
+    """Rotate a random half of the samples by half a turn, and mirror a random half of them.
 
     Args:
         patches: (n, 1, r, c).
@@ -31,11 +31,11 @@ def mirror_and_turn(
 
 
 def views(patches: Tensor, centre_grasp: Tensor) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
-    """The four views of grasps: as they are, mirrored, turned by half a turn, and both.
+    """Generate the four equivalent views of grasps: original, mirrored, rotated by half a turn, and both.
 
     Yields:
-        Patches (n, 1, r, c), centres (n, 3), and the signs (4,) that turn what is said of the view's
-        displacement into what it says of the grasp's, and back.
+        Patches (n, 1, r, c), centres (n, 3), and the signs (4,) that convert the displacement predicted for
+        the view into the grasp's, and back.
     """
     for turn in (1.0, -1.0):
         for mirror in (1.0, -1.0):
@@ -45,5 +45,5 @@ def views(patches: Tensor, centre_grasp: Tensor) -> Iterator[tuple[Tensor, Tenso
 
 
 def _signs(turned: Tensor, mirrored: Tensor) -> Tensor:
-    """(..., 4) signs of x, y, z and theta: -1 where half a turn, or a mirror image, reverses them."""
+    """Compute the signs (..., 4) of x, y, z and theta under half a turn and mirroring."""
     return torch.stack([turned, turned * mirrored, torch.ones_like(turned), mirrored], dim=-1)

@@ -1,4 +1,4 @@
-"""Trains the GQN, then the GDN; goes on to the bit where it was stopped."""
+"""Training of the GQN and then of the GDN, which resumes from a checkpoint with identical results."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from mskgrasp.core import metrics
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadDataset, MskgraspError, UsageError
-from mskgrasp.learning import held_out as validation
+from mskgrasp.learning import held_out
 from mskgrasp.learning.checkpoint import (
     Checkpoint,
     optimiser_tensors,
@@ -31,15 +31,15 @@ from mskgrasp.learning.samples import Samples, part_sides
 from mskgrasp.learning.symmetry import mirror_and_turn
 
 _LEAST_TARGET_STD = (1e-4, 1e-4, 1e-4, 1e-3)
-"""Metres and radians: what varies less (parts that never rise in the hand) is noise of the simulation."""
+"""Metres and radians: less variation (parts that never rise in the hand) is noise of the simulation."""
 
 
 class TrainingDiverged(MskgraspError):
-    """The loss is no number any more."""
+    """The loss is not finite."""
 
 
 class StageConfig(Config):
-    """How one network is optimised."""
+    """Optimisation of one network."""
 
     optimiser: Literal["adam", "rmsprop"] = "adam"
     learning_rate: float = Field(default=1e-3, gt=0.0)
@@ -52,7 +52,7 @@ class StageConfig(Config):
 
 
 class LearningConfig(Config):
-    """What is learned and how; the same settings, data and device type give the same model."""
+    """Settings of training; the same settings, data and device type give the same model."""
 
     seed: int = Field(default=0, ge=0)
     sides: Literal["name", "catalogue"] = "name"
@@ -63,14 +63,14 @@ class LearningConfig(Config):
     calibrate: bool = True
     """Correct quality and variances on the validation parts, at the end."""
     success_range: tuple[float, float] = (0.0, 1.0)
-    """Parts whose share of successful random grasps lies outside are left out (paper: 0.05 to 0.40)."""
+    """Parts whose success rate of random grasps lies outside are excluded (paper: 0.05 to 0.40)."""
     network: NetworkConfig = PatchNetworkConfig()
     noise_std: float = Field(default=0.003, ge=0.0)
     """Noise on each pixel of a training patch, metres."""
     symmetric: bool = True
-    """Half of the samples are turned by half a turn, half are mirrored: the physics does not care."""
+    """Half of the samples are rotated by half a turn, half are mirrored: the physics is symmetric."""
     mixed_precision: bool = False
-    """What looks at the picture learns in bfloat16, all else in float32: faster on a CPU that knows AMX."""
+    """The image branch trains in bfloat16, the rest in float32: faster on a CPU with AMX."""
     beta: float = Field(default=0.0, ge=0.0, le=1.0)
     """0: the paper's likelihood; 0.5: beta-NLL."""
     keep_best: bool = True
@@ -81,33 +81,35 @@ class LearningConfig(Config):
     @model_validator(mode="after")
     def _check(self) -> LearningConfig:
         if self.symmetric and self.network.sees_object:
-            raise ValueError("symmetric: true turns patches with their grasp; image: object has none")
+            raise ValueError(
+                "symmetric: true needs patches that are rotated with the grasp; with image: object none are"
+            )
         if self.network.symmetric_views and not self.symmetric:
-            raise ValueError("network.symmetric_views shows views that only symmetric: true teaches")
+            raise ValueError("network.symmetric_views needs symmetric: true, which trains on these views")
         return self
 
 
 class Reporter:
-    """Is told how training goes; this one tells nobody."""
+    """Receiver of training progress; this one ignores it."""
 
     def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:
-        """A network's training begins, or goes on after ``done`` batches."""
+        """Start a network's training, or resume it after ``done`` batches."""
 
     def batch(self, loss: float) -> None:
-        """A batch was learned."""
+        """Report the loss of a batch."""
 
     def epoch(self, history: list[dict[str, Any]]) -> None:
-        """An epoch is finished and saved; its row is the last."""
+        """Report a finished and saved epoch, the last row of the history."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sides:
-    """Rows of a dataset's samples, no part on two sides.
+    """Rows of the samples by side; no part is on two sides.
 
     Attributes:
-        training: What is learned from.
-        validation: Decides when to stop, and calibrates.
-        test: Never looked at before the end; empty where parts are split by name.
+        training: Rows to train on.
+        validation: Rows that select the epoch and calibrate.
+        test: Rows for the final metrics only; empty if parts are split by name.
     """
 
     training: Tensor
@@ -116,7 +118,7 @@ class Sides:
 
 
 def split(samples: Samples, config: LearningConfig) -> Sides:
-    """Splits the samples by their parts.
+    """Split the samples by their parts.
 
     Raises:
         BadDataset: Training or validation lacks successes or failures.
@@ -138,14 +140,14 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
 
 
 def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) -> ModelMeta:
-    """The networks' description, its normalisation measured on the training parts."""
+    """Describe the networks, with the normalisation measured on the training parts."""
     success = samples.success[training_rows]
     target = samples.grasp_displacement[training_rows[success]].double()
     scale = samples.centre_grasp[training_rows].abs().amax(dim=0).clamp(min=1e-3)
     std = target.std(dim=0, correction=0).clamp(min=torch.tensor(_LEAST_TARGET_STD).double())
     mean = target.mean(dim=0)
     if config.symmetric:
-        # Turned and mirrored copies make all but z symmetric about zero.
+        # Rotated and mirrored copies make all but z symmetric about zero.
         std = target.square().mean(dim=0).sqrt().clamp(min=torch.tensor(_LEAST_TARGET_STD).double())
         std[2] = target[:, 2].std(correction=0).clamp(min=_LEAST_TARGET_STD[2])
         mean = mean * torch.tensor([0.0, 0.0, 1.0, 0.0])
@@ -166,14 +168,14 @@ def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) ->
             "test_parts": [name for name in samples.parts if sides[name] == "test"],
             "skipped": samples.skipped,
             "data_fingerprint": samples.fingerprint,
-            # Where the data lay and the model went is nobody's business.
+            # Without the paths of data and model, which mean nothing elsewhere.
             "settings": config.model_dump(mode="json", include=set(LearningConfig.model_fields)),
         },
     )
 
 
 class Stage:
-    """The training of one of the two networks."""
+    """Training of one of the two networks."""
 
     def __init__(
         self,
@@ -204,7 +206,7 @@ class Stage:
             self.optimiser = torch.optim.RMSprop(parameters, lr=rate, alpha=0.9, eps=1e-7)
 
     def learning_rate(self, step: int) -> float:
-        """The rate of a step, counted from the first of the first epoch."""
+        """Compute the learning rate of a step, counted from the start of training."""
         s = self.settings
         rate = s.learning_rate / (1 + s.decay * step)
         if s.schedule == "cosine":
@@ -214,10 +216,10 @@ class Stage:
         return rate
 
     def epoch(self, number: int, reporter: Reporter) -> dict[str, Any]:
-        """Learns every training sample once (the GQN: as many failures as successes) and validates."""
+        """Train one epoch (the GQN on as many failures as successes) and validate."""
         started = time.perf_counter()
         device = self.models.device
-        # Every epoch has random numbers of its own, so that nothing but its number must be remembered.
+        # Every epoch seeds its own generators, so that a checkpoint needs to store only its number.
         seed = zlib.crc32(f"{self.config.seed} {self.name} {number}".encode())
         order = torch.Generator().manual_seed(seed)
         noise = torch.Generator(device).manual_seed(seed)
@@ -240,7 +242,7 @@ class Stage:
         return row | self._validate() | {"seconds": round(time.perf_counter() - started, 2)}
 
     def order(self, generator: torch.Generator) -> Tensor:
-        """The rows of an epoch in random order; the GQN sees as many failures as successes."""
+        """Draw the rows of an epoch in random order; the GQN sees as many failures as successes."""
         success = self.samples.success[self.training_rows]
         kinds = (self.training_rows[success], self.training_rows[~success])
         if self.name == "gqn":
@@ -253,9 +255,9 @@ class Stage:
         return rows[torch.randperm(len(rows), generator=generator)]
 
     def batch(self, rows: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Patches, object centres, displacements and successes of some rows.
+        """Get patches, object centres, displacements and successes of some rows.
 
-        Turned, mirrored and with noise, all at once on the networks' device.
+        Augmented by rotation, mirroring and noise, on the networks' device.
         """
         s, device = self.samples, self.models.device
         if self.name == "gqn":
@@ -271,7 +273,7 @@ class Stage:
         return patches, centre, target, s.success[rows].to(device)
 
     def learn(self, rows: Tensor, generator: torch.Generator) -> float:
-        """One step of the optimiser; the loss before it."""
+        """Take one step of the optimiser; return the loss before it."""
         patches, centre, target, success = self.batch(rows, generator)
         height, theta = (
             values[rows].to(patches.device) for values in (self.samples.height, self.samples.theta)
@@ -290,8 +292,8 @@ class Stage:
     def _validate(self) -> dict[str, float]:
         if self.name == "gqn":
             success = self.samples.success[self.rows].double()
-            quality = torch.from_numpy(validation.predict_quality(self.models, self.samples, self.rows))
-            # The loss of balanced data: the correction to the base rate is taken out again.
+            quality = torch.from_numpy(held_out.predict_quality(self.models, self.samples, self.rows))
+            # The loss is that of balanced data: the correction to the base rate is undone.
             logit = torch.logit(quality, eps=1e-12) - self.models.gqn.log_prior_odds.cpu()
             each = nn.functional.binary_cross_entropy_with_logits(logit, success, reduction="none")
             balanced = (each[success > 0].mean() + each[success == 0].mean()) / 2
@@ -300,12 +302,12 @@ class Stage:
                 "auroc": metrics.auroc(quality.numpy(), success.numpy() > 0),
             }
         rows = self.rows[self.samples.success[self.rows]]
-        mean, variance = validation.predict_grasp_displacement(self.models, self.samples, rows)
-        known = torch.from_numpy(variance) if self.config.network.variance else None
+        mean, variance = held_out.predict_grasp_displacement(self.models, self.samples, rows)
+        predicted = torch.from_numpy(variance) if self.config.network.variance else None
         std = self.models.gdn.target_std.cpu().double()
         target = self.samples.grasp_displacement[rows].double()
-        loss = displacement_loss(torch.from_numpy(mean), known, target, std)
-        errors = validation.displacement_errors(self.samples, rows, mean, variance)
+        loss = displacement_loss(torch.from_numpy(mean), predicted, target, std)
+        errors = held_out.displacement_errors(self.samples, rows, mean, variance)
         return {"validation_loss": float(loss)} | {
             name: errors[name] for name in ("translation_rmse", "rotation_rmse")
         }
@@ -320,23 +322,23 @@ def train(
     reporter: Reporter | None = None,
     sides: Sides | None = None,
 ) -> tuple[Models, list[dict[str, Any]]]:
-    """Trains both networks, from a checkpoint where there is one.
+    """Train both networks, from a checkpoint if there is one.
 
     Args:
         samples: The dataset.
         config: Settings.
         checkpoint_path: Replaced after every epoch.
         device: Where the networks run.
-        reporter: Is told how it goes.
-        sides: Of the samples; None: as the settings say.
+        reporter: Receives the progress.
+        sides: Split of the samples; None: according to the settings.
 
     Returns:
-        The networks with their metrics on the parts never seen, and one row an epoch.
+        The networks with their metrics on held-out parts, and one row for each epoch.
 
     Raises:
         BadDataset: The data cannot be split, or lack successes or failures.
         UsageError: The checkpoint was made from other data.
-        TrainingDiverged: The loss is no number any more.
+        TrainingDiverged: The loss is not finite.
     """
     reporter = reporter or Reporter()
     sides = sides or split(samples, config)
@@ -388,9 +390,9 @@ def train(
         network.load_state_dict(best)
 
     if config.calibrate:
-        found = validation.calibrate(models, samples, sides.validation)
+        found = held_out.calibrate(models, samples, sides.validation)
         models = replace(models, meta=meta.model_copy(update={"calibration": found}))
-    report = validation.report(models, samples, sides.training, sides.validation)
+    report = held_out.report(models, samples, sides.training, sides.validation)
     if len(sides.test):
-        report["test"] = validation.report(models, samples, sides.training, sides.test)
+        report["test"] = held_out.report(models, samples, sides.training, sides.test)
     return replace(models, meta=models.meta.model_copy(update={"metrics": report})), history

@@ -1,4 +1,4 @@
-"""The rectangle that a part fills on the table: seen in a depth image, or known from its CAD file."""
+"""Footprint of a part on the table, from a depth image or from its CAD file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mskgrasp.perception.part_detection import find_part_pixels
 
 @dataclass(frozen=True, kw_only=True)
 class Footprint:
-    """The smallest rectangle around a part seen from above.
+    """Smallest rectangle around a part seen from above.
 
     Attributes:
         sides: (2,) the longer and the shorter one, metres.
@@ -27,15 +27,15 @@ class Footprint:
     theta: float
 
     def extent(self, theta: float) -> np.ndarray:
-        """(2,) how far it reaches along base x and y with the longer side at ``theta``, metres."""
+        """Compute the extent (2,) along base x and y with the longer side at ``theta``, metres."""
         cos, sin = abs(np.cos(theta)), abs(np.sin(theta))
         long, short = self.sides
         return np.array([cos * long + sin * short, sin * long + cos * short])
 
 
 def footprint_of(points: np.ndarray) -> Footprint:
-    """The footprint of points (n, 2), base frame, metres."""
-    # OpenCV's rectangle is exact for points of some size, not for metres in single precision.
+    """Fit the footprint of points (n, 2), base frame, metres."""
+    # In millimetres, as OpenCV's single precision is too coarse for metres.
     _, (width, height), angle = cv2.minAreaRect((np.asarray(points) * 1e3).astype(np.float32))
     long, short = max(width, height), min(width, height)
     theta = np.radians(angle + (0.0 if width >= height else 90.0))
@@ -43,7 +43,7 @@ def footprint_of(points: np.ndarray) -> Footprint:
 
 
 def seen_points(frame: RgbdFrame) -> np.ndarray:
-    """(h * w, 3) what a frame's pixels show, base frame, metres; NaN where they show nothing."""
+    """Compute the points (h * w, 3) of a frame's pixels, base frame, metres; NaN where invalid."""
     depth = np.asarray(frame.depth, dtype=np.float64)
     rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
     rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(frame.intrinsics).T
@@ -51,23 +51,23 @@ def seen_points(frame: RgbdFrame) -> np.ndarray:
 
 
 def pixel_pitch(frame: RgbdFrame) -> float:
-    """How far apart neighbouring pixels look, at the median of the frame's depth, metres."""
+    """Compute the distance of neighbouring pixels at the median depth, metres."""
     return float(np.nanmedian(frame.depth)) / float(frame.intrinsics[0][0])
 
 
 def seen_footprint(
     frame: RgbdFrame, *, table_z: float, region: tuple[float, float, float, float], min_height: float
 ) -> Footprint:
-    """The footprint of the part that a frame shows.
+    """Detect the footprint of the part in a frame.
 
     Args:
         frame: Of the part on the table.
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
-        min_height: What rises less above the table is table, metres.
+        min_height: Least height of a part above the table, metres.
 
     Raises:
-        NoPartFound: The frame shows none.
+        NoPartFound: No part is detected.
     """
     found = find_part_pixels(
         frame.depth,
@@ -83,7 +83,7 @@ def seen_footprint(
 
 
 def usual_footprint(part: Part) -> Footprint:
-    """The footprint of a part on the side on which it comes to lie most often; theta is 0."""
+    """Compute the footprint of a part in its most probable resting pose; theta is 0."""
     mesh = trimesh.load_mesh(part.mesh_path)
     quat_wxyz = part.resting.quat_wxyz[int(np.argmax(part.resting_probability))]
     found = footprint_of(quat_rotate(quat_wxyz, np.asarray(mesh.vertices))[:, :2])

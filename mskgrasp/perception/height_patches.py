@@ -1,4 +1,4 @@
-"""From a depth image to what the networks see: heights over the table, patches around grasps."""
+"""Height images above the table, and patches cropped from them around grasps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mskgrasp.core.geometry import Array, Pose, quat_conjugate, quat_rotate, qua
 def height_image(
     depth: Array, intrinsics: np.ndarray, T_base_camera: Pose, table_z: float | np.ndarray
 ) -> Array:
-    """Heights above the table of every pixel of depth images.
+    """Compute the heights above the table of every pixel of depth images.
 
     Args:
         depth: (..., h, w) numpy array or tensor, metres along the optical axis, NaN where invalid.
@@ -25,7 +25,7 @@ def height_image(
     """
     camera_z = quat_to_matrix(np.asarray(T_base_camera.quat_wxyz, dtype=np.float64))[..., 2, :]
     inverse = np.linalg.inv(np.asarray(intrinsics, dtype=np.float64))
-    # How far a ray of depth 1 rises, z . inv(K) (u, v, 1), is linear in the pixel.
+    # The rise of a ray of depth 1, z . inv(K) (u, v, 1), is linear in the pixel.
     slope = _as_kind((camera_z[..., None, :] @ inverse)[..., 0, :], depth)
     offset = _as_kind(np.asarray(T_base_camera.position)[..., 2] - table_z, depth)
     rows, columns = _as_kind(np.arange(depth.shape[-2]), depth), _as_kind(np.arange(depth.shape[-1]), depth)
@@ -49,12 +49,12 @@ def crop_patches(
     side: float = 0.128,
     n_columns: int | None = None,
 ) -> Tensor:
-    """Crops the height image around grasps, turned so that the fingers close along the columns.
+    """Crop the height image around grasps, rotated so that the fingers close along the columns.
 
     A patch is a rectangle of the horizontal plane through the grasp point, centred on it: the grasp frame's
     x points right, its y, the closing direction, up. It is sampled bilinearly. Invalid pixels do not
-    spread: they are left out of the interpolation, and where they prevail the table (0) is assumed, as
-    outside the image.
+    spread: they are excluded from the interpolation; where they prevail, and outside the image, the table (0)
+    is assumed.
 
     Args:
         heights: (h, w) one image for all grasps, or (n, h, w) one image each; metres above the table,
@@ -80,7 +80,7 @@ def crop_patches(
     points = torch.stack([torch.ones_like(up), right, up])
     distance = axes[..., 2] @ points
     if distance.numel() and float(distance.min()) < 1e-6:
-        distance.clamp_(min=1e-6)  # what is behind the camera lands far outside
+        distance.clamp_(min=1e-6)  # points behind the camera project far outside
     where = torch.empty(*distance.shape, 2, device=heights.device)  # (n, pixels, 2)
     for k, size in enumerate((width, height)):
         # To grid_sample's units before the division by the distance: (2 / (width - 1)) u - 1.
@@ -90,7 +90,7 @@ def crop_patches(
 
 
 def _sampled(heights: Tensor, where: Tensor) -> Tensor:
-    """Heights (a, b) between the pixels of one image (h, w), or of a images (a, h, w), at (a, b, 2)."""
+    """Interpolate heights (a, b) of one image (h, w), or of a images (a, h, w), at (a, b, 2)."""
     one = heights.ndim == 2
     images = heights[None, None] if one else heights[:, None]
     grid = where[None] if one else where[:, None]
@@ -115,7 +115,7 @@ def _sampled(heights: Tensor, where: Tensor) -> Tensor:
 
 
 def _patch_axes(grasps: Tensor, intrinsics: Array, T_base_camera: Pose) -> Tensor:
-    """Homogeneous pixels (n, 3, 3) of the grasp points and of a metre along the grasp frames' x and y."""
+    """Compute homogeneous pixels (n, 3, 3) of the grasp points and of unit steps along their x and y."""
     device = grasps.device
     grasps = grasps.double()
     matrix = torch.as_tensor(intrinsics, dtype=torch.float64, device=device)

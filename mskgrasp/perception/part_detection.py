@@ -1,4 +1,4 @@
-"""Where a part lies in a depth image, found by its height over the table alone."""
+"""Detection of a part in a depth image by its height above the table."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from mskgrasp.core.geometry import Array, Pose, quat_to_matrix
 from mskgrasp.core.grasp import PartView
 
 REGION_MARGIN = 0.05
-"""How far a part that lies in the region may reach beyond it, metres."""
+"""How far a part in the region may reach beyond it, metres."""
 MOST_RAISED = 0.4
 """Share of the region's pixels that a part may cover: 15 cm of 34 cm, squared, are 20 %."""
 ALONE = 0.2
-"""Share of the part's pixels from which on something else in the region is another part."""
+"""Share of the part's pixels above which another group in the region is another part."""
 MIN_PIXELS = 5
 """Smaller groups of pixels are specks: an M3 nut covers 6 pixels of 2.2 mm."""
 QUIET = 0.0003
-"""Deviation of the heights from which on an image is noisy, metres; one stored in 0.1 mm has up to 0.03."""
+"""Deviation of the heights above which an image is noisy, metres; one stored in 0.1 mm has up to 0.03."""
 _PLAUSIBLE_DEPTH = 20.0
-"""Metres; a camera above a table never is that far away, but a depth in millimetres always is."""
+"""Metres; a camera above a table is never that far away, a depth in millimetres always is."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FoundPart:
-    """The pixels that show the part.
+    """Pixels of a detected part.
 
     Attributes:
         depth: (h, w) metres, NaN where invalid.
         mask: (h, w) bool.
         points_base: (3, h, w) x, y, z of what every pixel sees, base frame, metres, NaN where invalid.
-        heights: (h, w) above the table as it is seen, metres, NaN where invalid; of a noisy image the median
+        heights: (h, w) above the measured table, metres, NaN where invalid; of a noisy image the median
             of 3 x 3 pixels, twice.
-        table_offset: By how much the table is seen higher than ``table_z``, metres; 0 in an exact image.
-        n_other: How many pixels the next largest thing in the region has.
+        table_offset: Measured height of the table relative to ``table_z``, metres; 0 in an exact image.
+        n_other: Number of pixels of the next largest group in the region.
     """
 
     depth: np.ndarray
@@ -59,13 +59,12 @@ def find_part_pixels(
     region: tuple[float, float, float, float],
     min_height: float = 0.002,
 ) -> FoundPart:
-    """The largest connected group of pixels higher than ``min_height``; an exact image is taken as it is.
+    """Find the largest connected group of pixels higher than ``min_height``; an exact image is not filtered.
 
-    Where the image is noisy, a pixel is as high as its surroundings on average (Gaussian, 1 pixel), all
-    clipped to twice ``min_height``: so an edge of what is higher stays where it is. Heights count from where
-    the table is seen: what a camera measures too far everywhere must not swallow a flat part. Groups up to
-    four pixels apart are one, because noise breaks what is narrow. ``min_height`` is at least the deviation
-    of a pixel's noise.
+    In a noisy image, heights are smoothed (Gaussian, 1 pixel) after clipping to twice ``min_height``, so that
+    the edges of higher parts stay in place. Heights are relative to the measured table, so that a constant
+    depth error does not hide a flat part. Groups up to four pixels apart are joined, because noise splits
+    narrow parts. ``min_height`` is at least the standard deviation of a pixel's noise.
 
     Args:
         depth: (h, w) metres, NaN where invalid.
@@ -73,10 +72,10 @@ def find_part_pixels(
         T_base_camera: Pose of the camera's optical frame in the base; it need not look straight down.
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
-        min_height: What rises less above the table is table, metres.
+        min_height: Least height of a part above the table, metres.
 
     Raises:
-        NoPartFound: Nothing rises above the table there, a noisy camera sees the table more than
+        NoPartFound: Nothing rises above the table there, a noisy camera measures the table more than
             ``min_height`` from ``table_z``, or the image is no depth in metres.
     """
     depth = _checked(np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth))
@@ -128,11 +127,11 @@ def view_part(
     min_height: float = 0.002,
     alone: bool = False,
 ) -> PartView:
-    """Where the part lies on the table: the box around the pixels that show it (`find_part_pixels`).
+    """Detect the part on the table: the box around its pixels (`find_part_pixels`).
 
-    The box lies along the image's axes: a side wall that is seen bounds it directly, an edge of the top
-    half a pixel further out than its last pixel. Its top is the height that 2 % of its pixels exceed, so
-    that a flying pixel does not raise it.
+    The box is aligned with the image's axes. A visible side wall bounds it directly, an edge of the top half
+    a pixel beyond its last pixel. Its top is the height that 2 % of its pixels exceed, so that a flying pixel
+    does not raise it.
 
     Args:
         depth: (h, w) metres, NaN where invalid.
@@ -140,7 +139,7 @@ def view_part(
         T_base_camera: Pose of the camera's optical frame in the base; it need not look straight down.
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
-        min_height: What rises less above the table is table, metres.
+        min_height: Least height of a part above the table, metres.
         alone: Refuse a second part; in a noisy image one that is more than four pixels away.
 
     Raises:
@@ -184,17 +183,17 @@ def view_part(
 
 
 def _points_base(depth: np.ndarray, intrinsics: np.ndarray, T_base_camera: Pose) -> np.ndarray:
-    """(3, h, w) x, y, z of what every pixel sees, base frame."""
+    """Compute x, y, z (3, h, w) of every pixel, base frame."""
     points = _rays(depth.shape, _plain(intrinsics), _plain(T_base_camera.quat_wxyz)) * depth
     points += np.asarray(T_base_camera.position)[:, None, None]
     return points
 
 
-@lru_cache(maxsize=4)  # a camera stays where it is
+@lru_cache(maxsize=4)  # the camera's pose is constant
 def _rays(shape: tuple[int, int], intrinsics: tuple[float, ...], quat_wxyz: tuple[float, ...]) -> np.ndarray:
-    """(3, h, w) where the rays of a camera end at depth 1, seen from it along the axes of the base."""
+    """Compute the rays (3, h, w) of a camera at depth 1, along the axes of the base."""
     rotation = quat_to_matrix(np.array(quat_wxyz))
-    # That is linear in the pixel.
+    # The rays are linear in the pixel.
     along_u, along_v, first = (rotation @ np.linalg.inv(np.reshape(intrinsics, (3, 3)))).T[..., None, None]
     rays = along_u * np.arange(shape[1]) + (along_v * np.arange(shape[0])[:, None] + first)
     rays.flags.writeable = False
@@ -202,13 +201,13 @@ def _rays(shape: tuple[int, int], intrinsics: tuple[float, ...], quat_wxyz: tupl
 
 
 def _checked(depth: np.ndarray) -> np.ndarray:
-    """A depth image with NaN for all that is not finite."""
+    """Check a depth image, and replace all that is not finite by NaN."""
     floating = np.issubdtype(depth.dtype, np.floating)
     valid = np.isfinite(depth) if floating else depth > 0
     n_valid = np.count_nonzero(valid)
     if not n_valid:
         raise NoPartFound("the depth image has no valid pixel; check the camera, its range and its exposure")
-    # Counting tells on which side of a bound the median is, in a tenth of its time.
+    # Counting, ten times faster than a median, gives the side of the bound it is on.
     if not floating or 2 * np.count_nonzero(valid & (depth > _PLAUSIBLE_DEPTH)) > n_valid:
         raise NoPartFound(
             f"depth is {depth.dtype} with a median of {np.median(depth[valid]):g}, expected floating metres; "
@@ -218,27 +217,27 @@ def _checked(depth: np.ndarray) -> np.ndarray:
 
 
 def _noise(heights: np.ndarray, near: np.ndarray) -> float:
-    """Standard deviation of a pixel's noise, from the steps between neighbours: most are on the table.
+    """Estimate the standard deviation of a pixel's noise from the steps between neighbours.
 
-    0 where it is less than `QUIET`.
+    Most of them are on the table. 0 if it is less than `QUIET`.
     """
     # The median step is 0.6745 deviations of a step, which is sqrt(2) those of a pixel.
     deviations = 0.6745 * math.sqrt(2)
     few, fewer = _steps(heights[::4], near[::4])
     if 4 * np.count_nonzero((few > QUIET * deviations) & fewer) < np.count_nonzero(fewer):
-        return 0.0  # far from half of them: so the others say, too
+        return 0.0  # far from half of them: a quarter of the rows suffices
     steps, both = _steps(heights, near)
     noise = float(np.median(steps[both])) / deviations if both.any() else 0.0
     return noise if noise > QUIET else 0.0
 
 
 def _steps(heights: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(h, w - 1) between neighbours of a row, and whether both are near."""
+    """Compute the steps (h, w - 1) between neighbours of a row, and whether both are near."""
     return np.abs(np.diff(heights, axis=1)), near[:, 1:] & near[:, :-1]
 
 
 def _median(heights: np.ndarray) -> np.ndarray:
-    """Of 3 x 3 pixels, twice; NaN where nothing is seen."""
+    """Filter by the median of 3 x 3 pixels, twice; NaN where invalid."""
     seen = np.isfinite(heights)
     median = np.where(seen, heights, 0.0).astype(np.float32)
     for _ in range(2):
@@ -247,13 +246,13 @@ def _median(heights: np.ndarray) -> np.ndarray:
 
 
 def _offset(heights: np.ndarray, least: float) -> float:
-    """The table's height among (n,) heights, most of which are the table's."""
+    """Estimate the table's height from heights (n,), most of which are the table's."""
     first = np.median(heights)
     return float(np.median(heights[np.abs(heights - first) < least]))
 
 
 def _mean(heights: np.ndarray, most: float) -> np.ndarray:
-    """Of what is seen around a pixel, clipped; NaN where nothing is seen."""
+    """Average the clipped valid heights around each pixel; NaN where invalid."""
     seen = np.isfinite(heights)
     total, weight = (
         np.asarray(cv2.GaussianBlur(values, (0, 0), 1.0))
@@ -263,9 +262,9 @@ def _mean(heights: np.ndarray, most: float) -> np.ndarray:
 
 
 def _largest_group(mask: np.ndarray, reach: int) -> tuple[np.ndarray | None, int]:
-    """The largest group of pixels, and how many the second largest has.
+    """Find the largest group of pixels, and the size of the second largest.
 
-    Pixels are of one group where discs of ``reach`` pixels around them meet; 1: neighbours.
+    Pixels are of one group if discs of ``reach`` pixels around them touch; 1: neighbours.
     """
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
     _, labels = cv2.connectedComponents(cv2.dilate(mask.astype(np.uint8), disc), connectivity=8)
@@ -277,10 +276,10 @@ def _largest_group(mask: np.ndarray, reach: int) -> tuple[np.ndarray | None, int
 
 @lru_cache(maxsize=4)
 def _box_axes(quat_wxyz: tuple[float, ...]) -> tuple[tuple[float, ...], float, float]:
-    """Axes with z up and x along the rows of a camera's image as seen from above.
+    """Compute axes with z up and x along the rows of a camera's image seen from above.
 
     Returns:
-        Their quaternion in the base, and cosine and sine of their turn.
+        Their quaternion in the base, and cosine and sine of their angle.
     """
     right = quat_to_matrix(np.array(quat_wxyz))[:2, 0]
     half = math.atan2(right[1], right[0]) / 2
@@ -294,24 +293,24 @@ def _plain(values: Array) -> tuple[float, ...]:
 
 
 def _bounds(mask: np.ndarray) -> tuple[slice, slice]:
-    """Rows and columns of a mask that ends before the border, with one more on every side."""
+    """Find rows and columns of a mask inside the border, with a margin of one pixel."""
     found = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
     rows, columns = (slice(int(one[0]) - 1, int(one[-1]) + 2) for one in found)
     return rows, columns
 
 
 def _extent(along: np.ndarray, mask: np.ndarray, pitch: float) -> tuple[float, float]:
-    """Bounds of the masked points in a coordinate (h, w) that runs along the image's rows.
+    """Compute the bounds of the masked points in a coordinate (h, w) along the image's rows.
 
-    The mask ends before the border.
+    The mask does not touch the border.
     """
     bounds = []
     for sign in (-1.0, 1.0):
         outward = np.where(mask, sign * along, -np.inf)
         row, column = np.unravel_index(int(np.argmax(outward)), mask.shape)
         neighbours = outward[row, column - 1], outward[row, column + 1]
-        # On a wall two neighbouring pixels have the same coordinate: its place is known exactly. On a
-        # flat top they are a pixel apart, and the edge is, on average, half of that further out.
+        # On a wall two neighbouring pixels have the same coordinate, which is exact. On a flat top they
+        # are a pixel apart, and the edge is, on average, half a pixel further out.
         step = outward[row, column] - max(neighbours)
         bounds.append(sign * float(outward[row, column] + min(step, pitch) / 2))
     return bounds[0], bounds[1]

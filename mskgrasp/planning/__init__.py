@@ -1,1 +1,1 @@
-"""Grasp planning and placing."""
+"""Grasp planner, and placing of the grasped part."""

@@ -1,4 +1,4 @@
-"""A planner for a cell, and the part that it plans for."""
+"""Planner for a cell, and presentation of a part in it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SIMULATED_CELL = config_file("cells/sapien.yaml")
 
 
 def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
-    """The planner for a cell: its networks, and the cell's table.
+    """Make the planner for a cell: loaded networks, and the cell's table.
 
     Raises:
         BadModel: The model cannot be used.
@@ -34,10 +34,10 @@ def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
 
 
 def present(cell: Cell, part: str, seed: int) -> None:
-    """Has the cell's feeder lay a part on the table.
+    """Place a part on the table with the cell's feeder.
 
     Raises:
-        HalError: The cell has none.
+        HalError: The cell has no feeder.
     """
     if cell.feeder is None:
         raise HalError("this cell has no feeder; put the part there by hand and leave --part away")
@@ -45,12 +45,12 @@ def present(cell: Cell, part: str, seed: int) -> None:
 
 
 def part_name(text: str, unit: Unit | None = None) -> str:
-    """The name of a part, or its folder, from what a user says; a CAD file is made a part first.
+    """Resolve a user's name, folder or CAD file to a part's name or folder; a CAD file is imported first.
 
     The name of a shipped example stands for that file where the current folder has no such file.
 
     Raises:
-        BadPart: The file cannot be made one part.
+        BadPart: The file cannot be imported as one part.
     """
     path = Path(text)
     if not path.exists() and (example := example_file(text)) is not None:

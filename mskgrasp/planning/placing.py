@@ -1,4 +1,4 @@
-"""Where the hand must go so that a part ends where it shall, given how the part moved in the hand."""
+"""Placing of a grasped part at a target, corrected by its displacement in the hand."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_an
 from mskgrasp.core.grasp import centre_in_grasp_frame, lowest_grasp_z, pose_base_tcp
 
 EARLY = 0.007
-"""How far above its place a part may meet the table and count as put down, m."""
+"""Height above the target pose from which contact with the table counts as placed, metres."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """Where a part shall be put.
+    """Target position and rotation of a part.
 
     Attributes:
         x: Of the part's centre, base frame, metres.
         y: The same.
-        theta: By how much the part shall be turned about the vertical from how it lay, radians.
+        theta: Rotation of the part about the vertical from its initial pose, radians.
     """
 
     x: float
@@ -35,21 +35,21 @@ class Target:
 def place_pose(
     grasp: np.ndarray, displacement: np.ndarray, centre_base: np.ndarray, target: Target, table_z: float
 ) -> np.ndarray:
-    """The pose of the hand, as a grasp, at which the part that it holds is at the target.
+    """Compute the hand pose, as a grasp, at which the held part is at the target.
 
     In the grasp frame the part's centre is at c + d and is turned by dtheta, where c is the centre before the
     grasp and (d, dtheta) the displacement. The hand at (p, phi) has the centre at p + R(phi) (c + d) and the
-    part turned by phi - theta + dtheta from how it lay; both are solved for p and phi.
+    part rotated by phi - theta + dtheta from its initial pose; both are solved for p and phi.
 
     Args:
         grasp: (4,) x, y, z, theta at which the part was grasped, base frame.
         displacement: (4,) of the centre, in the grasp frame; zeros place without correction.
         centre_base: (3,) the part's centre before the grasp, base frame, metres.
-        target: Where the part shall be.
+        target: Of the part's centre.
         table_z: Height of the table, metres.
 
     Returns:
-        (4,) x, y, z, theta, base frame; theta is not wrapped to half a turn, as a part is in the hand.
+        (4,) x, y, z, theta, base frame; theta is not wrapped to half a turn, which would turn the part.
     """
     grasp, displacement = np.asarray(grasp, dtype=np.float64), np.asarray(displacement, dtype=np.float64)
     held = centre_in_grasp_frame(np.asarray(centre_base, dtype=np.float64), grasp)[:2] + displacement[:2]
@@ -57,41 +57,41 @@ def place_pose(
     cos, sin = np.cos(theta), np.sin(theta)
     x = target.x - (cos * held[0] - sin * held[1])
     y = target.y - (sin * held[0] + cos * held[1])
-    # A part that has sunk in the hand is let go higher, one that has risen lower.
+    # A part that has sunk in the hand is released higher, one that has risen lower.
     z = max(grasp[2] - displacement[2] + PUT_DOWN, lowest_grasp_z(table_z))
     return np.array([x, y, z, theta])
 
 
 def place_error(before: Pose, after: Pose, centre_offset: np.ndarray, target: Target) -> tuple[float, float]:
-    """How far a placed part is from its target, metres and radians.
+    """Compute the distance of a placed part from its target, metres and radians.
 
     Args:
-        before: ``T_base_obj`` where it lay.
-        after: ``T_base_obj`` where it was put.
-        centre_offset: (2,) the part's centre as it was seen, from the origin of obj, base axes, metres: it is
-            this point that shall be at the target.
-        target: Where it shall be.
+        before: ``T_base_obj`` before the grasp.
+        after: ``T_base_obj`` after placing.
+        centre_offset: (2,) the detected centre relative to the origin of obj, base axes, metres: the target
+            is that of this point.
+        target: Target of the centre.
     """
     turn = float(twist_and_swing(quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz)))[0])
     cos, sin = np.cos(turn), np.sin(turn)
     x, y = centre_offset
     centre = after.position[:2] + [cos * x - sin * y, sin * x + cos * y]
-    missed = float(np.hypot(*(centre - [target.x, target.y])))
-    return missed, turned_by(turn, target)
+    distance = float(np.hypot(*(centre - [target.x, target.y])))
+    return distance, turned_by(turn, target)
 
 
 def turned_by(turn: float, target: Target) -> float:
-    """By how much a part that made a turn missed the one it was asked for, radians, not negative."""
+    """Compute the absolute difference of a part's rotation from the target's, radians."""
     return float(abs(wrap_angle(turn - target.theta)))
 
 
 def displacement_of_point(displacement: np.ndarray, origin: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """The displacement (4,) of another point of a part, both in the grasp frame before the grasp.
+    """Convert a displacement (4,) of a part's origin to that of another point, in the grasp frame before.
 
     Args:
         displacement: (4,) of the origin.
         origin: (3,) metres.
-        point: (3,) metres; the part's tilt is left out.
+        point: (3,) metres; the part's tilt is ignored.
     """
     cos, sin = np.cos(displacement[3]), np.sin(displacement[3])
     x, y, _ = np.asarray(point) - origin
@@ -100,29 +100,29 @@ def displacement_of_point(displacement: np.ndarray, origin: np.ndarray, point: n
 
 
 def check_place(cell: Cell, pose: np.ndarray) -> None:
-    """Refuses a place that the arm cannot reach, before anything moves.
+    """Refuse a pose that the arm cannot reach, before anything moves.
 
     Raises:
-        OutOfWorkspace: It cannot.
+        OutOfWorkspace: The arm cannot reach it.
     """
     cell.arm.check_pose(pose_base_tcp(pose))
     cell.arm.check_pose(above_grasp(cell, pose))
 
 
 def place(cell: Cell, pose: np.ndarray, recover: Callable[[MotionAborted], None]) -> None:
-    """Carries what the hand holds to a pose, lets it go and rises.
+    """Move the held part to a pose, release it and retract.
 
-    The fingers open no farther than they must: what lies beside the place stays there. A part that hangs
-    askew meets the table early and ends the motion; it stands then, and is let go there.
+    The fingers open no farther than needed, so as not to push neighbouring parts. A tilted part touches the
+    table early, which ends the motion; it is released there.
 
     Args:
         cell: The arm has lifted the part.
         pose: (4,) as `place_pose` gives it.
-        recover: Lets the arm move again after that contact, or refuses by an error.
+        recover: Lets the arm move again after that contact, or raises an error.
 
     Raises:
         OutOfWorkspace: The pose is refused before anything moves.
-        MotionAborted: The part met something on its way, more than `EARLY` above the pose.
+        MotionAborted: The part touched something more than `EARLY` above the pose.
     """
     check_place(cell, pose)
     cell.arm.move_to_pose(above_grasp(cell, pose), speed=0.25)

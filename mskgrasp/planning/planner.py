@@ -1,4 +1,4 @@
-"""Plans a grasp that is likely to hold and whose displacement is best known (paper, section 3.4)."""
+"""Planner of grasps with high quality and low displacement variance (paper, section 3.4)."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from mskgrasp.planning.scoring import Scene, displacements, qualities
 
 
 class PlannerConfig(Config):
-    """How a grasp is searched and chosen; the defaults are the paper's."""
+    """Settings of the search and the selection; the defaults are the paper's."""
 
     n_candidates: int = Field(default=3200, ge=1)
     top_fraction: float = Field(default=0.03, gt=0.0, le=1.0)
-    """Share of the candidates, best quality first, among which the displacement decides."""
+    """Share of the candidates, best quality first, among which the variance score selects."""
     policy: Literal["low_variance", "quality"] = "low_variance"
-    """quality: take the best quality, whatever its variance (the paper's experiment 1)."""
+    """quality: take the best quality, regardless of its variance (the paper's experiment 1)."""
     min_quality: float = Field(default=0.0, ge=0.0, le=1.0)
-    """A grasp whose predicted quality is lower is not taken."""
+    """Lowest predicted quality of a selected grasp."""
     check_fingers: bool = False
-    """Leave out grasps whose open fingers the depth image shows something in the way of."""
+    """Exclude grasps whose open fingers would collide with something in the depth image."""
     refinements: int = Field(default=0, ge=0, le=20)
-    """Rounds of the cross-entropy method: grasps are drawn near the best ones and judged in turn."""
+    """Rounds of the cross-entropy method: grasps are drawn near the best ones and scored."""
     chunk_size: int = Field(default=640, ge=1)
-    """Grasps a network sees at once: many more do not fit a CPU's cache, few take long to prepare. (The
+    """Grasps in a batch: many more do not fit a CPU's cache, few have too much overhead. (The
     paper's network, with patches seven times larger, is fastest with 32.)"""
 
     @property
     def searches(self) -> bool:
-        """Whether more is asked for than the best of the candidates."""
+        """Whether more than one grasp is scored at the end."""
         return self.check_fingers or self.refinements > 0
 
 
@@ -54,7 +54,7 @@ class Shortlist:
     scores: np.ndarray
 
     def joined(self, other: Shortlist, found: np.ndarray) -> Shortlist:
-        """Both, by the qualities of all candidates."""
+        """Merge two shortlists, sorted by the qualities of all candidates."""
         names = ("rows", "mean", "variance", "scores")
         arrays = [np.append(getattr(self, name), getattr(other, name), axis=0) for name in names]
         order = np.argsort(-found[arrays[0]], kind="stable")
@@ -63,17 +63,17 @@ class Shortlist:
 
 @dataclass(frozen=True, kw_only=True)
 class GraspPlan:
-    """The chosen grasp, what is expected of it, and what it was chosen from.
+    """Selected grasp, its predictions, and the candidates it was selected from.
 
     Attributes:
         grasp: (4,) base frame, metres and radians.
         quality: Predicted probability of success.
         displacement: (4,) expected object displacement, axes of the grasp frame, metres and radians.
         displacement_cov: (4, 4) its covariance, to first order.
-        grasp_displacement: (4,) expected grasp displacement, as the network predicts it.
+        grasp_displacement: (4,) expected grasp displacement, predicted by the network.
         grasp_displacement_var: (4,) its variances; NaN if the network predicts none.
         score: Variance score of the grasp, square metres; NaN if the network predicts no variance.
-        view: Where the part was seen.
+        view: The detected part.
         candidates: (n, 4) all grasps considered.
         qualities: (n,) theirs.
         shortlist: (k,) indices of the candidates of best quality, best first.
@@ -107,7 +107,7 @@ class GraspPlan:
         centre: np.ndarray,
         seconds: dict[str, float],
     ) -> GraspPlan:
-        """The plan of the shortlist's grasp ``chosen``, for a part whose centre is at (3,), base frame."""
+        """Make the plan of the shortlist's grasp ``chosen``, for a part centre (3,), base frame."""
         row, mean, variance = best.rows[chosen], best.mean[chosen], best.variance[chosen]
         centre_grasp = centre_in_grasp_frame(centre, candidates[row])
         return cls(
@@ -128,7 +128,7 @@ class GraspPlan:
 
     @property
     def summary(self) -> str:
-        """The grasp in a line, for whoever is asked about it."""
+        """Description of the grasp in one line, for the operator."""
         x, y, z, theta = self.grasp
         place = f"x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees"
         return f"grasp at {place}, quality {self.quality:.2f}"
@@ -139,7 +139,7 @@ class GraspPlan:
         return np.sqrt(np.diag(self.displacement_cov))
 
     def to_json(self) -> dict[str, Any]:
-        """The plan without its candidates, as plain values; what is unknown (NaN) is None."""
+        """Convert the plan without its candidates to plain values; NaN becomes None."""
         return {
             "grasp": _plain(self.grasp),
             "quality": float(self.quality),
@@ -167,7 +167,7 @@ def _plain(values: np.ndarray) -> Any:
 
 
 class Planner:
-    """Samples grasps over the part, scores them with the networks, and selects one."""
+    """Planner that samples grasps over the part, scores them with the networks, and selects one."""
 
     def __init__(
         self,
@@ -178,7 +178,7 @@ class Planner:
         region: tuple[float, float, float, float],
         min_height: float = 0.002,
     ):
-        """Takes the workspace: table height, region (x_min, x_max, y_min, y_max), least height of a part.
+        """Take the workspace: table height, region (x_min, x_max, y_min, y_max), least height of a part.
 
         All in metres, base frame.
 
@@ -196,11 +196,11 @@ class Planner:
         self.min_height = min_height
 
     def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
-        """Plans a grasp of the part that a frame shows.
+        """Plan a grasp of the part in a frame.
 
         Raises:
-            NoPartFound: The frame shows none.
-            NoGraspFound: No candidate is of the demanded quality.
+            NoPartFound: No part is detected.
+            NoGraspFound: No candidate has the required quality.
         """
         started = time.perf_counter()
         view, candidates = self.sample(frame, rng)
@@ -208,7 +208,7 @@ class Planner:
         sampled = time.perf_counter()
         found = qualities(self.models, scene, candidates, self.config.chunk_size)
         scored = time.perf_counter()
-        best = self._judged(scene, candidates, self._shortlist(scene, candidates, found))
+        best = self._scored(scene, candidates, self._shortlist(scene, candidates, found))
         if self.config.refinements:
             candidates, found, best = self._refined(scene, candidates, found, best, rng)
         chosen = select(found[best.rows], best.scores, self.config)
@@ -222,10 +222,10 @@ class Planner:
         return GraspPlan.of(view, candidates, found, best, chosen, centre=view.centre_base, seconds=seconds)
 
     def _shortlist(self, scene: Scene, candidates: np.ndarray, found: np.ndarray) -> np.ndarray:
-        """Indices of the best candidates; of those whose fingers are free where that is asked for.
+        """Find the best candidates; with ``check_fingers`` the best whose fingers are free.
 
         Raises:
-            NoGraspFound: Something is in the way of all fingers.
+            NoGraspFound: The fingers of every candidate would collide.
         """
         if not self.config.check_fingers:
             return shortlist(found, self.config.top_fraction)
@@ -242,7 +242,7 @@ class Planner:
             )
         return free[:n]
 
-    def _judged(self, scene: Scene, candidates: np.ndarray, rows: np.ndarray) -> Shortlist:
+    def _scored(self, scene: Scene, candidates: np.ndarray, rows: np.ndarray) -> Shortlist:
         mean, variance = displacements(self.models, scene, candidates[rows], self.config.chunk_size)
         return Shortlist(rows, mean, variance, variance_score(variance, scene.view.gyration_radius))
 
@@ -254,10 +254,10 @@ class Planner:
         best: Shortlist,
         rng: np.random.Generator,
     ) -> tuple[np.ndarray, np.ndarray, Shortlist]:
-        """Candidates, qualities and shortlist after some rounds near the best grasps.
+        """Refine candidates, qualities and shortlist by rounds of sampling near the best grasps.
 
-        What is sought is what is chosen by: the least variance score at a quality that the first shortlist
-        had, or the best quality.
+        The objective is that of the selection: the lowest variance score at a quality no lower than the first
+        shortlist's, or the best quality.
         """
         n_best, least = len(best.rows), float(found[best.rows].min())
         for number in range(self.config.refinements):
@@ -271,11 +271,11 @@ class Planner:
             kept = kept[quality[kept] >= least]
             rows = len(candidates) + np.arange(len(kept))
             candidates, found = np.append(candidates, drawn[kept], axis=0), np.append(found, quality[kept])
-            best = best.joined(self._judged(scene, candidates, rows), found)
+            best = best.joined(self._scored(scene, candidates, rows), found)
         return candidates, found, best
 
     def sample(self, frame: RgbdFrame, rng: np.random.Generator) -> tuple[PartView, np.ndarray]:
-        """Finds the part and draws candidates (n, 4) over it."""
+        """Detect the part and sample candidates (n, 4) over it."""
         view = view_part(
             frame.depth,
             frame.intrinsics,
@@ -289,13 +289,13 @@ class Planner:
 
 
 def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:
-    """Indices of the best qualities, best first: ``top_fraction`` of them, at least one."""
+    """Find the indices of the best qualities, best first: ``top_fraction`` of them, at least one."""
     n = max(1, int(round(top_fraction * len(qualities))))
     return np.argsort(-qualities, kind="stable")[:n]
 
 
 def variance_score(variance: np.ndarray, gyration_radius: float) -> np.ndarray:
-    """One number for four variances (..., 4): var_x + var_y + var_z + r^2 var_theta, square metres.
+    """Compute var_x + var_y + var_z + r^2 var_theta of variances (..., 4), square metres.
 
     With r the part's radius of gyration it is the mean squared distance by which the part's points miss
     their predicted places.
@@ -304,10 +304,10 @@ def variance_score(variance: np.ndarray, gyration_radius: float) -> np.ndarray:
 
 
 def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> int:
-    """Which of the shortlisted grasps, best quality first, is taken.
+    """Select one of the shortlisted grasps, which are sorted by quality.
 
     Raises:
-        NoGraspFound: None has the demanded quality.
+        NoGraspFound: None has the required quality.
     """
     good = np.flatnonzero(qualities >= config.min_quality)
     if not len(good):
@@ -321,7 +321,7 @@ def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> 
 def object_displacement_covariance(
     grasp_displacement: np.ndarray, variance: np.ndarray, centre_grasp: np.ndarray
 ) -> np.ndarray:
-    """Covariance of the object displacement, to first order in the grasp displacement's deviations.
+    """Compute the object displacement's covariance, to first order in the grasp displacement's deviations.
 
     Args:
         grasp_displacement: (..., 4) mean.

@@ -1,4 +1,4 @@
-"""Refinements of the planner's search: fingers that would hit something, and grasps near the best ones."""
+"""Refinements of the planner's search: collision check of the fingers, and sampling near the best grasps."""
 
 from __future__ import annotations
 
@@ -17,15 +17,14 @@ from mskgrasp.core.grasp import (
 from mskgrasp.planning.scoring import Scene
 
 _STEP = 0.002
-_LEAST_SPREAD = np.array([0.0005, 0.0005, 0.0005, 0.01])
-"""Metres and radians: the elite may be one grasp."""
+_LEAST_STD = np.array([0.0005, 0.0005, 0.0005, 0.01])
+"""Metres and radians: the elite may be a single grasp."""
 
 
 def fingers_free(scene: Scene, grasps: np.ndarray) -> np.ndarray:
-    """Whether nothing is seen where the open fingers of grasps (n, 4) go (n,).
+    """Check (n,) whether the open fingers of grasps (n, 4) are free of collisions.
 
-    What is not seen is taken for table. A pixel higher than the finger tips within a finger's footprint is in
-    its way.
+    A pixel higher than the finger tips within a finger's footprint collides. Invalid pixels count as table.
     """
     reach = MAX_OPENING / 2 + FINGER_THICKNESS
     rows, columns = 2 * int(np.ceil(reach / _STEP)) + 1, 2 * int(np.ceil(FINGER_HALF_WIDTH / _STEP)) + 1
@@ -39,23 +38,23 @@ def fingers_free(scene: Scene, grasps: np.ndarray) -> np.ndarray:
 def grasps_near(
     elite: np.ndarray, n: int, view: PartView, rng: np.random.Generator, *, width: float
 ) -> np.ndarray:
-    """Grasps (n, 4), each an elite one moved at random: a round of the cross-entropy method.
+    """Sample grasps (n, 4) around elite ones: a round of the cross-entropy method.
 
-    The density is a Gaussian around every elite grasp, so that a part with two good places keeps both.
+    The density is a mixture of Gaussians around the elite grasps, so that separate optima are kept.
 
     Args:
         elite: (k, 4).
-        n: How many.
-        view: Its box holds all grasps.
-        rng: Source of all that is random.
-        width: Deviations by those of the elite.
+        n: Number of grasps.
+        view: The part; the grasps stay within its box.
+        rng: Random generator.
+        width: Standard deviations relative to those of the elite.
     """
     local = elite.copy()
     local[:, :3] = view.T_base_box.inverse().apply(elite[:, :3])
-    # The angles' spread about the first one: a jaw is the same after half a turn.
-    turned = wrap_half_turn(local[:, 3] - local[0, 3])
-    spread = np.maximum(np.column_stack([local[:, :3], turned]).std(axis=0), _LEAST_SPREAD)
-    found = local[rng.integers(len(local), size=n)] + width * spread * rng.standard_normal((n, 4))
+    # The angles relative to the first one: a jaw is the same after half a turn.
+    angles = wrap_half_turn(local[:, 3] - local[0, 3])
+    std = np.maximum(np.column_stack([local[:, :3], angles]).std(axis=0), _LEAST_STD)
+    found = local[rng.integers(len(local), size=n)] + width * std * rng.standard_normal((n, 4))
     found[:, :2] = np.clip(found[:, :2], -view.size[:2] / 2, view.size[:2] / 2)
     found[:, :3] = view.T_base_box.apply(found[:, :3])
     lowest = lowest_grasp_z(view.table_z)

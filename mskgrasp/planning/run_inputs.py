@@ -1,4 +1,4 @@
-"""Digests of what the results of a run depend on: cell, model, parts."""
+"""Digests of the inputs of a run: cell file, model, parts."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from mskgrasp.runtime.run_folder import file_digest
 
 
 def inputs_of(cell: Path, models: Path, parts: Iterable[str]) -> dict[str, str]:
-    """Digests of a cell's file, a model and parts."""
+    """Compute digests of a cell's file, a model and parts."""
     return {"cell": file_digest(cell)} | model_digests(models) | part_digests(parts)
 
 
 def model_digests(models: Path, label: str = "") -> dict[str, str]:
-    """Digests of a model's files; the label tells models apart."""
+    """Compute digests of a model's files; the label distinguishes models."""
     return {
         f"{label} {name}".strip(): file_digest(models / name) for name in ("model.json", "model.safetensors")
     }
 
 
 def part_digests(parts: Iterable[str]) -> dict[str, str]:
-    """Digests of parts, by name or folder."""
+    """Compute digests of parts, by name or folder."""
     return {f"part {name}": find_part(name).content_hash for name in parts}

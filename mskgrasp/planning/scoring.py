@@ -1,4 +1,4 @@
-"""What the networks say of many grasps in one image."""
+"""Predictions of the networks for many grasps in one image."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from mskgrasp.perception.height_patches import crop_patches, height_image
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """An image in which grasps are looked at.
+    """Height image in which grasps are scored.
 
     Attributes:
         heights: (h, w) metres above the table, on the networks' device.
         intrinsics: (3, 3).
         T_base_camera: Pose of the camera.
         table_z: Height of the table, base frame, metres.
-        view: The part in it.
+        view: The detected part.
     """
 
     heights: Tensor
@@ -37,7 +37,7 @@ class Scene:
 
     @classmethod
     def of(cls, frame: RgbdFrame, view: PartView, table_z: float, device: torch.device) -> Scene:
-        """The scene of a frame."""
+        """Make the scene of a frame."""
         depth = torch.as_tensor(np.asarray(frame.depth, dtype=np.float32), device=device)
         return cls(
             heights=height_image(depth, frame.intrinsics, frame.T_base_camera, table_z + view.table_offset),
@@ -48,15 +48,15 @@ class Scene:
         )
 
     def crop(self, grasps: np.ndarray, network: NetworkConfig) -> Tensor:
-        """Patches (n, 1, r, c) around grasps (n, 4), as the displacement network takes them."""
+        """Crop patches (n, 1, r, c) around grasps (n, 4) for the displacement network."""
         return self.crop_of(grasps, network.patch_shape, network.pixel)
 
     def crop_for_quality(self, grasps: np.ndarray, network: NetworkConfig) -> Tensor:
-        """The same for the quality network: what is not looked at is not cropped."""
+        """Crop patches (n, 1, r, c) around grasps (n, 4) for the quality network, at its resolution."""
         return self.crop_of(grasps, network.quality_shape, network.pixel * network.quality_stride)
 
     def crop_of(self, grasps: np.ndarray, shape: tuple[int, int], pixel: float) -> Tensor:
-        """Patches of any rows and columns, their pixels some metres apart: `images.crop_patches`."""
+        """Crop patches of any shape and pixel distance, metres: `height_patches.crop_patches`."""
         return crop_patches(
             self.heights,
             torch.as_tensor(grasps),
@@ -69,7 +69,7 @@ class Scene:
 
 
 def qualities(models: Models, scene: Scene, grasps: np.ndarray, chunk: int) -> np.ndarray:
-    """Predicted probabilities of success (n,) of grasps (n, 4)."""
+    """Predict probabilities of success (n,) of grasps (n, 4)."""
     found = [
         models.quality(scene.crop_for_quality(grasps[rows], models.meta.network), centre, height)
         for rows, centre, height, _ in _chunks(models, scene, grasps, chunk)
@@ -80,7 +80,7 @@ def qualities(models: Models, scene: Scene, grasps: np.ndarray, chunk: int) -> n
 def displacements(
     models: Models, scene: Scene, grasps: np.ndarray, chunk: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and variance (n, 4) of the grasps' displacement; NaN variance where the model knows none."""
+    """Predict mean and variance (n, 4) of the grasps' displacement; without a variance it is NaN."""
     network = models.meta.network
     whole = None
     if network.sees_object:
@@ -99,7 +99,7 @@ def displacements(
 def _chunks(
     models: Models, scene: Scene, grasps: np.ndarray, size: int
 ) -> Iterator[tuple[slice, Tensor, Tensor, Tensor]]:
-    """Object centres (k, 3) in the grasp frame, heights (k,) above the table and angles (k,) of some rows."""
+    """Generate rows, object centres (k, 3) in the grasp frame, heights (k,) above the table, angles (k,)."""
     values = np.column_stack(
         [centre_in_grasp_frame(scene.view.centre_base, grasps), grasps[:, 2] - scene.table_z, grasps[:, 3]]
     )

@@ -1,1 +1,1 @@
-"""Program: train the networks. Run ``python -m mskgrasp.train --help``."""
+"""Program that trains the networks. Run ``python -m mskgrasp.train --help``."""

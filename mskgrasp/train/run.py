@@ -1,4 +1,4 @@
-"""Trains the networks on a dataset: ``python -m mskgrasp.train --data DIR --out DIR``."""
+"""Training run on a dataset: ``python -m mskgrasp.train --data DIR --out DIR``."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from mskgrasp.train.figures import draw_curves, draw_uncertainty
 CHECKPOINT = "checkpoint.safetensors"
 
 
-class _Bar(Reporter):
-    """A progress bar with the loss and the time left, and a line and a row in the log for every epoch."""
+class _ProgressBar(Reporter):
+    """Progress bar with the loss and the time left; each epoch adds a line and a row of the log."""
 
     def __init__(self, progress: Progress, log: Path):
         self._progress, self._log = progress, log
@@ -63,7 +63,7 @@ def _line(row: dict[str, Any]) -> str:
 
 
 def run(config: TrainConfig) -> int:
-    """Trains, and writes the model, its metrics, the log and the curves into ``config.out``."""
+    """Train, and write the model, its metrics, the log and the figures into ``config.out``."""
     if config.epochs is not None:
         gqn, gdn = (stage.model_copy(update={"epochs": config.epochs}) for stage in (config.gqn, config.gdn))
         config = config.model_copy(update={"epochs": None, "gqn": gqn, "gdn": gdn})
@@ -82,13 +82,13 @@ def run(config: TrainConfig) -> int:
         samples = _read(config, config.data, progress)
         sides = split(samples, config)
         console.print(
-            f"{len(sides.training)} attempts to learn from, "
-            f"{len(sides.validation) + len(sides.test)} at parts never seen; "
+            f"{len(sides.training)} attempts to train on, "
+            f"{len(sides.validation) + len(sides.test)} at held-out parts; "
             f"{float(samples.success.double().mean()):.0%} succeed; on {device}"
         )
         if samples.skipped:
             skipped = ", ".join(f"{n} ({why})" for why, n in samples.skipped.items())
-            console.print(f"left out: {skipped}")
+            console.print(f"unusable attempts: {skipped}")
         cli.make_folder(out)
         write_config(config, out / "config.yaml")
         models, history = train(
@@ -96,7 +96,7 @@ def run(config: TrainConfig) -> int:
             config,
             checkpoint_path=out / CHECKPOINT,
             device=device,
-            reporter=_Bar(progress, out / "log.csv"),
+            reporter=_ProgressBar(progress, out / "log.csv"),
         )
     draw_curves(history, models.meta.metrics, out / "curves.png")
     if config.network.variance:
@@ -112,7 +112,7 @@ def run(config: TrainConfig) -> int:
 
 
 def _check_out(config: TrainConfig, out: Path) -> None:
-    """Refuses a folder that holds anything but a run of the same settings."""
+    """Refuse a folder that holds anything but a run of the same settings."""
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return
     if not (out / "config.yaml").is_file():
@@ -165,7 +165,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _finite(value: Any) -> Any:
-    """JSON knows no NaN: what is undefined becomes null."""
+    """Replace NaN, which JSON does not have, by null."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value
@@ -174,7 +174,7 @@ def _finite(value: Any) -> Any:
 def _summarise(console: Console, report: dict[str, Any], out: Path) -> None:
     gqn, gdn = (report.get("test", report)[name] for name in ("gqn", "gdn"))
     console.print(
-        f"quality on parts never seen: AUROC {gqn['auroc']:.3f}, "
+        f"quality on held-out parts: AUROC {gqn['auroc']:.3f}, "
         f"balanced accuracy {gqn['balanced_accuracy']:.1%}, "
         f"Brier {gqn['brier']:.3f} (always the base rate: {gqn['brier_of_base_rate']:.3f})"
     )
@@ -187,7 +187,7 @@ def _summarise(console: Console, report: dict[str, Any], out: Path) -> None:
 
 
 def main() -> int:
-    """Reads the command line and runs."""
+    """Read the command line and run."""
     return run(
         parse(
             TrainConfig,

@@ -27,7 +27,7 @@ from tests.learning.small import HAND, PATCH, SHORT
 
 
 def test_views_that_the_network_never_learned_are_refused():
-    with pytest.raises(ValueError, match="only symmetric: true teaches"):
+    with pytest.raises(ValueError, match="needs symmetric: true"):
         LearningConfig(symmetric=False, network=PatchNetworkConfig(symmetric_views=True))
 
 

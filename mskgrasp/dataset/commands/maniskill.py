@@ -17,19 +17,19 @@ from mskgrasp.dataset.shards import list_shards, read_columns, read_shard
 
 
 def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
-    """Writes a dataset as ManiSkill trajectories: ``out`` (.h5) and the .json file beside it.
+    """Write a dataset as ManiSkill trajectories: ``out`` (.h5) and the .json file beside it.
 
     An attempt is a trajectory of one step in control mode ``grasp`` of GraspDisplacement-v1; docs/dataset.md
-    has the mapping. The part's pose afterwards is known of successes alone: they hang in the lifted hand.
+    has the mapping. The part's pose afterwards is known only for successes, which are in the lifted hand.
 
     Returns:
-        How many attempts were written.
+        The number of attempts.
 
     Raises:
         BadDataset: A shard is damaged, or the shards do not belong together.
         UsageError: A file exists, or cannot be made.
     """
-    # The simulator's own conventions are its room's; this verb alone looks there.
+    # Imported here, because only this verb needs the simulator's conventions.
     from tasks.trajectories import Episode, write_trajectories
 
     files = check_export_path(folder, out, ".h5")
@@ -49,16 +49,16 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
             same_settings(path, own, [info])
             if attempts.depth.shape[1:] != size:
                 raise BadDataset(f"{path}: depth images of another size than {size}; collect it again")
-            # Where the arm errs, the hand was not where it was sent, and where it was is not stored.
-            after = _pose_after(attempts, np.nan if _arm_errs(own) else lift_height)
+            # With errors of the arm the hand's true pose differs from the commanded one, and is not stored.
+            after = _pose_after(attempts, np.nan if _has_arm_errors(own) else lift_height)
             for row in range(len(attempts)):
-                won = bool(attempts.success[row])
+                success = bool(attempts.success[row])
                 yield Episode(
                     part=own.part,
                     grasp=attempts.grasp[row],
                     depth=np.nan_to_num(u16_to_depth(attempts.depth[row])),
                     T_base_obj=np.stack([attempts.pose_base_obj[row], after[row]]),
-                    success=won,
+                    success=success,
                     info=_outcome(attempts, own, row),
                 )
 
@@ -81,12 +81,12 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
         )
 
 
-def _arm_errs(info: ShardInfo) -> bool:
+def _has_arm_errors(info: ShardInfo) -> bool:
     return any(info.noise.get(name) for name in ("arm_position_std", "arm_angle_std"))
 
 
 def _pose_after(attempts: Attempts, lift_height: float) -> np.ndarray:
-    """(n, 7) the part after the lift, base frame; NaN where it failed: the hand's place is not stored."""
+    """Compute the part's poses (n, 7) after the lift, base frame; NaN for failures."""
     if not np.isfinite(lift_height):
         return np.full((len(attempts), 7), np.nan)
     lifted = attempts.grasp.astype(np.float64)
@@ -96,7 +96,7 @@ def _pose_after(attempts: Attempts, lift_height: float) -> np.ndarray:
 
 
 def _physics(info: ShardInfo) -> dict[str, Any]:
-    """The settings of a shard; one that knows of no coarse rate was simulated finely throughout."""
+    """Get the settings of a shard; one without a coarse rate was simulated at the full rate throughout."""
     return dict(coarse_rate_hz=info.physics.get("rate_hz")) | info.physics
 
 

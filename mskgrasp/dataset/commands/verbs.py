@@ -1,4 +1,4 @@
-"""What ``python -m mskgrasp.dataset`` can do: check, info, export."""
+"""Verbs of ``python -m mskgrasp.dataset``: check, info, export."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ PROG = "python -m mskgrasp.dataset"
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """Read all of a dataset and name each shard that is bad, missing or foreign, with the reason.
+    """Read all of a dataset and report each shard that is bad, missing or foreign, with the reason.
 
-    Looked at: files that are truncated or damaged, types and shapes, values that contradict each other or
+    Checks: files that are truncated or damaged, types and shapes, values that contradict each other or
     cannot be (a success that moved over 5 cm, depths beyond the table, a grasp outside the region), shards
     that are missing or there twice, parts and settings that differ between shards. Nothing is changed.
     Exit code 1 if anything is bad. Delete what is bad and collect again: only that is made.
@@ -76,11 +76,11 @@ Verb = (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs one verb; returns the exit code."""
+    """Run one verb and return the exit code."""
     verb = tyro.cli(
         Verb,  # pyright: ignore[reportArgumentType]
         prog=PROG,
-        description="Datasets that mskgrasp.collect has made: are they sound, what they hold, and export.",
+        description="Check, summarise and export datasets of mskgrasp.collect.",
         args=None if argv is None else list(argv),
     )
     match verb:
@@ -95,8 +95,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def run_check(verb: Check) -> int:
-    """Prints a line for each fault, and a last line with their number."""
-    report = check_dataset(verb.folder, _watched)
+    """Print a line for each fault, and a last line with their number."""
+    report = check_dataset(verb.folder, _with_progress)
     for note in report.notes:
         print(f"note: {note}", file=sys.stderr)
     for fault in report.faults:
@@ -111,10 +111,10 @@ def run_check(verb: Check) -> int:
 
 
 def run_info(verb: Info) -> int:
-    """Prints the card."""
+    """Print the card."""
     require_dataset(verb.folder)
     try:
-        card = read_card(verb.folder, _watched)
+        card = read_card(verb.folder, _with_progress)
     except BadDataset as error:
         raise BadDataset(f"{error}; find all bad shards with: {PROG} check {verb.folder}") from error
     if verb.markdown:
@@ -130,18 +130,18 @@ def run_info(verb: Info) -> int:
 
 
 def run_export(verb: Export) -> int:
-    """Writes the files and names them."""
+    """Write the files and print their names."""
     require_dataset(verb.folder)
     if verb.format == "npz":
-        n, files = export_npz(verb.folder, verb.out, _watched), [verb.out]
+        n, files = export_npz(verb.folder, verb.out, _with_progress), [verb.out]
     else:
-        n = export_maniskill(verb.folder, verb.out, _watched)
+        n = export_maniskill(verb.folder, verb.out, _with_progress)
         files = [verb.out, verb.out.with_suffix(".json")]
     print(f"wrote {' and '.join(map(str, files))}: {n} attempts")
     return 0
 
 
-def _watched(paths: Sequence[Path]) -> Iterable[Path]:
+def _with_progress(paths: Sequence[Path]) -> Iterable[Path]:
     return tqdm(paths, unit="shard", delay=1.0, leave=False, dynamic_ncols=True, disable=None)
 
 

@@ -1,7 +1,7 @@
-"""Measuring without knowing the truth: two tape squares on a part, before a grasp and after it.
+"""Displacement measurement by two tape squares on a part, imaged before a grasp and after it.
 
-A picture of the part at rest, the grasp, the part put down again where it was grasped, the hand out of sight,
-another picture. Whatever may be wrong is `mskgrasp.core.errors.MarkersNotFound`, never a number.
+The part is imaged at rest, grasped, placed where it was grasped, and imaged again with the hand out of view.
+Every failure is a `mskgrasp.core.errors.MarkersNotFound`, never a wrong number.
 """
 
 from mskgrasp.perception.markers.find import Markers, find_markers

@@ -1,4 +1,4 @@
-"""Where the two tape squares on a part are."""
+"""Detection of the two tape squares on a part."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from mskgrasp.perception.markers.registered import LEAST_DEPTHS, RegisteredFrame
 from mskgrasp.perception.markers.spots import Spot, find_spots
 
 LEAST_CONTRAST = 12
-"""Grey levels between the tape and all around it; less is noise, or another surface."""
+"""Least grey levels between the tape and its surroundings; less is noise, or another surface."""
 LEAST_PIXELS = 6.0
-"""Pixels along the smaller square's side; with fewer, whole pixels decide about size and shape."""
+"""Least pixels along the smaller square's side; with fewer, size and shape are quantised too coarsely."""
 SPECK = 0.2
-"""A white spot smaller than this share of the smaller square is a glint, and no matter."""
+"""A white spot smaller than this share of the smaller square is ignored as a glint."""
 SIZE_TOLERANCE = 0.1
-"""A square may be larger or smaller than was said by this share, along each side: it is cut by hand."""
+"""Relative tolerance of each side, as the squares are cut by hand."""
 LEAST_FILL = 0.9
-"""A square fills its smallest rectangle; a disc fills 0.79 of it, one without a corner less than this."""
+"""Least share of its smallest rectangle that a square fills; a disc fills 0.79."""
 REGION_MARGIN = 0.05
-"""How far a part that lies in the region may reach beyond it, m."""
+"""How far a part in the region may reach beyond it, metres."""
 _STEP = 3
 _NAMES = ("larger", "smaller")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Markers:
-    """Both squares of one picture, the larger first.
+    """Both squares of one image, the larger first.
 
     Attributes:
         pixels: (2, 2) column and row of their centres in the depth image; the centre of a pixel has integer
             coordinates.
         points_base: (2, 3) their centres, base frame, metres.
-        sides: (2, 2) the longer and the shorter side of each as seen, metres.
-        contrast: Grey levels between the tape and the brightest thing around it.
+        sides: (2, 2) the measured longer and shorter side of each, metres.
+        contrast: Grey levels between the tape and the brightest surface around it.
     """
 
     pixels: np.ndarray
@@ -55,21 +55,21 @@ def find_markers(
     region: Region,
     heights: tuple[float, float] | None = None,
 ) -> Markers:
-    """Finds the two squares of white tape on top of a part.
+    """Find the two squares of white tape on top of a part.
 
-    The level between white and not white is sought from bright to dark: it is the middle of the first long
-    run of levels at which nothing but two squares of the right sizes is white in the region.
+    The threshold is searched from bright to dark: it is the middle of the first long run of levels at which
+    only two squares of the right sizes are white in the region.
 
     Args:
         frame: The part on the table and nothing else; its fine colour is used where it has one.
-        tape: How large the squares are; 12 and 8 mm where None.
+        tape: Sizes of the squares; None: 12 and 8 mm.
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
-        heights: Of the larger and the smaller square over the table, metres, where they are known better than
-            the depth image tells them; None: the median of the valid depths inside each.
+        heights: Known heights of the larger and the smaller square above the table, metres; None: from the
+            median of the valid depths inside each.
 
     Raises:
-        MarkersNotFound: Not exactly two such squares are seen, whole; the message says what is.
+        MarkersNotFound: The image does not show exactly two such whole squares; the message says why.
     """
     tape = tape or Tape()
     view = RegisteredFrame(frame, table_z)
@@ -81,7 +81,7 @@ def find_markers(
             f"wide, at least {LEAST_PIXELS:g} are needed; use larger squares, or a finer colour image "
             "(colour_scale)"
         )
-    grey = np.where(_shows(view, region, table_z), view.colour.min(axis=2), 0).astype(np.uint8)
+    grey = np.where(_region_mask(view, region, table_z), view.colour.min(axis=2), 0).astype(np.uint8)
     spots, contrast = _search(grey, view, tape, pitch)
     depths = []
     for i, spot in enumerate(spots):
@@ -103,8 +103,8 @@ def find_markers(
     )
 
 
-def _shows(view: RegisteredFrame, region: Region, table_z: float) -> np.ndarray:
-    """(h, w) of the colour image: which pixels show the table's region with a margin."""
+def _region_mask(view: RegisteredFrame, region: Region, table_z: float) -> np.ndarray:
+    """Mask the pixels (h, w) of the colour image that show the region with a margin."""
     x_min, x_max, y_min, y_max = np.array(region) + REGION_MARGIN * np.array([-1, 1, -1, 1])
     corners = np.array([[x_min, y_min], [x_min, y_max], [x_max, y_max], [x_max, y_min]])
     pixels = view.colour_pixel(np.column_stack([corners, np.full(4, table_z)]))
@@ -116,16 +116,16 @@ def _shows(view: RegisteredFrame, region: Region, table_z: float) -> np.ndarray:
 def _search(
     grey: np.ndarray, view: RegisteredFrame, tape: Tape, pitch: float
 ) -> tuple[tuple[Spot, Spot], int]:
-    """The larger and the smaller square, and between how many grey levels they alone are white.
+    """Search the larger and the smaller square, and the number of levels at which only they are white.
 
     Raises:
-        MarkersNotFound: There is no such level, or hardly one.
+        MarkersNotFound: There are no or too few such levels.
     """
     least, most = SPECK * (tape.small / pitch) ** 2, 2 * tape.large / pitch
     run: list[tuple[Spot, Spot]] = []
     longest = run
     nearest, complaint = 0, _complaint([], [], view, tape)
-    # Levels at which nothing is white say nothing; where half of all is, the table is, and tape no longer.
+    # Below the median grey level the table itself is white.
     darkest = int(np.median(grey[grey > 0])) if grey.any() else 255
     for level in range(int(grey.max()) - 1, darkest - 1, -_STEP):
         spots = find_spots(grey, level, least=least, most=most)
@@ -152,7 +152,7 @@ def _search(
 
 
 def _kind(spot: Spot, view: RegisteredFrame, tape: Tape, pitch: float) -> int | None:
-    """0 for the larger square, 1 for the smaller one, None for anything else."""
+    """Classify a spot: 0 for the larger square, 1 for the smaller one, None for anything else."""
     if spot.fill < LEAST_FILL - 0.6 / spot.side:  # noise shows in the outermost pixels of small ones
         return None
     sides = _sides(spot, view)
@@ -167,14 +167,14 @@ def _depths(view: RegisteredFrame, spot: Spot) -> np.ndarray:
 
 
 def _sides(spot: Spot, view: RegisteredFrame) -> np.ndarray:
-    """(2,) metres, at the depth that is measured there, or that of the table where none is."""
+    """Compute the sides (2,) of a spot, metres, at its median depth, or the table's if none is valid."""
     depths = _depths(view, spot)
     depth = float(np.median(depths)) if len(depths) else view.depth_at_height(spot.centre, 0.0)
     return spot.sides * depth / view.focal
 
 
 def _complaint(spots: list[Spot], kinds: list[int | None], view: RegisteredFrame, tape: Tape) -> str:
-    """Why the white spots are not the two squares, and what to do."""
+    """Explain why the white spots are not the two squares, and the remedy."""
     others = [spot for spot, kind in zip(spots, kinds, strict=True) if kind is None]
     found = set(kinds) - {None}
     sizes = f"{1e3 * tape.large:g} and {1e3 * tape.small:g} mm"

@@ -1,4 +1,4 @@
-"""How a part has moved, from its tape squares in two pictures."""
+"""Displacement of a part from its tape squares in two images."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.perception.markers.find import Markers
 
 DISTANCE_CHANGE = 0.001
-"""Both squares keep their distance to this, m, or they are not those on the part before."""
+"""Greatest change of the squares' distance, metres."""
 SIDE_CHANGE = 0.0006
-"""A square keeps each of its sides to this, m, or something covers it, or the part lies tilted."""
+"""Greatest change of a square's side, metres; more means that it is covered or tilted."""
 HEIGHT_CHANGE = 0.004
-"""A square keeps its height to this, m, or the part lies on another of its sides; a Kinect errs by 1 mm."""
+"""Greatest change of a square's height, metres; a Kinect errs by 1 mm."""
 
 
 PAD_PLAY = 0.002
-"""A part moves across the pads by this more than they do, m: pads and surfaces are not quite parallel."""
+"""Tolerance of a part's motion across the pads, metres: pads and surfaces are not exactly parallel."""
 
 
 def planar_displacement(
     before: Markers, after: Markers, grasp: np.ndarray, centre_base: np.ndarray
 ) -> np.ndarray:
-    """How the part was displaced in the hand, from its squares before the grasp and after it was put down.
+    """Compute the part's displacement in the hand from its squares before the grasp and after placing.
 
-    The hand has put the part down where it grasped it, so that the part moved on the table as it moved in the
-    hand. The squares tell that motion of the plane: a turn dtheta about the middle m of both, and where m
-    went. The part's origin c follows it: c' = m' + Rz(dtheta) (c - m). An error e of c costs
+    The hand has placed the part where it grasped it, so that the part moved on the table as it moved in the
+    hand. The squares give this planar motion: a rotation dtheta about the midpoint m of both, and the motion
+    of m. The part's origin c follows: c' = m' + Rz(dtheta) (c - m). An error e of c costs
     2 sin(dtheta / 2) |e|, 0.17 mm for 2 mm and 5 degrees.
 
     Args:
         before: The squares with the part at rest, before the grasp.
-        after: The same with the part put down again and the hand gone.
+        after: The squares with the part placed again and the hand gone.
         grasp: (4,) x, y, z, theta as commanded, base frame.
-        centre_base: (2,) or (3,) where the part's origin was before, base frame, metres: known, or estimated
+        centre_base: (2,) or (3,) the part's origin before, base frame, metres: known, or estimated
             (`mskgrasp.perception.part_detection.view_part`).
 
     Returns:
@@ -43,21 +43,21 @@ def planar_displacement(
         [-pi, pi).
 
     Raises:
-        MarkersNotFound: The squares of both pictures cannot be those of one rigid part flat on the table.
+        MarkersNotFound: The squares of both images cannot be those of one rigid part flat on the table.
     """
     _check_same_part(before, after)
     first, second = (markers.points_base[:, :2] for markers in (before, after))
     old, new = first[1] - first[0], second[1] - second[0]
     dtheta = np.arctan2(old[0] * new[1] - old[1] * new[0], old @ new)
     from_middle = np.asarray(centre_base, dtype=np.float64)[:2] - first.mean(axis=0)
-    moved = second.mean(axis=0) - first.mean(axis=0) + _turn(dtheta) @ from_middle - from_middle
-    return np.array([*(_turn(-float(grasp[3])) @ moved), wrap_angle(dtheta)])
+    moved = second.mean(axis=0) - first.mean(axis=0) + _rotation(dtheta) @ from_middle - from_middle
+    return np.array([*(_rotation(-float(grasp[3])) @ moved), wrap_angle(dtheta)])
 
 
 def check_between_pads(displacement: np.ndarray, centre_grasp: np.ndarray, width: float) -> None:
-    """Refuses a displacement that no jaw makes: what was dragged along as the hand let go and rose.
+    """Refuse a displacement that closing fingers cannot cause, as of a part dragged by the retracting hand.
 
-    What is between the pads has moved across them no farther than the pad that pushed it.
+    Between the pads a part moves across them no farther than the pad that pushes it.
 
     Args:
         displacement: (3,) dx, dy, dtheta as `planar_displacement` gives it, metres and radians.
@@ -65,11 +65,11 @@ def check_between_pads(displacement: np.ndarray, centre_grasp: np.ndarray, width
         width: Distance of the pads as they held the part, metres.
 
     Raises:
-        MarkersNotFound: It is one.
+        MarkersNotFound: The displacement is too large.
     """
     centre = np.asarray(centre_grasp, dtype=np.float64)[:2]
     # The point of the part that is at the TCP now, where it was before.
-    before = centre - _turn(-float(displacement[2])) @ (centre + displacement[:2])
+    before = centre - _rotation(-float(displacement[2])) @ (centre + displacement[:2])
     moved, most = abs(float(before[1])), (MAX_OPENING - width) / 2
     if not moved <= most + PAD_PLAY:
         raise MarkersNotFound(
@@ -78,7 +78,7 @@ def check_between_pads(displacement: np.ndarray, centre_grasp: np.ndarray, width
         )
 
 
-def _turn(angle: float) -> np.ndarray:
+def _rotation(angle: float) -> np.ndarray:
     return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 

@@ -1,4 +1,4 @@
-"""A frame whose colour may be finer than its depth, and the way from its pixels into the base frame."""
+"""Frame whose colour may be finer than its depth, and projection between its pixels and the base frame."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.geometry import quat_to_matrix
 
 LEAST_DEPTHS = 3
-"""Valid depths on a spot, for a median that a flying pixel does not decide."""
+"""Least valid depths on a spot, so that a flying pixel does not decide the median."""
 
 
 class RegisteredFrame:
@@ -47,31 +47,31 @@ class RegisteredFrame:
         self._table_z = table_z
 
     def depth_pixel(self, colour_pixel: np.ndarray) -> np.ndarray:
-        """Pixels (..., 2) of the depth image at pixels of the colour image."""
+        """Convert pixels (..., 2) of the colour image to those of the depth image."""
         return (colour_pixel + 0.5) / self.scale - 0.5
 
     def colour_pixel(self, point_base: np.ndarray) -> np.ndarray:
-        """Pixels (..., 2) of the colour image that show points (..., 3) of the base frame."""
+        """Project points (..., 3) of the base frame to pixels (..., 2) of the colour image."""
         seen = (point_base - self._origin) @ self._to_pixels.T
         return (seen[..., :2] / seen[..., 2:] + 0.5) * self.scale - 0.5
 
     def point_base(self, colour_pixel: np.ndarray, depth: float) -> np.ndarray:
-        """(3,) what a pixel (2,) of the colour image shows at a depth, base frame, metres."""
+        """Compute the point (3,) of a pixel (2,) of the colour image at a depth, base frame, metres."""
         return depth * (self._to_base @ [*self.depth_pixel(colour_pixel), 1.0]) + self._origin
 
     def depth_at_height(self, colour_pixel: np.ndarray, height: float) -> float:
-        """How deep the ray of a pixel (2,) is at a height over the table, metres."""
+        """Compute the depth of a pixel's ray (2,) at a height above the table, metres."""
         slope = self._to_base[2] @ [*self.depth_pixel(colour_pixel), 1.0]
         return float((self._table_z + height - self._origin[2]) / slope)
 
     def depths_within(self, colour_pixels: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
-        """The valid depths (k,), metres, of the pixels in ``colour_pixels`` near their centre.
+        """Get the valid depths (k,), metres, of the pixels in ``colour_pixels`` near their centre.
 
         Args:
-            colour_pixels: (n, 2) what belongs to the surface.
+            colour_pixels: (n, 2) pixels of the surface.
             centre: (2,) of it.
-            radius: Pixels of the colour image, along both axes, but a pixel of depth at least: farther out,
-                flying pixels float between the surface and what is behind it.
+            radius: Pixels of the colour image, along both axes, at least one pixel of depth: farther out,
+                flying pixels lie between the surface and the background.
         """
         near = np.abs(colour_pixels - centre).max(axis=1, initial=0.0) <= max(radius, self.scale)
         if not near.any():

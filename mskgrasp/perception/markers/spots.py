@@ -1,4 +1,4 @@
-"""White spots in a grey image: where they are, and how large, finer than a pixel."""
+"""White spots in a grey image, located and measured with subpixel accuracy."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Spot:
         centre: (2,) column and row of its centroid, pixels; the centre of a pixel has integer coordinates.
         sides: (2,) the longer and the shorter one of the rectangle with its second moments, pixels.
         side: Of the square with its area, pixels.
-        fill: Share of its smallest rectangle that it fills: 1 for a square, 0.79 for a disc; 0 where it is
-            too large to be measured.
-        inside: (k, 2) columns and rows of its pixels; none where it is too large.
+        fill: Share of its smallest rectangle that it fills: 1 for a square, 0.79 for a disc; 0 if it is too
+            large to be measured.
+        inside: (k, 2) columns and rows of its pixels; none if it is too large.
     """
 
     centre: np.ndarray
@@ -32,13 +32,13 @@ class Spot:
 
 
 def find_spots(grey: np.ndarray, level: int, *, least: float, most: float) -> list[Spot]:
-    """The white spots, largest first, and no more than a few of them.
+    """Find the largest white spots, largest first, eight at most.
 
     Args:
         grey: (h, w) uint8.
-        level: What is brighter is white.
+        level: Brighter pixels are white.
         least: Area of the smallest spot that counts, pixels.
-        most: A spot longer than this is told by its bounding box alone, pixels.
+        most: A spot longer than this is described by its bounding box alone, pixels.
     """
     _, labels, stats, _ = cv2.connectedComponentsWithStats((grey > level).astype(np.uint8), connectivity=8)
     numbers = 1 + np.flatnonzero(stats[1:, cv2.CC_STAT_AREA] >= least)
@@ -63,7 +63,7 @@ def _large(box: np.ndarray) -> Spot:
 
 
 def _measured(grey: np.ndarray, labels: np.ndarray, number: int, box: np.ndarray, level: int) -> Spot:
-    """The area within the line, between the pixels, at which the grey level is crossed."""
+    """Measure the area within the interpolated contour of the grey level."""
     left, top = np.maximum(box[:2] - 2, 0)
     window = np.s_[top : box[1] + box[3] + 2, left : box[0] + box[2] + 2]
     own = labels[window] == number
@@ -73,9 +73,9 @@ def _measured(grey: np.ndarray, labels: np.ndarray, number: int, box: np.ndarray
     mask = (larger > level).astype(np.uint8)
     moments = cv2.moments(mask, binaryImage=True)
     centre = np.array([moments["m10"], moments["m01"]]) / moments["m00"]
-    spread = np.array([[moments["mu20"], moments["mu11"]], [moments["mu11"], moments["mu02"]]])
+    second_moments = np.array([[moments["mu20"], moments["mu11"]], [moments["mu11"], moments["mu02"]]])
     # A rectangle's side is the square root of twelve times the variance along it.
-    sides = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread)[::-1], 0.0) / moments["m00"])
+    sides = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(second_moments)[::-1], 0.0) / moments["m00"])
     width, height = cv2.minAreaRect(np.argwhere(mask)[:, ::-1].astype(np.int32))[1]
     rows, columns = np.nonzero(own)
     return Spot(

@@ -1,0 +1,39 @@
+import numpy as np
+import pytest
+
+from mskgrasp.core.errors import NoPartFound
+from mskgrasp.core.geometry import wrap_half_turn
+from mskgrasp.perception.footprint import Footprint, footprint_of, pixel_pitch, seen_footprint
+from tests import synthetic
+from tests.synthetic import REGION, TABLE_Z, Box
+
+
+@pytest.mark.parametrize("theta", [-1.5, -0.4, 0.0, 0.7, 1.5])
+def test_the_footprint_of_a_rectangles_corners_is_the_rectangle(theta):
+    local = np.array([[0.04, 0.01], [0.04, -0.01], [-0.04, -0.01], [-0.04, 0.01]])
+    cos, sin = np.cos(theta), np.sin(theta)
+    found = footprint_of(local @ np.array([[cos, sin], [-sin, cos]]) + [0.45, 0.02])
+    assert found.sides == pytest.approx([0.08, 0.02], abs=1e-6)
+    assert float(wrap_half_turn(np.asarray(found.theta - theta))) == pytest.approx(0.0, abs=1e-4)
+
+
+def test_the_extent_is_that_of_the_turned_rectangle():
+    footprint = Footprint(sides=np.array([0.08, 0.02]), theta=0.0)
+    assert footprint.extent(0.0) == pytest.approx([0.08, 0.02])
+    assert footprint.extent(np.pi / 2) == pytest.approx([0.02, 0.08])
+    assert footprint.extent(-np.pi / 4) == pytest.approx([0.1 / np.sqrt(2)] * 2)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5, -1.2])
+def test_a_seen_box_has_its_sides_and_direction_within_a_pixel(yaw):
+    frame = synthetic.frame([Box(x=0.45, y=0.02, yaw=yaw, size=(0.08, 0.03, 0.004))])
+    found = seen_footprint(frame, table_z=TABLE_Z, region=REGION, min_height=0.002)
+    pitch = pixel_pitch(frame)
+    assert pitch == pytest.approx(0.8 / 365.5, rel=0.01)
+    assert np.abs(found.sides - [0.08, 0.03]).max() < 1.5 * pitch
+    assert abs(float(wrap_half_turn(np.asarray(found.theta - yaw)))) < 0.04
+
+
+def test_an_empty_table_has_no_footprint():
+    with pytest.raises(NoPartFound):
+        seen_footprint(synthetic.frame([]), table_z=TABLE_Z, region=REGION, min_height=0.002)
