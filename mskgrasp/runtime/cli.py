@@ -1,4 +1,4 @@
-"""What every program shares: a configuration file, overrides from the command line, clean exits."""
+"""Command lines of programs: configuration file, overriding options, exit codes."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ def parse(
     default_config: Path | None = None,
     argv: Sequence[str] | None = None,
 ) -> ConfigT:
-    """Builds a program's configuration: defaults, then ``--config FILE``, then the other options.
+    """Builds a program's configuration from defaults, ``--config FILE`` and the other options, in this order.
 
     Args:
         model: The pydantic model; each of its fields becomes an option, its docstrings the help.
-        prog: How the program is called, for ``--help``.
+        prog: The command that starts the program, for ``--help``.
         description: What the program does, for ``--help``.
         default_config: The YAML file used where the user gives no ``--config``.
-        argv: The arguments; the process's own by default.
+        argv: The arguments; by default those of the process.
 
     Raises:
         BadConfig: The file or an override is not valid.
@@ -109,7 +109,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def explain_os_error(error: OSError) -> str:
-    """One line: what failed, where, and the remedy."""
+    """Explains an error in one line with the path and the remedy."""
     place = f": {error.filename}" if error.filename else ""
     remedy = "free some space, what is finished is kept" if error.errno in _FULL else "choose another path"
     return f"{error.strerror or error}{place}; {remedy}"
@@ -126,7 +126,7 @@ def _heed_ctrl_c(unraisable: Any, report: Callable[[Any], None] = sys.unraisable
 def run(main: Callable[[], int | None]) -> None:
     """Runs a program's ``main`` and ends the process: 0, 1 failure, 2 usage, 130 Ctrl-C.
 
-    An error that a user can mend becomes one line on standard error; anything else is a defect and
+    An error that a user can correct becomes one line on standard error; anything else is a defect and
     keeps its traceback.
     """
     sys.unraisablehook = _heed_ctrl_c
