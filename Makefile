@@ -5,7 +5,7 @@ READY := $(VENV)/.ready
 TESTABLE := $(VENV)/.testable
 RUN := $(VENV)/bin/python -m
 
-.PHONY: help setup collect train plan evaluate palletize test regression bench-parts bench-collect bench-train bench-plan check format clean
+.PHONY: help setup collect train plan evaluate palletize test test-all regression bench-parts bench-collect bench-train bench-plan check format clean
 .DEFAULT_GOAL := help
 
 help: ## Explain the targets
@@ -45,7 +45,7 @@ test-all: $(TESTABLE) ## The same and the slow ones: every family, both drivers'
 	MSKGRASP_FAMILIES=99 MSKGRASP_KILLS=10 $(RUN) pytest -n 2 --dist loadfile --no-loadscope-reorder \
 		--durations 15 -m "slow or not slow"
 
-# Anew each time: what an earlier state of the code left must not count.
+# From scratch: results of an earlier state of the code must not count.
 regression: $(READY) ## Run the loop over a fixed set and print what has changed (ARGS=--store keeps it)
 	rm -rf out/regression
 	$(RUN) tests.sim_in_the_loop.regression --workers 2 $(ARGS)
@@ -62,7 +62,7 @@ bench-train: $(TESTABLE) ## Samples/s of training, our network beside the paper'
 bench-plan: $(TESTABLE) ## Milliseconds of a plan, our network beside the paper's
 	$(RUN) tests.benchmarks.plan_speed
 
-check: $(TESTABLE) ## Check style, types and the floors of the house
+check: $(TESTABLE) ## Check style, types and the layers of imports
 	$(RUN) ruff format --check .
 	$(RUN) ruff check .
 	$(VENV)/bin/pyright
