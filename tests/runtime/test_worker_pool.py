@@ -107,7 +107,7 @@ def test_ctrl_c_while_workers_are_started_is_heard_by_the_program_alone(threads:
 import os, signal, threading, time
 from multiprocessing import util
 from mskgrasp import processes
-from mskgrasp.cli import run
+from mskgrasp.runtime.cli import run
 from tests.runtime.test_worker_pool import bench
 
 def start_and_interrupt(*arguments, start=util.spawnv_passfds):
@@ -127,7 +127,7 @@ run(lambda: list(processes.results(processes.Work(bench, 3), [1, 2], 2)))
 def test_ctrl_c_while_python_cleans_up_is_not_lost():
     code = """
 import os, signal, time
-from mskgrasp.cli import run
+from mskgrasp.runtime.cli import run
 
 class Scene:
     def __del__(self):
