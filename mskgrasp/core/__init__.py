@@ -1,1 +1,1 @@
-"""Geometry, grasps, errors, configuration and settings: what every other room stands on."""
+"""Geometry, grasps, errors, configuration and settings: the foundation of all other packages."""

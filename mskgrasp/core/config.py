@@ -1,4 +1,4 @@
-"""Configuration files: YAML in, frozen and checked pydantic models out."""
+"""Configuration files in YAML and the frozen pydantic models that they are checked against."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ ConfigT = TypeVar("ConfigT", bound=BaseModel)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Reads a YAML file that holds a mapping; an empty file is an empty one.
+    """Reads a YAML file that holds a mapping; an empty file holds an empty mapping.
 
     Raises:
-        BadConfig: The file is missing, no YAML, or no mapping.
+        BadConfig: The file is missing, is not YAML, or does not hold a mapping.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -50,7 +50,7 @@ def read_config(model: type[ConfigT], path: Path) -> ConfigT:
     """Reads a YAML file as a configuration.
 
     Raises:
-        BadConfig: The file is missing, is no YAML mapping, or does not fit the model.
+        BadConfig: The file is missing, does not hold a YAML mapping, or does not fit the model.
     """
     return check_config(model, read_yaml(path), str(path))
 
@@ -72,7 +72,7 @@ def check_config(
         model: Of the configuration.
         values: A mapping of plain values.
         source: Their origin, for messages.
-        name: How a message calls the value at a location.
+        name: Gives the name of a value in messages from its location.
 
     Raises:
         BadConfig: The values do not fit the model; the message names the key and the legal ones.
@@ -110,7 +110,7 @@ def _explain(
         else:
             value = detail.get("input")
             shown = "" if detail["type"] == "missing" or isinstance(value, dict) else f", got {value!r}"
-            cause = detail.get("ctx", {}).get("error")  # of a validator of ours
+            cause = detail.get("ctx", {}).get("error")  # of a validator in this project
             problems.append(f"{key}{cause or detail['msg'].lower()}{shown}")
     return "; ".join(problems)
 

@@ -1,14 +1,14 @@
-"""The errors that a user can mend: one line that names the value and the remedy."""
+"""Errors that a user can correct; each message is one line."""
 
 
 class MskgraspError(Exception):
-    """Something failed; the message is one line with the value, the legal values and the remedy."""
+    """Base class; the message is one line with the value, the legal values and the remedy."""
 
     exit_code = 1
 
 
 class UsageError(MskgraspError):
-    """What the user typed or wrote into a configuration file cannot be used."""
+    """An option, or a value in a configuration file, cannot be used."""
 
     exit_code = 2
 
@@ -22,7 +22,7 @@ class BadPart(MskgraspError):
 
 
 class TapeDoesNotFit(BadPart):
-    """No two tape squares find room on top of the part."""
+    """The top of the part is too small for two tape squares."""
 
 
 class UnknownPart(BadPart, UsageError):
@@ -30,11 +30,11 @@ class UnknownPart(BadPart, UsageError):
 
 
 class BadDataset(MskgraspError):
-    """A dataset folder or one of its shards is missing, empty, truncated or foreign."""
+    """A dataset folder or one of its shards is missing, empty, truncated or of another format."""
 
 
 class BadModel(MskgraspError):
-    """A model folder is missing, damaged, or made for other inputs."""
+    """A model folder is missing, damaged, or made for other network inputs."""
 
 
 class NoPartFound(MskgraspError):
@@ -42,8 +42,8 @@ class NoPartFound(MskgraspError):
 
 
 class MarkersNotFound(MskgraspError):
-    """The tape squares on the part are not seen so that the part's motion could be told from them."""
+    """The tape squares on the part are not seen well enough to measure its motion."""
 
 
 class NoGraspFound(MskgraspError):
-    """No candidate meets what the planner demands."""
+    """No candidate grasp meets the planner's criteria."""

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, whatever happens while they are written."""
+"""Atomic writing of files, and exclusive use of folders."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ LOCK = ".lock"
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Writes a file so that either all of it or what was there before is ever seen under its name.
+    """Writes a file atomically: its name always refers to the old content or to all of the new.
 
-    It is written beside it under a name of its own, ``<name>.<random>.tmp``, synced and renamed: two
-    processes that write the same file, on one machine or two, do not disturb each other. A process that is
-    killed leaves that file behind.
+    The content is written to ``<name>.<random>.tmp`` in the same folder, synced and renamed, so that several
+    processes, on one machine or more, can write the same file. A process that is killed leaves its temporary
+    file behind.
 
     Raises:
-        OSError: The disk is full or not writable; nothing is left behind.
+        OSError: The disk is full or not writable; no temporary file is left behind.
     """
     path = Path(path)
     temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}.tmp")
@@ -42,9 +42,9 @@ def write_whole(path: Path, content: bytes) -> None:
 
 @contextmanager
 def only_here(folder: Path) -> Iterator[bool]:
-    """Whether no other process has this folder, which is this one's until the end of the block.
+    """Locks a folder until the end of the block; gives False if another process holds the lock.
 
-    The operating system frees it when a process dies, however it does; an empty file stays behind.
+    The operating system releases the lock when a process ends for whatever reason; its empty file remains.
     """
     with open(Path(folder) / LOCK, "w", encoding="utf-8") as file:
         try:

@@ -1,4 +1,4 @@
-"""What a grasp is, and how the part's displacement in the hand is defined.
+"""Grasps, their frames, and the displacement of a part in the hand.
 
 A grasp is an array (..., 4) of x, y, z in metres and theta in radians, in the base frame, theta in
 [-pi/2, pi/2). At theta = 0 the fingers close along the base's y. Two frames share the point (x, y, z):
@@ -36,27 +36,27 @@ TABLE_CLEARANCE = 0.001
 MAX_OPENING = 0.08
 """Distance between the pads of the open hand, metres (Franka Hand datasheet)."""
 FINGER_HALF_WIDTH = 0.011
-"""Of the widest of a finger's collision boxes, along the pads, metres (Panda hand)."""
+"""Half the width, along the pads, of the widest collision box of a finger, metres (Panda hand)."""
 FINGER_THICKNESS = 0.026
-"""From a pad's face to the back of the finger, metres."""
+"""Distance from a pad's face to the back of the finger, metres."""
 PALM_HEIGHT = 0.0374
-"""Of the hand's collision hull over the TCP, metres."""
+"""Height of the lower face of the hand's collision hull over the TCP, metres."""
 MIN_GAP = 0.5e-3
-"""Pads closer than this hold nothing, metres."""
+"""Pads with a smaller gap hold nothing, metres."""
 MIN_RISE = 0.8
-"""Least share of the lift that a held part has risen."""
+"""Least share of the lift height by which a held part has risen."""
 HOLD_S = 0.2
 """How long a lifted part is held before it is judged, seconds."""
 MAX_DISPLACEMENT = 0.05
-"""No grasp that holds a part lets it move farther than this in the hand: such a row is no label, metres."""
+"""Largest displacement of a held part in the hand, metres; a row with a larger one is not used as a label."""
 EJECTED_DISTANCE = 0.05
-"""A part that ends this far from where it lay, and not in the hand, was ejected, metres."""
+"""A part that ends this far from its initial position, and not in the hand, was ejected, metres."""
 FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled")
 """Why an attempt failed, by code: a shard stores the index into this tuple."""
 
 
 def lowest_grasp_z(table_z: float) -> float:
-    """The lowest z of a grasp above a table at ``table_z``, metres: lower, the pads would hit it."""
+    """The lowest z, metres, of a grasp whose pads keep clear of a table at ``table_z``."""
     return table_z + PAD_REACH + TABLE_CLEARANCE
 
 
@@ -85,7 +85,7 @@ def object_displacement(T_tcp_obj_before: Pose, T_tcp_obj_after: Pose) -> tuple[
     Returns:
         displacement: (..., 4) dx, dy, dz (metres, along the axes of the grasp frame) of the part's
             origin and dtheta (radians in [-pi, pi)), the twist about the grasp frame's z.
-        tilt: (...) the swing that is left when the twist is taken out, radians.
+        tilt: (...) the swing that remains when the twist is removed, radians.
     """
     before, after = (_tcp_to_grasp_frame(pose) for pose in (T_tcp_obj_before, T_tcp_obj_after))
     xp = array_namespace(before.position)
@@ -144,7 +144,7 @@ def to_object_displacement(grasp_displacement: Array, centre_grasp: Array) -> Ar
 
 @dataclass(frozen=True, kw_only=True)
 class PartView:
-    """What the depth image tells of the part: the only knowledge a network's input is made from.
+    """A part as detected in the depth image: all that a network's input is made from.
 
     Attributes:
         centre_base: (3,) centre of the bounding box at mid height, base frame, metres.
@@ -153,7 +153,7 @@ class PartView:
         size: (3,) extent of the box along those axes, metres; size[2] is the part's height.
         gyration_radius: RMS distance of the part's visible points from the centre seen from above, m.
         table_z: Height of the table, base frame, metres.
-        table_offset: By how much a noisy camera sees the table above ``table_z``, metres; 0 if exact.
+        table_offset: Height at which a noisy camera sees the table above ``table_z``, metres; 0 if exact.
     """
 
     centre_base: np.ndarray
@@ -170,9 +170,9 @@ def sample_grasps(view: PartView, n: int, rng: np.random.Generator) -> np.ndarra
     A part lower than the lowest grasp is grasped at that height. theta is uniform in [-pi/2, pi/2).
 
     Args:
-        view: Where the part is seen.
+        view: The detected part.
         n: Number of grasps.
-        rng: Source of all that is random.
+        rng: Source of randomness.
 
     Returns:
         (n, 4) float64, base frame, metres and radians.

@@ -1,4 +1,4 @@
-"""How good predictions are: numbers with a definition each, over numpy arrays."""
+"""Metrics of predictions, calibration and uncertainty, and confidence intervals, on numpy arrays."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def translation_rmse(predicted: np.ndarray, true: np.ndarray) -> float:
     """sqrt(mean |predicted - true|^2) of the first three components, metres.
 
     Args:
-        predicted: (n, 4) object displacements; the error is the distance, not its share an axis.
+        predicted: (n, 4) object displacements; the error is the distance, not the error per axis.
         true: (n, 4).
     """
     error = np.asarray(predicted, dtype=np.float64)[:, :3] - np.asarray(true, dtype=np.float64)[:, :3]
@@ -55,7 +55,7 @@ def gaussian_nll(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> fl
 
 
 def coverage(mean: np.ndarray, variance: np.ndarray, true: np.ndarray, level: float = 0.9) -> np.ndarray:
-    """Share of true values inside the central interval that should hold ``level`` of them, an axis (4,)."""
+    """Share of true values inside the central interval of probability ``level``, per axis (4,)."""
     if not len(true):
         return np.full(4, np.nan)
     half_width = norm.ppf((1 + level) / 2)
@@ -63,7 +63,7 @@ def coverage(mean: np.ndarray, variance: np.ndarray, true: np.ndarray, level: fl
 
 
 def crps(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Continuous ranked probability score of Gaussians, an axis (4,), in the axes' units; 0 is perfect.
+    """Continuous ranked probability score of Gaussians, per axis (4,), in the axes' units; 0 is perfect.
 
     Gneiting and Raftery (2007), equation 21: sigma (z (2 Phi(z) - 1) + 2 phi(z) - 1 / sqrt(pi)).
     """
@@ -73,22 +73,22 @@ def crps(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray
 
 
 def calibration_error(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Mean difference of level and coverage of the central intervals of 5, 10, ... 95 %, an axis (4,)."""
+    """Mean difference of level and coverage of the central intervals of 5, 10, ... 95 %, per axis (4,)."""
     levels = np.linspace(0.05, 0.95, 19)
     covered = np.stack([coverage(mean, variance, true, level) for level in levels])
     return np.abs(covered - levels[:, None]).mean(axis=0)
 
 
 def sparsification(error: np.ndarray, uncertainty: np.ndarray, steps: int = 50) -> tuple[np.ndarray, ...]:
-    """RMSE of what is left when the most uncertain samples are dropped, beside dropping the worst ones.
+    """RMSE of the remaining samples when the most uncertain ones, or the worst ones, are dropped.
 
     Args:
-        error: (n,) not negative.
+        error: (n,) absolute errors.
         uncertainty: (n,) predicted; only its order matters.
-        steps: Shares that are dropped, from none to 1 - 1 / steps.
+        steps: Number of dropped shares, from 0 to 1 - 1 / steps.
 
     Returns:
-        Shares (steps,), RMSE by the prediction, RMSE by the oracle that knows the errors.
+        Shares (steps,), RMSE in the order of uncertainty, RMSE in the order of the errors (the oracle).
     """
     shares = np.arange(steps) / steps
     squared = np.asarray(error, dtype=np.float64) ** 2
@@ -101,9 +101,9 @@ def sparsification(error: np.ndarray, uncertainty: np.ndarray, steps: int = 50) 
 
 
 def ause(error: np.ndarray, uncertainty: np.ndarray) -> float:
-    """Area between both curves of `sparsification` by that of dropping at random: 0 perfect, 1 of no use.
+    """Area under the sparsification error, relative to a random order: 0 is perfect, 1 is useless.
 
-    Ilg et al. 2018 (arXiv 1802.07095), divided by what an order that knows nothing has.
+    Ilg et al. 2018 (arXiv 1802.07095), divided by the area of a random order.
     """
     if len(error) < 2:
         return float("nan")
@@ -113,7 +113,7 @@ def ause(error: np.ndarray, uncertainty: np.ndarray) -> float:
 
 
 def reliability(probability: np.ndarray, success: np.ndarray, bins: int = 10) -> np.ndarray:
-    """Rows (k, 3) of mean predicted probability, share of successes and count, of the bins that hold any."""
+    """Rows (k, 3) of mean predicted probability, share of successes and count of the non-empty bins."""
     probability = np.asarray(probability, dtype=np.float64)
     which = np.minimum((probability * bins).astype(int), bins - 1)
     rows = [
@@ -132,16 +132,16 @@ def bootstrap_interval(
     repeats: int = 1000,
     seed: int = 0,
 ) -> tuple[float, float]:
-    """Confidence interval of a statistic over objects: whole objects are drawn again, with replacement.
+    """Bootstrap confidence interval of a statistic; whole objects are resampled with replacement.
 
-    Grasps of one part resemble one another; drawing single grasps would make intervals too narrow.
+    Grasps of one part are correlated; resampling single grasps would make intervals too narrow.
 
     Args:
         values: One array (n_i, ...) of samples for each object.
-        statistic: Of the samples of the drawn objects together.
-        level: Of confidence.
+        statistic: Function of the concatenated samples of the drawn objects.
+        level: Confidence level.
         repeats: Number of draws.
-        seed: Of the draws.
+        seed: Seed of the draws.
     """
     if not values:
         return float("nan"), float("nan")
@@ -155,21 +155,21 @@ def bootstrap_interval(
 
 
 def brier(probability: np.ndarray, success: np.ndarray) -> float:
-    """Mean (probability - success)^2; always saying the base rate b scores b (1 - b)."""
+    """Mean (probability - success)^2; always predicting the base rate b scores b (1 - b)."""
     return float(((np.asarray(probability, dtype=np.float64) - success) ** 2).mean())
 
 
 def balanced_accuracy(probability: np.ndarray, success: np.ndarray, threshold: float = 0.5) -> float:
-    """Mean of the shares of successes and of failures told right; NaN if either kind is missing."""
-    told = np.asarray(probability) > threshold
+    """Mean of the true positive and true negative rates; NaN if either class is missing."""
+    positive = np.asarray(probability) > threshold
     success = np.asarray(success, dtype=bool)
     if success.all() or not success.any():
         return float("nan")
-    return float((told[success].mean() + (~told[~success]).mean()) / 2)
+    return float((positive[success].mean() + (~positive[~success]).mean()) / 2)
 
 
 def auroc(score: np.ndarray, success: np.ndarray) -> float:
-    """Probability that a success scores above a failure, ties counted half; NaN if a kind is missing."""
+    """Probability that a success scores above a failure, ties counted half; NaN if a class is missing."""
     success = np.asarray(success, dtype=bool)
     n_success, n_failure = int(success.sum()), int((~success).sum())
     if not n_success or not n_failure:
@@ -179,7 +179,7 @@ def auroc(score: np.ndarray, success: np.ndarray) -> float:
 
 
 def wilson_interval(n_success: int, n: int, level: float = 0.95) -> tuple[float, float]:
-    """Confidence interval of a share (Wilson 1927): sensible for few trials and for shares near 0 and 1."""
+    """Confidence interval of a share (Wilson 1927); valid for few trials and for shares near 0 and 1."""
     if n == 0:
         return 0.0, 1.0
     z = float(norm.ppf((1 + level) / 2))

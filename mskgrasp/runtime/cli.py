@@ -28,7 +28,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def explain_os_error(error: OSError) -> str:
-    """One line: what failed, where, and the remedy."""
+    """Explains an error in one line with the path and the remedy."""
     place = f": {error.filename}" if error.filename else ""
     remedy = "free some space, what is finished is kept" if error.errno in _FULL else "choose another path"
     return f"{error.strerror or error}{place}; {remedy}"

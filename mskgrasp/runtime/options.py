@@ -28,11 +28,11 @@ def parse(
     default_config: Path | None = None,
     argv: Sequence[str] | None = None,
 ) -> ConfigT:
-    """Builds a program's configuration: defaults, then ``--config FILE``, then the other options.
+    """Builds a program's configuration from defaults, ``--config FILE`` and the other options, in this order.
 
     Args:
         model: The pydantic model; each of its fields becomes an option, its docstrings the help.
-        prog: How the program is called, for ``--help``.
+        prog: The command that starts the program, for ``--help``.
         description: What the program does, for ``--help``.
         default_config: The YAML file used where the user gives no ``--config``.
         argv: The arguments; the process's own by default.

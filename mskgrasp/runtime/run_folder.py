@@ -1,4 +1,4 @@
-"""A run of trials in a folder: begun with certain inputs, every trial stored at once, gone on with later."""
+"""Folder of a run of trials, which stores every trial at once and can be resumed with the same inputs."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ TRIALS = "trials.jsonl"
 
 
 def begin(config: Config, out: Path, inputs: Mapping[str, str], *, may_change: Collection[str]) -> None:
-    """Opens the folder of a run: new, or begun with the same settings and inputs.
+    """Opens the folder of a run: a new one, or one that was started with the same settings and inputs.
 
     Args:
-        config: Of the run.
+        config: Settings of the run.
         out: The folder.
-        inputs: Digest of each file and part that the results depend on, by a name for messages.
-        may_change: Settings that a run goes on with, whatever they were.
+        inputs: Digests of the files and parts that the results depend on, by their names in messages.
+        may_change: Names of settings that may differ when a run is resumed.
 
     Raises:
-        UsageError: It holds something else.
+        UsageError: The folder holds another run, or other files.
     """
     settings, fingerprint = out / SETTINGS, out / INPUTS
     if settings.exists() and fingerprint.exists():
@@ -43,7 +43,7 @@ def begin(config: Config, out: Path, inputs: Mapping[str, str], *, may_change: C
         changed += [name for name, value in inputs.items() if known.get(name, value) != value]
         if changed:
             raise UsageError(
-                f"{out} was begun with other inputs ({', '.join(changed)} differ); choose another --out"
+                f"{out} was started with other inputs ({', '.join(changed)} differ); choose another --out"
             )
         inputs = known | dict(inputs)
     elif out.is_dir() and any(out.iterdir()):
@@ -57,7 +57,7 @@ def file_digest(path: Path) -> str:
     """SHA-256 of a file.
 
     Raises:
-        UsageError: It cannot be read.
+        UsageError: The file cannot be read.
     """
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
@@ -66,21 +66,21 @@ def file_digest(path: Path) -> str:
 
 
 def append(path: Path, values: Mapping[str, Any]) -> None:
-    """Adds a line to a file of trials; NaN is no JSON and refused."""
+    """Appends a line to a file of trials; NaN is refused, since JSON has none."""
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(values, allow_nan=False) + "\n")
 
 
 def rewrite(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
-    """Writes a file of trials anew, whole or not at all."""
+    """Replaces a file of trials atomically."""
     write_whole(path, "".join(json.dumps(one, allow_nan=False) + "\n" for one in lines).encode())
 
 
 def read(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
-    """Trials already done, in order; a last line cut short by a kill is dropped from the file.
+    """Reads the stored trials in order; removes an incomplete last line, which a killed run leaves.
 
     Raises:
-        BadDataset: The file holds something else.
+        BadDataset: A line of the file is not a trial.
     """
     if not path.exists():
         return []
@@ -91,7 +91,7 @@ def read(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
             found.append(make(json.loads(line)))
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise BadDataset(
-                f"{path}: line {i + 1} is no trial; delete it or choose another --out"
+                f"{path}: line {i + 1} is not a trial; delete it or choose another --out"
             ) from error
     if lines[-1]:
         path.write_text("\n".join(lines[:-1]) + ("\n" if len(lines) > 1 else ""), encoding="utf-8")

@@ -85,13 +85,13 @@ def test_lines_survive_the_file_and_a_line_cut_short(tmp_path: Path):
     np.testing.assert_array_equal(found.measured, first.measured)
     assert path.read_text() == lines[0] + "\n"
     path.write_text("no json\n")
-    with pytest.raises(BadDataset, match="line 1 is no trial"):
+    with pytest.raises(BadDataset, match="line 1 is not a trial"):
         read(path, Trial.from_json)
 
 
 def test_a_name_that_leads_out_of_the_folder_is_no_trial(tmp_path: Path):
     append(tmp_path / TRIALS, trial().to_json() | {"part": "../../etc/passwd"})
-    with pytest.raises(BadDataset, match="no trial"):
+    with pytest.raises(BadDataset, match="not a trial"):
         find_trial(tmp_path, "../../etc/passwd-000")
 
 

@@ -1,4 +1,4 @@
-"""What is simulated, as plain settings: known without the simulator, which takes seconds to load."""
+"""Settings of the simulated cell; importing them does not load the simulator."""
 
 from mskgrasp.core.settings.execution import ExecutionError, ExecutionNoise
 from mskgrasp.core.settings.overhead import Overhead

@@ -1,4 +1,4 @@
-"""What a real cell does not do exactly: errors of arm, gripper, friction and camera, an attempt each."""
+"""Execution noise: random errors of arm, gripper, friction and camera, drawn for each attempt."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ Range = tuple[float, float]
 class ExecutionNoise(Config):
     """Distributions of the cell's errors; everything is off by default. SI units.
 
-    Labels keep their meaning: the displacement is between what was commanded and seen, and where the part
-    truly is in the hand, so that it holds what these errors do.
+    Labels keep their definition: the displacement is from the commanded and observed pose to the true pose
+    of the part in the hand, so that it includes the effect of these errors.
     """
 
     arm_position_std: float = Field(default=0.0, ge=0, le=0.005)
-    """Error of the hand's place along each axis of the base, normal, m; a grasp below the lowest allowed
-    one is lifted to it."""
+    """Standard deviation (normal) of the hand's position along each axis of the base, m; a grasp below the
+    lowest allowed one is raised to it."""
     arm_angle_std: float = Field(default=0.0, ge=0, le=0.1)
-    """Error of the hand's turn about the vertical, normal, rad."""
+    """Standard deviation (normal) of the hand's angle about the vertical, rad."""
     finger_force: Range | None = None
-    """Force of each pad, uniform between two bounds, N; null: that of the physics settings."""
+    """Bounds of each pad's force, uniformly distributed, N; null: the force in the physics settings."""
     friction_pad_part: Range | None = None
-    """Effective coefficient between pads and part, uniform between two bounds; null: that of the settings."""
+    """Bounds of the effective friction between pads and part, uniformly distributed; null: the settings'."""
     camera_position_std: float = Field(default=0.0, ge=0, le=0.02)
-    """Error of the camera's calibrated place along each axis of the base, normal, m."""
+    """Standard deviation (normal) of the camera's calibrated position along each axis of the base, m."""
     camera_angle_std: float = Field(default=0.0, ge=0, le=0.05)
-    """Error of its turn about each axis of its optical frame, normal, rad; 0.01 moves the picture by 8 mm at
-    0.8 m."""
+    """Standard deviation (normal) of its rotation about each axis of its optical frame, rad; 0.01 shifts the
+    image by 8 mm at 0.8 m."""
 
     @model_validator(mode="after")
     def _check(self) -> ExecutionNoise:
@@ -47,13 +47,13 @@ class ExecutionNoise(Config):
 
     @property
     def moves_camera(self) -> bool:
-        """Whether the camera hangs elsewhere than its calibration says."""
+        """Whether the camera's true pose differs from its calibrated pose."""
         return self.camera_position_std > 0 or self.camera_angle_std > 0
 
     def draw(self, rng: np.random.RandomState) -> ExecutionError:
-        """The errors of one attempt.
+        """Draws the errors of one attempt.
 
-        Every quantity is drawn whether it is on or not: switching one on leaves the others as they were.
+        Every quantity is drawn whether it is on or off, so that switching one on leaves the others unchanged.
         """
         place, turn = rng.normal(size=3), rng.normal()
         force, friction = rng.uniform(size=2)
@@ -69,13 +69,13 @@ class ExecutionNoise(Config):
 
 @dataclass(frozen=True, kw_only=True)
 class ExecutionError:
-    """What one attempt meets.
+    """The errors of one attempt.
 
     Attributes:
-        grasp: (4,) added to the commanded x, y, z, theta, base frame, m and rad.
-        finger_force: Of each pad, N; None: that of the physics settings.
-        friction_pad_part: Effective coefficient; None: that of the physics settings.
-        camera_shift: (3,) of the camera's true place against its calibration, base frame, m.
+        grasp: (4,) error added to the commanded x, y, z, theta, base frame, m and rad.
+        finger_force: Force of each pad, N; None: the force in the physics settings.
+        friction_pad_part: Effective coefficient; None: the coefficient in the physics settings.
+        camera_shift: (3,) true minus calibrated position of the camera, base frame, m.
         camera_turn: (3,) rotation vector of its true optical frame in the calibrated one, rad.
     """
 
@@ -86,7 +86,7 @@ class ExecutionError:
     camera_turn: np.ndarray
 
     def true_camera(self, calibrated: Pose) -> Pose:
-        """Where the camera truly is, ``T_base_camera``, when its calibration says ``calibrated``."""
+        """The camera's true ``T_base_camera`` for its calibrated one."""
         angle = float(np.linalg.norm(self.camera_turn))
         axis = self.camera_turn / angle if angle else np.zeros(3)
         turn = np.array([np.cos(angle / 2), *(np.sin(angle / 2) * axis)])

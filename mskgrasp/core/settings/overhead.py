@@ -10,7 +10,7 @@ from mskgrasp.core.geometry import Pose
 
 
 class Overhead(Config):
-    """Where the camera hangs and what it sees."""
+    """Pose and intrinsics of the overhead camera."""
 
     height: float = Field(default=0.8, gt=0.3, lt=3)
     """Height over the table, m."""
@@ -25,10 +25,10 @@ class Overhead(Config):
         return np.array([[self.focal_px, 0, centre], [0, self.focal_px, centre], [0, 0, 1.0]])
 
     def check_sees(self, region: tuple[float, float, float, float]) -> None:
-        """Refuses a region that the image does not show whole.
+        """Checks that the image shows all of a region.
 
         Raises:
-            ValueError: Says how much it shows.
+            ValueError: The region is empty or larger than the part of the table that the camera sees.
         """
         x_min, x_max, y_min, y_max = region
         if not (x_min < x_max and y_min < y_max):

@@ -1,6 +1,6 @@
-"""The physics settings that make the labels true, in one place.
+"""Physics settings of the simulated cell.
 
-Every default has its reason beside it; docs/physics.md tells the measurements.
+The reason for a default stands beside it; the measurements are in docs/physics.md.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ class Physics(Config):
     """Settings of the simulated cell; SI units."""
 
     rate_hz: int = Field(default=1000, ge=100)
-    """Simulation steps a second. At 500 Hz displacements are twice as far from those of finer simulation;
-    under 250 Hz light parts creep out of the fingers: data is not collected."""
+    """Simulation steps a second. At 500 Hz displacements differ twice as much from those of finer
+    simulation; below 250 Hz light parts creep out of the fingers, and no data is collected."""
     coarse_rate_hz: int = Field(default=250, ge=100)
-    """The same, at most ``rate_hz``, for parts of ``coarse_mass`` and more, in lift and hold, and while one
-    that was not held comes to rest. The first 12 mm of the lift, in which the part leaves the table, and the
-    last 20 ms, before it is looked at in the hand, are fine. Of attempts alone: the simulated cell is never
-    coarse."""
+    """Steps a second, at most ``rate_hz``, for parts of ``coarse_mass`` and more during lift and hold, and
+    while a part that is not held comes to rest. The first 12 mm of the lift, in which the part leaves the
+    table, and the last 20 ms before the part's pose in the hand is measured use ``rate_hz``, as does all of
+    the simulated cell (`hal.sim`)."""
     coarse_mass: float = Field(default=0.04, gt=0)
-    """Lighter parts are simulated finely throughout, kg: the grip shakes them, the more the longer a step."""
+    """Lighter parts are simulated at ``rate_hz`` throughout, kg: longer steps shake them in the grip."""
     position_iterations: int = Field(default=50, ge=4)
-    """Solver iterations a step. With 25 displacements are twice as far from those of finer simulation."""
+    """Solver iterations a step. With 25 displacements differ twice as much from those of finer steps."""
     contact_offset: float = Field(default=0.003, gt=0, le=0.02)
     """Distance at which contacts are generated, m; ManiSkill's 20 mm costs two to four times the time."""
     persistent_manifold: bool = False
-    """PhysX' cache of contact points (PCM); on a GPU it is always on. Points that are no longer there hold 2
-    of 100 blocks that spin between closing pads up to 1.4 degrees askew."""
+    """PhysX' cache of contact points (PCM); on a GPU it is always on. Stale points keep 2 of 100 blocks
+    that spin between closing pads rotated by up to 1.4 degrees."""
     friction_pad_part: float = Field(default=0.5, ge=0, le=2)
     """Effective Coulomb coefficient between pads and part (rubber on dry steel: 0.4 to 0.7)."""
     friction_table_part: float = Field(default=0.4, ge=0, le=2)
@@ -46,8 +46,8 @@ class Physics(Config):
     finger_force: float = Field(default=20.0, gt=0, le=70)
     """Force of each pad on the part, N."""
     finger_stiffness: float = Field(default=8000.0, gt=0)
-    """Drive stiffness of a finger, N/m; with the force limit and the speed it says how soon a pad presses in
-    full: 12 ms after it was stopped."""
+    """Drive stiffness of a finger, N/m; with the force limit and the speed it decides how soon a stopped pad
+    reaches its full force: 12 ms."""
     finger_damping: float = Field(default=100.0, ge=0)
     """Drive damping of a finger, N s/m: critical, with the armature."""
     finger_armature: float = Field(default=0.3, ge=0)
@@ -65,14 +65,14 @@ class Physics(Config):
     approach_clearance: float = Field(default=0.01, gt=0, le=0.1)
     """Height of the pads over the part's top at which the straight descent begins, m."""
     skip_air: bool = True
-    """Whether the hand is put where it gets through nothing but air, instead of being moved there."""
+    """Whether motions of the hand through free space are skipped: it is placed at their end."""
     reflex_force: float = Field(default=20.0, gt=0)
     """Contact force on the hand that ends a descent, N, as the robot's reflex would."""
 
     @model_validator(mode="before")
     @classmethod
     def _no_coarser_than_told(cls, values: Any) -> Any:
-        # Who lowers the rate alone need not know of the other.
+        # Lowering rate_hz alone is legal.
         if isinstance(values, dict) and "coarse_rate_hz" not in values:
             rate, usual = values.get("rate_hz"), cls.model_fields["coarse_rate_hz"].default
             if isinstance(rate, int) and rate < usual:
@@ -90,10 +90,10 @@ class Physics(Config):
         return self
 
     def coarse_hz(self, mass: float) -> int:
-        """Simulation steps a second of a part of some mass, kg, where no finger closes."""
+        """Simulation steps a second for a part of that mass, kg, in phases in which no finger closes."""
         return self.rate_hz if mass < self.coarse_mass else self.coarse_rate_hz
 
     @property
     def friction_table(self) -> float:
-        """The table's own coefficient: PhysX averages both materials, and the part's is that of the pads."""
+        """The table's own coefficient: PhysX averages both materials, and a part's is that of the pads."""
         return 2 * self.friction_table_part - self.friction_pad_part

@@ -1,4 +1,4 @@
-"""Two squares of white tape on top of a part: what a camera can measure its motion by."""
+"""Two squares of white tape on top of a part, from which a camera measures its motion."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from pydantic import Field, model_validator
 from mskgrasp.core.config import Config
 
 LEAST_RATIO = 1.25
-"""Squares nearer in size than this may be taken for each other."""
+"""Least ratio of the sides; squares closer in size may be confused."""
 
 
 class Tape(Config):
-    """How large the squares are, as measured on the part; their sizes tell them apart."""
+    """Sizes of the squares, as measured on the part; the squares are distinguished by size."""
 
     large: float = Field(default=0.012, ge=0.006, le=0.04)
     """Side of the larger square, m."""
@@ -29,5 +29,5 @@ class Tape(Config):
 
     @property
     def sides(self) -> tuple[float, float]:
-        """Of the larger and the smaller square, metres."""
+        """Sides of the larger and the smaller square, metres."""
         return self.large, self.small
