@@ -19,7 +19,7 @@ from mskgrasp.collect.run import is_done, main
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.files import only_here
 from mskgrasp.dataset import list_shards, read_shard
-from mskgrasp.simulation.versions import ShardTask
+from mskgrasp.simulation.shard_task import ShardTask
 from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, command
 from tests.programs import run_here
 
