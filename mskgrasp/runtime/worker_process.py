@@ -18,7 +18,7 @@ from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
 @contextmanager
 def one_thread_a_process() -> Iterator[None]:
-    """Limits numerical libraries to one thread in processes started meanwhile: one process a core is faster."""
+    """Limits numerical libraries to one thread in processes started meanwhile: one process a core is best."""
     before = os.environ.get("OMP_NUM_THREADS")
     os.environ["OMP_NUM_THREADS"] = "1"
     try:
