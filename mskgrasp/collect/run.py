@@ -172,7 +172,7 @@ def check_out(config: CollectConfig) -> None:
     changed = [key for key in now if now[key] != before[key]]
     if changed:
         raise UsageError(
-            f"{config.out} was begun with other settings ({', '.join(changed)} differ); choose another "
+            f"{config.out} was made with other settings ({', '.join(changed)} differ); choose another "
             "--out, or the settings in its config.yaml"
         )
 

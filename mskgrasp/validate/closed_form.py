@@ -272,16 +272,16 @@ def centring(scene: BodyScene, bodies: dict[str, Part]) -> Iterator[Check]:
         low=-math.degrees(0.3) - 0.3, high=-math.degrees(0.3) + 0.3,
     )  # fmt: skip
     rng = np.random.default_rng(0)
-    askew = []
+    errors = []
     for _ in range(BLOCKS):
         turn = float(rng.uniform(-0.5, 0.5))
         dx, dy = rng.uniform(-0.007, 0.007, 2)
         # One after the other in the same scene, as the collector does it.
         outcome = scene.grasp(bodies["block"], (x + dx, y + dy, z), turn, fresh=False)
-        askew.append(abs(math.degrees(float(outcome["displacement"][3]) + turn)))
+        errors.append(abs(math.degrees(float(outcome["displacement"][3]) + turn)))
     yield Check(
-        name=f"the most askew of {BLOCKS} blocks laid at random", formula="flat against the pads", unit="deg",
-        expected=0.0, measured=float(np.max(askew)), low=0.0, high=0.3,
+        name=f"greatest angle of {BLOCKS} random blocks", formula="flat against the pads", unit="deg",
+        expected=0.0, measured=float(np.max(errors)), low=0.0, high=0.3,
     )  # fmt: skip
     outcome = scene.grasp(bodies["block"], (x, y, z))
     yield Check(
