@@ -23,10 +23,11 @@ from mskgrasp.parts import Part
 from mskgrasp.parts.store import pack_part
 from mskgrasp.runtime.executor import Completed, Delivered, Died, Loss, WorkerFailed
 from mskgrasp.runtime.worker_pool import run_jobs
-from mskgrasp.simulation.versions import ShardTask, versions
+from mskgrasp.simulation.shard_task import ShardTask
+from mskgrasp.simulation.versions import versions
 
 VISIBLE_S = 120.0
-"""How long a file that a node has written may take to be seen here (NFS keeps listings for a minute), s."""
+"""How long a file that a node has written may take to appear here (NFS keeps listings for a minute), s."""
 _ADDRESS = re.compile(r"auto|[A-Za-z0-9_.-]+:[0-9]{1,5}|\[[0-9A-Fa-f:]+\]:[0-9]{1,5}")
 
 
@@ -34,7 +35,7 @@ def check_cluster(address: str) -> None:
     """Refuses an address that cannot be one, and a machine without Ray.
 
     Raises:
-        UsageError: Says which extra to install, or what an address looks like.
+        UsageError: The message names the extra to install, or the form of an address.
     """
     if not _ADDRESS.fullmatch(address):
         raise UsageError(
@@ -49,20 +50,20 @@ def connected(address: str) -> Iterator[None]:
     """This process as a driver of the cluster, which must have a node on this machine.
 
     Raises:
-        WorkerFailed: Nobody answers there, or its software is another.
+        WorkerFailed: No cluster answers there, or it runs other software.
     """
     # Read when Ray is imported; a user who wants otherwise sets them.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
-    # Ray prints what befalls its processes over the progress bar; what matters is told as `Lost`.
+    # Ray prints over the progress bar what happens to its processes; `Died` events report what matters.
     os.environ.setdefault("RAY_DEDUP_LOGS_SKIP_REGEX", ".")
     if address != "auto":
-        _knock(address)
+        _check_reachable(address)
     import ray
 
     try:
         ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
-    except Exception as error:  # Ray has no base class for what may go wrong here
+    except Exception as error:  # Ray has no common base class for these errors
         ray.shutdown()
         reason = " ".join(str(error).split())[:300]
         raise WorkerFailed(
@@ -75,8 +76,8 @@ def connected(address: str) -> Iterator[None]:
         ray.shutdown()
 
 
-def _knock(address: str) -> None:
-    # Ray itself tries for a minute and then ends the process.
+def _check_reachable(address: str) -> None:
+    # Ray itself would try for a minute and then end the process.
     host, _, port = address.rpartition(":")
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=10).close()
@@ -196,10 +197,10 @@ def make_shards_on_cluster(
 
 
 def wait_until_seen(out: Path, tasks: Sequence[ShardTask]) -> None:
-    """Waits until the shards that nodes have written are seen on this machine, too.
+    """Waits until the shards that nodes have written appear on this machine.
 
     Raises:
-        WorkerFailed: They are not, after some time.
+        WorkerFailed: They do not, within `VISIBLE_S`.
     """
     deadline = time.monotonic() + VISIBLE_S
     unseen = [shard_path(out, task.part, task.index) for task in tasks]

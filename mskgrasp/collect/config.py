@@ -1,4 +1,4 @@
-"""What a collection run is: its parts, its numbers and its physics."""
+"""Configuration of a collection run: its parts, its numbers and its physics."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class CollectConfig(Config):
     """Settings of a collection run."""
 
     out: Path = Path("data/demo")
-    """Folder of the dataset; a run into a folder that was begun with the same settings goes on."""
+    """Folder of the dataset; a run into a folder with the same settings resumes it."""
     parts: tuple[str, ...] = ()
     """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
     sample: int = Field(default=0, ge=0)
@@ -79,5 +79,5 @@ class CollectConfig(Config):
         return self
 
     def identity(self) -> dict:
-        """What decides the data: two runs with the same identity make the same arrays."""
+        """The settings that determine the data: two runs with the same identity make the same arrays."""
         return self.model_dump(mode="json", exclude={"out", "workers", "cluster"})

@@ -16,7 +16,8 @@ from mskgrasp.parts.store import receive_part
 from mskgrasp.runtime.cli import explain_os_error
 from mskgrasp.runtime.executor import WorkerFailed
 from mskgrasp.runtime.worker_process import use_one_core
-from mskgrasp.simulation.versions import ShardTask, versions
+from mskgrasp.simulation.shard_task import ShardTask
+from mskgrasp.simulation.versions import versions
 
 if TYPE_CHECKING:
     from mskgrasp.simulation.shard import Simulator

@@ -31,14 +31,15 @@ from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 from mskgrasp.runtime.options import parse
 from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult
-from mskgrasp.simulation.versions import ShardTask, other_versions
+from mskgrasp.simulation.shard_task import ShardTask
+from mskgrasp.simulation.versions import other_versions
 
 DESCRIPTION = """Simulates random grasps of parts and records what happened.
 
-For each part and attempt: the part lies in a resting pose at a random place and turn, the overhead
+For each part and attempt: the part lies in a resting pose at a random position and yaw, the overhead
 camera takes a depth image, a grasp is drawn uniformly from the part's box in that image, the arm tries
 it, and one row is written: success, reason of failure, how the part moved in the hand. A run that was
-stopped goes on where it was when started again with the same settings."""
+stopped resumes when it is started again with the same settings."""
 
 
 def main() -> int:
@@ -57,7 +58,7 @@ def collect(config: CollectConfig) -> None:
     """Makes the shards that are missing and sums up the dataset."""
     if config.cluster is not None:
         check_cluster(config.cluster)
-    # Sets of parts are written out: a catalogue that grows must not change a dataset that was begun.
+    # Sets are stored as names of parts: a catalogue that grows must not change an existing dataset.
     names = chosen_names(config.parts or ("starter",))
     if config.sample:
         names = sampled(names, config.sample)
@@ -95,7 +96,7 @@ def _collect(config: CollectConfig, parts: list[Part]) -> None:
     print(
         f"{len(parts)} parts, {sum(task.n for task in everything)} attempts into {config.out}"
         + (f", {done} of them already there" if done else "")
-        + (f"; {_hands(config, missing)}" if missing else "")
+        + (f"; {_worker_summary(config, missing)}" if missing else "")
     )
     if missing:
         _simulate(config, missing, parts, done)
@@ -108,8 +109,8 @@ def _collect(config: CollectConfig, parts: list[Part]) -> None:
     print(f"wrote {config.out / 'summary.json'} and {draw_summary(config.out, config.seed)}")
 
 
-def _hands(config: CollectConfig, missing: list[ShardTask]) -> str:
-    """Who will make the missing shards."""
+def _worker_summary(config: CollectConfig, missing: list[ShardTask]) -> str:
+    """The workers that will make the missing shards, in words."""
     if config.cluster is not None:
         cores = count_cores()
         waits = "" if cores else " (waiting for nodes to join it)"
@@ -122,7 +123,7 @@ def _n_workers(config: CollectConfig, missing: list[ShardTask]) -> int:
 
 
 def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:
-    """The parts of the run, as they were asked for and built where need be, that pass the part filter."""
+    """The requested parts that pass the part filter, by the names given; those that are missing are built."""
     bounds = config.part_filter
     rated = ratings() if bounds.min_success is not None or bounds.max_success is not None else {}
     parts: list[tuple[str, Part]] = []
@@ -152,7 +153,7 @@ def check_out(config: CollectConfig) -> None:
     """Refuses an output folder that holds something else; changes nothing.
 
     Raises:
-        UsageError: A file is in the way, or the folder was begun with other settings, or is no dataset.
+        UsageError: A file is in the way, or the folder has other settings, or is no dataset.
     """
     settings = config.out / "config.yaml"
     if config.out.exists() and not config.out.is_dir():
@@ -170,7 +171,7 @@ def check_out(config: CollectConfig) -> None:
     changed = [key for key in now if now[key] != before[key]]
     if changed:
         raise UsageError(
-            f"{config.out} was begun with other settings ({', '.join(changed)} differ); choose another "
+            f"{config.out} was made with other settings ({', '.join(changed)} differ); choose another "
             "--out, or the settings in its config.yaml"
         )
 
@@ -180,17 +181,17 @@ def _is_leftover(path: Path) -> bool:
 
 
 def begin(config: CollectConfig) -> None:
-    """Opens the dataset's folder, and clears away what a killed run left half-written."""
+    """Opens the dataset's folder, and deletes half-written files of a killed run."""
     if not (config.out / "config.yaml").exists():
         write_config(config, config.out / "config.yaml")
-    # Only now: a folder that holds something is known as a dataset by its settings.
+    # After the settings: they mark a folder with other files as a dataset.
     make_folder(config.out / "shards")
     for leftover in (*config.out.glob("config.yaml.*.tmp"), *(config.out / "shards").glob("*.tmp")):
-        leftover.unlink(missing_ok=True)  # a worker of that run may just be ending
+        leftover.unlink(missing_ok=True)  # a worker of that run may be about to delete it itself
 
 
 def plan_shards(config: CollectConfig, parts: list[Part]) -> list[ShardTask]:
-    """The shards of a run, dealt part by part in turn so that an early stop leaves some of each."""
+    """The shards of a run, in turn over the parts so that an early stop leaves some of each."""
     starts = range(0, config.attempts_per_part, config.shard_size)
     return [
         ShardTask(
@@ -207,7 +208,7 @@ def plan_shards(config: CollectConfig, parts: list[Part]) -> list[ShardTask]:
 
 
 def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
-    """Whether a shard lies on disk and is whole; a damaged one is told of, to be made again.
+    """Whether a shard is on disk and whole; a damaged one is reported, and will be made again.
 
     Raises:
         BadDataset: The part, or what simulates it, has changed since the shard was made.

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.runtime.local_executor import LocalExecutor
 from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult, run_jobs
-from mskgrasp.simulation.versions import ShardTask
+from mskgrasp.simulation.shard_task import ShardTask
 
 ShardEvents = Generator[JobResult[ShardTask, int] | JobDone[ShardTask] | JobLost[ShardTask], None, None]
 """Results are attempts: 1 success, 0 failure, -1 discarded. A shard that is lost is made again as a whole."""
@@ -20,7 +20,7 @@ def make_shards(config: CollectConfig, tasks: Sequence[ShardTask], n_workers: in
     Raises:
         WorkerFailed: A shard failed for a reason that trying again does not remove.
     """
-    executor = LocalExecutor(_shard_bench, config, n_workers)
+    executor = LocalExecutor(_shard_maker, config, n_workers)
     return run_jobs(tasks, executor, name=task_name, remedy="leave the part out with --parts")
 
 
@@ -30,7 +30,7 @@ def task_name(task: ShardTask) -> str:
 
 
 @contextmanager
-def _shard_bench(config: CollectConfig) -> Iterator[Callable[[ShardTask], Iterator[int]]]:
+def _shard_maker(config: CollectConfig) -> Iterator[Callable[[ShardTask], Iterator[int]]]:
     """A simulator, and the function that makes a shard and writes it, yielding every attempt's outcome."""
     from mskgrasp.simulation.shard import Simulator
 

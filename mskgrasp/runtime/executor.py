@@ -18,7 +18,7 @@ MAX_NODES = 10
 Settings = TypeVar("Settings")
 Job = TypeVar("Job")
 Result = TypeVar("Result")
-Bench = Callable[[Settings], AbstractContextManager[Callable[[Job], Iterator[Result]]]]
+WorkerContext = Callable[[Settings], AbstractContextManager[Callable[[Job], Iterator[Result]]]]
 """Sets up what a worker needs, a cell and a planner, and gives the function that does a job."""
 
 

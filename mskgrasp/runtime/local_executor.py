@@ -11,7 +11,7 @@ from typing import Any
 
 from mskgrasp.core.errors import MskgraspError
 from mskgrasp.runtime.cli import explain_os_error
-from mskgrasp.runtime.executor import Bench, Completed, Delivered, Died, WorkerFailed
+from mskgrasp.runtime.executor import Completed, Delivered, Died, WorkerContext, WorkerFailed
 from mskgrasp.runtime.worker_process import (
     ignore_ctrl_c,
     leave_with_parent,
@@ -33,24 +33,24 @@ class LocalExecutor:
     """At most `n_workers` processes, started when there is a job for them and kept for the next one.
 
     Args:
-        bench: See `worker_pool.Work`, as for the others.
-        settings: Argument of `bench`.
+        context: See `worker_pool.Work`, as for the others.
+        settings: Argument of `context`.
         n_workers: How many processes.
         lost_by: Errors with which a process counts as dead.
     """
 
     def __init__(
         self,
-        bench: Bench[Any, Any, Any],
+        context: WorkerContext[Any, Any, Any],
         settings: Any,
         n_workers: int,
         *,
         lost_by: tuple[type[Exception], ...] = (),
     ):
-        self._arguments = bench, settings, lost_by
+        self._arguments = context, settings, lost_by
         self._n_workers = n_workers
         # Spawned: a forked simulator would share the parent's driver state.
-        self._context: Any = multiprocessing.get_context("spawn")
+        self._spawn: Any = multiprocessing.get_context("spawn")
         self._workers: list[_Worker] = []
 
     def n_slots(self) -> int:
@@ -99,8 +99,8 @@ class LocalExecutor:
 
     def _start(self) -> _Worker:
         with one_thread_a_process(), out_of_reach_of_ctrl_c():
-            ours, theirs = self._context.Pipe()
-            process = self._context.Process(target=_serve, args=(theirs, *self._arguments), daemon=True)
+            ours, theirs = self._spawn.Pipe()
+            process = self._spawn.Process(target=_serve, args=(theirs, *self._arguments), daemon=True)
             process.start()
             theirs.close()
             worker = _Worker(process=process, connection=ours)
@@ -128,14 +128,17 @@ def _end(workers: Sequence[_Worker]) -> None:
 
 
 def _serve(
-    connection: Connection, bench: Bench[Any, Any, Any], settings: Any, lost_by: tuple[type[Exception], ...]
+    connection: Connection,
+    context: WorkerContext[Any, Any, Any],
+    settings: Any,
+    lost_by: tuple[type[Exception], ...],
 ) -> None:
     """A worker process: receives jobs one by one and sends their results."""
     ignore_ctrl_c()
     leave_with_parent()
     try:
         use_one_core()
-        with bench(settings) as do:
+        with context(settings) as do:
             while True:
                 for result in do(connection.recv()):
                     connection.send(("result", result))

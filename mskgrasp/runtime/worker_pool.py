@@ -15,7 +15,6 @@ from typing import Any, Generic
 from tqdm import tqdm
 
 from mskgrasp.runtime.executor import (
-    Bench,
     Delivered,
     Died,
     Executor,
@@ -23,6 +22,7 @@ from mskgrasp.runtime.executor import (
     Loss,
     Result,
     Settings,
+    WorkerContext,
     WorkerFailed,
 )
 from mskgrasp.runtime.local_executor import LocalExecutor
@@ -65,10 +65,10 @@ class JobLost(Generic[Job]):
 class Work(Generic[Settings, Job, Result]):
     """What every worker does, and what becomes of a job whose worker dies."""
 
-    bench: Bench[Settings, Job, Result]
+    context: WorkerContext[Settings, Job, Result]
     """A function of a module; a spawned process imports it."""
     settings: Settings
-    """Argument of `bench`; pickled."""
+    """Argument of `context`; pickled."""
     name: Callable[[Job], str] = str
     """The job's name in messages."""
     rest: Callable[[Job, int], Job | None] = whole
@@ -155,11 +155,11 @@ def results(
     if not jobs:
         return
     if not apart and (n_workers == 1 or len(jobs) < 2):
-        with work.bench(work.settings) as do:
+        with work.context(work.settings) as do:
             for job in jobs:
                 yield from do(job)
         return
-    executor = LocalExecutor(work.bench, work.settings, n_workers, lost_by=work.lost_by)
+    executor = LocalExecutor(work.context, work.settings, n_workers, lost_by=work.lost_by)
     events = run_jobs(jobs, executor, name=work.name, rest=work.rest, remedy=work.remedy)
     with contextlib.closing(events):
         for event in events:

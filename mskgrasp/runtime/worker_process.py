@@ -18,7 +18,7 @@ from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
 @contextmanager
 def one_thread_a_process() -> Iterator[None]:
-    """Processes started meanwhile run numerical libraries in one thread: a process a core serves better."""
+    """Limits numerical libraries to one thread in processes started meanwhile: one process a core is best."""
     before = os.environ.get("OMP_NUM_THREADS")
     os.environ["OMP_NUM_THREADS"] = "1"
     try:
@@ -55,8 +55,8 @@ def ignore_ctrl_c() -> None:
 
 
 def leave_with_parent() -> None:
-    """Ends this process when its parent is gone, however that ended."""
-    # Asked now, the system may already name another: the parent can have died while this process started.
+    """Ends this process soon after its parent has ended, for whatever reason."""
+    # Not getppid() alone: the parent may have died while this process started.
     born_of = multiprocessing.parent_process()
     parent = os.getppid() if born_of is None else born_of.pid
 
@@ -69,7 +69,7 @@ def leave_with_parent() -> None:
 
 
 def use_one_core() -> None:
-    """Keeps this process to one core: neither torch nor the software renderer may spread over the others."""
+    """Limits torch and the software renderer to one thread each in this process."""
     os.environ.setdefault("LP_NUM_THREADS", "1")
     os.environ["OMP_NUM_THREADS"] = "1"  # torch reads it when it is loaded
     if "torch" in sys.modules:

@@ -1,1 +1,1 @@
-"""Simulated grasp attempts and the versions of what makes them."""
+"""Shards of simulated grasp attempts, their description, and the versions of what makes them."""

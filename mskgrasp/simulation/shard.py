@@ -1,4 +1,4 @@
-"""One shard: some attempts on one part, all of them determined by the seed."""
+"""Simulation of a shard: attempts on one part, determined by the seed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
 from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, u16_to_depth, write_shard
 from mskgrasp.perception.part_detection import view_part
-from mskgrasp.simulation.versions import ShardTask, versions
+from mskgrasp.simulation.shard_task import ShardTask
+from mskgrasp.simulation.versions import versions
 from tasks import GraspDisplacementEnv
 from tasks.attempt.outcome import MAX_PENETRATION, MAX_SPEED
 from tasks.scene.renderer import render_backend
@@ -39,7 +40,7 @@ class Simulator:
         self._env: gymnasium.Env | None = None
 
     def load(self, folder: str) -> GraspDisplacementEnv:
-        """A fresh scene with the part: what earlier shards left behind in PhysX must not matter."""
+        """Builds a fresh scene with the part, free of state that earlier shards left in PhysX."""
         if self._env is None:
             self._env = gymnasium.make(
                 "GraspDisplacement-v1",
@@ -50,7 +51,7 @@ class Simulator:
                 noise=self._noise.model_dump(),
                 render_backend=render_backend(),
             )
-            # ManiSkill collects garbage at every new scene; what is loaded by now is none.
+            # ManiSkill collects garbage at every new scene; the modules loaded by now need no scan.
             gc.collect()
             gc.freeze()
         else:
@@ -116,7 +117,7 @@ class Simulator:
 def draw_attempt(
     env: GraspDisplacementEnv, part: str, seed: int, attempt: int
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Lays the part as a seed and a number say, looks at it and draws a grasp.
+    """Places the part as determined by seed and attempt number, takes a depth image and draws a grasp.
 
     Returns:
         The depth image (h, w), uint16 in 0.1 mm, and the grasp (1, 4), float32, base frame; None where the

@@ -1,31 +1,17 @@
-"""What a worker is asked to make, and what it makes it with; known without the simulator."""
+"""Versions of what makes simulated data: the simulation's own, and those of its libraries."""
 
 from __future__ import annotations
 
 import importlib.metadata
 import platform
-from dataclasses import dataclass
 
 import mskgrasp
-
-
-@dataclass(frozen=True, kw_only=True)
-class ShardTask:
-    """Which attempts to make: `n` of them on a part, from number `first` on."""
-
-    part: str
-    folder: str
-    index: int
-    first: int
-    n: int
-    seed: int
-
 
 SIMULATION_VERSION = 1
 """Raised by every change after which a seed makes other attempts; `tests/versions.py` names the files."""
 
 _FIRST_SIMULATION = "38dc7f58aea7bdfa"
-"""What shards carry that were made by version 1 before versions were counted: a digest of its files."""
+"""In place of the number in shards made by version 1 before versions were counted: a digest of its files."""
 
 
 def versions() -> dict[str, str]:

@@ -9,9 +9,9 @@ from mskgrasp.runtime.options import parse
 
 DESCRIPTION = """Shows whether simulated labels are right: run it after changing a setting or a part.
 
-Three kinds of evidence: experiments whose outcome can be worked out on paper; parts as the engine cooked
-them, against their meshes; and the same grasps under coarser and finer settings, against the finest, beside
-the floor: the finest setting against itself with the starts moved by 10 um. Writes validate.json and
+Three kinds of evidence: experiments whose outcome follows from closed-form physics; parts as the engine
+cooked them, against their meshes; and the same grasps under coarser and finer settings, against the finest,
+beside the floor: the finest setting against itself with the starts moved by 10 um. Writes validate.json and
 validate.png; ends with 1 if a check fails or the settings under test add something to the floor."""
 
 

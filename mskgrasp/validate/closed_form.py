@@ -1,4 +1,4 @@
-"""The simulation against physics that can be worked out on paper."""
+"""Experiments whose outcome follows from closed-form physics."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mskgrasp.core.panda_kinematics import top_down
 from mskgrasp.core.settings import Physics
 from mskgrasp.parts import Part
 from mskgrasp.parts.solids import shape as h
-from mskgrasp.validate.bench import Bench, make_body
+from mskgrasp.validate.body_scene import BodyScene, make_body
 from tasks.attempt.outcome import MAX_PENETRATION
 
 GRAVITY = 9.81
@@ -27,7 +27,7 @@ PAD = (0.0175, 0.0185)
 FACETS = 16
 """Sides of a prism that stands for a cylinder: two rings of as many corners are the 32 of a hull."""
 RADIUS, ROLLED = 0.015, 0.0177
-"""Of the cylinder, and how far it lies off centre, m."""
+"""Of the cylinder, and its distance from the centre, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +38,8 @@ class Check:
         name: What is checked.
         formula: Where the expected value comes from.
         unit: Of the three numbers.
-        expected: What paper says.
-        measured: What the simulation did.
+        expected: By the formula.
+        measured: In the simulation.
         low: Least value that passes.
         high: Greatest value that passes.
     """
@@ -63,18 +63,18 @@ class Check:
 
 
 def run_checks(physics: Physics, report: Callable[[Check], None]) -> list[Check]:
-    """All checks under some settings; ``report`` is told of each when it is done."""
+    """Runs all checks under some settings, and calls ``report`` with each when it is done."""
     with tempfile.TemporaryDirectory(prefix="mskgrasp-validate-") as scratch:
         bodies = _bodies(Path(scratch), physics)
-        bench = Bench(physics, bodies["block"])
+        scene = BodyScene(physics, bodies["block"])
         done = []
         try:
             for experiment in EXPERIMENTS:
-                for check in experiment(bench, bodies):
+                for check in experiment(scene, bodies):
                     report(check)
                     done.append(check)
         finally:
-            bench.close()
+            scene.close()
     return done
 
 
@@ -105,18 +105,18 @@ LEVER_ARM = 0.06
 BLOCKS = 40
 
 
-def holding_limit(bench: Bench, bodies: dict[str, Part]) -> Iterator[Check]:
+def holding_limit(scene: BodyScene, bodies: dict[str, Part]) -> Iterator[Check]:
     """A block held aloft: the weaker the grip, the sooner it slips."""
-    block, mu = bodies["heavy"], bench.physics.friction_pad_part
+    block, mu = bodies["heavy"], scene.physics.friction_pad_part
 
     def height(load: float, seconds: float) -> tuple[float, float]:
         """Time since the grip was weakened, s, and way that the block has slipped by then, m."""
-        bench.pinch(block)
-        before = bench.pose_in_hand().position[2]
-        bench.env.agent.set_finger_force(block.mass * GRAVITY / (2 * mu * load))
-        with bench.env.motion.coarsely():  # as a part is lifted
-            t = bench.step(seconds)
-        return t, float(bench.pose_in_hand().position[2] - before)
+        scene.pinch(block)
+        before = scene.pose_in_hand().position[2]
+        scene.env.agent.set_finger_force(block.mass * GRAVITY / (2 * mu * load))
+        with scene.env.motion.coarsely():  # as a part is lifted
+            t = scene.step(seconds)
+        return t, float(scene.pose_in_hand().position[2] - before)
 
     # One percent over the limit, a block slips by 4 mm in this time.
     loads = np.round(np.arange(0.90, 1.11, 0.01), 3)
@@ -137,54 +137,54 @@ def holding_limit(bench: Bench, bodies: dict[str, Part]) -> Iterator[Check]:
     )  # fmt: skip
 
 
-def free_fall(bench: Bench, bodies: dict[str, Part]) -> Iterator[Check]:
+def free_fall(scene: BodyScene, bodies: dict[str, Part]) -> Iterator[Check]:
     """A block dropped in the air, and one that spins there."""
-    x, y = bench.env.region_centre
+    x, y = scene.env.region_centre
     clear_of_the_arm = (x, y + 0.3, 0.5)
-    bench.lay(bodies["block"], clear_of_the_arm)
-    before = bench.pose().position[2]
-    t = bench.step(0.2)
-    fallen = before - bench.pose().position[2]
+    scene.place(bodies["block"], clear_of_the_arm)
+    before = scene.pose().position[2]
+    t = scene.step(0.2)
+    fallen = before - scene.pose().position[2]
     yield _near("fall in 0.2 s", "g t^2 / 2", "m", GRAVITY * t**2 / 2, float(fallen), 0.025)
-    bench.lay(bodies["block"], clear_of_the_arm)
-    bench.body.disable_gravity = True
+    scene.place(bodies["block"], clear_of_the_arm)
+    scene.body.disable_gravity = True
     spin = 10.0
-    bench.body.set_angular_velocity([0.0, 0.0, spin])
-    before = bench.pose()
-    t = bench.step(0.2)
+    scene.body.set_angular_velocity([0.0, 0.0, spin])
+    before = scene.pose()
+    t = scene.step(0.2)
     yield _near(
-        "turn of a free block in 0.2 s", "omega t", "rad", spin * t, _turn(before, bench.pose(), 2), 0.01
+        "turn of a free block in 0.2 s", "omega t", "rad", spin * t, _turn(before, scene.pose(), 2), 0.01
     )
 
 
-def sliding(bench: Bench, bodies: dict[str, Part]) -> Iterator[Check]:
+def sliding(scene: BodyScene, bodies: dict[str, Part]) -> Iterator[Check]:
     """A block on the table: sliding to rest, pushed too little, pushed enough."""
-    mu, mass = bench.physics.friction_table_part, bodies["block"].mass
-    x, y = bench.env.region_centre
+    mu, mass = scene.physics.friction_table_part, bodies["block"].mass
+    x, y = scene.env.region_centre
     rest = (x, y, BLOCK[2] / 2)
-    bench.lay(bodies["block"], rest)
-    bench.step(0.05)
-    before, speed = bench.pose().position, 0.5
-    bench.body.set_linear_velocity([0.0, speed, 0.0])
-    bench.step(0.5)
-    way = float(np.linalg.norm((bench.pose().position - before)[:2]))
+    scene.place(bodies["block"], rest)
+    scene.step(0.05)
+    before, speed = scene.pose().position, 0.5
+    scene.body.set_linear_velocity([0.0, speed, 0.0])
+    scene.step(0.5)
+    way = float(np.linalg.norm((scene.pose().position - before)[:2]))
     yield _near(
         "way of a block that slides to rest", "v^2 / (2 mu g)", "m", speed**2 / (2 * mu * GRAVITY), way, 0.05
     )
-    bench.lay(bodies["block"], rest)
-    bench.step(0.05)
-    before = bench.pose().position
-    bench.push([0.0, 0.9 * mu * mass * GRAVITY, 0.0], 0.3)
-    way = float(np.linalg.norm((bench.pose().position - before)[:2]))
+    scene.place(bodies["block"], rest)
+    scene.step(0.05)
+    before = scene.pose().position
+    scene.push([0.0, 0.9 * mu * mass * GRAVITY, 0.0], 0.3)
+    way = float(np.linalg.norm((scene.pose().position - before)[:2]))
     yield Check(
         name="way of a block pushed with 0.9 mu m g in 0.3 s", formula="none: friction holds", unit="m",
         expected=0.0, measured=way, low=0.0, high=2e-4,
     )  # fmt: skip
-    bench.lay(bodies["block"], rest)
-    bench.step(0.05)
-    before = bench.pose().position
-    t = bench.push([0.0, 1.5 * mu * mass * GRAVITY, 0.0], 0.3)
-    way = float(np.linalg.norm((bench.pose().position - before)[:2]))
+    scene.place(bodies["block"], rest)
+    scene.step(0.05)
+    before = scene.pose().position
+    t = scene.push([0.0, 1.5 * mu * mass * GRAVITY, 0.0], 0.3)
+    way = float(np.linalg.norm((scene.pose().position - before)[:2]))
     yield _near(
         "acceleration of a block pushed with 1.5 mu m g",
         "0.5 mu g",
@@ -195,17 +195,17 @@ def sliding(bench: Bench, bodies: dict[str, Part]) -> Iterator[Check]:
     )
 
 
-def rolling(bench: Bench, bodies: dict[str, Part]) -> Iterator[Check]:
+def rolling(scene: BodyScene, bodies: dict[str, Part]) -> Iterator[Check]:
     """A cylinder lying along the pads, off centre: the first pad rolls it towards the other.
 
     Quasi-static: of a cylinder that is pushed at the height of its axis, the table's friction turns it with
     more moment than the pad's friction can oppose (mu < 1), so it rolls. At the production speed it would
     slide first, until friction has brought it to its speed.
     """
-    slow = Bench(bench.physics.model_copy(update={"finger_speed": 0.02}), bodies["cylinder"])
+    slow = BodyScene(scene.physics.model_copy(update={"finger_speed": 0.02}), bodies["cylinder"])
     try:
         x, y = slow.env.region_centre
-        slow.lay(bodies["cylinder"], (x, y - ROLLED, RADIUS))
+        slow.place(bodies["cylinder"], (x, y - ROLLED, RADIUS))
         before = slow.pose()
         grasp = torch.tensor([[x, y, RADIUS, 0.0]], dtype=torch.float64)
         slow.env.motion.place(top_down(grasp)[0])
@@ -220,16 +220,16 @@ def rolling(bench: Bench, bodies: dict[str, Part]) -> Iterator[Check]:
     )  # fmt: skip
 
 
-def lever(bench: Bench, bodies: dict[str, Part]) -> Iterator[Check]:
+def lever(scene: BodyScene, bodies: dict[str, Part]) -> Iterator[Check]:
     """A bar held off its middle: friction of the pads holds one, another swings down."""
     for name, low, high in (("light-lever", 0.0, 2.0), ("heavy-lever", 20.0, 180.0)):
         part = bodies[name]
-        bench.pinch(part, (LEVER_ARM, 0.0, 0.0))
-        before = bench.pose_in_hand()
-        with bench.env.motion.coarsely():
-            bench.step(0.3)
-        turn = abs(math.degrees(_turn(before, bench.pose_in_hand(), 1)))
-        uniform, most = _pad_moments(bench.physics)
+        scene.pinch(part, (LEVER_ARM, 0.0, 0.0))
+        before = scene.pose_in_hand()
+        with scene.env.motion.coarsely():
+            scene.step(0.3)
+        turn = abs(math.degrees(_turn(before, scene.pose_in_hand(), 1)))
+        uniform, most = _pad_moments(scene.physics)
         moment = part.mass * GRAVITY * LEVER_ARM
         yield Check(
             name=f"turn in 0.3 s of a lever, {moment / uniform:.1f} of the friction moment",
@@ -256,34 +256,34 @@ def _lever_masses(physics: Physics) -> tuple[float, float]:
     return 0.4 * uniform / (GRAVITY * LEVER_ARM), 1.5 * most / (GRAVITY * LEVER_ARM)
 
 
-def centring(bench: Bench, bodies: dict[str, Part]) -> Iterator[Check]:
+def centring(scene: BodyScene, bodies: dict[str, Part]) -> Iterator[Check]:
     """A block off centre, and one that lies turned, end as the pads want them."""
-    x, y = bench.env.region_centre
+    x, y = scene.env.region_centre
     z = BLOCK[2] / 2
-    outcome = bench.grasp(bodies["block"], (x, y + 0.012, z))
+    outcome = scene.grasp(bodies["block"], (x, y + 0.012, z))
     yield Check(
         name="shift of a block 12 mm off centre", formula="to the middle", unit="mm",
         expected=-12.0, measured=1e3 * float(outcome["displacement"][1]), low=-12.15, high=-11.85,
     )  # fmt: skip
-    outcome = bench.grasp(bodies["block"], (x, y, z), 0.3)
+    outcome = scene.grasp(bodies["block"], (x, y, z), 0.3)
     yield Check(
         name="turn of a block that lies turned by 0.3 rad", formula="flat against the pads", unit="deg",
         expected=-math.degrees(0.3), measured=math.degrees(float(outcome["displacement"][3])),
         low=-math.degrees(0.3) - 0.3, high=-math.degrees(0.3) + 0.3,
     )  # fmt: skip
     rng = np.random.default_rng(0)
-    askew = []
+    errors = []
     for _ in range(BLOCKS):
         turn = float(rng.uniform(-0.5, 0.5))
         dx, dy = rng.uniform(-0.007, 0.007, 2)
         # One after the other in the same scene, as the collector does it.
-        outcome = bench.grasp(bodies["block"], (x + dx, y + dy, z), turn, fresh=False)
-        askew.append(abs(math.degrees(float(outcome["displacement"][3]) + turn)))
+        outcome = scene.grasp(bodies["block"], (x + dx, y + dy, z), turn, fresh=False)
+        errors.append(abs(math.degrees(float(outcome["displacement"][3]) + turn)))
     yield Check(
-        name=f"the most askew of {BLOCKS} blocks laid at random", formula="flat against the pads", unit="deg",
-        expected=0.0, measured=float(np.max(askew)), low=0.0, high=0.3,
+        name=f"greatest angle of {BLOCKS} random blocks", formula="flat against the pads", unit="deg",
+        expected=0.0, measured=float(np.max(errors)), low=0.0, high=0.3,
     )  # fmt: skip
-    outcome = bench.grasp(bodies["block"], (x, y, z))
+    outcome = scene.grasp(bodies["block"], (x, y, z))
     yield Check(
         name="overlap of pads and a block", formula="none", unit="mm", expected=0.0,
         measured=1e3 * float(outcome["penetration"]), low=0.0, high=100 * MAX_PENETRATION,

@@ -1,4 +1,4 @@
-"""How far outcomes under one setting are from those under the finest, beside the intrinsic floor."""
+"""Differences between outcomes under one setting and under the finest, judged by the intrinsic floor."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NOTICED = (5e-5, 5e-5, 5e-5, 1e-3)
 """Half of what the arm repeats, m and rad: a shift of the distributions that nobody would notice. Most parts
 do not rise in the hand, so that a micrometre in dz is significant."""
 LEAST_BOTH = 30
-"""Grasps that must succeed under both: of fewer nothing can be said."""
+"""Grasps that must succeed under both for a comparison."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,8 +39,8 @@ class Comparison:
         turn_median: Median difference of the displacements' turns, rad.
         turn_p90: Its 90th percentile, rad.
         p_value: Least p of two-sample Kolmogorov-Smirnov tests of dx, dy, dz, dtheta, times four.
-        p_beyond: The same of whether the distributions differ by more than a shift of ``NOTICED``; shown, it
-            decides nothing.
+        p_beyond: The same of whether the distributions differ by more than a shift of ``NOTICED``; reported,
+            not a criterion.
         bias: Largest mean difference of dx, dy, dz over grasps that succeeded under both, m, without the
             tenth that differs most either way: what is wrong on the whole, not grasp by grasp.
         bias_p: Least p of paired Wilcoxon signed-rank tests of the four differences, times four.

@@ -1,4 +1,4 @@
-"""What a validation is: settings, parts, and against which finer settings they are held."""
+"""Configuration of a validation: settings under test, parts, and finer settings for comparison."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Physics
 
 SHIFT = 1e-5
-"""By how much the starts of the floor are moved, m: less than any camera or arm could tell."""
+"""By how much the starts of the floor are moved, m: less than any camera or arm could resolve."""
 CELL_SHIFT = 1e-4
 """The same for the cell's floor: what a Panda repeats (ISO 9283, by its data sheet), m."""
 
@@ -24,7 +24,7 @@ class Setting:
 
     Attributes:
         name: For tables and files.
-        physics: What differs.
+        physics: Its values.
         shift: By how much the parts' starts are moved on the table, m: 0 but for the floors.
     """
 
@@ -37,7 +37,7 @@ class ValidateConfig(Config):
     """Settings of a validation."""
 
     out: Path = Path("out/validate")
-    """Folder of the report; outcomes are kept there, too, so that a stopped run goes on."""
+    """Folder of the report and of the outcomes, from which a stopped run resumes."""
     parts: tuple[str, ...] = ()
     """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
     grasps_per_part: int = Field(default=40, ge=1)
@@ -52,7 +52,7 @@ class ValidateConfig(Config):
     """Solver iterations; the most, those under test included, belong to the finest setting."""
     variants: Annotated[dict[str, dict[str, float | bool]], tyro.conf.Suppress] = {}
     """Other values of some physics settings, by a name for the tables: each is tried at the rate and with the
-    iterations under test, and held against the same finest setting. It shows what these values decide."""
+    iterations under test, and compared with the same finest setting. It shows the effect of these values."""
     convergence: bool = True
     """Whether grasps are compared under all rates and iterations; without, the checks take a minute."""
     physics: Physics = Physics()
@@ -97,7 +97,7 @@ class ValidateConfig(Config):
             for rate, count in sorted(pairs)
         ]
         whole = {"skip_air": False}
-        # What is under test is never held against what is coarser.
+        # The setting under test is never compared with a coarser one.
         finest_hz = max(*self.rates_hz, self.physics.rate_hz)
         finest = self.at(finest_hz, max(*self.iterations, self.physics.position_iterations)).model_copy(
             update=whole | {"coarse_rate_hz": finest_hz}
@@ -119,5 +119,5 @@ NOTHING_SKIPPED = "under test, nothing skipped"
 
 
 def setting_name(rate_hz: int, iterations: int) -> str:
-    """How tables call a setting."""
+    """Name of a setting in tables."""
     return f"{rate_hz} Hz, {iterations} it"

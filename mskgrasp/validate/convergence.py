@@ -1,4 +1,4 @@
-"""The same grasps under coarser and finer settings, against the finest."""
+"""The same grasps simulated under coarser and finer settings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ KEPT = ("success", "failure", "displacement", "tilt", "penetration", "fastest", 
 
 @dataclass(frozen=True, kw_only=True)
 class Outcomes:
-    """What became of n grasps under one setting, in the order of the grasps.
+    """Outcomes of n grasps under one setting, in the order of the grasps.
 
     Attributes:
         success: (n,) bool.
@@ -93,14 +93,14 @@ def run_settings(
     workers: int,
     report: Callable[[int], None],
 ) -> dict[str, Outcomes]:
-    """Tries the drawn grasps under every setting; what lies in ``out`` already is not made again.
+    """Tries the drawn grasps under every setting; outcomes stored in ``out`` are read.
 
     Args:
         settings: Tried in parallel with the parts.
         drawn: The grasps.
         out: Where outcomes are kept.
         workers: Processes.
-        report: Told how many grasps were tried.
+        report: Called with the number of grasps that were tried.
 
     Raises:
         WorkerFailed: Processes died again and again.
@@ -114,7 +114,7 @@ def run_settings(
                     report(len(stored["success"]))
             else:
                 jobs.append((setting, one, file))
-    # The finest first: what takes longest must not be begun last.
+    # The finest first: the longest job must not be the last to start.
     jobs.sort(key=lambda job: -job[0].physics.rate_hz * job[0].physics.position_iterations)
     _in_parallel(_try_grasps, jobs, workers, report)
     return {setting.name: _read(out, setting, drawn) for setting in settings}
@@ -123,14 +123,14 @@ def run_settings(
 def _in_parallel(
     function: Callable[..., int], jobs: Sequence[tuple], workers: int, report: Callable[[int], None]
 ) -> None:
-    # Apart, even with one worker: every job loads its own scenes, and a process is one simulator's.
-    work = Work(_bench, function, name=lambda job: Path(job[-1]).name)
+    # In processes of their own even with one worker: every job loads its own scenes.
+    work = Work(_caller, function, name=lambda job: Path(job[-1]).name)
     for tried in results(work, jobs, workers, apart=True):
         report(tried)
 
 
 @contextmanager
-def _bench(function: Callable[..., int]) -> Iterator[Callable[[tuple], Iterator[int]]]:
+def _caller(function: Callable[..., int]) -> Iterator[Callable[[tuple], Iterator[int]]]:
     def work(job: tuple) -> Iterator[int]:
         yield function(*job)
 
@@ -198,7 +198,7 @@ def _write(file: Path, **arrays: np.ndarray) -> None:
 def _outcome_file(out: Path, setting: Setting, drawn: Drawn) -> Path:
     grasps = hashlib.sha256(drawn.file.read_bytes()).hexdigest()
     part = load_part(drawn.folder)
-    # Outcomes of other code, or of another engine, are not taken for this one's.
+    # The versions, so that outcomes of another simulation are not read as this one's.
     text = json.dumps([setting.physics.model_dump(), setting.shift, part.content_hash, grasps, versions()])
     return out / "outcomes" / f"{part.name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
 

@@ -1,4 +1,4 @@
-"""What the engine made of parts: surface, mass and inertia, against their meshes."""
+"""Fidelity of parts in the engine: surface, mass and inertia, against their meshes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sapien.physx import PhysxCollisionShapeConvexMesh
 from mskgrasp.parts import Part
 from mskgrasp.parts.solids.decompose import MOST_P95_MM, MOST_VOLUME_RATIO
 from mskgrasp.parts.solids.measure import hull_fit
-from mskgrasp.validate.bench import Bench
+from mskgrasp.validate.body_scene import BodyScene
 
 MOST_MASS_ERROR = 1e-4
 MOST_INERTIA_ERROR = 1e-2
@@ -21,7 +21,7 @@ MOST_INERTIA_ERROR = 1e-2
 
 @dataclass(frozen=True, kw_only=True)
 class Fidelity:
-    """How true a part is in the engine.
+    """Errors of a part in the engine.
 
     Attributes:
         part: Its name.
@@ -54,20 +54,20 @@ class Fidelity:
         return asdict(self) | {"passed": self.passed}
 
 
-def check_parts(bench: Bench, parts: Sequence[Part], report: Callable[[], None]) -> list[Fidelity]:
-    """Loads every part into the engine and compares."""
+def check_parts(scene: BodyScene, parts: Sequence[Part], report: Callable[[], None]) -> list[Fidelity]:
+    """Loads every part into the engine and compares it with its mesh."""
     found = []
     for part in parts:
-        bench.lay(part, (*bench.env.region_centre, 0.5))
-        found.append(_compare(part, bench))
+        scene.place(part, (*scene.env.region_centre, 0.5))
+        found.append(_compare(part, scene))
         report()
     return found
 
 
-def _compare(part: Part, bench: Bench) -> Fidelity:
+def _compare(part: Part, scene: BodyScene) -> Fidelity:
     mesh = trimesh.load_mesh(part.mesh_path)
     mesh.density = part.density
-    body = bench.body
+    body = scene.body
     expected = np.sort(np.linalg.eigvalsh(mesh.moment_inertia))
     shapes = [shape for shape in body.collision_shapes if isinstance(shape, PhysxCollisionShapeConvexMesh)]
     cooked = [1e3 * shape.vertices * shape.scale for shape in shapes]

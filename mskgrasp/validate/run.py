@@ -1,4 +1,4 @@
-"""The whole of a validation, one kind of evidence after the other."""
+"""The steps of a validation: closed-form checks, fidelity of parts, convergence, report."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tqdm import tqdm
 from mskgrasp.core.settings.physics import LEAST_RATE_HZ
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.runtime.cli import make_folder
-from mskgrasp.validate.bench import Bench
+from mskgrasp.validate.body_scene import BodyScene
 from mskgrasp.validate.closed_form import Check, run_checks
 from mskgrasp.validate.compare import Comparison, cheapest, compare, complaints
 from mskgrasp.validate.config import CELL_FLOOR, FLOOR, NOTHING_SKIPPED, REFERENCE, ValidateConfig
@@ -29,11 +29,11 @@ from mskgrasp.validate.report import (
 
 
 def validate(config: ValidateConfig) -> int:
-    """Runs everything that is asked for; 0 where all of it passes."""
+    """Runs a validation; 0 if all checks pass, 1 otherwise."""
     names = chosen_names(config.parts or ("starter",))
     parts = [find_part(name) for name in tqdm(names, desc="parts", unit="part", leave=False, disable=None)]
     make_folder(config.out)
-    checks = _by_hand(config)
+    checks = _closed_form(config)
     print_checks(checks)
     fidelity = _fidelity(config, parts)
     print_fidelity(fidelity)
@@ -59,18 +59,18 @@ def validate(config: ValidateConfig) -> int:
     return 1 if failed else 0
 
 
-def _by_hand(config: ValidateConfig) -> list[Check]:
+def _closed_form(config: ValidateConfig) -> list[Check]:
     with tqdm(desc="closed form", unit="check", leave=False, disable=None) as bar:
         return run_checks(config.physics, lambda _: _advance(bar))
 
 
 def _fidelity(config: ValidateConfig, parts: list[Part]) -> list:
-    bench = Bench(config.physics, parts[0])
+    scene = BodyScene(config.physics, parts[0])
     try:
         with tqdm(total=len(parts), desc="parts", unit="part", leave=False, disable=None) as bar:
-            return check_parts(bench, parts, lambda: _advance(bar))
+            return check_parts(scene, parts, lambda: _advance(bar))
     finally:
-        bench.close()
+        scene.close()
 
 
 def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, Any]) -> dict[str, Comparison]:

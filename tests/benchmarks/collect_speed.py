@@ -43,7 +43,7 @@ from mskgrasp.core.settings import REGION, ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import Part, find_part, starter_names
 from mskgrasp.runtime.worker_pool import JobResult
 from mskgrasp.simulation.shard import Simulator, draw_attempt
-from mskgrasp.simulation.versions import ShardTask
+from mskgrasp.simulation.shard_task import ShardTask
 from tasks.scene.renderer import render_backend
 from tests.benchmarks.raw_sapien import RawSapien
 

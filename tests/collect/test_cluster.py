@@ -24,7 +24,8 @@ from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.dataset import list_shards
 from mskgrasp.parts import find_part
 from mskgrasp.parts.store import pack_part, receive_part
-from mskgrasp.simulation.versions import ShardTask, versions
+from mskgrasp.simulation.shard_task import ShardTask
+from mskgrasp.simulation.versions import versions
 from tests.collecting import PARTS, REPOSITORY, assert_equal, command
 
 RAY = [sys.executable, "-m", "ray.scripts.scripts"]

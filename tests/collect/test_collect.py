@@ -19,7 +19,7 @@ from mskgrasp.collect.run import is_done, main
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.files import only_here
 from mskgrasp.dataset import list_shards, read_shard
-from mskgrasp.simulation.versions import ShardTask
+from mskgrasp.simulation.shard_task import ShardTask
 from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, command
 from tests.programs import run_here
 
@@ -55,7 +55,7 @@ def test_a_finished_run_has_nothing_left_to_do(collected):
     assert [path.stat().st_mtime_ns for path in list_shards(collected)] == stamps
 
 
-def test_other_settings_are_refused_for_a_begun_dataset(collected):
+def test_other_settings_are_refused_for_an_existing_dataset(collected):
     done = run_here(main, *arguments(collected, "--seed", "6"))
     assert done.returncode == 2
     assert "seed differ" in done.stderr and len(done.stderr.strip().splitlines()) == 1
@@ -75,7 +75,7 @@ def workers(pid: int) -> list[int]:
 
 
 def started(out: Path, *options: str) -> subprocess.Popen[str]:
-    """A collection that has begun to work: it has written one shard more than there were."""
+    """A collection at work: it has written one shard more than there were."""
     before = len(list((out / "shards").glob("*.h5")))
     process = subprocess.Popen(
         command(out, *options),

@@ -1,4 +1,4 @@
-"""A bench of plain bodies in the very scene that makes the labels: same hand, same table, same settings."""
+"""Plain bodies in the very scene that makes the labels: same hand, same table, same settings."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def make_body(folder: Path, name: str, solid: Solid, mass: float) -> Part:
         )
 
 
-class Bench:
+class BodyScene:
     """One sub-scene on the CPU whose part is changed from check to check.
 
     Args:
         physics: The settings under test.
-        part: The part to begin with.
+        part: The first part.
     """
 
     def __init__(self, physics: Physics, part: Part):
@@ -67,7 +67,7 @@ class Bench:
         """Frees the simulation."""
         self._env.close()
 
-    def lay(
+    def place(
         self,
         part: Part,
         position: tuple[float, float, float],
@@ -75,7 +75,7 @@ class Bench:
         *,
         fresh: bool = True,
     ) -> None:
-        """The part at rest at a pose in the base frame, metres, the arm at home; in a fresh scene, or not."""
+        """Places the part at rest at a pose in the base frame, metres, with the arm at home."""
         quat = np.array([1.0, 0, 0, 0]) if quat_wxyz is None else quat_wxyz
         pose = np.array([[*position, *quat]])
         scene = dict(parts=[str(part.folder)], reconfigure=True) if fresh else {}
@@ -106,7 +106,7 @@ class Bench:
         return n / self.env.motion.rate_hz
 
     def push(self, force: list[float], seconds: float) -> float:
-        """The same with a constant force (x, y, z), N, on the part's centre of mass."""
+        """Advances the simulation with a constant force (x, y, z), N, on the part's centre of mass."""
         n = self.env.motion.n_steps(seconds)
         for _ in range(n):
             body = self.body
@@ -122,7 +122,7 @@ class Bench:
             along: Where its centroid is, seen from the point between the pads, base frame, metres.
         """
         x, y = self.env.region_centre
-        self.lay(part, (x + along[0], y + along[1], ALOFT + along[2]))
+        self.place(part, (x + along[0], y + along[1], ALOFT + along[2]))
         grasp = torch.tensor([[x, y, ALOFT, 0.0]], dtype=torch.float64)
         self.env.motion.place(top_down(grasp)[0])
         self.body.disable_gravity = True
@@ -132,8 +132,8 @@ class Bench:
     def grasp(
         self, part: Part, position: tuple[float, float, float], turn: float = 0.0, *, fresh: bool = True
     ) -> dict[str, np.ndarray]:
-        """Lays the part at a pose (turned about z) and grasps the middle of the region at 20 mm."""
-        self.lay(part, position, np.array([np.cos(turn / 2), 0, 0, np.sin(turn / 2)]), fresh=fresh)
+        """Places the part at a pose (turned about z) and grasps the middle of the region at 20 mm."""
+        self.place(part, position, np.array([np.cos(turn / 2), 0, 0, np.sin(turn / 2)]), fresh=fresh)
         x, y = self.env.region_centre
         outcome = self.env.attempt.run(torch.tensor([[x, y, 0.02, 0.0]]))
         return {name: value[0].double().numpy() for name, value in outcome.items()}
