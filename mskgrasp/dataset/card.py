@@ -1,4 +1,4 @@
-"""A dataset's card: what it holds, how it was made, how large it is; for a terminal and for a page."""
+"""Card of a dataset: content, origin and size."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """Attempts on the parts of one family: how many parts, attempts, successes."""
+    """Number of parts, attempts and successes of one family."""
 
     parts: int
     attempts: int
@@ -32,18 +32,18 @@ class Card:
     """A dataset in numbers.
 
     Attributes:
-        name: Of its folder.
-        shards: Files.
-        parts: Different parts.
+        name: Name of its folder.
+        shards: Number of files.
+        parts: Number of different parts.
         families: By name, sorted.
         failures: Attempts that failed, by reason.
-        discarded: Attempts that were thrown away, by reason; not among the attempts.
+        discarded: Discarded attempts by reason; not among the attempts.
         displacement: Median and 90th percentile of the translation over successes, metres; None without.
         turn: The same of |dtheta|, radians.
         image: Height and width of a depth image, pixels.
-        seed: Everything random follows from it.
+        seed: Seed of the run.
         physics: Settings of the simulation.
-        noise: Errors of the cell that the attempts met; empty: none were asked about.
+        noise: Simulated errors of the cell; empty: none.
         versions: Sets of software versions, and how many shards were made with each.
         size: Bytes on disk.
     """
@@ -65,21 +65,21 @@ class Card:
 
     @property
     def attempts(self) -> int:
-        """All attempts."""
+        """Number of attempts."""
         return sum(family.attempts for family in self.families.values())
 
     @property
     def successes(self) -> int:
-        """Those that lifted the part."""
+        """Number of attempts that lifted the part."""
         return sum(family.successes for family in self.families.values())
 
 
 def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = iter) -> Card:
-    """Sums up a dataset without reading its images.
+    """Summarises a dataset without reading its images.
 
     Args:
         folder: Of the dataset.
-        watch: Given the files that will be read, yields each: the place for a progress bar.
+        watch: Wraps the files to be read, for a progress bar.
 
     Raises:
         BadDataset: There is no shard, or one is damaged.
@@ -164,7 +164,7 @@ def tables(card: Card) -> list[Table]:
         for name, f in card.families.items()
     ]
     failures = [(name, f"{count}", f"{count / max(n, 1):.1%}") for name, count in card.failures.items()]
-    thrown = [(name, f"{count}") for name, count in card.discarded.items()] or [("none", "0")]
+    discarded = [(name, f"{count}") for name, count in card.discarded.items()] or [("none", "0")]
     versions = [
         (", ".join(f"{name} {version}" for name, version in names.items()), f"{count}")
         for names, count in card.versions
@@ -173,7 +173,7 @@ def tables(card: Card) -> list[Table]:
         (f"Dataset {card.name}", ("", ""), facts),
         ("Success by family", ("family", "parts", "attempts", "success (95 % interval)"), families),
         ("Failures", ("reason", "attempts", "of all"), failures or [("none", "0", "0.0%")]),
-        ("Discarded", ("reason", "attempts"), thrown),
+        ("Discarded", ("reason", "attempts"), discarded),
         ("Physics", ("setting", "value"), [(key, f"{value}") for key, value in card.physics.items()]),
         (
             "Errors of the cell",
@@ -185,10 +185,10 @@ def tables(card: Card) -> list[Table]:
 
 
 def markdown(card: Card) -> str:
-    """The card as a page."""
+    """The card as a Markdown page."""
     blocks = []
     for level, (title, headers, rows) in enumerate(tables(card)):
-        # A name is text here, whatever it contains.
+        # A pipe in a name would end its cell.
         cells = [[cell.replace("|", "\\|") for cell in row] for row in (headers, *rows)]
         lines = ["| " + " | ".join(row) + " |" for row in cells]
         lines.insert(1, "|" + "---|" * len(headers))
