@@ -1,4 +1,4 @@
-"""A page in a headless browser, asked over the DevTools protocol's pipe: no port, no package."""
+"""Page in a headless browser, controlled over the pipe of the DevTools protocol."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Page:
         width: Of the window, pixels.
 
     Attributes:
-        complaints: What the browser's console and log said, and every request it made but for the file.
+        complaints: Messages of the browser's console and log, and every request other than for the file.
     """
 
     def __init__(self, path: Path, *, width: int = 1000):

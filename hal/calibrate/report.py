@@ -75,9 +75,9 @@ def describe(found: HandEye, views: Sequence[View], before: Pose, offset: DepthO
         f"{np.degrees(found.rms_rotation_rad):.2f} degrees (RMS, each picture on its own)",
         f"repeatable  to {found.half_translation_m * 1e3:.2f} mm at the board and "
         f"{np.degrees(found.half_rotation_rad):.3f} degrees (one half of the pictures against the other)",
-        f"squares     seem {100 * (found.scale - 1):+.2f} % larger than was said",
-        f"moved by    {moved * 1e3:.2f} mm and {np.degrees(turned):.3f} degrees against where the camera was "
-        "said to be",
+        f"squares     seem {100 * (found.scale - 1):+.2f} % larger than specified",
+        f"moved by    {moved * 1e3:.2f} mm and {np.degrees(turned):.3f} degrees from the camera's "
+        "previous pose",
     ]
     if offset is None:
         return [*lines, "depth       not compared: the board has no depth in the pictures"]

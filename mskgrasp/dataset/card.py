@@ -20,7 +20,7 @@ Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """Attempts on the parts of one family: how many parts, attempts, successes."""
+    """Number of parts, attempts and successes of one family."""
 
     parts: int
     attempts: int
@@ -32,9 +32,9 @@ class Card:
     """Statistics of a dataset.
 
     Attributes:
-        name: Of its folder.
-        shards: Files.
-        parts: Different parts.
+        name: Name of its folder.
+        shards: Number of files.
+        parts: Number of different parts.
         families: By name, sorted.
         failures: Attempts that failed, by reason.
         discarded: Discarded attempts, by reason; not among the attempts.
@@ -164,7 +164,7 @@ def tables(card: Card) -> list[Table]:
         for name, f in card.families.items()
     ]
     failures = [(name, f"{count}", f"{count / max(n, 1):.1%}") for name, count in card.failures.items()]
-    thrown = [(name, f"{count}") for name, count in card.discarded.items()] or [("none", "0")]
+    discarded = [(name, f"{count}") for name, count in card.discarded.items()] or [("none", "0")]
     versions = [
         (", ".join(f"{name} {version}" for name, version in names.items()), f"{count}")
         for names, count in card.versions
@@ -173,7 +173,7 @@ def tables(card: Card) -> list[Table]:
         (f"Dataset {card.name}", ("", ""), facts),
         ("Success by family", ("family", "parts", "attempts", "success (95 % interval)"), families),
         ("Failures", ("reason", "attempts", "of all"), failures or [("none", "0", "0.0%")]),
-        ("Discarded", ("reason", "attempts"), thrown),
+        ("Discarded", ("reason", "attempts"), discarded),
         ("Physics", ("setting", "value"), [(key, f"{value}") for key, value in card.physics.items()]),
         (
             "Errors of the cell",
@@ -188,7 +188,7 @@ def markdown(card: Card) -> str:
     """Format the card as Markdown."""
     blocks = []
     for level, (title, headers, rows) in enumerate(tables(card)):
-        # A name is text here, whatever it contains.
+        # A pipe in a name would end its cell.
         cells = [[cell.replace("|", "\\|") for cell in row] for row in (headers, *rows)]
         lines = ["| " + " | ".join(row) + " |" for row in cells]
         lines.insert(1, "|" + "---|" * len(headers))

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field, field_validator
-from tqdm import tqdm
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadModel, UsageError
@@ -38,6 +37,7 @@ from mskgrasp.planning.run_inputs import model_digests, part_digests
 from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.options import parse
+from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import TRIALS, append, begin, read, rewrite
 from mskgrasp.simulation.versions import versions
 from mskgrasp.trials.cell_file import CellFile, Noise, read_cell
@@ -221,10 +221,7 @@ def _make_trials(
     )
     n = sum(map(len, missing))
     done = sum(map(len, tasks)) - n
-    bar = tqdm(
-        total=n + done, initial=done, unit="trial", file=sys.stderr, smoothing=0.05, dynamic_ncols=True,
-        mininterval=0.5 if sys.stderr.isatty() else 15.0,
-    )  # fmt: skip
+    bar = progress(total=n + done, done=done, unit="trial", keep=True)
     n_lifted = 0
     n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
     with closing(run_trials(setup, missing, n_workers)) as made, bar:
@@ -243,7 +240,7 @@ def _with_predictions(
     config: EvaluateConfig, trials: dict[str, Trial], compared: Compared
 ) -> dict[str, Trial]:
     """Adds what each model expects of the grasps of best quality, where that is not known yet."""
-    bar = tqdm(trials.items(), desc="predictions", leave=False, delay=5, file=sys.stderr)
+    bar = progress(trials.items(), title="predictions", unit="trial")
     more = {key: with_predictions(trial, config.out, compared.predictors) for key, trial in bar}
     if more != trials:
         rewrite(config.out / TRIALS, (more[key].to_json() for key in sorted(more)))

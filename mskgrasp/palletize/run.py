@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -12,7 +11,6 @@ from typing import Any
 
 import cv2
 from pydantic import Field, field_validator
-from tqdm import tqdm
 
 from hal import cell_from_yaml
 from hal.operator import Operator
@@ -33,6 +31,7 @@ from mskgrasp.planning.planner import PlannerConfig
 from mskgrasp.planning.run_inputs import inputs_of
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.options import parse
+from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import TRIALS, append, begin, file_digest, read
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.trials.engine import connected_engine
@@ -242,7 +241,7 @@ def _place_all(config: PalletizeConfig, pallets: list[list[Task]], asks: bool) -
     if missing:
         work = Work(pallet_bench, config, name=lambda one: one.title, rest=Pallet.after)
         placed = results(work, missing, config.workers)
-        bar = tqdm(total=left, unit="placement", file=sys.stderr, disable=asks)
+        bar = progress(total=len(keys), done=len(keys) - left, unit="placement", keep=True, hidden=asks)
         with contextlib.closing(placed), bar:
             for placement in placed:
                 if placement.key not in found:

@@ -1,4 +1,4 @@
-"""A placement seen from above, before and after, as it is stored and drawn."""
+"""Views of a placement from above, before and after."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ _N = 200
 
 @dataclass(frozen=True, kw_only=True)
 class Views:
-    """A placement seen from above, before and after; squares with the base's axes, metres.
+    """Views of a placement from above, before and after: squares along the base's axes, metres.
 
     Attributes:
-        before: (n, n) heights over the table around the part as it lay, its centre in the middle.
+        before: (n, n) heights over the table around the part before the grasp, its centre in the middle.
         after: (n, n) the same around the target; empty where the part was not placed.
-        side: Length of a side of both.
+        side: Edge length of both squares.
         top: Height of the part.
         grasp: (3,) x, y from the part's centre, and theta.
-        turn: By how much the part shall be turned, radians.
+        turn: Target turn of the part, radians.
         theta: Direction of its longer side at the target, radians.
     """
 
@@ -47,7 +47,7 @@ class Views:
 def take_views(
     before: RgbdFrame, after: RgbdFrame | None, plan: GraspPlan, target: Target, theta: float
 ) -> Views:
-    """The views of a placement from its frames."""
+    """Views of a placement from its frames."""
     view = plan.view
     side = max(0.1, 1.6 * float(np.hypot(*view.size[:2])))
     return Views(
@@ -64,7 +64,7 @@ def take_views(
 
 
 def write_views(views: Views, path: Path) -> None:
-    """Writes views as a compressed file, whole or not at all."""
+    """Writes views as a compressed file, atomically."""
     values: dict[str, Any] = {name: np.asarray(value) for name, value in asdict(views).items()}
     for name in ("before", "after"):
         values[name] = values[name].astype(np.float32)
@@ -74,10 +74,10 @@ def write_views(views: Views, path: Path) -> None:
 
 
 def read_views(path: Path) -> Views:
-    """What `write_views` wrote.
+    """Reads a file of `write_views`.
 
     Raises:
-        BadDataset: It is not there, or damaged.
+        BadDataset: The file is missing or damaged.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -91,7 +91,7 @@ def read_views(path: Path) -> Views:
 
 
 def _heights(frame: RgbdFrame, centre: np.ndarray, side: float, table_z: float) -> np.ndarray:
-    """(n, n) heights as seen from straight above, whatever the place in the frame: no parallax."""
+    """(n, n) heights as seen orthographically from above, without parallax."""
     points = seen_points(frame)
     cell = side / _N
     from_corner = (points[:, :2] - centre) * [1, -1] + side / 2

@@ -7,12 +7,14 @@ import io
 import json
 import math
 import os
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import torch
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from tqdm import tqdm
 
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import UsageError
@@ -22,6 +24,7 @@ from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.trainer import Reporter, split, train
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.options import parse
+from mskgrasp.runtime.progress import advance_to, progress
 from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
 from mskgrasp.train.figures import draw_curves, draw_uncertainty
 
@@ -31,25 +34,32 @@ CHECKPOINT = "checkpoint.safetensors"
 class _ProgressBar(Reporter):
     """Progress bar with the loss and the time left; each epoch adds a line and a row of the log."""
 
-    def __init__(self, progress: Progress, log: Path):
-        self._progress, self._log = progress, log
-        self._task = progress.add_task("", total=None, loss="")
+    def __init__(self, log: Path):
+        self._log = log
+        self._bar: tqdm | None = None
         self._name, self._epochs = "", 0
 
     def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:
         self._name, self._epochs = name, epochs
-        self._progress.remove_task(self._task)
-        self._task = self._progress.add_task(
-            f"train {name.upper()}", total=epochs * batches, completed=done, loss=""
+        self.close()
+        self._bar = progress(
+            title=f"train {name.upper()}", unit="batch", total=epochs * batches, done=done, keep=True
         )
 
     def batch(self, loss: float) -> None:
-        self._progress.update(self._task, advance=1, loss=f"loss {loss:.3f}")
+        if self._bar is not None:
+            self._bar.set_postfix_str(f"loss {loss:.3f}", refresh=False)
+            self._bar.update()
 
     def epoch(self, history: list[dict[str, Any]]) -> None:
         row = history[-1]
         _write(self._log, _table(history))
-        self._progress.console.print(f"{self._name} {row['epoch']:3d}/{self._epochs}  {_line(row)}")
+        tqdm.write(f"{self._name} {row['epoch']:3d}/{self._epochs}  {_line(row)}")
+
+    def close(self) -> None:
+        """Ends the bar."""
+        if self._bar is not None:
+            self._bar.close()
 
 
 def _line(row: dict[str, Any]) -> str:
@@ -77,26 +87,21 @@ def run(config: TrainConfig) -> int:
         console.print(f"{out} is trained already; choose another --out to train again")
         return 0
     device = _device(config.device)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, TextColumn("{task.fields[loss]}"), console=console) as progress:
-        samples = _read(config, config.data, progress)
-        sides = split(samples, config)
-        console.print(
-            f"{len(sides.training)} attempts to train on, "
-            f"{len(sides.validation) + len(sides.test)} at held-out parts; "
-            f"{float(samples.success.double().mean()):.0%} succeed; on {device}"
-        )
-        if samples.skipped:
-            skipped = ", ".join(f"{n} ({why})" for why, n in samples.skipped.items())
-            console.print(f"unusable attempts: {skipped}")
-        cli.make_folder(out)
-        write_config(config, out / "config.yaml")
+    samples = _read(config, config.data)
+    sides = split(samples, config)
+    console.print(
+        f"{len(sides.training)} attempts to train on, "
+        f"{len(sides.validation) + len(sides.test)} at held-out parts; "
+        f"{float(samples.success.double().mean()):.0%} succeed; on {device}"
+    )
+    if samples.skipped:
+        skipped = ", ".join(f"{n} ({why})" for why, n in samples.skipped.items())
+        console.print(f"unusable attempts: {skipped}")
+    cli.make_folder(out)
+    write_config(config, out / "config.yaml")
+    with closing(_ProgressBar(out / "log.csv")) as bar:
         models, history = train(
-            samples,
-            config,
-            checkpoint_path=out / CHECKPOINT,
-            device=device,
-            reporter=_ProgressBar(progress, out / "log.csv"),
+            samples, config, checkpoint_path=out / CHECKPOINT, device=device, reporter=bar
         )
     draw_curves(history, models.meta.metrics, out / "curves.png")
     if config.network.variance:
@@ -138,14 +143,9 @@ def _device(name: str) -> torch.device:
     return torch.device("cuda", 0)
 
 
-def _read(config: TrainConfig, data: Path, progress: Progress) -> Samples:
-    task = progress.add_task("read shards", total=None, loss="")
-    samples = read_samples(
-        data,
-        config.network,
-        advance=lambda done, total: progress.update(task, completed=done, total=total),
-    )
-    progress.remove_task(task)
+def _read(config: TrainConfig, data: Path) -> Samples:
+    with progress(title="read shards", unit="shard") as bar:
+        samples = read_samples(data, config.network, advance=partial(advance_to, bar))
     return samples.of_parts_between(*config.success_range)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from typing import Any
 
 from tqdm import tqdm
@@ -11,6 +10,7 @@ from tqdm import tqdm
 from mskgrasp.core.settings.physics import LEAST_RATE_HZ
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.runtime.cli import make_folder
+from mskgrasp.runtime.progress import progress
 from mskgrasp.validate.body_scene import BodyScene
 from mskgrasp.validate.closed_form import Check, run_checks
 from mskgrasp.validate.compare import Comparison, cheapest, compare, complaints
@@ -31,7 +31,7 @@ from mskgrasp.validate.report import (
 def validate(config: ValidateConfig) -> int:
     """Runs a validation; 0 if all checks pass, 1 otherwise."""
     names = chosen_names(config.parts or ("starter",))
-    parts = [find_part(name) for name in tqdm(names, desc="parts", unit="part", leave=False, disable=None)]
+    parts = [find_part(name) for name in progress(names, title="parts", unit="part")]
     make_folder(config.out)
     checks = _closed_form(config)
     print_checks(checks)
@@ -60,14 +60,14 @@ def validate(config: ValidateConfig) -> int:
 
 
 def _closed_form(config: ValidateConfig) -> list[Check]:
-    with tqdm(desc="closed form", unit="check", leave=False, disable=None) as bar:
+    with progress(title="closed form", unit="check") as bar:
         return run_checks(config.physics, lambda _: _advance(bar))
 
 
 def _fidelity(config: ValidateConfig, parts: list[Part]) -> list:
     scene = BodyScene(config.physics, parts[0])
     try:
-        with tqdm(total=len(parts), desc="parts", unit="part", leave=False, disable=None) as bar:
+        with progress(total=len(parts), title="parts", unit="part") as bar:
             return check_parts(scene, parts, lambda: _advance(bar))
     finally:
         scene.close()
@@ -78,7 +78,7 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
     folders = [part.folder for part in parts]
     settings = config.settings()
     n = len(parts) * config.grasps_per_part
-    with tqdm(total=n, desc="drawing grasps", unit="grasp", leave=False, mininterval=_patience()) as bar:
+    with progress(total=n, title="drawing grasps", unit="grasp") as bar:
         drawn = draw_grasps(
             folders,
             config.grasps_per_part,
@@ -87,7 +87,7 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
             workers,
             lambda k: _advance(bar, k),
         )
-    with tqdm(total=n * len(settings), desc="grasps", unit="grasp", mininterval=_patience()) as bar:
+    with progress(total=n * len(settings), title="grasps", unit="grasp", keep=True) as bar:
         outcomes = run_settings(settings, drawn, config.out, workers, lambda k: _advance(bar, k))
     found = {name: compare(one, outcomes[REFERENCE]) for name, one in outcomes.items()}
     apart = (FLOOR, CELL_FLOOR, REFERENCE, NOTHING_SKIPPED, *config.variants)
@@ -107,10 +107,6 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
     results["cheapest_that_adds_nothing"] = chosen
     results["impossible"] = vars(seen)
     return found
-
-
-def _patience() -> float:
-    return 0.5 if sys.stderr.isatty() else 15.0
 
 
 def _advance(bar: tqdm, by: int = 1) -> None:

@@ -1,4 +1,4 @@
-"""A report is one file that a browser shows without a complaint, whatever stands in it."""
+"""A report is one file that a browser shows without errors, whatever text it contains."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def report(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_browser_shows_every_picture_and_complains_of_nothing(report):
+def test_a_browser_shows_every_figure_without_errors(report):
     with Page(report) as page:
         widths = page.evaluate("[...document.images].map(i => i.complete ? i.naturalWidth : 0)")
         assert widths == [1725, 40]
@@ -74,8 +74,8 @@ def test_a_browser_shows_every_picture_and_complains_of_nothing(report):
         assert page.complaints == []
 
 
-def test_a_browser_that_finds_fault_says_so(tmp_path):
-    """The test above would pass with a browser that tells nothing."""
+def test_errors_of_a_page_are_reported(tmp_path):
+    """The test above would pass with a browser that reports nothing."""
     path = tmp_path / "bad.html"
     path.write_text('<script>console.error("oh")</script><img src="missing.png"><p>')
     with Page(path) as page:

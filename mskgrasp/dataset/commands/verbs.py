@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, Literal, assert_never
 
 import tyro
-from tqdm import tqdm
 
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.dataset.card import markdown, read_card, tables
@@ -18,6 +17,7 @@ from mskgrasp.dataset.commands.maniskill import export_maniskill
 from mskgrasp.dataset.export import export_npz
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.section import Section, Table
+from mskgrasp.runtime.progress import progress
 
 PROG = "python -m mskgrasp.dataset"
 
@@ -142,7 +142,7 @@ def run_export(verb: Export) -> int:
 
 
 def _with_progress(paths: Sequence[Path]) -> Iterable[Path]:
-    return tqdm(paths, unit="shard", delay=1.0, leave=False, dynamic_ncols=True, disable=None)
+    return progress(paths, unit="shard")
 
 
 def _within(path: Path, folder: Path) -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
 from dataclasses import dataclass
 
@@ -14,10 +13,8 @@ from mskgrasp.parts import store
 from mskgrasp.parts.build import builtin_names, recipe_of, starter_names
 from mskgrasp.parts.catalogue import Index, make_index, read_index, write_index
 from mskgrasp.parts.commands.build_parts import BuildResult, build_parts
-from mskgrasp.parts.commands.progress import progress_bar
 from mskgrasp.parts.recipes import cad
-
-_REPORT_EVERY_S = 30.0
+from mskgrasp.runtime.progress import progress
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,20 +71,13 @@ def run_build(command: Build) -> int:
 
 
 def _build(names: tuple[str, ...], before: Index, workers: int, found: dict[str, BuildResult]) -> None:
-    reported = started = time.monotonic()
     events = build_parts(names, before, workers)
-    with progress_bar() as progress:
-        task = progress.add_task("parts", total=len(names))
+    with progress(total=len(names), unit="part") as bar:
         try:
             for built in events:
                 found[built.name] = built
-                progress.update(task, description=built.name, advance=1)
-                now = time.monotonic()
-                if progress.disable and now - reported > _REPORT_EVERY_S:
-                    reported = now
-                    left = (now - started) / len(found) * (len(names) - len(found))
-                    done = f"{len(found)} of {len(names)} parts"
-                    print(f"{done}, about {left / 60:.0f} min left", file=sys.stderr)
+                bar.set_description(built.name, refresh=False)
+                bar.update()
         finally:
             events.close()
 

@@ -17,8 +17,8 @@ from rich.text import Text
 
 from mskgrasp.core.errors import BadPart, MskgraspError, UsageError
 from mskgrasp.parts import store
-from mskgrasp.parts.commands.progress import progress_bar
 from mskgrasp.parts.part import Part
+from mskgrasp.runtime.progress import note, progress
 
 if TYPE_CHECKING:
     from mskgrasp.parts.importing.import_file import Imported
@@ -113,10 +113,9 @@ def _import_all(command: Import, files: Sequence[Path], rows: list[_Row]) -> Non
     from mskgrasp.parts.importing.import_file import import_file, legal_name
 
     taken: dict[str, Path] = {}
-    with progress_bar() as progress:
-        task = progress.add_task("", total=len(files))
+    with progress(total=len(files), unit="file") as bar:
         for path in files:
-            progress.update(task, description=path.name)
+            bar.set_description(path.name, refresh=False)
             try:
                 name = legal_name(path.stem if command.name is None else command.name)
                 there = (store.parts_folder() / name).is_dir()
@@ -133,12 +132,12 @@ def _import_all(command: Import, files: Sequence[Path], rows: list[_Row]) -> Non
                 taken |= {part.name: path for part in imported.parts}
                 for part in imported.parts:
                     for warning in _warnings(part, imported.unit):
-                        print(f"warning: {warning}", file=sys.stderr)
+                        note(f"warning: {warning}")
                 rows.append(_row(path, imported, replaced=there))
             except MskgraspError as error:
                 rows.append(_Row(file=str(path), result="refused", remarks=(_without(str(error), path),)))
-                print(f"error: {error}", file=sys.stderr)
-            progress.advance(task)
+                note(f"error: {error}")
+            bar.update()
 
 
 def _refuse_taken(taken: dict[str, Path], path: Path, name: str) -> None:

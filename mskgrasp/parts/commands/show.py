@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import tyro
@@ -10,7 +11,7 @@ import tyro
 from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts.build import find_part
 from mskgrasp.parts.catalogue import read_index
-from mskgrasp.parts.commands.progress import progress_bar
+from mskgrasp.runtime.progress import advance_to, progress
 
 PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -64,14 +65,8 @@ def run_sheet(command: Sheet) -> int:
     index = read_index()
     if not index.parts:
         raise BadPart("the catalogue is not built yet: python -m mskgrasp.parts build --catalogue")
-    with progress_bar() as progress:
-        task = progress.add_task("sheet", total=None)
-        draw_sheet(
-            index,
-            command.out,
-            command.parts,
-            lambda done, total: progress.update(task, completed=done, total=total),
-        )
+    with progress(title="sheet", unit="part") as bar:
+        draw_sheet(index, command.out, command.parts, partial(advance_to, bar))
     print(command.out)
     return 0
 
