@@ -1,6 +1,38 @@
-"""``python -m mskgrasp.palletize``."""
+"""Program ``python -m mskgrasp.palletize``."""
 
-from mskgrasp.palletize.run import main
-from mskgrasp.runtime.cli import run
+from __future__ import annotations
 
-run(main)
+import sys
+
+from rich.console import Console
+
+from mskgrasp.palletize.config import PalletizeConfig
+from mskgrasp.palletize.placements import print_placements
+from mskgrasp.palletize.run import palletize
+from mskgrasp.runtime.cli import parse, run
+
+DESCRIPTION = """Grasps parts, puts each into its target place, and measures its distance from the target.
+
+Every trial is made once for each correction, with the same part in the same place: none (as if nothing
+moved in the hand), predicted (by the displacement network), truth (what the tracker saw: the best that any
+prediction could do). Writes report.html, report.json and pictures. Every finished placement is stored at
+once; a stopped run goes on where it was.
+
+One target for all parts: --target 0.5,0.06,90
+
+A pallet of several: --cell configs/palletize/cell.yaml --slots configs/palletize/grid.yaml
+
+A real cell asks its operator to place every part, and before the arm moves (--yes: it asks nothing)."""
+
+
+def main() -> int:
+    """Parses, palletizes, reports."""
+    config = parse(PalletizeConfig, prog="python -m mskgrasp.palletize", description=DESCRIPTION)
+    report = palletize(config)
+    print_placements(report, Console(width=None if sys.stdout.isatty() else 110))
+    print(f"wrote {config.out}/report.html, report.json, trials.jsonl and a picture of every placement")
+    return 0
+
+
+if __name__ == "__main__":
+    run(main)
