@@ -1,4 +1,4 @@
-"""Which trials an experiment is made of, and with which models."""
+"""Experiments: their trials and the models they compare."""
 
 from __future__ import annotations
 
