@@ -1,4 +1,4 @@
-"""Which trials an experiment is made of, and with which models."""
+"""Experiments: their trials and the models they compare."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -28,7 +27,6 @@ from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
 from mskgrasp.trials.trial_runner import TrialTask
 
-Experiment = Literal["success", "displacement"]
 # No hyphen: it parts a label from the number of a trial.
 _LABEL = re.compile(r"[A-Za-z][A-Za-z0-9_+.]*")
 

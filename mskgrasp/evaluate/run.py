@@ -1,24 +1,20 @@
-"""Program: the paper's experiments on any cell. Run ``python -m mskgrasp.evaluate --help``."""
+"""The paper's experiments on any cell: trials, summary and report."""
 
 from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import Field, field_validator
-
-from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadModel, UsageError
 from mskgrasp.core.files import only_here, write_whole
 from mskgrasp.evaluate.comparison import compare
+from mskgrasp.evaluate.config import EvaluateConfig, Experiment
 from mskgrasp.evaluate.experiments import (
     Compared,
-    Experiment,
     load_compared,
     open_model,
     scenes,
@@ -26,36 +22,20 @@ from mskgrasp.evaluate.experiments import (
 )
 from mskgrasp.evaluate.figures import draw_comparison, draw_errors, draw_success
 from mskgrasp.evaluate.replay_trial import describe_trial, draw_trial, find_trial, outcome_text
-from mskgrasp.evaluate.report import TITLES, conclusion, print_report, sections
+from mskgrasp.evaluate.report import TITLES, conclusion, sections
 from mskgrasp.evaluate.summary import farthest_off, summarise, worst_trials
-from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
-from mskgrasp.planning.for_cell import SIMULATED_CELL
-from mskgrasp.planning.planner import PlannerConfig
 from mskgrasp.planning.run_inputs import model_digests, part_digests
 from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
-from mskgrasp.runtime.options import parse
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import TRIALS, append, begin, read, rewrite
 from mskgrasp.simulation.versions import versions
-from mskgrasp.trials.cell_file import CellFile, Noise, read_cell
+from mskgrasp.trials.cell_file import CellFile, read_cell
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import FOLDER
 from mskgrasp.trials.trial_runner import Setup, TrialTask, run_trials
-
-DESCRIPTION = """Plans and executes grasps on a cell and reports what came of them.
-
---experiment success: how often the grasp of the best predicted quality lifts the part.
---experiment displacement: how well models predict how the part moves in the hand, for grasps of the best
-quality and for those of low predicted variance among the best; --compare names the models, --lowess-data a
-dataset from which LOWESS predicts known parts. One grasp of the best quality serves all models.
-
-Every trial is stored at once, with what was seen: a stopped run goes on where it was, with more parts, trials
-or models if need be, and --replay OUT TRIAL draws one again. Simulated cells work in parallel; the number of
-them changes nothing. Another cell is another YAML file; a real one asks its operator to lay every part, and
-before the arm moves (--yes: it asks nothing)."""
 
 PARTS: dict[Experiment, tuple[str, ...]] = {
     "success": ("validation",),
@@ -63,65 +43,7 @@ PARTS: dict[Experiment, tuple[str, ...]] = {
 }
 
 
-class EvaluateConfig(Config):
-    """Settings of an evaluation."""
-
-    models: Path = PRETRAINED
-    """Folder with model.safetensors and model.json; by default the shipped one. Its qualities count."""
-    experiment: Experiment = "success"
-    """success: the policy of --planner.policy. displacement: both policies, known and novel parts apart."""
-    cell: Path = SIMULATED_CELL
-    """YAML file of the cell; by default the simulated one."""
-    noise: Noise | None = None
-    """How a simulated camera errs (iid: 3 mm a pixel), instead of what its cell's file says."""
-    measure: Literal["truth", "markers"] = "truth"
-    """truth: the cell's tracker tells the displacement. markers: two squares of tape do (docs/markers.md)."""
-    tape: tuple[float, float] | None = None
-    """Sides of both squares, m, the larger first; by default 0.012 0.008, or those of a simulated cell."""
-    out: Path = Path("out/eval")
-    """Folder for trials.jsonl, report.json and the pictures."""
-    parts: tuple[str, ...] = ()
-    """Names or folders of parts, or sets: train (those the model knows), validation and test (that it never
-    saw), starter, catalogue. By default validation, for displacement train and validation."""
-    n_parts: int = Field(default=0, ge=0)
-    """At most so many parts, evenly chosen, an equal share of every set; 0: all."""
-    trials: int = Field(default=5, ge=1)
-    """Trials a part."""
-    compare: tuple[str, ...] = ()
-    """Models of the displacement experiment, label=folder each; by default the one of --models."""
-    lowess_data: Path | None = None
-    """A collected dataset: LOWESS predicts the parts of which it holds grasps."""
-    workers: int = Field(default=0, ge=0)
-    """Simulated cells at work at once; 0: one a core."""
-    yes: bool = False
-    """Ask no operator: on a real cell, too, the arm moves as soon as a grasp is planned."""
-    seed: int = Field(default=0, ge=0)
-    """Places, turns and candidates follow from it."""
-    planner: PlannerConfig = PlannerConfig(policy="quality")
-    """How grasps are chosen."""
-    replay: tuple[Path, str] | None = None
-    """Draw a stored trial again and do nothing else: the folder of a run, and the trial's name."""
-
-    @field_validator("compare", mode="before")
-    @classmethod
-    def _from_mapping(cls, value: Any) -> Any:
-        return [f"{label}={folder}" for label, folder in value.items()] if isinstance(value, dict) else value
-
-
 MAY_CHANGE = ("out", "trials", "parts", "n_parts", "compare", "lowess_data", "workers", "yes", "replay")
-
-
-def main() -> int:
-    """Runs the trials and reports."""
-    argv = sys.argv[1:]
-    config = parse(EvaluateConfig, prog="python -m mskgrasp.evaluate", description=DESCRIPTION, argv=argv)
-    if config.replay is not None:
-        return replay(*config.replay)
-    report = evaluate(config)
-    print_report(report, config.out)
-    pictures = "success.png, errors.png" if config.experiment == "success" else "displacement.png"
-    print(f"wrote {config.out}/report.html, report.json, {pictures}; any trial: --replay {config.out} TRIAL")
-    return 0
 
 
 def replay(out: Path, key: str) -> int:

@@ -1,4 +1,4 @@
-"""What trials amount to, in numbers: how many were lifted, how well displacements were predicted."""
+"""Summary of trials in numbers: success rates and errors of predicted displacements."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from mskgrasp.trials.trial import Prediction, Trial
 
 SCHEMA_VERSION = 2
 COVERED = 0.9
-"""The central interval whose coverage is told."""
+"""The central interval whose coverage is reported."""
 
 TILTED = float(np.radians(1.0))
-"""A part that hangs more askew than this is put down otherwise than it was held, radians."""
+"""A part that hangs tilted by more than this is put down otherwise than it was held, radians."""
 
 PAPER_SUCCESS = {"simulated": 0.949, "real": 0.863}
 """Share of novel parts' grasps that lifted (Zhao et al. 2019, evaluation in simulation and on the robot)."""

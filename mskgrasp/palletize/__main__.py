@@ -1,14 +1,35 @@
-"""``python -m mskgrasp.palletize``."""
+"""Program ``python -m mskgrasp.palletize``."""
+
+from __future__ import annotations
 
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
+DESCRIPTION = """Grasps parts, puts each into its target place, and measures its distance from the target.
 
-def main() -> int | None:
-    """Imports the program and runs it."""
+Every trial is made once for each correction, with the same part in the same place: none (as if nothing
+moved in the hand), predicted (by the displacement network), truth (what the tracker saw: the best that any
+prediction could do). Writes report.html, report.json and pictures. Every finished placement is stored at
+once; a stopped run goes on where it was.
+
+One target for all parts: --target 0.5,0.06,90
+
+A pallet of several: --cell configs/palletize/cell.yaml --slots configs/palletize/grid.yaml
+
+A real cell asks its operator to place every part, and before the arm moves (--yes: it asks nothing)."""
+
+
+def main() -> int:
+    """Parses, palletizes, reports."""
     with ctrl_c_deferred():
-        from mskgrasp.palletize.run import main as palletize
-    return palletize()
+        from mskgrasp.palletize.config import PalletizeConfig
+        from mskgrasp.palletize.report import print_report
+        from mskgrasp.palletize.run import palletize
+        from mskgrasp.runtime.options import parse
+    config = parse(PalletizeConfig, prog="python -m mskgrasp.palletize", description=DESCRIPTION)
+    print_report(palletize(config))
+    print(f"wrote {config.out}/report.html, report.json, trials.jsonl and a picture of every placement")
+    return 0
 
 
 if __name__ == "__main__":

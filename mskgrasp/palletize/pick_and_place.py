@@ -30,7 +30,7 @@ _NEAR = 0.001
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class PlacementTask:
     """A part to be put into a slot.
 
     Attributes:
@@ -73,7 +73,7 @@ class PickAndPlace:
         self._pictures = pictures
         self._tops: dict[int, float] = {}
 
-    def run(self, task: Task, name: str = "") -> Placement:
+    def run(self, task: PlacementTask, name: str = "") -> Placement:
         """Puts one part into its slot and measures it; writes its picture.
 
         Args:

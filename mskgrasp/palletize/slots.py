@@ -1,4 +1,4 @@
-"""Where parts shall be put: a target on the command line, or the slots of a pallet in a YAML file."""
+"""Slots for parts: a target on the command line, or the slots of a pallet in a YAML file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mskgrasp.perception.footprint import Footprint, usual_footprint
 from mskgrasp.planning.placing import Target, check_place
 
 SEEN_TOLERANCE = 0.003
-"""A depth image tells a part's sides to about a pixel, m."""
+"""A depth image shows a part's sides to about a pixel, m."""
 _ANGLES = np.radians([-90.0, -45.0, 0.0, 45.0])
 
 
@@ -32,8 +32,8 @@ class Slot:
     Attributes:
         x: Of the part's centre, base frame, metres.
         y: The same.
-        theta: Direction of the part's longer side seen from above, radians from base x; which way round it
-            lies a depth image does not tell, and a half turn more is the same.
+        theta: Direction of the part's longer side seen from above, radians from base x; a depth image
+            does not show which way round it is, and a half turn more is the same.
         size: How much room there is along base x and y, metres; None where it does not matter.
     """
 
@@ -49,7 +49,7 @@ class Slot:
         return Target(x=self.x, y=self.y, theta=turn), Target(x=self.x, y=self.y, theta=other)
 
     def fits(self, footprint: Footprint, tolerance: float = 0.0) -> bool:
-        """Whether a part has room in it, turned as it shall lie."""
+        """Whether a part has room in it, turned to the slot's direction."""
         if self.size is None:
             return True
         room = footprint.extent(self.theta)
@@ -100,8 +100,8 @@ class Grid(Config):
         return self
 
 
-class Pallet(Config):
-    """A file of slots: a grid, or a list, or both."""
+class SlotsFile(Config):
+    """Contents of a file of slots: a grid, a list, or both."""
 
     grid: Grid | None = None
     slots: tuple[SlotEntry, ...] = ()
@@ -146,7 +146,7 @@ def read_slots(path: Path) -> list[Slot]:
         BadConfig: It cannot be read, or says something else.
         UsageError: It holds no slot.
     """
-    slots = read_config(Pallet, path).all_slots()
+    slots = read_config(SlotsFile, path).all_slots()
     if not slots:
         raise UsageError(f"{path} holds no slot; give a grid, or a list of slots such as {{x: 0.5, y: 0.05}}")
     return slots

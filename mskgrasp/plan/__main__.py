@@ -1,14 +1,28 @@
-"""``python -m mskgrasp.plan``."""
+"""Program ``python -m mskgrasp.plan``."""
+
+from __future__ import annotations
 
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
+DESCRIPTION = """Takes a depth image of the cell and plans a precise grasp of the part in it.
 
-def main() -> int | None:
-    """Imports the program and runs it."""
+Samples grasps over the part, keeps those of the best predicted quality, and chooses the one whose
+displacement in the hand is best known. Nothing moves. Writes plan.png and plan.json.
+
+A part of your own: python -m mskgrasp.plan --part my_bracket.stl"""
+
+
+def main() -> int:
+    """Parses, plans, reports."""
     with ctrl_c_deferred():
-        from mskgrasp.plan.run import main as plan
-    return plan()
+        from mskgrasp.plan.config import PlanConfig
+        from mskgrasp.plan.run import describe, plan_grasp
+        from mskgrasp.runtime.options import parse
+    config = parse(PlanConfig, prog="python -m mskgrasp.plan", description=DESCRIPTION)
+    print(describe(plan_grasp(config)))
+    print(f"wrote {config.out / 'plan.json'} and {config.out / 'plan.png'}")
+    return 0
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The cell of a run: a YAML file, and for a simulated one what the command line says otherwise."""
+"""Cell of a run: its YAML file, with the command line's overrides for a simulated one."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class CellFile:
 
     Attributes:
         path: Of the user's file.
-        values: What is in it, and what the command line says otherwise.
+        values: Its contents with the command line's overrides.
         tape: Sizes of the squares to measure by; None where a tracker measures.
     """
 
@@ -38,7 +38,7 @@ class CellFile:
 
     @property
     def simulated(self) -> bool:
-        """Whether there may be as many of these cells as one likes."""
+        """Whether the cell is simulated, so that several may run at once."""
         return self.values.get("type") == SIMULATED
 
     @property
@@ -99,5 +99,5 @@ def read_cell(
             squares = squares or values.get("tape") or {}
             values |= {"tape": squares, "colour_scale": max(FINE, values.get("colour_scale", 1))}
         squares = check_config(Tape, squares, "--tape" if tape else f"{path}: tape")
-    cell_from_values(values, path)  # a wrong file is told here, not by a worker
+    cell_from_values(values, path)  # a wrong file is refused here, not by a worker
     return CellFile(path=path, values=values, tape=squares)

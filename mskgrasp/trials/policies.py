@@ -1,4 +1,4 @@
-"""Chooses grasps as the paper's experiments do: by quality, or among the best by some model's variance."""
+"""Policies of the paper's experiments: by quality, or by a model's variance among the best."""
 
 from __future__ import annotations
 
@@ -75,10 +75,10 @@ class Chooser:
 
     Attributes:
         candidates: Where the qualities come from.
-        predictor: Tells the displacement, and with the policy ``low_variance`` decides by its variances.
+        predictor: Predicts the displacement, and with the policy ``low_variance`` decides by its variances.
         policy: As in `mskgrasp.planning.planner.PlannerConfig`.
         part: Name of what lies on the table.
-        tracker: Tells its pose to a predictor that needs it.
+        tracker: Source of its pose for a predictor that needs it.
     """
 
     candidates: Candidates

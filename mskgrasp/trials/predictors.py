@@ -26,13 +26,13 @@ LOWESS = "lowess"
 
 @dataclass(frozen=True, kw_only=True)
 class Seen:
-    """What a model may know of a part before it is grasped.
+    """Inputs of a predictor: a part before it is grasped.
 
     Attributes:
         part: Its name.
         frame: The picture of it.
         view: Where it is seen there.
-        pose_base_obj: How it lies, where a tracker tells; networks do not look at it.
+        pose_base_obj: Its pose, where a tracker reports it; networks do not use it.
     """
 
     part: str
@@ -46,7 +46,7 @@ class Predictor(Protocol):
 
     @property
     def has_variance(self) -> bool:
-        """Whether it tells how sure it is."""
+        """Whether it predicts variances."""
         ...
 
     def knows(self, part: str) -> bool:

@@ -1,4 +1,4 @@
-"""A trial on disk: the frame that was seen, what was planned in it, and the frame afterwards, if any."""
+"""Trial on disk: the frame before the grasp, the plan, and the frame afterwards, if any."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _NUMBERS = ("quality", "score")
 
 
 def trial_file(run: Path, key: str) -> Path:
-    """Where the trial of a key lies."""
+    """File of the trial of a key."""
     return run / FOLDER / f"{key}.npz"
 
 

@@ -23,8 +23,9 @@ import pytest
 from hal.operator import StoppedByOperator
 from hal.sim import SapienArm
 from mskgrasp.core.errors import BadConfig, UsageError
+from mskgrasp.evaluate.config import EvaluateConfig
 from mskgrasp.evaluate.experiments import scenes
-from mskgrasp.evaluate.run import EvaluateConfig, evaluate
+from mskgrasp.evaluate.run import evaluate
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.planning.planner import PlannerConfig

@@ -20,8 +20,10 @@ from hal.sim import SapienCellConfig, sapien_cell
 from mskgrasp.core.errors import BadModel, UsageError
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED
-from mskgrasp.palletize.pick_and_place import PickAndPlace, Task
-from mskgrasp.palletize.run import PalletizeConfig, main, palletize
+from mskgrasp.palletize.__main__ import main
+from mskgrasp.palletize.config import PalletizeConfig
+from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
+from mskgrasp.palletize.run import palletize
 from mskgrasp.palletize.slots import Slot
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.planner import PlannerConfig
@@ -153,7 +155,7 @@ def test_a_cell_without_feeder_and_tracker_is_served_by_its_operator_and_measure
     feeder, tracker, prompts = whole.feeder, whole.tracker, io.StringIO()
     hands = Hands(lambda: feeder.present(TAPED, 5), "\nn\ny\nyq")
     operator = Operator(cell, answers=hands, prompts=prompts)  # type: ignore[arg-type]
-    task = Task(
+    task = PlacementTask(
         part=TAPED, number=0, index=0, slot=Slot(x=0.52, y=0.05, theta=1.0), correction="predicted", seed=5,
         keep=False,
     )  # fmt: skip

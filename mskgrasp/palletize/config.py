@@ -1,0 +1,70 @@
+"""Settings of palletizing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import Field, field_validator
+
+from mskgrasp.core.config import Config
+from mskgrasp.core.settings import Tape
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.palletize.placements import Correction
+from mskgrasp.palletize.slots import Slot, parse_target, read_slots
+from mskgrasp.planning.for_cell import SIMULATED_CELL
+from mskgrasp.planning.planner import PlannerConfig
+
+
+class PalletizeConfig(Config):
+    """Settings of a palletizing run."""
+
+    models: Path = PRETRAINED
+    """Folder with model.safetensors and model.json; by default the shipped one."""
+    cell: Path = SIMULATED_CELL
+    """YAML file of the cell; by default the simulated one."""
+    out: Path = Path("out/palletize")
+    """Folder for trials.jsonl, report.html and the pictures."""
+    parts: tuple[str, ...] = ("test",)
+    """Names, folders, or sets: test and validation (never seen by the model), starter, catalogue."""
+    n_parts: int = Field(default=0, ge=0)
+    """At most so many of these parts, evenly chosen; 0: all."""
+    trials: int = Field(default=3, ge=1)
+    """Trials a part; with --slots, pallets."""
+    target: str = "0.5,0.06,90"
+    """x and y of the centre, m (base), and the direction of the part's longer side from above, degrees."""
+    slots: Path | None = None
+    """YAML file of slots instead, filled with the parts in turn; see configs/palletize/grid.yaml."""
+    corrections: tuple[Correction, ...] = ()
+    """What is corrected by, of none, predicted, truth; by default all that the cell can."""
+    tape: tuple[float, float] | None = None
+    """Sides of the two squares of tape on every part to measure by, m, such as 0.012 0.008; by default the
+    cell's tracker measures, and where it has none, nothing does."""
+    seed: int = Field(default=0, ge=0)
+    """Places, turns and candidates follow from it."""
+    workers: int = Field(default=1, ge=1, le=256)
+    """Processes, each with a simulated cell of its own; they change no result."""
+    yes: bool = False
+    """Ask no operator: the arm moves as soon as a grasp is planned."""
+    planner: PlannerConfig = PlannerConfig()
+    """How grasps are chosen."""
+
+    @field_validator("target")
+    @classmethod
+    def _target(cls, text: str) -> str:
+        parse_target(text)
+        return text
+
+    @field_validator("tape")
+    @classmethod
+    def _tape(cls, sides: tuple[float, float] | None) -> tuple[float, float] | None:
+        if sides is not None:
+            Tape(large=sides[0], small=sides[1])
+        return sides
+
+    def squares(self) -> Tape | None:
+        """The tape to measure by."""
+        return None if self.tape is None else Tape(large=self.tape[0], small=self.tape[1])
+
+    def all_slots(self) -> list[Slot]:
+        """The file's slots, or the one target."""
+        return [parse_target(self.target)] if self.slots is None else read_slots(self.slots)

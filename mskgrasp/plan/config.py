@@ -1,0 +1,32 @@
+"""Settings of planning one grasp."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import Field
+
+from mskgrasp.core.config import Config
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.parts.importing.mesh_files import Unit
+from mskgrasp.planning.for_cell import SIMULATED_CELL
+from mskgrasp.planning.planner import PlannerConfig
+
+
+class PlanConfig(Config):
+    """Settings of planning one grasp."""
+
+    models: Path = PRETRAINED
+    """Folder with model.safetensors and model.json; by default the shipped one."""
+    cell: Path = SIMULATED_CELL
+    """YAML file of the cell; by default the simulated one."""
+    out: Path = Path("out/plan")
+    """Folder for plan.png and plan.json."""
+    part: str | None = None
+    """Place this part (a name, a folder or a CAD file) on the table first; the cell needs a feeder."""
+    unit: Unit | None = None
+    """Of a CAD file's coordinates, where the format does not say; mm if not given."""
+    seed: int = Field(default=0, ge=0)
+    """Determines the candidates, and the place of --part."""
+    planner: PlannerConfig = PlannerConfig()
+    """How the grasp is chosen."""
