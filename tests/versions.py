@@ -28,6 +28,8 @@ SIMULATION = (
     "mskgrasp/core/geometry.py",
     "mskgrasp/core/grasp.py",
     "mskgrasp/core/panda_kinematics.py",
+    "mskgrasp/core/minimum_jerk.py",
+    "mskgrasp/core/seeds.py",
     "mskgrasp/perception/part_detection.py",
     "mskgrasp/simulation/shard.py",
 )

@@ -12,6 +12,7 @@ All functions take numpy arrays and torch tensors and broadcast over leading axe
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from array_api_compat import array_namespace
@@ -53,6 +54,57 @@ EJECTED_DISTANCE = 0.05
 """A part that ends this far from its initial position, and not in the hand, was ejected, metres."""
 FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled")
 """Why an attempt failed, by code: a shard stores the index into this tuple."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grasp:
+    """Top-down grasps in the base frame; batched like `Pose`.
+
+    At theta = 0 the fingers close along the base's y.
+
+    Attributes:
+        position: (..., 3) of the TCP, metres.
+        theta: (...) radians; a jaw cannot tell theta from theta + pi.
+    """
+
+    position: Array
+    theta: Array
+
+    @classmethod
+    def from_vector(cls, vector: Array) -> Grasp:
+        """Grasps of vectors (..., 4): x y z theta."""
+        if vector.shape[-1:] != (4,):
+            raise ValueError(f"a grasp is x y z theta, shape (..., 4), got shape {tuple(vector.shape)}")
+        return cls(position=vector[..., :3], theta=vector[..., 3])
+
+    def as_vector(self) -> Array:
+        """(..., 4): x y z theta."""
+        xp = array_namespace(self.position)
+        return xp.concat([self.position, xp.asarray(self.theta)[..., None]], axis=-1)
+
+    def __len__(self) -> int:
+        """Number of grasps along the first axis."""
+        return len(self.position[..., 0])
+
+    def __getitem__(self, rows: Any) -> Grasp:
+        """Some of a batch of grasps."""
+        return Grasp(position=self.position[rows], theta=self.theta[rows])
+
+    def raised(self, height: Array) -> Grasp:
+        """The same grasps, ``height`` metres higher."""
+        xp = array_namespace(self.position)
+        up = xp.asarray([0.0, 0.0, 1.0], dtype=self.position.dtype)
+        return Grasp(position=self.position + height * up, theta=self.theta)
+
+    @property
+    def T_base_grasp(self) -> Pose:
+        """Grasp frames: z up, y the closing direction."""
+        return pose_base_grasp(self.as_vector())
+
+    @property
+    def T_base_tcp(self) -> Pose:
+        """TCP frames: z out of the hand, y the closing direction."""
+        return pose_base_tcp(self.as_vector())
 
 
 def lowest_grasp_z(table_z: float) -> float:
