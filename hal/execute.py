@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from hal.arm import JOINT_TOLERANCE
 from hal.cell import Cell
 from hal.errors import MotionAborted, Stopped
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import HOLD_S, MAX_OPENING, MIN_GAP, pose_base_tcp
+from mskgrasp.core.grasp import HOLD_S, MAX_OPENING, MIN_GAP, Grasp
 
 APPROACH = 0.12
 """Height over the table from which the straight descent begins, m."""
@@ -44,23 +44,20 @@ class GraspResult:
     aborted: str | None
 
 
-def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
+def execute_grasp(cell: Cell, grasp: Grasp) -> GraspResult:
     """Opens, approaches, descends, closes, lifts and holds.
 
     Args:
         cell: Connected, without an error in force.
-        grasp: (4,) x, y, z, theta, base frame.
+        grasp: A single one, base frame.
 
     Raises:
         OutOfWorkspace: The grasp is refused before anything moves.
         HalError: The arm was lost or stopped; a motion that met resistance is a result, not an error.
     """
     arm, lift = cell.arm, cell.workspace.lift_height
-    grasp = np.asarray(grasp, dtype=np.float64)
-    target = pose_base_tcp(grasp)
-    above = above_grasp(cell, grasp)
-    lifted = grasp + np.array([0.0, 0.0, lift, 0.0])
-    for pose in (target, above, pose_base_tcp(lifted)):
+    target, above, lifted = grasp.T_base_tcp, above_grasp(cell, grasp), grasp.raised(lift).T_base_tcp
+    for pose in (target, above, lifted):
         arm.check_pose(pose)
     try:
         arm.move_gripper(MAX_OPENING)
@@ -68,7 +65,7 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
         arm.move_to_pose(target, speed=0.25)
         closed = arm.grasp(cell.workspace.grasp_force)
         if closed.holding:
-            arm.move_to_pose(pose_base_tcp(lifted), speed=0.25)
+            arm.move_to_pose(lifted, speed=0.25)
             arm.wait(HOLD_S)
     except Stopped:
         raise
@@ -91,20 +88,19 @@ def execute_grasp(cell: Cell, grasp: np.ndarray) -> GraspResult:
     )
 
 
-def above_grasp(cell: Cell, grasp: np.ndarray) -> Pose:
-    """Pre-grasp: from here the hand descends straight to a grasp (4,), and here it returns."""
-    height = max(cell.workspace.table_z + APPROACH, grasp[2] + 0.02)
-    return pose_base_tcp(np.array([grasp[0], grasp[1], height, grasp[3]]))
+def above_grasp(cell: Cell, grasp: Grasp) -> Pose:
+    """Pre-grasp: from here the hand descends straight to a grasp, and here it returns."""
+    x, y, z = grasp.position
+    height = max(cell.workspace.table_z + APPROACH, z + 0.02)
+    return replace(grasp, position=np.array([x, y, height])).T_base_tcp
 
 
-def put_down(
-    cell: Cell, grasp: np.ndarray, *, height: float = PUT_DOWN, opening: float = MAX_OPENING
-) -> None:
+def put_down(cell: Cell, grasp: Grasp, *, height: float = PUT_DOWN, opening: float = MAX_OPENING) -> None:
     """Lowers a lifted part to where it was grasped, opens the fingers and rises.
 
     Args:
         cell: The hand holds the part over the table.
-        grasp: (4,) at which it was grasped.
+        grasp: At which it was grasped.
         height: Of the release above the grasp, metres; falling 2 mm, a part may shift by 1 mm.
         opening: As in `let_go`.
 
@@ -116,22 +112,21 @@ def put_down(
     let_go(cell, grasp, opening=opening)
 
 
-def lower(cell: Cell, grasp: np.ndarray, *, height: float = 0.0) -> None:
+def lower(cell: Cell, grasp: Grasp, *, height: float = 0.0) -> None:
     """Lowers a lifted part to where it was grasped, or ``height`` metres above.
 
     Raises:
         MotionAborted: The part met the table early, because it hangs lower in the hand than before.
     """
-    place = np.asarray(grasp, dtype=np.float64) + np.array([0.0, 0.0, height, 0.0])
-    cell.arm.move_to_pose(pose_base_tcp(place), speed=0.15)
+    cell.arm.move_to_pose(grasp.raised(height).T_base_tcp, speed=0.15)
 
 
-def let_go(cell: Cell, place: np.ndarray, *, opening: float) -> None:
+def let_go(cell: Cell, place: Grasp, *, opening: float) -> None:
     """Opens the fingers and rises straight.
 
     Args:
         cell: The hand is at ``place`` and holds a part.
-        place: (4,) x, y, z, theta, base frame; the hand may be a little higher.
+        place: Base frame; the hand may be a little higher.
         opening: Distance of the pads afterwards, metres; 0 for the least that releases the part, which is
             `RELEASE` more than now. The fingers had room on the way down to the grasp, but since then the
             part has moved between them: one inside a bore may push it as it opens all the way.

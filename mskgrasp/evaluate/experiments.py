@@ -181,5 +181,5 @@ def with_predictions(trial: Trial, run: Path, predictors: Mapping[str, Predictor
     assert plan is not None  # it was measured
     pose = None if trial.pose_base_obj is None else Pose.from_vector(np.array(trial.pose_base_obj))
     seen = Seen(part=trial.part, frame=frame, view=plan.view, pose_base_obj=pose)
-    more = {label: predict_one(predictors[label], seen, plan.grasp) for label in missing}
+    more = {label: predict_one(predictors[label], seen, plan.grasp.as_vector()) for label in missing}
     return replace(trial, predictions=trial.predictions | more)

@@ -12,6 +12,7 @@ from hal import RgbdFrame
 from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.settings import Region
 from mskgrasp.palletize.figures import draw_placement, pallet_image
 from mskgrasp.palletize.placements import Correction, Placement
@@ -96,7 +97,7 @@ class PickAndPlace:
         frame, plan = planned.frame, planned.plan
         if plan is None:
             return replace(failed, reason=planned.reason)
-        known = replace(failed, grasp=plan.grasp.tolist(), predicted=plan.displacement.tolist())
+        known = replace(failed, grasp=plan.grasp.as_vector().tolist(), predicted=plan.displacement.tolist())
         workspace = self._cell.workspace
         footprint = seen_footprint(
             frame, table_z=workspace.table_z, region=workspace.region, min_height=workspace.min_height
@@ -156,7 +157,7 @@ class PickAndPlace:
         engine.put_back(plan)
         return replace(known, reason="OutOfWorkspace"), target, None
 
-    def _pose(self, plan: GraspPlan, displacement: np.ndarray, target: Target) -> np.ndarray:
+    def _pose(self, plan: GraspPlan, displacement: np.ndarray, target: Target) -> Grasp:
         table_z = self._cell.workspace.table_z
         return place_pose(plan.grasp, displacement, plan.view.centre_base, target, table_z)
 

@@ -16,6 +16,7 @@ from hal.errors import OutOfWorkspace
 from mskgrasp.core.config import Config, read_config
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import wrap_half_turn
+from mskgrasp.core.grasp import Grasp
 from mskgrasp.parts import Part
 from mskgrasp.perception.footprint import Footprint, usual_footprint
 from mskgrasp.planning.placing import Target, check_place
@@ -160,10 +161,8 @@ def check_reach(cell: Cell, slots: Sequence[Slot]) -> None:
     """
     for number, slot in enumerate(slots, 1):
         for theta in _ANGLES:
-            ways = [
-                np.array([slot.x, slot.y, cell.workspace.table_z + 0.02, theta + turn])
-                for turn in (0.0, np.pi)
-            ]
+            over = np.array([slot.x, slot.y, cell.workspace.table_z + 0.02])
+            ways = [Grasp(position=over, theta=np.asarray(theta + turn)) for turn in (0.0, np.pi)]
             try:
                 first_reachable(cell, ways)
             except OutOfWorkspace as error:
@@ -173,8 +172,8 @@ def check_reach(cell: Cell, slots: Sequence[Slot]) -> None:
                 ) from error
 
 
-def first_reachable(cell: Cell, poses: Sequence[np.ndarray]) -> int:
-    """Index of the first of some poses (4,) of the hand at which the arm can let go of a part.
+def first_reachable(cell: Cell, poses: Sequence[Grasp]) -> int:
+    """Index of the first of some poses of the hand at which the arm can let go of a part.
 
     Raises:
         OutOfWorkspace: It reaches none; why not the first.

@@ -57,7 +57,7 @@ def take_views(
         else _heights(after, np.array([target.x, target.y]), side, view.table_z),
         side=side,
         top=float(view.size[2]),
-        grasp=np.array([*(plan.grasp[:2] - view.centre_base[:2]), plan.grasp[3]]),
+        grasp=np.array([*(plan.grasp.position[:2] - view.centre_base[:2]), plan.grasp.theta]),
         turn=target.theta,
         theta=theta,
     )

@@ -16,7 +16,7 @@ from mskgrasp.runtime.cli import make_folder
 
 def describe(plan: GraspPlan) -> str:
     """The plan in words, with units."""
-    x, y, z, theta = plan.grasp
+    x, y, z, theta = plan.grasp.as_vector()
     mean, std = plan.displacement, plan.displacement_std
     shifts = ", ".join(
         f"{name} {value * 1e3:+.1f} +- {deviation * 1e3:.1f} mm"

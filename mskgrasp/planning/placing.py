@@ -11,7 +11,7 @@ from hal import Cell
 from hal.errors import MotionAborted
 from hal.execute import PUT_DOWN, above_grasp, let_go
 from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing, wrap_angle
-from mskgrasp.core.grasp import centre_in_grasp_frame, lowest_grasp_z, pose_base_tcp
+from mskgrasp.core.grasp import Grasp, lowest_grasp_z
 
 EARLY = 0.007
 """Height above the target pose from which contact with the table counts as placed, metres."""
@@ -33,8 +33,8 @@ class Target:
 
 
 def place_pose(
-    grasp: np.ndarray, displacement: np.ndarray, centre_base: np.ndarray, target: Target, table_z: float
-) -> np.ndarray:
+    grasp: Grasp, displacement: np.ndarray, centre_base: np.ndarray, target: Target, table_z: float
+) -> Grasp:
     """Compute the hand pose, as a grasp, at which the held part is at the target.
 
     In the grasp frame the part's centre is at c + d and is turned by dtheta, where c is the centre before the
@@ -42,24 +42,25 @@ def place_pose(
     part rotated by phi - theta + dtheta from its initial pose; both are solved for p and phi.
 
     Args:
-        grasp: (4,) x, y, z, theta at which the part was grasped, base frame.
+        grasp: At which the part was grasped, base frame.
         displacement: (4,) of the centre, in the grasp frame; zeros place without correction.
         centre_base: (3,) the part's centre before the grasp, base frame, metres.
         target: Of the part's centre.
         table_z: Height of the table, metres.
 
     Returns:
-        (4,) x, y, z, theta, base frame; theta is not wrapped to half a turn, which would turn the part.
+        Base frame; theta is not wrapped to half a turn, which would turn the part.
     """
-    grasp, displacement = np.asarray(grasp, dtype=np.float64), np.asarray(displacement, dtype=np.float64)
-    held = centre_in_grasp_frame(np.asarray(centre_base, dtype=np.float64), grasp)[:2] + displacement[:2]
-    theta = wrap_angle(grasp[3] + target.theta - displacement[3])
+    displacement = np.asarray(displacement, dtype=np.float64)
+    centre_grasp = grasp.T_base_grasp.inverse().apply(np.asarray(centre_base, dtype=np.float64))
+    held = centre_grasp[:2] + displacement[:2]
+    theta = wrap_angle(grasp.theta + target.theta - displacement[3])
     cos, sin = np.cos(theta), np.sin(theta)
     x = target.x - (cos * held[0] - sin * held[1])
     y = target.y - (sin * held[0] + cos * held[1])
     # A part that has sunk in the hand is released higher, one that has risen lower.
-    z = max(grasp[2] - displacement[2] + PUT_DOWN, lowest_grasp_z(table_z))
-    return np.array([x, y, z, theta])
+    z = max(grasp.position[2] - displacement[2] + PUT_DOWN, lowest_grasp_z(table_z))
+    return Grasp(position=np.array([x, y, z]), theta=theta)
 
 
 def place_error(before: Pose, after: Pose, centre_offset: np.ndarray, target: Target) -> tuple[float, float]:
@@ -99,17 +100,17 @@ def displacement_of_point(displacement: np.ndarray, origin: np.ndarray, point: n
     return np.asarray(displacement, dtype=np.float64) + swept
 
 
-def check_place(cell: Cell, pose: np.ndarray) -> None:
+def check_place(cell: Cell, pose: Grasp) -> None:
     """Refuse a pose that the arm cannot reach, before anything moves.
 
     Raises:
         OutOfWorkspace: The arm cannot reach it.
     """
-    cell.arm.check_pose(pose_base_tcp(pose))
+    cell.arm.check_pose(pose.T_base_tcp)
     cell.arm.check_pose(above_grasp(cell, pose))
 
 
-def place(cell: Cell, pose: np.ndarray, recover: Callable[[MotionAborted], None]) -> None:
+def place(cell: Cell, pose: Grasp, recover: Callable[[MotionAborted], None]) -> None:
     """Move the held part to a pose, release it and retract.
 
     The fingers open no farther than needed, so as not to push neighbouring parts. A tilted part touches the
@@ -117,7 +118,7 @@ def place(cell: Cell, pose: np.ndarray, recover: Callable[[MotionAborted], None]
 
     Args:
         cell: The arm has lifted the part.
-        pose: (4,) as `place_pose` gives it.
+        pose: As `place_pose` gives it.
         recover: Lets the arm move again after that contact, or raises an error.
 
     Raises:
@@ -127,9 +128,9 @@ def place(cell: Cell, pose: np.ndarray, recover: Callable[[MotionAborted], None]
     check_place(cell, pose)
     cell.arm.move_to_pose(above_grasp(cell, pose), speed=0.25)
     try:
-        cell.arm.move_to_pose(pose_base_tcp(pose), speed=0.1)
+        cell.arm.move_to_pose(pose.T_base_tcp, speed=0.1)
     except MotionAborted as error:
-        if cell.arm.state().T_base_tcp.position[2] > pose[2] + EARLY:
+        if cell.arm.state().T_base_tcp.position[2] > pose.position[2] + EARLY:
             raise
         recover(error)
     let_go(cell, pose, opening=0.0)

@@ -13,7 +13,7 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadModel, NoGraspFound
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.grasp import PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
+from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.refine import fingers_free, grasps_near
@@ -66,7 +66,7 @@ class GraspPlan:
     """Selected grasp, its predictions, and the candidates it was selected from.
 
     Attributes:
-        grasp: (4,) base frame, metres and radians.
+        grasp: The chosen one, base frame.
         quality: Predicted probability of success.
         displacement: (4,) expected object displacement, axes of the grasp frame, metres and radians.
         displacement_cov: (4, 4) its covariance, to first order.
@@ -81,7 +81,7 @@ class GraspPlan:
         seconds: Time spent in each stage.
     """
 
-    grasp: np.ndarray
+    grasp: Grasp
     quality: float
     displacement: np.ndarray
     displacement_cov: np.ndarray
@@ -111,7 +111,7 @@ class GraspPlan:
         row, mean, variance = best.rows[chosen], best.mean[chosen], best.variance[chosen]
         centre_grasp = centre_in_grasp_frame(centre, candidates[row])
         return cls(
-            grasp=candidates[row],
+            grasp=Grasp.from_vector(candidates[row]),
             quality=float(qualities[row]),
             displacement=to_object_displacement(mean, centre_grasp),
             displacement_cov=object_displacement_covariance(mean, variance, centre_grasp),
@@ -129,7 +129,7 @@ class GraspPlan:
     @property
     def summary(self) -> str:
         """Description of the grasp in one line, for the operator."""
-        x, y, z, theta = self.grasp
+        x, y, z, theta = self.grasp.as_vector()
         place = f"x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees"
         return f"grasp at {place}, quality {self.quality:.2f}"
 
@@ -141,7 +141,7 @@ class GraspPlan:
     def to_json(self) -> dict[str, Any]:
         """Convert the plan without its candidates to plain values; NaN becomes None."""
         return {
-            "grasp": _plain(self.grasp),
+            "grasp": _plain(self.grasp.as_vector()),
             "quality": float(self.quality),
             "displacement": _plain(self.displacement),
             "displacement_std": _plain(self.displacement_std),

@@ -18,7 +18,7 @@ from matplotlib.patches import Ellipse, Rectangle
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import FAILURES, MAX_OPENING, centre_in_grasp_frame
+from mskgrasp.core.grasp import FAILURES, MAX_OPENING
 from mskgrasp.core.palette import BLUE, FAINT, GREEN, INK, ORANGE, RED
 from mskgrasp.dataset import Attempts, ShardInfo, u16_to_depth
 from mskgrasp.perception.height_patches import crop_patches, height_image
@@ -159,7 +159,7 @@ def _plan_text(plan: GraspPlan) -> str:
 
 def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPlan) -> None:
     view = plan.view
-    off = np.abs(plan.grasp[:2] - view.centre_base[:2]).max()
+    off = np.abs(plan.grasp.position[:2] - view.centre_base[:2]).max()
     fingers = off + np.hypot(MAX_OPENING / 2 + _PAD_THICKNESS, _PAD_WIDTH / 2)
     side = max(0.14, 1.5 * float(np.hypot(*view.size[:2])), 2.05 * float(fingers))
     # The plane of the part's top: there the picture is free of parallax.
@@ -182,7 +182,7 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     best = plan.candidates[plan.shortlist]
     axes.plot(*(best[:, :2] * _MM).T, "o", ms=3.2, mfc="none", mec=INK, mew=0.6, zorder=5, label="shortlist")
-    _jaw(axes, plan.grasp, float(plan.grasp[3]))
+    _jaw(axes, plan.grasp.position, float(plan.grasp.theta))
     axes.legend(loc="lower left", fontsize=8)
     axes.set(xlabel="base x, mm", ylabel="base y, mm", title=f"{len(plan.candidates)} candidates")
 
@@ -190,12 +190,12 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
 def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.ndarray | None) -> None:
     side = 0.128
     heights = _from_above(
-        frame.depth, frame.intrinsics, frame.T_base_camera, plan.view.table_z, plan.grasp, side
+        frame.depth, frame.intrinsics, frame.T_base_camera, plan.view.table_z, plan.grasp.as_vector(), side
     )
     top = float(plan.view.size[2]) * _MM
     _show_heights(axes, heights, (0.0, 0.0), side, top)
     _jaw(axes, np.zeros(2), 0.0)
-    centre = centre_in_grasp_frame(plan.view.centre_base, plan.grasp)[:2] * _MM
+    centre = plan.grasp.T_base_grasp.inverse().apply(plan.view.centre_base)[:2] * _MM
     shift, turn = plan.displacement[:2] * _MM, float(plan.displacement[3])
     _outlines(axes, heights, np.zeros(2), side, centre, shift, turn)
     axes.plot([], [], color=INK, lw=0.9, label="part before")

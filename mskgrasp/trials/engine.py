@@ -19,9 +19,7 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import (
     EJECTED_DISTANCE,
     MIN_RISE,
-    centre_in_grasp_frame,
     object_displacement,
-    pose_base_tcp,
 )
 from mskgrasp.core.settings import Region, Tape
 from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
@@ -86,7 +84,7 @@ class ExecutedGrasp:
         if self.displacement is None or self.before is None:
             return None
         origin, centre = (
-            centre_in_grasp_frame(point, plan.grasp)
+            plan.grasp.T_base_grasp.inverse().apply(point)
             for point in (self.before.position, plan.view.centre_base)
         )
         return displacement_of_point(self.displacement, origin, centre)
@@ -206,7 +204,7 @@ class TrialEngine:
         if reason or before is None or after is None:
             return ExecutedGrasp(reason=reason, result=result, before=before)
         displacement, swing = object_displacement(
-            pose_base_tcp(plan.grasp).inverse() @ before, result.T_base_tcp.inverse() @ after
+            plan.grasp.T_base_tcp.inverse() @ before, result.T_base_tcp.inverse() @ after
         )
         return ExecutedGrasp(
             reason="", result=result, before=before, displacement=np.asarray(displacement), tilt=float(swing)

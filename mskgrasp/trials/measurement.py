@@ -9,7 +9,7 @@ import numpy as np
 from hal import RgbdFrame, let_go, lower
 from hal.errors import MotionAborted
 from mskgrasp.core.errors import MarkersNotFound
-from mskgrasp.core.grasp import MAX_OPENING, centre_in_grasp_frame
+from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.perception.markers import check_between_pads, planar_displacement
 from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.trials.engine import PlannedGrasp, TrialEngine
@@ -63,7 +63,7 @@ def run_trial(
         trial,
         success=not done.reason,
         reason=done.reason,
-        grasp=plan.grasp.tolist(),
+        grasp=plan.grasp.as_vector().tolist(),
         quality=plan.quality,
         predicted=plan.displacement.tolist(),
         predicted_std=plan.displacement_std.tolist(),
@@ -117,8 +117,11 @@ def _measure_by_tape(
             raise MarkersNotFound("touched: the hand met something as it let go and rose") from error
         engine.home()
         after = engine.capture()
-        moved = planar_displacement(before, engine.find_tape(after), plan.grasp, plan.view.centre_base)
-        check_between_pads(moved, centre_in_grasp_frame(plan.view.centre_base, plan.grasp), width)
+        moved = planar_displacement(
+            before, engine.find_tape(after), plan.grasp.as_vector(), plan.view.centre_base
+        )
+        centre_grasp = plan.grasp.T_base_grasp.inverse().apply(plan.view.centre_base)
+        check_between_pads(moved, centre_grasp, width)
     except MarkersNotFound as error:
         return TrialRecord(
             trial=replace(trial, unmeasured=str(error)), frame=frame, plan=plan, after=after,

@@ -14,14 +14,14 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import PartView
+from mskgrasp.core.grasp import Grasp, PartView
 from mskgrasp.dataset import depth_to_u16, u16_to_depth
 from mskgrasp.planning.planner import GraspPlan
 
 SCHEMA_VERSION = 1
 FOLDER = "trials"
 _ARRAYS = (
-    "grasp", "displacement", "displacement_cov", "grasp_displacement", "grasp_displacement_var", "qualities",
+    "displacement", "displacement_cov", "grasp_displacement", "grasp_displacement_var", "qualities",
     "shortlist", "shortlist_scores",
 )  # fmt: skip
 _NUMBERS = ("quality", "score")
@@ -44,6 +44,7 @@ def write_trial(path: Path, frame: RgbdFrame, plan: GraspPlan | None, after: Rgb
         arrays |= _frame_arrays("after", after, fine=True)
     if plan is not None:
         arrays |= {f"plan_{name}": getattr(plan, name) for name in (*_ARRAYS, *_NUMBERS)}
+        arrays["plan_grasp"] = plan.grasp.as_vector()
         arrays["plan_candidates"] = plan.candidates.astype(np.float32)
         view = plan.view
         arrays |= {
@@ -134,6 +135,7 @@ def _plan(arrays: dict[str, np.ndarray]) -> GraspPlan:
             table_z=float(arrays["view_table_z"]),
             table_offset=float(arrays.get("view_table_offset", 0.0)),
         ),
+        grasp=Grasp.from_vector(arrays["plan_grasp"].reshape(4)),
         candidates=arrays["plan_candidates"].astype(np.float64).reshape(-1, 4),
         seconds={},
         **rest,

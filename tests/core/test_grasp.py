@@ -7,6 +7,7 @@ from hypothesis.extra.numpy import arrays
 
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, wrap_angle
 from mskgrasp.core.grasp import (
+    Grasp,
     PartView,
     centre_in_grasp_frame,
     lowest_grasp_z,
@@ -133,3 +134,27 @@ def test_a_flat_part_is_grasped_at_the_lowest_height():
 def test_seed_zero_is_a_seed():
     first, second, other = (sample_grasps(a_view(0.04), 5, np.random.default_rng(s)) for s in (0, 0, 1))
     assert np.array_equal(first, second) and not np.array_equal(first, other)
+
+
+def test_grasps_are_batched_and_their_vectors_and_frames_agree_with_arrays():
+    vectors = np.random.default_rng(0).uniform(-1, 1, (5, 3, 4))
+    grasps = Grasp.from_vector(vectors)
+    np.testing.assert_array_equal(grasps.as_vector(), vectors)
+    np.testing.assert_array_equal(grasps[2, 1].as_vector(), vectors[2, 1])
+    assert len(grasps) == 5
+    closing = grasps.T_base_grasp.apply(np.array([0.0, 1.0, 0.0])) - grasps.position
+    np.testing.assert_allclose(
+        closing, np.stack([-np.sin(grasps.theta), np.cos(grasps.theta), 0 * grasps.theta], -1), atol=1e-12
+    )
+    down = grasps.T_base_tcp.apply(np.array([0.0, 0.0, 1.0])) - grasps.position
+    np.testing.assert_allclose(down, np.broadcast_to([0, 0, -1.0], down.shape), atol=1e-12)
+
+
+def test_a_raised_grasp_is_higher_and_nothing_else():
+    grasp = Grasp.from_vector(np.array([0.5, 0.1, 0.02, 0.3]))
+    np.testing.assert_allclose(grasp.raised(0.1).as_vector(), [0.5, 0.1, 0.12, 0.3])
+
+
+def test_a_vector_that_is_no_grasp_is_refused_with_its_shape():
+    with pytest.raises(ValueError, match=r"x y z theta, shape \(\.\.\., 4\), got shape \(7,\)"):
+        Grasp.from_vector(np.zeros(7))

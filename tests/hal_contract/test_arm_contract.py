@@ -23,7 +23,7 @@ from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspac
 from hal.replay import ReplayArm, ReplayArmConfig, recorded_cell
 from hal.replay.recorder import RecordingArm
 from mskgrasp.core.geometry import Pose, pose_distance, quat_multiply
-from mskgrasp.core.grasp import pose_base_tcp
+from mskgrasp.core.grasp import Grasp, pose_base_tcp
 from tests.hal.franka.robots import robot_for, write_cell
 from tests.hal.replay.toy import toy_cell
 from tests.hal_contract.conftest import CELLS
@@ -259,7 +259,7 @@ def test_a_tilted_hand_keeps_its_corners_off_the_table(cell: Cell):
 def test_a_grasp_out_of_reach_is_refused_before_anything_moves(cell: Cell):
     before = cell.arm.state()
     with pytest.raises(OutOfWorkspace, match="reach"):
-        execute_grasp(cell, np.array([0.74, 0.39, 0.02, 0.0]))
+        execute_grasp(cell, Grasp.from_vector(np.array([0.74, 0.39, 0.02, 0.0])))
     after = cell.arm.state()
     assert after.joints == pytest.approx(before.joints, abs=STILL_RAD)
     assert after.gripper_width == pytest.approx(before.gripper_width, abs=STILL_M)

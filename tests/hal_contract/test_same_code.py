@@ -54,13 +54,13 @@ def pick_and_place(cell: Cell, planner: Planner) -> np.ndarray:
     plan = planner.plan(cell.camera.capture(), np.random.default_rng(SEED))
     result = execute_grasp(cell, plan.grasp)
     assert result.holding, result
-    place = np.array([*PLACE, plan.grasp[2] + 0.003, 0.0])
+    place = np.array([*PLACE, plan.grasp.position[2] + 0.003, 0.0])
     above = place + np.array([0.0, 0.0, cell.workspace.lift_height, 0.0])
     cell.arm.move_to_pose(pose_base_tcp(above), speed=0.25)
     cell.arm.move_to_pose(pose_base_tcp(place), speed=0.15)
     cell.arm.move_gripper(MAX_OPENING)
     go_home(cell)
-    return plan.grasp
+    return plan.grasp.as_vector()
 
 
 def test_the_same_program_sends_the_same_commands_to_both_arms(tmp_path: Path, monkeypatch):

@@ -10,7 +10,7 @@ import pytest
 
 from hal import Cell, execute_grasp, go_home, let_go, put_down
 from hal.errors import MotionAborted, NeedsRecovery, Stopped
-from mskgrasp.core.grasp import pose_base_tcp
+from mskgrasp.core.grasp import Grasp, pose_base_tcp
 from mskgrasp.planning.placing import place
 
 
@@ -59,12 +59,12 @@ def test_a_grasp_lifts_a_part_and_the_simulator_agrees(cell: Cell):
     assert cell.feeder is not None and cell.tracker is not None
     cell.feeder.present("hex_nut_m30", 0)
     before = cell.tracker.part_pose().position
-    result = execute_grasp(cell, np.array([before[0], before[1], 0.0115, 0.3]))
+    result = execute_grasp(cell, Grasp.from_vector(np.array([before[0], before[1], 0.0115, 0.3])))
     assert result.holding and result.aborted is None
     rise = cell.tracker.part_pose().position[2] - before[2]
     assert rise == pytest.approx(cell.workspace.lift_height, abs=2e-3)
     assert 0.04 < result.width < 0.06
-    put_down(cell, np.array([before[0], before[1], 0.0115, 0.3]))
+    put_down(cell, Grasp.from_vector(np.array([before[0], before[1], 0.0115, 0.3])))
     go_home(cell)
     assert cell.tracker.part_pose().position == pytest.approx(before, abs=2e-3)
 
@@ -76,7 +76,7 @@ def test_a_part_is_lifted_whatever_the_grip_force(cell: Cell, force: float):
     cell.feeder.present("hex_nut_m30", 0)
     before = cell.tracker.part_pose().position
     firm = dataclasses.replace(cell, workspace=dataclasses.replace(cell.workspace, grasp_force=force))
-    result = execute_grasp(firm, np.array([before[0], before[1], 0.0115, 0.3]))
+    result = execute_grasp(firm, Grasp.from_vector(np.array([before[0], before[1], 0.0115, 0.3])))
     assert result.aborted is None and result.holding
     go_home(firm)
     assert cell.arm.state().joints == pytest.approx(cell.workspace.home, abs=5e-3)
@@ -87,7 +87,7 @@ def test_a_part_that_the_grip_itself_presses_on_the_table_is_lifted(cell: Cell):
     assert cell.feeder is not None and cell.tracker is not None
     cell.feeder.present("v_pulley_56x1x66", 1080180507)
     before = cell.tracker.part_pose().position
-    result = execute_grasp(cell, np.array([0.4576, 0.0045, 0.0483, 0.9098]))
+    result = execute_grasp(cell, Grasp.from_vector(np.array([0.4576, 0.0045, 0.0483, 0.9098])))
     assert result.aborted is None and result.holding
     assert cell.tracker.part_pose().position[2] > before[2] + 0.8 * cell.workspace.lift_height
     go_home(cell)
@@ -99,7 +99,7 @@ def test_a_held_part_that_is_pressed_on_the_table_stops_the_arm(cell: Cell):
     cell.feeder.present("hex_nut_m30", 0)
     x, y, _ = cell.tracker.part_pose().position
     firm = dataclasses.replace(cell, workspace=dataclasses.replace(cell.workspace, grasp_force=40.0))
-    assert execute_grasp(firm, np.array([x, y, 0.019, 0.3])).holding
+    assert execute_grasp(firm, Grasp.from_vector(np.array([x, y, 0.019, 0.3]))).holding
     with pytest.raises(MotionAborted, match="contact force over 20 N"):
         cell.arm.move_to_pose(pose_base_tcp(np.array([x, y, 0.0115, 0.3])))
     cell.arm.recover()
@@ -112,14 +112,14 @@ def test_a_part_that_meets_the_table_early_is_let_go_there(cell: Cell):
     cell.feeder.present("hex_nut_m30", 0)
     before = cell.tracker.part_pose().position
     firm = dataclasses.replace(cell, workspace=dataclasses.replace(cell.workspace, grasp_force=40.0))
-    assert execute_grasp(firm, np.array([before[0], before[1], 0.019, 0.3])).holding
+    assert execute_grasp(firm, Grasp.from_vector(np.array([before[0], before[1], 0.019, 0.3]))).holding
     stops: list[MotionAborted] = []
 
     def recover(error: MotionAborted) -> None:
         stops.append(error)
         cell.arm.recover()
 
-    place(firm, np.array([before[0] + 0.02, before[1], 0.013, 0.3]), recover)
+    place(firm, Grasp.from_vector(np.array([before[0] + 0.02, before[1], 0.013, 0.3])), recover)
     assert len(stops) == 1
     assert cell.tracker.part_pose().position == pytest.approx(before + [0.02, 0, 0], abs=3e-3)
     go_home(cell)
@@ -130,7 +130,7 @@ def test_a_part_that_falls_from_the_hand_does_not_stop_the_arm(cell: Cell):
     assert cell.feeder is not None and cell.tracker is not None
     cell.feeder.present("hex_nut_m30", 0)
     before = cell.tracker.part_pose().position
-    assert execute_grasp(cell, np.array([before[0], before[1], 0.0115, 0.3])).holding
+    assert execute_grasp(cell, Grasp.from_vector(np.array([before[0], before[1], 0.0115, 0.3]))).holding
     agent = cell.feeder.env.agent  # type: ignore[union-attr]  # the feeder is the simulated world
     agent.set_finger_force(0.01)
     cell.arm.move_to_pose(pose_base_tcp(np.array([before[0], before[1], 0.17, 0.3])))
@@ -146,7 +146,7 @@ def test_a_stop_is_no_outcome_of_a_grasp(cell: Cell):
     timer = threading.Timer(0.1, cell.arm.stop)
     timer.start()
     with pytest.raises(Stopped):
-        execute_grasp(cell, np.array([x, y, 0.0115, 0.3]))
+        execute_grasp(cell, Grasp.from_vector(np.array([x, y, 0.0115, 0.3])))
     timer.join()
     cell.arm.recover()
     go_home(cell)
@@ -155,7 +155,7 @@ def test_a_stop_is_no_outcome_of_a_grasp(cell: Cell):
 @pytest.mark.parametrize("opening", [-0.01, 0.09, float("nan")])
 def test_fingers_cannot_let_go_by_any_opening(cell: Cell, opening: float):
     with pytest.raises(ValueError, match="outside 0"):
-        let_go(cell, np.array([0.5, 0.0, 0.1, 0.0]), opening=opening)
+        let_go(cell, Grasp.from_vector(np.array([0.5, 0.0, 0.1, 0.0])), opening=opening)
 
 
 @pytest.mark.parametrize(("opening", "pushed"), [(0.08, True), (0.041, False)])
@@ -165,7 +165,7 @@ def test_a_finger_in_a_bore_leaves_the_part_where_it_is_if_it_opens_no_farther_t
     """A ring is gripped by its wall and drawn aside; open all the way, the inner finger pushes it on."""
     assert cell.feeder is not None and cell.tracker is not None
     cell.feeder.present("shaft_collar_45", 836804417)
-    grasp = np.array([0.5128, -0.0410, 0.01365, 0.7254])
+    grasp = Grasp.from_vector(np.array([0.5128, -0.0410, 0.01365, 0.7254]))
     before = cell.tracker.part_pose().position
     assert execute_grasp(cell, grasp).holding
     held = cell.tracker.part_pose().position

@@ -18,6 +18,7 @@ from hal.errors import CommunicationLost
 from hal.operator import Operator, StoppedByOperator
 from hal.sim import SapienCellConfig, sapien_cell
 from mskgrasp.core.errors import BadModel, UsageError
+from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.palletize.__main__ import main
@@ -54,9 +55,9 @@ def config(out: Path, **changes: object) -> PalletizeConfig:
 
 def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_path, monkeypatch, capsys):
     out = tmp_path / "run"
-    grasped: list[np.ndarray] = []
+    grasped: list[Grasp] = []
 
-    def pulled_cable(cell: Cell, grasp: np.ndarray) -> GraspResult:
+    def pulled_cable(cell: Cell, grasp: Grasp) -> GraspResult:
         if grasped:
             raise CommunicationLost("no answer from the arm")
         grasped.append(grasp)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mskgrasp.core.geometry import Pose, quat_about_z, wrap_angle
-from mskgrasp.core.grasp import centre_in_grasp_frame, lowest_grasp_z, pose_base_grasp
+from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, lowest_grasp_z, pose_base_grasp
 from mskgrasp.planning.placing import Target, displacement_of_point, place_error, place_pose
 
 near = st.floats(-0.04, 0.04)
@@ -28,8 +28,8 @@ def test_a_part_whose_displacement_is_known_lands_on_its_target(dx, dy, yaw, cx,
     grasp = np.array([0.5, 0.0, 0.03, 0.4])
     displacement = np.array([dx, dy, 0.001, dtheta])
     target = Target(x=0.55 + tx, y=ty, theta=turn)
-    pose = place_pose(grasp, displacement, part.position, target, 0.0)
-    placed = pose_base_grasp(pose) @ moved_in_hand(grasp, part, displacement)
+    pose = place_pose(Grasp.from_vector(grasp), displacement, part.position, target, 0.0)
+    placed = pose.T_base_grasp @ moved_in_hand(grasp, part, displacement)
     missed, off = place_error(part, placed, np.zeros(2), target)
     assert missed < 1e-9 and off < 1e-7
 
@@ -38,8 +38,8 @@ def test_without_correction_the_part_misses_by_its_displacement():
     part = Pose(position=np.array([0.5, 0.0, 0.02]), quat_wxyz=np.array([1.0, 0, 0, 0]))
     grasp, displacement = np.array([0.51, 0.0, 0.03, 0.0]), np.array([0.003, 0.004, 0.0, 0.1])
     target = Target(x=0.6, y=0.1, theta=np.pi / 2)
-    pose = place_pose(grasp, np.zeros(4), part.position, target, 0.0)
-    placed = pose_base_grasp(pose) @ moved_in_hand(grasp, part, displacement)
+    pose = place_pose(Grasp.from_vector(grasp), np.zeros(4), part.position, target, 0.0)
+    placed = pose.T_base_grasp @ moved_in_hand(grasp, part, displacement)
     missed, off = place_error(part, placed, np.zeros(2), target)
     assert missed == pytest.approx(0.005) and off == pytest.approx(0.1)
 
@@ -66,8 +66,8 @@ def test_the_seen_centre_counts_where_it_is_not_the_origin():
     of_centre = displacement_of_point(
         displacement, centre_in_grasp_frame(part.position, grasp), centre_in_grasp_frame(centre, grasp)
     )
-    pose = place_pose(grasp, of_centre, centre, target, 0.0)
-    placed = pose_base_grasp(pose) @ moved_in_hand(grasp, part, displacement)
+    pose = place_pose(Grasp.from_vector(grasp), of_centre, centre, target, 0.0)
+    placed = pose.T_base_grasp @ moved_in_hand(grasp, part, displacement)
     missed, off = place_error(part, placed, offset, target)
     assert missed < 1e-9 and off < 1e-9
 
@@ -75,8 +75,10 @@ def test_the_seen_centre_counts_where_it_is_not_the_origin():
 def test_the_hand_stays_above_the_table_and_follows_a_part_that_sank():
     grasp, centre = np.array([0.5, 0.0, 0.03, 0.0]), np.array([0.5, 0.0, 0.02])
     target = Target(x=0.5, y=0.0, theta=0.0)
-    sunk = place_pose(grasp, np.array([0, 0, -0.004, 0]), centre, target, 0.0)
-    assert sunk[2] == pytest.approx(0.03 + 0.004 + 0.002)
-    risen = place_pose(np.array([0.5, 0, 0.0106, 0]), np.array([0, 0, 0.005, 0]), centre, target, 0.0)
-    assert risen[2] == lowest_grasp_z(0.0)
-    assert wrap_angle(sunk[3]) == sunk[3]
+    sunk = place_pose(Grasp.from_vector(grasp), np.array([0, 0, -0.004, 0]), centre, target, 0.0)
+    assert sunk.position[2] == pytest.approx(0.03 + 0.004 + 0.002)
+    risen = place_pose(
+        Grasp.from_vector(np.array([0.5, 0, 0.0106, 0])), np.array([0, 0, 0.005, 0]), centre, target, 0.0
+    )
+    assert risen.position[2] == lowest_grasp_z(0.0)
+    assert wrap_angle(sunk.theta) == sunk.theta

@@ -36,6 +36,7 @@ from hal.replay import (
 )
 from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import Grasp
 from tests.hal.replay.toy import DOWN, ToyArm, ToyCamera, toy_cell
 
 GRASP = np.array([0.45, 0.05, 0.06, 0.2])
@@ -51,7 +52,7 @@ def run_on(cell: Cell, log: list[object]) -> None:
     cell.feeder.present("nut", 3)
     log.append(cell.camera.capture().depth.tolist())
     log.append(cell.tracker.part_pose().position.tolist())
-    result = execute_grasp(cell, GRASP)
+    result = execute_grasp(cell, Grasp.from_vector(GRASP))
     log += [result.width, result.holding, result.T_base_tcp.position.tolist()]
     with pytest.raises(MotionAborted, match="contact force"):
         cell.arm.move_to_pose(at(0.03))
@@ -128,13 +129,13 @@ def test_commands_may_differ_by_the_tolerances_and_no_more(recording: Path):
         assert cell.feeder is not None
         cell.feeder.present("nut", 3)
         cell.camera.capture()
-        execute_grasp(cell, GRASP + np.array([5e-4, 0, 0, 5e-3]))
+        execute_grasp(cell, Grasp.from_vector(GRASP + np.array([5e-4, 0, 0, 5e-3])))
     with replayed(recording).connected() as cell:
         assert cell.feeder is not None
         cell.feeder.present("nut", 3)
         cell.camera.capture()
         with pytest.raises(NotRecorded):
-            execute_grasp(cell, GRASP + np.array([2e-3, 0, 0, 0]))
+            execute_grasp(cell, Grasp.from_vector(GRASP + np.array([2e-3, 0, 0, 0])))
 
 
 def test_a_frame_comes_where_it_was_taken(recording: Path):

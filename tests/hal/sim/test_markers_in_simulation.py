@@ -14,7 +14,7 @@ from hal.errors import MotionAborted
 from hal.operator import Operator
 from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.geometry import quat_rotate, wrap_half_turn
-from mskgrasp.core.grasp import object_displacement, pose_base_tcp
+from mskgrasp.core.grasp import Grasp, object_displacement, pose_base_tcp
 from mskgrasp.core.panda_kinematics import top_down
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.parts import find_part
@@ -68,10 +68,10 @@ def test_a_grasp_that_shifts_and_turns_a_part_is_measured_on_the_table_as_it_was
     grasp[3] = wrap_half_turn(np.arctan2(lengthwise[1], lengthwise[0]) + 0.25)
     with cell.arm:
         before = find(cell, cell.camera.capture())
-        result = execute_grasp(cell, grasp)
+        result = execute_grasp(cell, Grasp.from_vector(grasp))
         assert result.holding and result.aborted is None
         T_tcp_obj = result.T_base_tcp.inverse() @ world(cell).part_pose()
-        put_down(cell, grasp)
+        put_down(cell, Grasp.from_vector(grasp))
         go_home(cell)
         after = find(cell, cell.camera.capture())
     true, _ = object_displacement(pose_base_tcp(grasp).inverse() @ resting, T_tcp_obj)
@@ -93,7 +93,7 @@ def test_a_hand_that_meets_something_as_it_lets_go_measures_nothing(cell: Cell, 
     )
     let_go, recovered = measurement.let_go, []
 
-    def met(cell: Cell, place: np.ndarray, *, opening: float) -> None:
+    def met(cell: Cell, place: Grasp, *, opening: float) -> None:
         let_go(cell, place, opening=opening)
         raise MotionAborted("contact")
 
