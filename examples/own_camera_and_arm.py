@@ -7,7 +7,7 @@ import numpy as np
 from hal import Arm, ArmLimits, ArmState, Camera, Cell, GraspOutcome, RgbdFrame, Workspace
 from mskgrasp import Planner, PlannerConfig, Pose, execute_grasp, load_models
 
-DOWN = np.array([0.0, 1.0, 0.0, 0.0])  # wxyz; z of the camera and of the hand points at the table
+DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 ABOVE = Pose(position=np.array([0.5, 0.0, 0.8]), quat_wxyz=DOWN)
 REGION = (0.38, 0.62, -0.12, 0.12)
 
@@ -57,5 +57,4 @@ table = Workspace(table_z=0, region=REGION, home=arm.pose, min_height=0.002, lif
 planner = Planner(load_models(), PlannerConfig(), table_z=0.0, region=REGION)
 with Cell(camera=BlockCamera(), arm=arm, workspace=table).connected() as cell:
     plan = planner.plan(cell.camera.capture(), np.random.default_rng(0))
-    print(plan.summary)
-    print("holding" if execute_grasp(cell, plan.grasp).holding else "not holding")
+    print(plan.summary, "holding" if execute_grasp(cell, plan.grasp).holding else "not holding", sep="\n")

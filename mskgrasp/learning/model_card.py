@@ -8,14 +8,13 @@ from typing import Any
 from mskgrasp.learning.grasp_models import ModelMeta
 
 _LIMITS = """\
-- Made for a Franka Hand with its standard pads (80 mm opening) that comes down from above on a part that lies
-  alone on a flat table, seen by a depth camera from above. Another gripper, slanted grasps or clutter are
-  another task.
+- For a Franka Hand with its standard pads (80 mm opening), vertical grasps of a single part on a flat table,
+  and a depth camera above it. Not for other grippers, inclined grasps or clutter.
 - Labels are simulated: rigid parts, uniform density, one friction for all. Soft, wet or magnetic ones behave
   differently.
 - The displacement is that of grasps that succeed. What happens when a grasp fails is not predicted.
-- Large displacements, above all of round parts that roll between the pads, are predicted as what they are:
-  uncertain. Choose by the predicted deviation, not by the mean.
+- Large displacements, above all of round parts that roll between the pads, are predicted with a large
+  deviation. Choose by the predicted deviation, not by the mean.
 """
 
 
@@ -33,21 +32,23 @@ def model_card(meta: ModelMeta) -> str:
     lines = [
         "# Model card",
         "",
-        "Predicts, for grasps of a parallel jaw from above, the probability that they lift the part, and a",
-        "Gaussian over its displacement in the hand. Read by `mskgrasp.plan`, `evaluate` and `palletize`.",
+        "Predicts, for grasps of a parallel gripper from above, the probability that they lift the part, and",
+        "a Gaussian over the displacement of the part in the hand. Loaded by `mskgrasp.plan`, `evaluate` and",
+        "`palletize`.",
         "",
         "## Data",
         "",
-        f"- {known.get('attempts', 0)} simulated attempts to learn from, "
+        f"- {known.get('attempts', 0)} simulated training attempts, "
         f"{known.get('successes', 0)} of them successes",
-        f"- {sides[0]} parts to learn from, {sides[1]} to stop and calibrate by, {sides[2]} to test on",
+        f"- {sides[0]} training parts, {sides[1]} validation parts (early stopping and calibration), "
+        f"{sides[2]} test parts (held out from both)",
         f"- digest of grasps and outcomes: `{str(known.get('data_fingerprint', ''))[:16]}`",
         "",
         "## Settings",
         "",
         *(f"- {name}: {_words(settings[name])}" for name in sorted(settings)),
         "",
-        f"## On {side} parts, never seen",
+        f"## On held-out {side} parts",
         "",
         *_table(_quality_rows(report["gqn"])),
         "",
@@ -55,8 +56,8 @@ def model_card(meta: ModelMeta) -> str:
         "",
         *_table(_axis_rows(report["gdn"])),
         "",
-        "Intervals are of 95 %, by drawing whole parts again. RMSE is over all random grasps that succeeded;",
-        "a planner takes those that the network is surest of.",
+        "Intervals are of 95 %, bootstrapped over parts. RMSE is over all random grasps that succeeded;",
+        "a planner chooses among those of which the network is most confident.",
         "",
         "## Limits",
         "",
@@ -89,7 +90,7 @@ def _displacement_rows(gdn: dict[str, Any]) -> list[tuple[str, ...]]:
         rows.append((f"predicting {name.replace('_', ' ')}", *values))
     for share, errors in gdn.get("least_uncertain", {}).items():
         values = (f"{factor * error:.2f}" for factor, error in zip(units.values(), errors, strict=True))
-        rows.append((f"the surest {share}", *values))
+        rows.append((f"the most confident {share}", *values))
     return rows
 
 

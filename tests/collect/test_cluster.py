@@ -285,7 +285,7 @@ def test_a_part_keeps_its_hash_on_the_way_and_takes_no_other_parts_place(tmp_pat
     with pytest.raises(BadPart, match="arrived damaged"):
         receive_part(part.name, "f" * 64, spoilt)
     for name, contents in (("../x", files), (part.name, {**files, "extra": b""})):
-        with pytest.raises(BadPart, match="is no part"):
+        with pytest.raises(BadPart, match="is not a part"):
             receive_part(name, part.content_hash, contents)
 
 

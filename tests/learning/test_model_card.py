@@ -13,10 +13,10 @@ def test_the_card_reports_test_parts_where_there_are_some_and_validation_parts_o
     on_test, on_validation = meta.metrics["test"]["gqn"]["auroc"], meta.metrics["gqn"]["auroc"]
     assert f"{on_test:.3f}" != f"{on_validation:.3f}"
     card = model_card(meta)
-    assert "## On test parts" in card and f"| AUROC | {on_test:.3f} |" in card
+    assert "## On held-out test parts" in card and f"| AUROC | {on_test:.3f} |" in card
     without = {name: value for name, value in meta.metrics.items() if name != "test"}
     card = model_card(meta.model_copy(update={"metrics": without}))
-    assert "## On validation parts" in card and f"| AUROC | {on_validation:.3f} |" in card
+    assert "## On held-out validation parts" in card and f"| AUROC | {on_validation:.3f} |" in card
 
 
 def test_tables_are_well_formed_with_and_without_variances():
