@@ -1,4 +1,4 @@
-"""What came of putting parts down, and what a set of placements amounts to: in numbers."""
+"""Outcomes of placements and their statistics."""
 
 from __future__ import annotations
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from mskgrasp.parts.build import build_part, builtin_names, find_part, starter_names
 from mskgrasp.parts.catalogue import chosen_names
+from mskgrasp.parts.load import load_part
 from mskgrasp.parts.part import Part
-from mskgrasp.parts.store import load_part, parts_folder
+from mskgrasp.parts.store import parts_folder, read_part
 
 __all__ = [
     "Part",
@@ -15,5 +16,6 @@ __all__ = [
     "find_part",
     "load_part",
     "parts_folder",
+    "read_part",
     "starter_names",
 ]

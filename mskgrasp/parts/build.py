@@ -83,7 +83,7 @@ def build_part(name: str) -> Part:
     """
     recipe = recipe_of(name)
     if is_built(name):
-        return store.load_part(store.parts_folder() / name)
+        return store.read_part(store.parts_folder() / name)
     dimensions = {
         key.removesuffix("_mm"): value / 1000 if key.endswith("_mm") else value
         for key, value in recipe.dimensions.items()
@@ -128,9 +128,9 @@ def find_part(name_or_folder: str | Path) -> Part:
     if text in _recipes():
         return build_part(text)
     if LEGAL_NAME.fullmatch(text) and (store.parts_folder() / text).is_dir():
-        return store.load_part(store.parts_folder() / text)
+        return store.read_part(store.parts_folder() / text)
     if Path(text).is_dir():
-        return store.load_part(Path(text))
+        return store.read_part(Path(text))
     raise unknown_part(text)
 
 

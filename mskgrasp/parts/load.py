@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mskgrasp.parts.build import find_part
-from mskgrasp.parts.importing.mesh_files import Unit
 from mskgrasp.parts.part import Part
+
+if TYPE_CHECKING:
+    from mskgrasp.parts.importing.mesh_files import Unit
 
 
 def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:

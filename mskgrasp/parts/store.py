@@ -74,7 +74,7 @@ def write_part(name: str, mesh: bytes, hulls: bytes, record: dict[str, Any]) -> 
     record = record | {"content_hash": content_hash(mesh, hulls, record)}
     text = json.dumps(record, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
     contents = dict(zip(FILES, (mesh, hulls, text.encode()), strict=True))
-    return load_part(_put(parts_folder(), name, contents, record["recipe_hash"]))
+    return read_part(_put(parts_folder(), name, contents, record["recipe_hash"]))
 
 
 def pack_part(part: Part) -> dict[str, bytes]:
@@ -98,7 +98,7 @@ def receive_part(name: str, digest: str, contents: Mapping[str, bytes]) -> Part:
             f"{name!r} with {', '.join(contents)} was received, which is not a part: check the sender"
         )
     try:
-        part = load_part(root / folder)
+        part = read_part(root / folder)
         if part.content_hash == digest:
             return part
     except BadPart:
@@ -108,7 +108,7 @@ def receive_part(name: str, digest: str, contents: Mapping[str, bytes]) -> Part:
         raise BadPart(
             f"part '{name}' arrived damaged: its files do not match the hash {digest[:16]}; try again"
         )
-    return load_part(_put(root, folder, contents, str(record.get("recipe_hash"))))
+    return read_part(_put(root, folder, contents, str(record.get("recipe_hash"))))
 
 
 def _put(root: Path, name: str, contents: Mapping[str, bytes], recipe: str) -> Path:
@@ -128,7 +128,7 @@ def _put(root: Path, name: str, contents: Mapping[str, bytes], recipe: str) -> P
     return root / name
 
 
-def load_part(folder: Path | str) -> Part:
+def read_part(folder: Path | str) -> Part:
     """Reads a part folder.
 
     Raises:
@@ -155,7 +155,7 @@ def load_part(folder: Path | str) -> Part:
 def recipe_hash(folder: Path) -> str | None:
     """Hash of the recipe that made a folder's part; None where there is no undamaged part."""
     try:
-        load_part(folder)
+        read_part(folder)
         return str(_record(folder, _read(folder, "part.json")).get("recipe_hash"))
     except BadPart:
         return None

@@ -17,7 +17,7 @@ import numpy as np
 import torch
 
 from mskgrasp.core.settings import Physics
-from mskgrasp.parts import load_part
+from mskgrasp.parts import read_part
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.simulation.shard import draw_attempt
 from mskgrasp.simulation.versions import versions
@@ -78,7 +78,7 @@ def draw_grasps(
     """
     drawn = []
     for folder in folders:
-        part = load_part(folder)
+        part = read_part(folder)
         name = f"{part.name}-{part.content_hash[:12]}-{seed}-{n}.npz"
         drawn.append(Drawn(folder=folder, file=out / "grasps" / name))
     jobs = [(str(one.folder), n, seed, str(one.file)) for one in drawn if not one.file.exists()]
@@ -197,7 +197,7 @@ def _write(file: Path, **arrays: np.ndarray) -> None:
 
 def _outcome_file(out: Path, setting: Setting, drawn: Drawn) -> Path:
     grasps = hashlib.sha256(drawn.file.read_bytes()).hexdigest()
-    part = load_part(drawn.folder)
+    part = read_part(drawn.folder)
     # The versions, so that outcomes of another simulation are not read as this one's.
     text = json.dumps([setting.physics.model_dump(), setting.shift, part.content_hash, grasps, versions()])
     return out / "outcomes" / f"{part.name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"

@@ -12,7 +12,7 @@ import pytest
 
 import mskgrasp.parts
 from mskgrasp.core.errors import BadPart
-from mskgrasp.parts import build_part, find_part, load_part, parts_folder
+from mskgrasp.parts import build_part, find_part, parts_folder, read_part
 
 FILES = ("mesh.ply", "hulls.glb", "part.json")
 
@@ -66,7 +66,7 @@ def test_a_truncated_file_is_refused_when_loaded_and_rebuilt(file_name):
     good = contents(folder)
     (folder / file_name).write_bytes(good[file_name][:-50])
     with pytest.raises(BadPart, match="build or import the part again"):
-        load_part(folder)
+        read_part(folder)
     find_part("washer_m36")
     assert contents(folder) == good
 
@@ -93,15 +93,15 @@ def test_a_damaged_record_is_refused_in_one_line(key, value):
     record[key] = value
     (folder / "part.json").write_text(json.dumps(record))
     with pytest.raises(BadPart) as caught:
-        load_part(folder)
+        read_part(folder)
     assert "\n" not in str(caught.value) and str(folder) in str(caught.value)
 
 
 def test_a_folder_without_its_files_is_refused(tmp_path):
     with pytest.raises(BadPart, match="mesh.ply is missing"):
-        load_part(tmp_path)
+        read_part(tmp_path)
     with pytest.raises(BadPart, match="is missing"):
-        load_part(tmp_path / "nowhere")
+        read_part(tmp_path / "nowhere")
 
 
 def test_a_file_that_leads_out_of_the_folder_is_refused(tmp_path):
@@ -110,7 +110,7 @@ def test_a_file_that_leads_out_of_the_folder_is_refused(tmp_path):
     (folder / "mesh.ply").rename(outside)
     (folder / "mesh.ply").symlink_to(outside)
     with pytest.raises(BadPart, match="leads out of its folder"):
-        load_part(folder)
+        read_part(folder)
 
 
 def test_a_part_is_found_by_name_and_by_folder(own_cache):
@@ -146,7 +146,7 @@ def test_a_killed_build_leaves_whole_parts_only(own_cache):
     build.wait()
     finished = list(own_cache.glob("[a-z]*"))
     assert 1 <= len(finished) < 25
-    assert all(load_part(folder).name == folder.name for folder in finished)
+    assert all(read_part(folder).name == folder.name for folder in finished)
 
 
 def _hash_of(name: str) -> str:

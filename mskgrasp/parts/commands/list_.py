@@ -96,7 +96,7 @@ def _row(name: str) -> tuple[str, ...]:
     if name in starter_names() and not is_built(name):
         return ("(not built yet)",)
     try:
-        part = store.load_part(store.parts_folder() / name)
+        part = store.read_part(store.parts_folder() / name)
     except BadPart:
         return ("(damaged: import it again)",)
     return (

@@ -68,7 +68,7 @@ def draw_sheet(index: Index, out: Path, parts: int, report_progress: Callable[[i
 
 
 def _picture(entry: Entry, width: int, height: int) -> np.ndarray:
-    part = store.load_part(store.parts_folder() / entry.name)
+    part = store.read_part(store.parts_folder() / entry.name)
     mesh = _simple(trimesh.load_mesh(part.mesh_path, process=False))
     mesh.vertices = mesh.vertices @ quat_to_matrix(part.resting.quat_wxyz[0]).T
     low = np.asarray(mesh.vertices).min(axis=0)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mskgrasp.core.errors import MskgraspError
-from mskgrasp.parts import load_part, starter_names
+from mskgrasp.parts import read_part, starter_names
 from mskgrasp.parts.catalogue import Index, make_index, read_index, write_index
 from mskgrasp.parts.commands.build_parts import build_parts
 from mskgrasp.parts.commands.command_line import main
@@ -76,7 +76,7 @@ def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
         assert said.splitlines() == ["stopped by Ctrl-C; what was finished is kept"]
     finished = [folder.name for folder in own_cache.glob("[a-z]*")]
     assert 1 <= len(finished) < len(starter_names())
-    assert all(load_part(own_cache / name).name == name for name in finished)
+    assert all(read_part(own_cache / name).name == name for name in finished)
     some = [*finished[:2], "parallel_pin_20x100"]
     seconds = {built.name: built.seconds for built in build_parts(some, read_index(), 1)}
     assert all(seconds[name] == 0 for name in finished[:2])

@@ -1,6 +1,6 @@
 """Parallel building: on all cores, what is up to date is kept, what failed is not tried again."""
 
-from mskgrasp.parts import build_part, load_part
+from mskgrasp.parts import build_part, read_part
 from mskgrasp.parts.build import recipe_hash
 from mskgrasp.parts.catalogue import Index, LeftOut
 from mskgrasp.parts.commands.build_parts import build_parts
@@ -29,7 +29,7 @@ def test_a_part_without_one_of_its_files_is_made_again(own_cache):
     build_part("washer_m36")
     (own_cache / "washer_m36" / "hulls.glb").unlink()
     [built] = build_parts(["washer_m36"], EMPTY, 1)
-    assert built.seconds > 0 and load_part(own_cache / "washer_m36").n_hulls
+    assert built.seconds > 0 and read_part(own_cache / "washer_m36").n_hulls
 
 
 def test_a_recipe_that_failed_is_not_tried_again_until_it_changes():

@@ -18,7 +18,7 @@ import pytest
 import trimesh
 
 from mskgrasp.core.errors import UsageError
-from mskgrasp.parts import load_part
+from mskgrasp.parts import read_part
 from mskgrasp.parts.commands.import_ import Import, run_import
 
 
@@ -192,7 +192,7 @@ def test_two_million_triangles_become_a_part_in_bounded_time_and_memory(tmp_path
     row = table(done.stdout)["pin.stl"]
     found = re.search(r"decimated from 2,000,000 to ([\d,]+) triangles, .* moved by at most ([\d.]+) mm", row)
     assert found and int(found[1].replace(",", "")) < 50_000 and 0 < float(found[2]) <= 0.05
-    part = load_part(own_cache / "pin")
+    part = read_part(own_cache / "pin")
     mass = 1000 * np.pi * 0.008**2 * 0.06
     assert part.mass == pytest.approx(mass, rel=4e-3)
     across = mass * (3 * 0.008**2 + 0.06**2) / 12
@@ -220,4 +220,4 @@ def test_ctrl_c_leaves_whole_parts_only_and_lists_what_was_done(tmp_path, own_ca
     stdout, stderr = process.communicate(timeout=120)
     assert process.returncode == 130 and "stopped by Ctrl-C" in stderr and "Traceback" not in stderr
     assert "a.stl" in table(stdout + "\n") or "a.stl" in stdout
-    assert [load_part(path).name for path in sorted(own_cache.iterdir())][0] == "a"
+    assert [read_part(path).name for path in sorted(own_cache.iterdir())][0] == "a"

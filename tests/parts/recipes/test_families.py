@@ -13,7 +13,7 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from mskgrasp.parts import Part, builtin_names, load_part
+from mskgrasp.parts import Part, builtin_names, read_part
 from mskgrasp.parts.build import recipe_of
 from mskgrasp.parts.catalogue import Index
 from mskgrasp.parts.commands.build_parts import build_parts
@@ -41,10 +41,10 @@ import sapien
 if sys.argv[1] == "gpu":
     from sapien.pysapien.physx import _enable_gpu
     _enable_gpu()  # hulls are then cooked as for a GPU: 64 faces at most, and not too oblong
-from mskgrasp.parts import load_part
+from mskgrasp.parts import read_part
 scene = sapien.Scene([sapien.physx.PhysxCpuSystem()])
 for folder in sys.stdin.read().split():
-    part = load_part(Path(folder))
+    part = read_part(Path(folder))
     builder = scene.create_actor_builder()
     builder.add_multiple_convex_collisions_from_file(str(part.hulls_path), scale=[1e-3] * 3)
     builder.set_mass_and_inertia(part.mass, sapien.Pose(q=part.quat_obj_principal), part.principal_inertia)
@@ -62,7 +62,7 @@ def family_parts(shared_cache: Path) -> dict[str, Part]:
         names = some_of_every_module()
         built = list(build_parts(names, Index(parts={}, left_out={}), 2))
         assert [found.reason for found in built if found.entry is None] == []
-        return {name: load_part(shared_cache / "mskgrasp" / "parts" / name) for name in names}
+        return {name: read_part(shared_cache / "mskgrasp" / "parts" / name) for name in names}
 
 
 def hulls_of(part: Part) -> list[np.ndarray]:

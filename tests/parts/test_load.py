@@ -1,0 +1,18 @@
+import pytest
+
+from mskgrasp.core.errors import UnknownPart
+from mskgrasp.core.shipped import example_file
+from mskgrasp.parts import load_part, read_part
+
+
+def test_a_cad_file_a_name_and_a_folder_give_the_same_part():
+    from_file = load_part(example_file("bracket.stl"), unit="mm")
+    assert from_file.name == "bracket" and 0.01 < from_file.longest_axis < 0.2
+    for source in ("bracket", from_file.folder):
+        assert load_part(source).content_hash == from_file.content_hash
+    assert read_part(from_file.folder).mass == from_file.mass
+
+
+def test_an_unknown_name_lists_similar_ones():
+    with pytest.raises(UnknownPart, match=r"hex_nut_m3.*did you mean .*hex_nut_m30"):
+        load_part("hex_nut_m3x")
