@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from mskgrasp.parts import Part
-from mskgrasp.parts.build import write_solid
+from mskgrasp.parts.builtin import write_solid
 from mskgrasp.parts.solids.solid import Solid
 
 

@@ -1,4 +1,4 @@
-from mskgrasp.parts.build import builtin_names, recipe_hash
+from mskgrasp.parts.builtin import builtin_names, recipe_hash
 from mskgrasp.simulation.versions import other_versions, versions
 from tests.versions import changed, code_digest
 

@@ -34,7 +34,7 @@ SIMULATION = (
     "mskgrasp/simulation/shard.py",
 )
 PART = (
-    "mskgrasp/parts/build.py",
+    "mskgrasp/parts/builtin.py",
     *(
         f"mskgrasp/parts/solids/{name}.py"
         for name in ("measure", "stable_poses", "solid", "pieces", "decompose")

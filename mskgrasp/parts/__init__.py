@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mskgrasp.parts.build import build_part, builtin_names, find_part, starter_names
+from mskgrasp.parts.builtin import build_part, builtin_names, find_part, starter_names
 from mskgrasp.parts.catalogue import chosen_names
 from mskgrasp.parts.load import load_part
 from mskgrasp.parts.part import Part

@@ -19,7 +19,7 @@ import numpy as np
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import store
-from mskgrasp.parts.build import builtin_names, recipe_hash, starter_names, unknown_part
+from mskgrasp.parts.builtin import builtin_names, recipe_hash, starter_names, unknown_part
 
 INDEX_VERSION = 1
 INDEX_NAME = "catalogue.json"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mskgrasp.parts.build import find_part
+from mskgrasp.parts.builtin import find_part
 from mskgrasp.parts.part import Part
 
 if TYPE_CHECKING:

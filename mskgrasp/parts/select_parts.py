@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from mskgrasp.parts.build import find_part, starter_names
+from mskgrasp.parts.builtin import find_part, starter_names
 from mskgrasp.parts.catalogue import chosen_names
 
 

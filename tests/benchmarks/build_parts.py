@@ -39,7 +39,7 @@ def main() -> None:
 def measure(per_family: int, only: str | None) -> None:
     """Makes the parts and prints what they took."""
     from mskgrasp.parts import builtin_names
-    from mskgrasp.parts.build import recipe_of
+    from mskgrasp.parts.builtin import recipe_of
 
     families: dict[str, list[str]] = defaultdict(list)
     for name in builtin_names():
@@ -64,7 +64,7 @@ def measure(per_family: int, only: str | None) -> None:
 
 def warm_up(chosen: dict[str, list[str]]) -> None:
     """Loads the libraries, which a build pays for once a process."""
-    from mskgrasp.parts.build import recipe_of
+    from mskgrasp.parts.builtin import recipe_of
     from mskgrasp.parts.solids import decompose  # noqa: F401
 
     modules = {recipe_of(names[0]).make.__module__: names[0] for names in chosen.values()}
@@ -74,7 +74,7 @@ def warm_up(chosen: dict[str, list[str]]) -> None:
 
 def stages(name: str) -> list[float]:
     """Seconds of each stage for one part."""
-    from mskgrasp.parts.build import build_part, recipe_of, with_hulls
+    from mskgrasp.parts.builtin import build_part, recipe_of, with_hulls
     from mskgrasp.parts.solids.measure import hull_fit
     from mskgrasp.parts.solids.stable_poses import stable_poses
 

@@ -8,7 +8,7 @@ import pytest
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import builtin_names, chosen_names, starter_names
-from mskgrasp.parts.build import build_part, recipe_hash, recipe_of
+from mskgrasp.parts.builtin import build_part, recipe_hash, recipe_of
 from mskgrasp.parts.catalogue import (
     NEIGHBOUR,
     SPLITS,

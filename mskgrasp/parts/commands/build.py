@@ -10,7 +10,7 @@ import tyro
 
 from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts import store
-from mskgrasp.parts.build import builtin_names, recipe_of, starter_names
+from mskgrasp.parts.builtin import builtin_names, recipe_of, starter_names
 from mskgrasp.parts.catalogue import Index, make_index, read_index, write_index
 from mskgrasp.parts.commands.build_parts import BuildResult, build_parts
 from mskgrasp.parts.recipes import cad

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import store
-from mskgrasp.parts.build import build_part, recipe_hash
+from mskgrasp.parts.builtin import build_part, recipe_hash
 from mskgrasp.parts.catalogue import Entry, Index, entry_of
 from mskgrasp.runtime.worker_pool import Work, results
 

@@ -7,7 +7,7 @@ from typing import Annotated, assert_never
 
 import tyro
 
-from mskgrasp.parts.build import builtin_names
+from mskgrasp.parts.builtin import builtin_names
 from mskgrasp.parts.commands.build import Build, run_build
 from mskgrasp.parts.commands.import_ import Import, run_import
 from mskgrasp.parts.commands.list_ import List, run_list

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts import store
-from mskgrasp.parts.build import imported_names, is_built, starter_names
+from mskgrasp.parts.builtin import imported_names, is_built, starter_names
 from mskgrasp.parts.catalogue import SPLITS, THIN, Entry, Index, read_index
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import tyro
 
 from mskgrasp.core.errors import BadPart, UsageError
-from mskgrasp.parts.build import find_part
+from mskgrasp.parts.builtin import find_part
 from mskgrasp.parts.catalogue import read_index
 from mskgrasp.runtime.progress import advance_to, progress
 

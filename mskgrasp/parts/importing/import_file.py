@@ -15,7 +15,7 @@ import trimesh
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import store
-from mskgrasp.parts.build import LEGAL_NAME, builtin_names, write_solid
+from mskgrasp.parts.builtin import LEGAL_NAME, builtin_names, write_solid
 from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
 from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, MeshFile, Unit, read_content, read_mesh
 from mskgrasp.parts.part import Part

@@ -1,7 +1,7 @@
 """Parallel building: on all cores, what is up to date is kept, what failed is not tried again."""
 
 from mskgrasp.parts import build_part, read_part
-from mskgrasp.parts.build import recipe_hash
+from mskgrasp.parts.builtin import recipe_hash
 from mskgrasp.parts.catalogue import Index, LeftOut
 from mskgrasp.parts.commands.build_parts import build_parts
 

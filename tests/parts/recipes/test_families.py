@@ -14,7 +14,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from mskgrasp.parts import Part, builtin_names, read_part
-from mskgrasp.parts.build import recipe_of
+from mskgrasp.parts.builtin import recipe_of
 from mskgrasp.parts.catalogue import Index
 from mskgrasp.parts.commands.build_parts import build_parts
 from mskgrasp.parts.solids.measure import aspect_ratio

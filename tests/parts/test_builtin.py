@@ -12,8 +12,7 @@ from scipy.spatial import ConvexHull
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.core.geometry import quat_to_matrix
-from mskgrasp.parts import Part, build_part, starter_names
-from mskgrasp.parts import build as build_module
+from mskgrasp.parts import Part, build_part, builtin, starter_names
 from mskgrasp.parts.recipes.families import recipes
 from mskgrasp.parts.recipes.recipe import TABLES, table
 from mskgrasp.parts.solids.measure import aspect_ratio
@@ -183,13 +182,13 @@ def test_dimensions_are_stored_in_metres_and_counts_as_they_are(builtin_parts):
 
 
 def test_hulls_that_are_not_the_part_are_refused_with_both_numbers(monkeypatch):
-    recipe = build_module.recipe_of("bushing_20x26x30")
+    recipe = builtin.recipe_of("bushing_20x26x30")
 
     def plugged(size):
         made = recipe.make(size)
         return Solid(mesh=made.mesh, hulls=(made.mesh.convex_hull.vertices[::8],))
 
     recipes = {"bushing_20x26x30": replace(recipe, make=plugged)}
-    monkeypatch.setattr(build_module, "_recipes", lambda: recipes)
+    monkeypatch.setattr(builtin, "_recipes", lambda: recipes)
     with pytest.raises(BadPart, match=r"95 % of the surface is within .* mm .*volume ratio 2\.\d\d"):
         build_part("bushing_20x26x30")
