@@ -9,8 +9,8 @@ import pytest
 import trimesh
 
 from mskgrasp.parts import Part
-from mskgrasp.parts.builtin import write_solid
 from mskgrasp.parts.solids.solid import Solid
+from mskgrasp.parts.write_solid import write_solid
 
 
 def make_box(cache: Path, name: str, size: tuple[float, float, float], mass: float) -> Part:

@@ -35,6 +35,7 @@ SIMULATION = (
 )
 PART = (
     "mskgrasp/parts/builtin.py",
+    "mskgrasp/parts/write_solid.py",
     *(
         f"mskgrasp/parts/solids/{name}.py"
         for name in ("measure", "stable_poses", "solid", "pieces", "decompose")

@@ -16,8 +16,8 @@ from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.panda_kinematics import top_down
 from mskgrasp.core.settings import Physics
 from mskgrasp.parts import Part, store
-from mskgrasp.parts.builtin import write_solid
 from mskgrasp.parts.solids.solid import Solid
+from mskgrasp.parts.write_solid import write_solid
 from tasks import GraspDisplacementEnv
 from tasks.scene.frames import base_pose
 

@@ -11,8 +11,7 @@ import trimesh
 from sapien.physx import PhysxCollisionShapeConvexMesh
 
 from mskgrasp.parts import Part
-from mskgrasp.parts.solids.decompose import MOST_P95_MM, MOST_VOLUME_RATIO
-from mskgrasp.parts.solids.measure import hull_fit
+from mskgrasp.parts.solids.measure import MOST_P95_MM, MOST_VOLUME_RATIO, hull_fit
 from mskgrasp.validate.body_scene import BodyScene
 
 MOST_MASS_ERROR = 1e-4

@@ -74,9 +74,10 @@ def warm_up(chosen: dict[str, list[str]]) -> None:
 
 def stages(name: str) -> list[float]:
     """Seconds of each stage for one part."""
-    from mskgrasp.parts.builtin import build_part, recipe_of, with_hulls
+    from mskgrasp.parts.builtin import build_part, recipe_of
     from mskgrasp.parts.solids.measure import hull_fit
     from mskgrasp.parts.solids.stable_poses import stable_poses
+    from mskgrasp.parts.write_solid import with_hulls
 
     recipe = recipe_of(name)
     clock = time.process_time

@@ -15,7 +15,7 @@ import trimesh
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import store
-from mskgrasp.parts.builtin import LEGAL_NAME, builtin_names, write_solid
+from mskgrasp.parts.builtin import LEGAL_NAME, builtin_names
 from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
 from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, MeshFile, Unit, read_content, read_mesh
 from mskgrasp.parts.part import Part
@@ -23,6 +23,7 @@ from mskgrasp.parts.solids.decompose import convex_pieces
 from mskgrasp.parts.solids.simplify import for_collision
 from mskgrasp.parts.solids.solid import Solid
 from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION, stamp
+from mskgrasp.parts.write_solid import write_solid
 
 USUAL_DENSITY = (10.0, 25_000.0)
 """From foam to osmium, kg/m^3."""

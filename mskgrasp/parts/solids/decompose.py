@@ -15,17 +15,18 @@ from manifold3d import Manifold
 from scipy.spatial import ConvexHull
 
 from mskgrasp.core.errors import BadPart
-from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, HullFit, MeshSurface, aspect_ratio
+from mskgrasp.parts.solids.measure import (
+    MOST_ASPECT_RATIO,
+    MOST_P95_MM,
+    MOST_VOLUME_RATIO,
+    HullFit,
+    MeshSurface,
+    aspect_ratio,
+)
 from mskgrasp.parts.solids.pieces import merge_hulls
 from mskgrasp.parts.solids.solid import cut, few_corners
 
 MOST_HULLS = 48
-
-MOST_P95_MM = 0.7
-"""95 % of the surfaces of hulls and mesh have to be within this distance."""
-
-MOST_VOLUME_RATIO = 1.1
-"""Largest ratio between the volumes of hulls and mesh, either way."""
 
 CONCAVITIES_MM = (2.0, 1.0, 0.5)
 """Concavity that CoACD may leave, tried in turn, in millimetres.

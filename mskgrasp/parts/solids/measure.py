@@ -18,6 +18,12 @@ MOST_SAMPLES = 12_000
 MOST_ASPECT_RATIO = 50.0
 """PhysX on a GPU drops hulls whose length is about 64 times their thickness."""
 
+MOST_P95_MM = 0.7
+"""95 % of the surfaces of hulls and mesh have to be within this distance."""
+
+MOST_VOLUME_RATIO = 1.1
+"""Largest ratio between the volumes of hulls and mesh, either way."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class MassProperties:
