@@ -7,7 +7,7 @@ import numpy as np
 
 from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.dataset.card import read_card
-from mskgrasp.dataset.commands.verbs import main
+from mskgrasp.dataset.commands.command_line import main
 from tests import synthetic
 
 

@@ -15,7 +15,7 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES, pose_base_tcp
 from mskgrasp.dataset import read_shard
 from mskgrasp.dataset.check import check_dataset
-from mskgrasp.dataset.commands.verbs import main
+from mskgrasp.dataset.commands.command_line import main
 from tests.collecting import REPOSITORY
 
 KEY, NUT = "parallel_key_a16x10x56", "hex_nut_m30"

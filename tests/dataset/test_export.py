@@ -17,8 +17,8 @@ import tasks  # noqa: F401 (registers the task)
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.dataset import Attempts, list_shards, read_shard, u16_to_depth
+from mskgrasp.dataset.commands.command_line import main
 from mskgrasp.dataset.commands.maniskill import export_maniskill
-from mskgrasp.dataset.commands.verbs import main
 from mskgrasp.dataset.export import export_npz
 from tests import synthetic
 from tests.programs import run_here

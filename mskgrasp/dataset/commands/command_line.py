@@ -1,4 +1,4 @@
-"""Verbs of ``python -m mskgrasp.dataset``: check, info, export."""
+"""Command line of ``python -m mskgrasp.dataset``: check, info, export."""
 
 from __future__ import annotations
 
