@@ -17,6 +17,7 @@ from mskgrasp.parts import Part, builtin_names, read_part
 from mskgrasp.parts.builtin import recipe_of
 from mskgrasp.parts.catalogue import Index
 from mskgrasp.parts.commands.build_parts import build_parts
+from mskgrasp.parts.recipes import families
 from mskgrasp.parts.solids.measure import aspect_ratio
 
 ONCE_A_FAMILY = {recipe_of(name).family: name for name in reversed(builtin_names())}
@@ -63,6 +64,13 @@ def family_parts(shared_cache: Path) -> dict[str, Part]:
         built = list(build_parts(names, Index(parts={}, left_out={}), 2))
         assert [found.reason for found in built if found.entry is None] == []
         return {name: read_part(shared_cache / "mskgrasp" / "parts" / name) for name in names}
+
+
+def test_every_module_with_recipes_is_listed():
+    package = Path(families.__file__).parent
+    modules = [path for path in package.glob("*.py") if path.name != "__init__.py"]
+    found = [path.stem for path in modules if "\ndef recipes() ->" in path.read_text(encoding="utf-8")]
+    assert sorted(found) == list(families.MODULES)
 
 
 def hulls_of(part: Part) -> list[np.ndarray]:

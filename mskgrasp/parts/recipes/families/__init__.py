@@ -3,38 +3,41 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib import import_module
 
 from mskgrasp.core.errors import BadPart
-from mskgrasp.parts.recipes.families import (
-    angles,
-    bends,
-    brackets,
-    couplings,
-    cranks,
-    devices,
-    eyes,
-    fasteners,
-    fittings,
-    fixtures,
-    gears,
-    grips,
-    handles,
-    hinges,
-    joints,
-    nuts,
-    pins,
-    pipe,
-    plates,
-    profiles,
-    pulleys,
-    racks,
-    rings,
-    screws,
-    shafts,
-    studs,
-    supports,
-)
 from mskgrasp.parts.recipes.recipe import Recipe
+
+MODULES = (
+    "angles",
+    "bends",
+    "brackets",
+    "couplings",
+    "cranks",
+    "devices",
+    "eyes",
+    "fasteners",
+    "fittings",
+    "fixtures",
+    "gears",
+    "grips",
+    "handles",
+    "hinges",
+    "joints",
+    "nuts",
+    "pins",
+    "pipe",
+    "plates",
+    "profiles",
+    "pulleys",
+    "racks",
+    "rings",
+    "screws",
+    "shafts",
+    "studs",
+    "supports",
+)
+"""The modules of families in this package; each has a function ``recipes``."""
 
 STARTER = (
     "bearing_6202",
@@ -69,38 +72,10 @@ STARTER = (
 @lru_cache(maxsize=1)
 def recipes() -> dict[str, Recipe]:
     """All built-in parts by name, sorted."""
-    modules = (
-        angles,
-        bends,
-        brackets,
-        couplings,
-        cranks,
-        devices,
-        eyes,
-        fasteners,
-        fittings,
-        fixtures,
-        gears,
-        grips,
-        handles,
-        hinges,
-        joints,
-        nuts,
-        pins,
-        pipe,
-        plates,
-        profiles,
-        pulleys,
-        racks,
-        rings,
-        screws,
-        shafts,
-        studs,
-        supports,
-    )
     found: dict[str, Recipe] = {}
-    for recipe in (recipe for module in modules for recipe in module.recipes()):
-        if recipe.name in found:
-            raise BadPart(f"two recipes are called {recipe.name!r}: rename one")
-        found[recipe.name] = recipe
+    for module in MODULES:
+        for recipe in import_module(f"{__name__}.{module}").recipes():
+            if recipe.name in found:
+                raise BadPart(f"two recipes are called {recipe.name!r}: rename one")
+            found[recipe.name] = recipe
     return dict(sorted(found.items()))
