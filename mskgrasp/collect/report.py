@@ -17,7 +17,8 @@ from mskgrasp.dataset import ShardInfo, list_shards, read_shard
 from mskgrasp.dataset.shards import read_columns
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.grasp_figures import draw_contact_sheet
-from mskgrasp.reports.section import Section, Table
+from mskgrasp.reports.section import Section
+from mskgrasp.runtime.console_table import Table
 
 N_PICTURES = 24
 _HEADER = (

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from rich.console import Console
-from rich.table import Table
 
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.metrics import wilson_interval
@@ -94,40 +92,6 @@ def passing(index: Index, low: float, high: float) -> tuple[int, float, float]:
         expected += float(estimate(others, rated, low, high).sum()) + len(others) * float(residual.mean())
         error = len(others) * float(residual.std(ddof=1)) * np.sqrt(1 / len(rated) + 1 / len(others))
     return int(inside.sum()), expected, error
-
-
-def report(index: Index, bounds: tuple[float, float]) -> None:
-    """Print the rated families, and the number of parts between the bounds."""
-    low, high = bounds
-    families: dict[str, list[Entry]] = defaultdict(list)
-    for entry in index.parts.values():
-        families[entry.family].append(entry)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("family", no_wrap=True)
-    for header in ("parts", "rated", "grasps", "success", "95 % interval", f"within {low:.0%} - {high:.0%}"):
-        table.add_column(header, justify="right")
-    for family, entries in sorted(families.items()):
-        rated = [entry.rating for entry in entries if entry.rating is not None]
-        if not rated:
-            continue
-        n, won = sum(r.attempts for r in rated), sum(r.successes for r in rated)
-        interval = wilson_interval(won, n)
-        table.add_row(
-            family, str(len(entries)), str(len(rated)), str(n), f"{won / max(n, 1):.0%}",
-            f"{interval[0]:.0%} - {interval[1]:.0%}",
-            f"{sum(low <= r.rate <= high for r in rated)} of {len(rated)}",
-        )  # fmt: skip
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=160)
-    console.print(table)
-    rated_parts = [entry for entry in index.parts.values() if entry.rating is not None]
-    if len(rated_parts) >= 2:
-        inside, expected, error = passing(index, low, high)
-        print(
-            f"{inside} of {len(rated_parts)} rated parts lie within {low:.0%} - {high:.0%}; of all "
-            f"{len(index.parts)} parts of the catalogue an estimated {expected:.0f} +- {2 * error:.0f} do"
-        )
 
 
 def draw_ratings(index: Index, bounds: tuple[float, float], path: Path) -> Path:

@@ -10,7 +10,8 @@ from rich.console import Console
 
 from mskgrasp.evaluate.comparison import POLICIES, POLICY_NAMES, SIDES
 from mskgrasp.reports.console import print_sections
-from mskgrasp.reports.section import Figure, Link, Section, Table, settings_section
+from mskgrasp.reports.section import Figure, Section, settings_section
+from mskgrasp.runtime.console_table import Link, Table
 
 TITLES = {"success": "Success of planned grasps", "displacement": "Displacement in the hand"}
 _SUCCESS_COLUMNS = (

@@ -30,7 +30,8 @@ from mskgrasp.palletize.slots import Slot
 from mskgrasp.palletize.views import read_views
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.html import write_html
-from mskgrasp.reports.section import Figure, Link, Section, Table, settings_section
+from mskgrasp.reports.section import Figure, Section, settings_section
+from mskgrasp.runtime.console_table import Link, Table
 
 WORST = 10
 _ROWS = 4

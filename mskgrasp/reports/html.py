@@ -13,7 +13,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from mskgrasp.core import palette
 from mskgrasp.core.files import write_whole
-from mskgrasp.reports.section import Figure, Link, Section, cell_text
+from mskgrasp.reports.section import Figure, Section
+from mskgrasp.runtime.console_table import Link, cell_text
 
 _TEMPLATE = "report.html.j2"
 _KINDS = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}

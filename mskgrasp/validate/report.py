@@ -16,8 +16,9 @@ from matplotlib.ticker import NullFormatter, ScalarFormatter
 from mskgrasp.core.grasp import MAX_DISPLACEMENT
 from mskgrasp.core.palette import GREEN, INK, PALE_GREEN, RED
 from mskgrasp.reports.console import print_sections
-from mskgrasp.reports.section import Section, Table
+from mskgrasp.reports.section import Section
 from mskgrasp.reports.style import saved_figure
+from mskgrasp.runtime.console_table import Table
 from mskgrasp.simulation.versions import versions
 from mskgrasp.validate.closed_form import Check
 from mskgrasp.validate.compare import MOST_DISAGREEMENT, MOST_TIMES_FLOOR, Comparison, complaints

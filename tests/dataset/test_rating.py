@@ -8,7 +8,7 @@ import pytest
 
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.dataset import read_shard, shard_path, write_shard
-from mskgrasp.dataset.rating import draw_ratings, estimate, passing, rate_parts, report
+from mskgrasp.dataset.rating import draw_ratings, estimate, passing, rate_parts
 from mskgrasp.parts.catalogue import Entry, Index, Rating
 from tests.synthetic import write_dataset
 
@@ -98,10 +98,7 @@ def test_a_single_rated_part_says_nothing_of_others():
         estimate([bar("a", 0.1, None)], [bar("b", 0.1, 20)], 0.05, 0.40)
 
 
-def test_report_and_picture_are_written(tmp_path: Path, capsys):
+def test_the_picture_is_written(tmp_path: Path):
     entries = bars(np.random.default_rng(2), 60, 30)
     index = Index(parts={entry.name: entry for entry in entries}, left_out={})
-    report(index, (0.05, 0.40))
-    out = capsys.readouterr().out
-    assert "of 30 rated parts lie within 5% - 40%" in out
     assert draw_ratings(index, (0.05, 0.40), tmp_path / "rating.png").stat().st_size > 10_000

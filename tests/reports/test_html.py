@@ -10,7 +10,8 @@ import pytest
 
 from mskgrasp.planning.planner import PlannerConfig
 from mskgrasp.reports.html import write_html
-from mskgrasp.reports.section import Figure, Link, Section, Table, settings_section
+from mskgrasp.reports.section import Figure, Section, settings_section
+from mskgrasp.runtime.console_table import Link, Table
 from tests.browser import Page
 
 HOSTILE = '<script>document.title="owned"</script> & "quoted" <img src=x onerror=alert(1)>'

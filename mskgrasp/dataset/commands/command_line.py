@@ -16,7 +16,8 @@ from mskgrasp.dataset.check import check_dataset, require_dataset
 from mskgrasp.dataset.commands.maniskill import export_maniskill
 from mskgrasp.dataset.export import export_npz
 from mskgrasp.reports.console import print_sections
-from mskgrasp.reports.section import Section, Table
+from mskgrasp.reports.section import Section
+from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import progress
 
 PROG = "python -m mskgrasp.dataset"

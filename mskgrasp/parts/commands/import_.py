@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,12 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from mskgrasp.core.errors import BadPart, MskgraspError, UsageError
 from mskgrasp.parts import store
 from mskgrasp.parts.part import Part
+from mskgrasp.runtime.console_table import Table, print_table, report_console
 from mskgrasp.runtime.progress import note, progress
 
 if TYPE_CHECKING:
@@ -183,32 +182,26 @@ def _warnings(part: Part, unit: str) -> list[str]:
 
 
 def _print_table(rows: Sequence[_Row]) -> None:
-    console = Console()
+    console = report_console()
     if console.is_terminal and console.width < _TABLE_WIDTH:
         for row in rows:
             _print_lines(console, row)
         return
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for header in ("file", "part", "result"):
-        table.add_column(header, overflow="fold")
-    for header in ("size mm", "mass g", "hulls", "error p95 mm", "max mm"):
-        table.add_column(header, justify="right", no_wrap=True)
-    table.add_column("repairs, or reason of refusal", overflow="fold")
+    header = (
+        "file", "part", "result", "size mm", "mass g", "hulls", "error p95 mm", "max mm",
+        "repairs, or reason of refusal",
+    )  # fmt: skip
+    cells: list[tuple[object, ...]] = []
     for row in rows:
-        remarks = "; ".join(row.remarks)
-        first = [Text(row.file), "", Text(row.result, style=_COLOURS[row.result]), *5 * [""], Text(remarks)]
-        for number, part in enumerate(row.parts):
-            line = first if number == 0 else ["", "", "", *5 * [""], ""]
-            table.add_row(line[0], part.name, line[2], *_figures(part), line[8])
+        of_file = (row.file, Text(row.result, style=_COLOURS[row.result]), "; ".join(row.remarks))
+        for part in row.parts:
+            file, result, remarks = of_file
+            cells.append((file, part.name, result, *_figures(part), remarks))
+            of_file = ("", "", "")
         if not row.parts:
-            table.add_row(*first)
-    if console.is_terminal:
-        console.print(table)
-        return
-    wide = Console(width=10_000, file=io.StringIO(), no_color=True)  # a pipe gets every column in full
-    with wide.capture() as capture:
-        wide.print(table)
-    print("\n".join(line.rstrip() for line in capture.get().splitlines()))
+            file, result, remarks = of_file
+            cells.append((file, "", result, *5 * ("",), remarks))
+    print_table(Table(header=header, rows=cells))
 
 
 def _print_lines(console: Console, row: _Row) -> None:

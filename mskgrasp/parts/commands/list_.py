@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import imported_names, is_built, starter_names
 from mskgrasp.parts.catalogue import SPLITS, THIN, Entry, Index, read_index
+from mskgrasp.runtime.console_table import Table, print_table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,22 +44,19 @@ def run_list(command: List) -> int:
             raise UsageError(
                 f"no family {command.family!r}: give one of {', '.join(sorted(index.families()))}"
             )
-        _print(_entry_table(entries))
+        print_table(_entry_table(entries))
         print(f"{len(entries)} parts")
     elif command.catalogue or command.csv is not None:
         index = _built_index()
-        _print(_family_table(index))
+        print_table(_family_table(index))
         _print_spread(index)
         print(f"{len(index.parts)} parts")
     else:
         names = sorted((*starter_names(), *imported_names()))
-        table = _table(
-            ("name", "family", "source"),
-            ("longest axis mm", "mass g", "hulls", "hull error mm", "poses"),
-        )
-        for name in names:
-            table.add_row(name, *_row(name))
-        _print(table)
+        header = (
+            "name", "family", "source", "longest axis mm", "mass g", "hulls", "hull error mm", "poses"
+        )  # fmt: skip
+        print_table(Table(header=header, rows=[(name, *_row(name)) for name in names]))
         print(f"{len(names)} parts")
     return 0
 
@@ -94,11 +90,11 @@ def _built_index() -> Index:
 
 def _row(name: str) -> tuple[str, ...]:
     if name in starter_names() and not is_built(name):
-        return ("(not built yet)",)
+        return ("(not built yet)", *6 * ("",))
     try:
         part = store.read_part(store.parts_folder() / name)
     except BadPart:
-        return ("(damaged: import it again)",)
+        return ("(damaged: import it again)", *6 * ("",))
     return (
         part.family,
         part.source,
@@ -111,49 +107,55 @@ def _row(name: str) -> tuple[str, ...]:
 
 
 def _entry_table(entries: Iterable[Entry]) -> Table:
-    table = _table(
-        ("name", "source", "split"),
-        ("edges mm", "mass g", "hulls", "hull error mm, 95 %", "largest", "volume", "random grasps"),
-    )
+    header = (
+        "name", "source", "split", "edges mm", "mass g", "hulls", "hull error mm, 95 %", "largest", "volume",
+        "random grasps",
+    )  # fmt: skip
+    rows = []
     for entry in entries:
         rating = entry.rating
         low, high = rating.interval if rating else (0.0, 1.0)
-        table.add_row(
-            entry.name,
-            entry.source,
-            entry.split,
-            " x ".join(f"{1e3 * edge:.4g}" for edge in entry.extents[::-1]),
-            f"{1e3 * entry.mass:.3g}",
-            str(entry.n_hulls),
-            f"{1e3 * entry.hull_error_p95:.2f}",
-            f"{1e3 * entry.hull_error:.2f}",
-            f"{100 * entry.hull_volume_ratio - 100:+.1f} %",
-            f"{rating.rate:.0%} ({low:.0%} - {high:.0%})" if rating else "not rated",
+        rows.append(
+            (
+                entry.name,
+                entry.source,
+                entry.split,
+                " x ".join(f"{1e3 * edge:.4g}" for edge in entry.extents[::-1]),
+                f"{1e3 * entry.mass:.3g}",
+                str(entry.n_hulls),
+                f"{1e3 * entry.hull_error_p95:.2f}",
+                f"{1e3 * entry.hull_error:.2f}",
+                f"{100 * entry.hull_volume_ratio - 100:+.1f} %",
+                f"{rating.rate:.0%} ({low:.0%} - {high:.0%})" if rating else "not rated",
+            )
         )
-    return table
+    return Table(header=header, rows=rows)
 
 
 def _family_table(index: Index) -> Table:
-    table = _table(
-        ("family",),
-        ("parts", "longest axis mm", "hulls median", "hull error mm, 95 %", *SPLITS, "random grasps"),
-    )
+    header = (
+        "family", "parts", "longest axis mm", "hulls median", "largest hull error mm, 95 %", *SPLITS,
+        "random grasps",
+    )  # fmt: skip
+    rows = []
     for family in sorted(index.families()):
         entries = [entry for entry in index.parts.values() if entry.family == family]
         length = [1e3 * entry.longest_axis for entry in entries]
         sides = Counter(entry.split for entry in entries)
         rated = [entry.rating for entry in entries if entry.rating is not None]
         rate = sum(r.successes for r in rated) / max(1, sum(r.attempts for r in rated))
-        table.add_row(
-            family,
-            str(len(entries)),
-            f"{min(length):.0f} - {max(length):.0f}",
-            f"{np.median([entry.n_hulls for entry in entries]):.0f}",
-            f"up to {1e3 * max(entry.hull_error_p95 for entry in entries):.2f}",
-            *(str(sides[side]) for side in SPLITS),
-            f"{rate:.0%} ({len(rated)} rated)" if rated else "not rated",
+        rows.append(
+            (
+                family,
+                str(len(entries)),
+                f"{min(length):.0f} - {max(length):.0f}",
+                f"{np.median([entry.n_hulls for entry in entries]):.0f}",
+                f"{1e3 * max(entry.hull_error_p95 for entry in entries):.2f}",
+                *(str(sides[side]) for side in SPLITS),
+                f"{rate:.0%} ({len(rated)} rated)" if rated else "not rated",
+            )
         )
-    return table
+    return Table(header=header, rows=rows)
 
 
 def _print_spread(index: Index) -> None:
@@ -171,19 +173,3 @@ def _print_spread(index: Index) -> None:
         f"largest family: {family}, {most / len(entries):.1%}; thinner than {1e3 * THIN:.0f} mm: "
         f"{thin / len(entries):.1%}; left out: {len(index.left_out)}"
     )
-
-
-def _table(texts: tuple[str, ...], numbers: tuple[str, ...]) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for header in texts:
-        table.add_column(header, no_wrap=header in ("name", "family"))
-    for header in numbers:
-        table.add_column(header, justify="right")
-    return table
-
-
-def _print(table: Table) -> None:
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=160)  # a pipe gets every column in full
-    console.print(table)

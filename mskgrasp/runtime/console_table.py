@@ -1,0 +1,118 @@
+"""Tables of programs, and how they are printed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from rich import box
+from rich.console import Console
+from rich.table import Table as ConsoleTable
+from rich.text import Text
+
+Kind = Literal["number", "word", "prose"]
+_NUMBER = re.compile(r"[+\-−]?\d.*|[-–]?")
+_LONG = 40
+"""Characters; a column with a longer cell is wrapped."""
+_PIPE_WIDTH = 10_000
+"""Characters: wide enough that no table is wrapped in a file."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """A cell that leads to a figure of the same report.
+
+    Attributes:
+        text: Text of the cell.
+        to: Name of the figure.
+    """
+
+    text: str
+    to: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A table.
+
+    Attributes:
+        header: (k,) names of the columns; all empty: no header is shown.
+        rows: Of k cells each: text, numbers, `Link` or None.
+        caption: Shown above it; empty: none.
+        total: The last row sums up the others.
+
+    Raises:
+        ValueError: A row has not as many cells as the header.
+    """
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[object]]
+    caption: str = ""
+    total: bool = False
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.header):
+                raise ValueError(f"a row of {len(row)} cells under a header of {len(self.header)}: {row}")
+
+    def kinds(self) -> list[Kind]:
+        """The kind of each column: numbers (or dashes) throughout, words, or prose that needs wrapping."""
+        return [_kind([cell_text(row[k]) for row in self.rows]) for k in range(len(self.header))]
+
+
+def cell_text(cell: object) -> str:
+    """A cell as plain text; a dash for None."""
+    if isinstance(cell, Link):
+        return cell.text
+    return "–" if cell is None else str(cell)
+
+
+def report_console() -> Console:
+    """A console on standard output, wide where that is no terminal."""
+    console = Console()
+    return console if console.is_terminal else Console(width=_PIPE_WIDTH)
+
+
+def print_table(table: Table, console: Console | None = None) -> None:
+    """Prints one table without its caption; `rich.text.Text` in a cell keeps its style.
+
+    Args:
+        table: The table.
+        console: Where to; None: `report_console`.
+    """
+    console = console or report_console()
+    shown = _console_table(table)
+    if console.is_terminal:
+        console.print(shown)
+        return
+    with console.capture() as capture:
+        console.print(shown)
+    console.print(Text("\n".join(line.rstrip() for line in capture.get().splitlines())), soft_wrap=True)
+
+
+def _console_table(table: Table) -> ConsoleTable:
+    rows = [[cell if isinstance(cell, Text) else Text(cell_text(cell)) for cell in row] for row in table.rows]
+    last = rows.pop() if table.total and rows else None
+    shown = ConsoleTable(
+        box=box.SIMPLE, pad_edge=False, show_edge=False, show_header=any(table.header),
+        show_footer=last is not None,
+    )  # fmt: skip
+    for k, (name, kind) in enumerate(zip(table.header, table.kinds(), strict=True)):
+        shown.add_column(
+            Text(name),
+            last[k] if last is not None else "",
+            justify="right" if kind == "number" else "left",
+            overflow="fold",
+            no_wrap=kind == "number",
+        )
+    for row in rows:
+        shown.add_row(*row)
+    return shown
+
+
+def _kind(cells: Sequence[str]) -> Kind:
+    if any(len(cell) > _LONG for cell in cells):
+        return "prose"
+    return "number" if all(_NUMBER.fullmatch(cell) for cell in cells) else "word"
