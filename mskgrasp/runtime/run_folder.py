@@ -50,7 +50,7 @@ def begin(config: Config, out: Path, inputs: Mapping[str, str], *, may_change: C
         raise UsageError(f"--out {out} holds other files; choose a new folder")
     make_folder(out)
     write_config(config, settings)
-    fingerprint.write_text(json.dumps(dict(inputs), indent=1) + "\n", encoding="utf-8")
+    write_whole(fingerprint, (json.dumps(dict(inputs), indent=1) + "\n").encode())
 
 
 def file_digest(path: Path) -> str:
@@ -94,5 +94,5 @@ def read(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
                 f"{path}: line {i + 1} is not a trial; delete it or choose another --out"
             ) from error
     if lines[-1]:
-        path.write_text("\n".join(lines[:-1]) + ("\n" if len(lines) > 1 else ""), encoding="utf-8")
+        write_whole(path, "".join(f"{line}\n" for line in lines[:-1]).encode())
     return found
