@@ -1,10 +1,12 @@
-"""Which parts a user's words mean, and how some of them are chosen."""
+"""Parts that names, folders and sets select, and how some of many are chosen."""
 
 from __future__ import annotations
 
 import pytest
 
 from mskgrasp.core.errors import UnknownPart
+from mskgrasp.parts import build_part, starter_names
+from mskgrasp.parts.catalogue import entry_of, make_index, read_index, write_index
 from mskgrasp.parts.select_parts import evenly, part_names
 
 TRAINING = {
@@ -34,6 +36,20 @@ def test_sets_are_those_of_the_model_and_share_the_number_of_parts():
     }  # fmt: skip
 
 
-def test_an_unknown_part_is_told():
+def test_an_unknown_part_is_an_error_that_names_a_similar_one():
     with pytest.raises(UnknownPart, match="hex_nut_m30"):
         part_names(("hex_nut_m3x",), TRAINING)
+
+
+def test_a_held_out_set_of_the_catalogue_leaves_out_what_the_model_was_trained_on():
+    names = ("hex_bolt_m12x60", "hex_nut_m20", "washer_m36")  # two of the side "test", one of "train"
+    for name in names:
+        build_part(name)
+    write_index(make_index([entry_of(name) for name in names], {}, read_index()))
+    assert part_names(("test",), {}) == ["hex_bolt_m12x60", "hex_nut_m20"]
+    assert part_names(("test",), {"training_parts": ["hex_nut_m20"]}) == ["hex_bolt_m12x60"]
+    assert part_names(("train",), {}) == ["washer_m36"]
+
+
+def test_all_is_the_starter_set_and_a_part_named_twice_counts_once():
+    assert part_names(("all", "washer_m36"), {}, 0) == list(starter_names())
