@@ -10,7 +10,7 @@ import tyro
 
 from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts import store
-from mskgrasp.parts.builtin import builtin_names, recipe_of, starter_names
+from mskgrasp.parts.builtin import builtin_names, recipe_hash, recipe_of, starter_names
 from mskgrasp.parts.catalogue import Index, make_index, read_index, write_index
 from mskgrasp.parts.commands.build_parts import BuildResult, build_parts
 from mskgrasp.parts.recipes import cad
@@ -54,9 +54,7 @@ def run_build(command: Build) -> int:
         _build(names, before, command.workers or os.cpu_count() or 1, found)
     finally:
         if command.catalogue and found:
-            # The parts of a build that was stopped are kept in the index.
-            index = _catalogue(found, before)
-            write_index(index)
+            write_index(_catalogue(names, found, before))
     fresh = [built for built in found.values() if built.seconds and built.entry is not None]
     refused = [built for built in found.values() if built.entry is None]
     print(
@@ -64,7 +62,7 @@ def run_build(command: Build) -> int:
         f"({time.monotonic() - started:.0f} s), in {store.parts_folder()}"
     )
     if command.catalogue:
-        _print_summary(_catalogue(found, before))
+        _print_summary(_catalogue(names, found, before))
     elif refused:
         raise BadPart("; ".join(f"{built.name}: {built.reason}" for built in refused))
     return 0
@@ -82,9 +80,18 @@ def _build(names: tuple[str, ...], before: Index, workers: int, found: dict[str,
             events.close()
 
 
-def _catalogue(found: dict[str, BuildResult], before: Index) -> Index:
+def _catalogue(names: tuple[str, ...], found: dict[str, BuildResult], before: Index) -> Index:
+    """The index of the results so far; parts that a stopped build did not reach stay as they were."""
     entries = [built.entry for built in found.values() if built.entry is not None]
     failures = {name: built.reason for name, built in found.items() if built.entry is None}
+    for name in names:
+        if name in found:
+            continue
+        old = before.left_out.get(name)
+        if name in before.parts:
+            entries.append(before.parts[name])
+        elif old is not None and old.recipe_hash == recipe_hash(name):
+            failures[name] = old.reason
     return make_index(entries, failures, before)
 
 

@@ -10,8 +10,17 @@ from pathlib import Path
 import pytest
 
 from mskgrasp.core.errors import MskgraspError
-from mskgrasp.parts import read_part, starter_names
-from mskgrasp.parts.catalogue import Index, make_index, read_index, write_index
+from mskgrasp.parts import build_part, read_part, starter_names
+from mskgrasp.parts.catalogue import (
+    Index,
+    Rating,
+    entry_of,
+    make_index,
+    read_index,
+    with_ratings,
+    write_index,
+)
+from mskgrasp.parts.commands import build as build_command
 from mskgrasp.parts.commands.build_parts import build_parts
 from mskgrasp.parts.commands.command_line import main
 
@@ -53,6 +62,27 @@ def test_mistakes_are_told_in_one_line(arguments, exit_code):
     with pytest.raises(MskgraspError) as caught:
         main(arguments)
     assert caught.value.exit_code == exit_code and "\n" not in str(caught.value)
+
+
+def test_a_build_of_the_catalogue_that_is_stopped_keeps_the_rest_of_the_index(monkeypatch):
+    for name in NAMES:
+        build_part(name)
+    index = make_index([entry_of(name) for name in NAMES], {}, EMPTY)
+    washer = index.parts["washer_m36"]
+    rating = Rating(
+        attempts=9, successes=3, interval=(0.1, 0.6), part_hash=washer.content_hash, dataset="data"
+    )
+    write_index(with_ratings(index, {washer.name: rating}))
+
+    def stopped_after_one(names, before, workers):
+        yield next(build_parts(["hex_nut_m20"], before, workers))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(build_command, "build_parts", stopped_after_one)
+    with pytest.raises(KeyboardInterrupt):
+        main(["build", "--catalogue"])
+    assert set(read_index().parts) == set(NAMES)
+    assert read_index().parts["washer_m36"].rating == rating
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
