@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -18,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mskgrasp.core.errors import BadPart
+from mskgrasp.core.files import write_whole
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import builtin_names, recipe_hash, starter_names, unknown_part
 
@@ -160,15 +160,7 @@ def write_index(index: Index) -> None:
     }
     path = index_path()
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    try:
-        with open(temporary, "w", encoding="utf-8") as file:
-            json.dump(record, file, indent=1, sort_keys=True)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, json.dumps(record, indent=1, sort_keys=True).encode())
 
 
 def entry_of(name: str) -> Entry:
