@@ -11,8 +11,6 @@ import numpy as np
 import torch
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Rectangle
 
@@ -26,6 +24,7 @@ from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.reports.style import saved_figure
 
 _PAD_WIDTH, _PAD_THICKNESS = 0.020, 0.008  # drawn size of a finger pad seen from above, metres
+_FEW = 6  # grasps of the best scores drawn besides the chosen one
 _MM = 1e3
 
 
@@ -122,7 +121,7 @@ def _ellipse(axes: Axes, centre: np.ndarray, covariance: np.ndarray, n_sigma: fl
 def draw_plan(
     frame: RgbdFrame, plan: GraspPlan, path: Path, *, measured: np.ndarray | None = None, note: str = ""
 ) -> None:
-    """Draws a plan: candidates by quality over the part, and the chosen grasp with the expected shift.
+    """Draws a plan: the part, candidates by quality, the best few, the chosen grasp and the expected shift.
 
     Left, the base frame from above, right, the grasp frame; both in millimetres and to scale.
 
@@ -166,25 +165,43 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     square = np.array([*view.centre_base[:2], view.table_z + view.size[2], 0.0])
     heights = _from_above(frame.depth, frame.intrinsics, frame.T_base_camera, view.table_z, square, side)
     _show_heights(axes, heights, view.centre_base[:2], side, float(view.size[2]) * _MM)
+    _outline(axes, heights, view.centre_base[:2] * _MM, side)
     order = np.argsort(plan.qualities)
     grasps = plan.candidates[order]
-    closing = 0.0035 * np.stack([-np.sin(grasps[:, 3]), np.cos(grasps[:, 3])], axis=-1)
-    ends = np.stack([grasps[:, :2] - closing, grasps[:, :2] + closing], axis=1) * _MM
-    lines = LineCollection(list(ends), cmap="viridis", linewidths=0.9, zorder=4)
-    lines.set_array(plan.qualities[order])
-    # Candidates of low quality must not hide the part.
-    lines.set_alpha(list(0.15 + 0.75 * plan.qualities[order].clip(0.0, 1.0)))
-    lines.set_clim(0.0, 1.0)
-    axes.add_collection(lines)
-    opaque = ScalarMappable(norm=Normalize(0.0, 1.0), cmap="viridis")
-    bar = figure.colorbar(opaque, ax=axes, shrink=0.8, pad=0.02)
-    bar.set_label("predicted quality")
+    dots = axes.scatter(
+        *(grasps[:, :2] * _MM).T,
+        c=plan.qualities[order],
+        s=2.5,
+        lw=0,
+        alpha=0.4,
+        vmin=0.0,
+        vmax=1.0,
+        zorder=4,
+    )
+    bar = figure.colorbar(ScalarMappable(dots.norm, dots.cmap), ax=axes, shrink=0.8, pad=0.02)
+    bar.set_label("predicted quality of a candidate")
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
-    best = plan.candidates[plan.shortlist]
-    axes.plot(*(best[:, :2] * _MM).T, "o", ms=3.2, mfc="none", mec=INK, mew=0.6, zorder=5, label="shortlist")
+    # Without predicted variances all scores are NaN: the order by quality remains.
+    few = plan.candidates[plan.shortlist[np.argsort(plan.shortlist_scores, kind="stable")[:_FEW]]]
+    for x, y, _, theta in few:
+        _closing_line(axes, np.array([x, y]) * _MM, theta)
+    axes.plot([], [], color=BLUE, lw=1.0, alpha=0.6, marker="|", label=f"{len(few)} of best score")
     _jaw(axes, plan.grasp.position, float(plan.grasp.theta))
+    axes.plot([], [], color=BLUE, lw=1.4, ls=(0, (4, 2)), marker="s", label="chosen grasp")
     axes.legend(loc="lower left", fontsize=8)
     axes.set(xlabel="base x, mm", ylabel="base y, mm", title=f"{len(plan.candidates)} candidates")
+
+
+def _closing_line(axes: Axes, origin: np.ndarray, theta: float) -> None:
+    """The line along which an open hand closes, with a short mark at each pad (mm)."""
+    closing = MAX_OPENING / 2 * _MM * np.array([-np.sin(theta), np.cos(theta)])
+    along = _PAD_WIDTH / 4 * _MM * np.array([np.cos(theta), np.sin(theta)])
+    for start, end in (
+        (-closing, closing),
+        (closing - along, closing + along),
+        (-closing - along, along - closing),
+    ):
+        axes.plot(*np.stack([origin + start, origin + end]).T, color=BLUE, lw=1.0, alpha=0.6, zorder=5)
 
 
 def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.ndarray | None) -> None:
@@ -227,6 +244,20 @@ def _draw_shift(axes: Axes, start: np.ndarray, shift: np.ndarray, covariance: np
     _arrow(axes, start, shift)
 
 
+def _outline(
+    axes: Axes, heights: np.ndarray, origin: np.ndarray, side: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[float]]:
+    """Draws the part's outline; returns x and y (mm), the height of each pixel and the outline's height."""
+    n = heights.shape[0]
+    pixel = (np.arange(n) - (n - 1) / 2) * (side * _MM / n)
+    x, y = np.meshgrid(origin[0] + pixel, origin[1] - pixel)
+    # A camera pixel is several of these: without the blur the outline shows its stairs.
+    smooth = cv2.GaussianBlur(heights, (0, 0), 0.0015 / (side / n))
+    level = [0.5 * max(float(heights.max()), 0.1)]
+    axes.contour(x, y, smooth, levels=level, colors=[INK], linewidths=0.9, zorder=5)
+    return x, y, smooth, level
+
+
 def _outlines(
     axes: Axes,
     heights: np.ndarray,
@@ -238,17 +269,11 @@ def _outlines(
     colour: str = ORANGE,
 ) -> None:
     """The part's outline, and dashed the displaced outline, turned about its centre and shifted (mm)."""
-    n = heights.shape[0]
-    pixel = (np.arange(n) - (n - 1) / 2) * (side * _MM / n)
-    x, y = np.meshgrid(origin[0] + pixel, origin[1] - pixel)
-    # A camera pixel is several of these: without the blur the outline shows its stairs.
-    smooth = cv2.GaussianBlur(heights, (0, 0), 0.0015 / (side / n))
-    level = [0.5 * max(float(heights.max()), 0.1)]
+    x, y, smooth, level = _outline(axes, heights, origin, side)
     cos, sin = np.cos(turn), np.sin(turn)
     dx, dy = x - centre[0], y - centre[1]
     moved_x = centre[0] + shift[0] + cos * dx - sin * dy
     moved_y = centre[1] + shift[1] + sin * dx + cos * dy
-    axes.contour(x, y, smooth, levels=level, colors=[INK], linewidths=0.9, zorder=5)
     axes.contour(
         moved_x, moved_y, smooth, levels=level, colors=[colour], linewidths=1.3, linestyles="--", zorder=6
     )
