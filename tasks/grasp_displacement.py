@@ -47,7 +47,7 @@ class GraspDisplacementEnv(BaseEnv):
     close, lift, hold. The other control modes of the Panda (joint and end-effector) work as usual.
 
     **Randomizations:**
-    - the part: one for each sub-scene, given by ``parts`` or drawn from the built-in ones
+    - the part: one for each sub-scene, given by ``parts`` or drawn from the starter set
     - its resting pose, by the poses' probabilities
     - its place, uniform in a 24 x 24 cm region, and its turn about the vertical
     - where ``noise`` asks for it: errors of arm, gripper force, friction and camera (`core.settings`)
@@ -90,7 +90,7 @@ class GraspDisplacementEnv(BaseEnv):
 
         Args:
             *args: Passed to ManiSkill.
-            parts: Names or folders of parts, dealt out over the sub-scenes; drawn when None.
+            parts: Names or folders of parts, for the sub-scenes in turn; None: drawn from the starter set.
             physics: Overrides of `mskgrasp.core.settings.Physics`.
             camera: Overrides of `mskgrasp.core.settings.Overhead`.
             noise: Overrides of `mskgrasp.core.settings.ExecutionNoise`, all of which is off.
@@ -100,7 +100,7 @@ class GraspDisplacementEnv(BaseEnv):
             **kwargs: Passed to ManiSkill.
 
         Raises:
-            BadConfig: An override is not valid, or asks for what cannot be varied.
+            BadConfig: An override is not valid, or its noise cannot be simulated.
             BadPart: A part is unknown or damaged.
         """
         if robot_uids != "panda_grasp":
@@ -124,7 +124,9 @@ class GraspDisplacementEnv(BaseEnv):
     def _check_noise(self, num_envs: int) -> None:
         noise, part = self.noise, self.physics.friction_pad_part
         low = noise.friction_pad_part[0] if noise.friction_pad_part else part
-        if low < part / 2:  # PhysX averages: pads without any friction leave half of the part's
+        if (
+            low < part / 2
+        ):  # PhysX averages both coefficients: without any on the pads half of the part's is left
             raise BadConfig(
                 f"noise: friction_pad_part from {low:g} on needs physics.friction_pad_part <= {2 * low:g}"
             )
@@ -155,7 +157,7 @@ class GraspDisplacementEnv(BaseEnv):
         x_min, x_max, y_min, y_max = self.region
         return (x_min + x_max) / 2, (y_min + y_max) / 2
 
-    # ------------------------------------------------------------------ building
+    # ------------------------------------------------------------------ scene and episode
 
     def _load_agent(self, options: dict, *_: Any, **__: Any) -> None:
         super()._load_agent(options, sapien.Pose(p=BASE_IN_WORLD))
@@ -189,7 +191,7 @@ class GraspDisplacementEnv(BaseEnv):
         builder.build_static(name="table")
 
     def _after_reconfigure(self, options: dict) -> None:
-        self._laid_z = torch.zeros(self.num_envs, device=self.device)
+        self._resting_z = torch.zeros(self.num_envs, device=self.device)
         self._errors: list[ExecutionError | None] = [None] * self.num_envs
         if self.scene.can_render():
             without_reflection_table(self._overhead_sensor)
@@ -213,7 +215,7 @@ class GraspDisplacementEnv(BaseEnv):
             ]
             given = np.stack(rows)
         pose = torch.as_tensor(np.asarray(given), dtype=torch.float32, device=self.device).reshape(-1, 7)
-        self._laid_z[env_idx] = pose[:, 2]
+        self._resting_z[env_idx] = pose[:, 2]
         self.part.set_pose(ManiSkillPose.create_from_pq(to_world(pose[:, :3]), pose[:, 3:]))
         if len(env_idx) == self.num_envs and self.agent.control_mode == "grasp":
             # This mode's controller sets no targets: the drives would pull towards the last attempt.
@@ -223,7 +225,7 @@ class GraspDisplacementEnv(BaseEnv):
         if self.noise != _EXACT:
             for i in env_idx.tolist():
                 self._errors[i] = self.noise.draw(self._batched_episode_rng[i])
-            self._apply(self._errors[0])
+            self._apply_error(self._errors[0])
 
     def begin_episode(self, seed: int) -> None:
         """Begins the episode of ``reset(seed=seed)`` for `try_grasp`, without its other work.
@@ -232,7 +234,7 @@ class GraspDisplacementEnv(BaseEnv):
         the other control modes are not reset, nor is torch's generator seeded: nothing here is drawn from it.
         """
         everywhere = torch.arange(self.num_envs, device=self.device)
-        if self.num_envs == 1:  # the generator that there is: a new one takes half as long as a step
+        if self.num_envs == 1:  # reseeds the generator: a new one takes half as long as a step
             self._episode_seed = np.array([seed])
             self._batched_episode_rng.rngs[0].seed(seed)
         else:
@@ -244,8 +246,8 @@ class GraspDisplacementEnv(BaseEnv):
             self.scene.px.gpu_update_articulation_kinematics()
             self.scene._gpu_fetch_all()
 
-    def _apply(self, error: ExecutionError | None) -> None:
-        """Makes gripper, pads and camera those of an attempt; where they vary there is one sub-scene."""
+    def _apply_error(self, error: ExecutionError | None) -> None:
+        """Sets gripper force, pad friction and camera pose to those of an attempt, in a single sub-scene."""
         if error is None:
             return
         if error.finger_force is not None:
@@ -256,25 +258,25 @@ class GraspDisplacementEnv(BaseEnv):
             true = error.true_camera(self.T_base_camera)
             self._overhead_sensor.camera._render_cameras[0].set_local_pose(sapien_camera_pose(true))
 
-    # ------------------------------------------------------------------ looking
+    # ------------------------------------------------------------------ images and poses
 
     def capture_depth(self) -> Tensor:
         """(n, h, w) float32 depth in metres from the overhead camera, the robot left out of the picture."""
-        return self._look("depth", with_robot=False)["depth"][..., 0]
+        return self._render_overhead("depth", with_robot=False)["depth"][..., 0]
 
     def capture_rgbd(self, *, with_robot: bool = False) -> tuple[Tensor, Tensor]:
         """Colour (n, h, w, 3) uint8 and depth (n, h, w) float32 metres from the overhead camera."""
-        seen = self._look("rgb", "depth", with_robot=with_robot)
-        return seen["rgb"], seen["depth"][..., 0]
+        images = self._render_overhead("rgb", "depth", with_robot=with_robot)
+        return images["rgb"], images["depth"][..., 0]
 
-    def _look(self, *what: str, with_robot: bool) -> dict[str, Tensor]:
+    def _render_overhead(self, *textures: str, with_robot: bool) -> dict[str, Tensor]:
         self.agent.show(with_robot)
         try:
             self.scene.update_render(update_sensors=True, update_human_render_cameras=False)
             sensor = self._overhead_sensor
             sensor.capture()
             return sensor.get_obs(
-                rgb="rgb" in what, depth="depth" in what, position=False, segmentation=False
+                rgb="rgb" in textures, depth="depth" in textures, position=False, segmentation=False
             )
         finally:
             self.agent.show(True)
@@ -293,7 +295,7 @@ class GraspDisplacementEnv(BaseEnv):
         """Measured ``T_base_tcp``: positions (n, 3), quaternions (n, 4)."""
         return base_pose(self.agent.tcp)
 
-    # ------------------------------------------------------------------ stepping
+    # ------------------------------------------------------------------ attempts
 
     def try_grasp(self, grasp: Tensor) -> dict[str, Tensor]:
         """One whole attempt in every sub-scene; see `tasks.attempt.attempt.Attempt.run`.
@@ -319,13 +321,13 @@ class GraspDisplacementEnv(BaseEnv):
         self._outcome = self.try_grasp(grasp)
         return grasp
 
-    # ------------------------------------------------------------------ ManiSkill's questions
+    # ------------------------------------------------------------------ outcome
 
     def evaluate(self) -> dict[str, Tensor]:
         """Outcome of the last attempt; in the other control modes, whether the part is held aloft now."""
         if self._outcome is not None:
             return dict(self._outcome, fail=~self._outcome["success"])
-        risen = self.part.pose.p[:, 2] - self._laid_z
+        risen = self.part.pose.p[:, 2] - self._resting_z
         held = torch.as_tensor(self.attempt.grip()[0])
         aloft = risen >= MIN_RISE * self.physics.lift_height
         return dict(success=held & aloft)

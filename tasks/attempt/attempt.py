@@ -34,7 +34,7 @@ from tasks.scene.frames import own_pose
 
 SPEED_WINDOW_S = 0.02
 """The last part of the hold, over which the part's speed in the hand is measured, s."""
-AFTERMATH_S = 0.3
+REST_TIMEOUT_S = 0.3
 """Time a part that was not lifted has to fall, roll and come to rest before it is judged, s."""
 REST_WINDOW_S = 0.06
 """A part that has not moved for this time is at rest, s."""
@@ -48,8 +48,8 @@ REFLEX_S = 0.008
 """Time between two checks of the force on a descending hand, s."""
 ARRIVAL_S = 0.024
 """Time a hand has to come to rest after its descent, s."""
-LEFT_BEHIND = 0.02
-"""A hand farther from the part than a success allows by this has lost it, m."""
+LOST_MARGIN = 0.02
+"""A part is lost where it is lower in the hand than a success allows by more than this, m."""
 
 
 class Attempt:
@@ -60,7 +60,7 @@ class Attempt:
         part: The part of each.
         hulls: For each sub-scene the corners (k, 3) of each hull of its part, obj frame, metres.
         motion: Moves arm and fingers.
-        contacts: What touches the hand.
+        contacts: Forces on the hand and overlap with the part.
         physics: Speeds, forces and times of the attempt.
     """
 
@@ -101,8 +101,8 @@ class Attempt:
         Raises:
             ValueError: A grasp is too low or out of the arm's reach.
         """
-        wanted = self._arrays.of(commanded)
-        outcome = self._run(wanted, wanted if executed is None else self._arrays.of(executed))
+        target = self._arrays.of(commanded)
+        outcome = self._run(target, target if executed is None else self._arrays.of(executed))
         return {name: torch.as_tensor(values) for name, values in outcome.items()}
 
     def _run(self, commanded: Array, grasp: Array) -> dict[str, Array]:
@@ -112,15 +112,15 @@ class Attempt:
         check_grasps(xp.concat([grasp, start, lifted]))
         began = motion.seconds
         empty = free & (reach == 0)
-        # Fingers that would close through free air, with room for their run-up, begin near the part.
+        # Where their run-up has room, fingers begin near the part instead of closing through free air.
         room = max(self._run_up, AHEAD + physics.finger_speed / motion.rate_hz)
         running = free & ~empty & (reach + room <= MAX_OPENING / 2)
-        width = xp.where(running, 2 * self._beginning(reach), xp.full_like(reach, MAX_OPENING))
+        width = xp.where(running, 2 * self._finger_start(reach), xp.full_like(reach, MAX_OPENING))
         down = None if bool(free.all()) else self._line(start, grasp, physics.descend_speed)
         motion.place(top_down(_double(grasp))[0] if down is None else down[0], width)
         self._speed.start(motion.seconds)
         placed = self._part_pose()
-        # Finely: a part lies some micrometres deep in the table, and how many depends on the step.
+        # At the fine rate: a part sinks some micrometres into the table, depending on the step.
         motion.step(motion.n_steps(physics.settle_s))
         rest = self._part_pose()
         settled = at_rest(placed, rest)
@@ -147,11 +147,11 @@ class Attempt:
         if bool(alive.any()):
             apart = collided | empty
 
-            def all_met() -> bool:
+            def all_closed() -> bool:
                 return bool((apart | (motion.gap() <= MIN_GAP)).all())
 
             motion.run_fingers(running & ~apart)
-            motion.move_fingers(-MAX_OPENING / 2, frozen=apart, check=all_met)
+            motion.move_fingers(-MAX_OPENING / 2, frozen=apart, check=all_closed)
             held, penetration = self.grip()
         carried = bool((alive & held).any())
         if carried:
@@ -169,13 +169,13 @@ class Attempt:
         return own_pose(self._agent.tcp, self._arrays)
 
     def _approach(self, grasp: Array) -> tuple[Array, Array, Array]:
-        """Where the descent begins (n, 4), whether it is free (n,), and the reach of the part.
+        """Start of the descent and clearance of the open hand.
 
         Returns:
-            start: The grasp itself where the hand can be put there; else over it, pads clear of the part's
-                top by the approach clearance.
-            free: (n,) bool.
-            reach: (n,) greatest distance from the middle of what stands between the pads, m.
+            start: (n, 4) the grasp itself where the hand can be placed there; else above it, the pads by the
+                approach clearance over the part's top.
+            free: (n,) bool, the hand can be placed at the grasp.
+            reach: (n,) greatest distance of the part between the pads from the middle, m; 0 without a part.
         """
         above, free, reach = [], [], []
         grasps = self._arrays.numpy(grasp)
@@ -194,38 +194,45 @@ class Attempt:
         start = _raised(grasp, own(np.array(above, np.float32)))
         return start, own(np.array(free)), own(np.array(reach, np.float32))
 
-    def _beginning(self, reach: Array) -> Array:
-        """(n,) where fingers with only air before them begin, from the middle, m.
+    def _finger_start(self, reach: Array) -> Array:
+        """(n,) distance from the middle at which fingers in free air begin to close, m.
 
-        A place that they would have been at after a step of the whole ramp: then they meet the part at the
-        same moment of a step as fingers that have come all the way.
+        It is one that a ramp from the open hand reaches at the end of a step, so that the fingers meet the
+        part at the same instant within a step as after the whole ramp.
         """
         step = self._physics.finger_speed / self._motion.rate_hz
         first = MAX_OPENING / 2 + finger_lag(self._physics)
         return first - self._arrays.xp.floor((first - reach - AHEAD) / step) * step
 
     def _wait_for_rest(self) -> None:
-        """Lets parts that were not lifted fall and roll: in flight, the moment would decide."""
+        """Waits until parts that were not lifted are at rest: the pose of a falling part is arbitrary."""
         motion = self._motion
         before = self._part_pose()
-        for _ in range(round(AFTERMATH_S / REST_WINDOW_S)):
+        for _ in range(round(REST_TIMEOUT_S / REST_WINDOW_S)):
             motion.step(motion.n_steps(REST_WINDOW_S))
             now = self._part_pose()
             if bool(at_rest(before, now).all()):
                 return
             before = now
 
-    def _lift(self, grasp: Array, lifted: Array, alive: Array, stay: Array) -> tuple[bool, Array]:
-        """Lifts and holds; False where nothing was left to hold, and (n,) the deepest overlap seen, m.
+    def _lift(self, grasp: Array, lifted: Array, alive: Array, stopped: Array) -> tuple[bool, Array]:
+        """Lifts and holds.
 
-        Arms that stay (n,) may have been stopped on their way down.
+        Args:
+            grasp: (n, 4) where the fingers closed.
+            lifted: (n, 4) the same, at the end of the lift.
+            alive: (n,) bool, hands that hold a part.
+            stopped: (n,) bool, arms that do not move: a reflex may have ended their descent.
+
+        Returns:
+            Whether any part is still held, and (n,) the deepest overlap seen, m.
         """
         motion, physics, xp = self._motion, self._physics, self._arrays.xp
 
         def behind() -> Array:
             return self._hand_pose().position[:, 2] - self._part_pose().position[:, 2]
 
-        most_behind = behind() + (1 - MIN_RISE) * physics.lift_height + LEFT_BEHIND
+        most_behind = behind() + (1 - MIN_RISE) * physics.lift_height + LOST_MARGIN
         deepest = self._arrays.full(motion.n, 0.0)
 
         def all_lost(_: int) -> bool:
@@ -235,16 +242,16 @@ class Attempt:
             return bool(lost.all())
 
         def rise(times: np.ndarray) -> bool:
-            up = self._way(grasp, lifted, times)
-            return motion.follow(up, check=all_lost, check_every=motion.n_steps(0.05), frozen=stay)
+            up = self._line_at(grasp, lifted, times)
+            return motion.follow(up, check=all_lost, check_every=motion.n_steps(0.05), frozen=stopped)
 
         seconds = minimum_jerk_duration(physics.lift_height, physics.lift_speed, PEAK_ACCELERATION)
         times = _moments(motion.n_steps(seconds))
         times = times[: 1 + int(np.searchsorted(physics.lift_height * minimum_jerk(times), TAKE_OFF))]
         if not rise(times):
             return False, deepest
-        # What the fingers and the table do to the part is done: the rest needs no such fine steps. The last
-        # measurement does: a part trembles between the pads, and more in coarse steps.
+        # Off the table coarse steps suffice, but not for the last measurement: with them a part trembles more
+        # between the pads.
         with motion.coarsely():
             rest = 1 - times[-1]
             if rest > 0 and not rise(times[-1] + rest * _moments(motion.n_steps(rest * seconds))):
@@ -321,9 +328,9 @@ class Attempt:
         start, goal = self._arrays.of(start), self._arrays.of(goal)
         distance = float(_length((goal - start)[:, :3]).max())
         n_steps = self._motion.n_steps(minimum_jerk_duration(distance, speed, PEAK_ACCELERATION))
-        return self._way(start, goal, _moments(n_steps))
+        return self._line_at(start, goal, _moments(n_steps))
 
-    def _way(self, start: Array, goal: Array, times: np.ndarray) -> Array:
+    def _line_at(self, start: Array, goal: Array, times: np.ndarray) -> Array:
         """(steps, n, 7) joints at times of a straight line between grasps, as shares of its duration."""
         share = self._arrays.of(minimum_jerk(times))[:, None, None]
         start, goal = _double(start), _double(goal)
@@ -356,7 +363,7 @@ def check_grasps(grasp: Array) -> None:
 
 
 def _spans(hulls: list[np.ndarray]) -> list[slice]:
-    """Where each hull's corners are among all of them."""
+    """The rows of each hull among the corners of all."""
     ends = np.cumsum([len(hull) for hull in hulls]).tolist()
     return [slice(start, end) for start, end in pairwise([0, *ends])]
 

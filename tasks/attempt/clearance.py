@@ -1,7 +1,8 @@
 """Clearance between the open hand and a part: motions in free air need no simulation.
 
-A descent beside which nothing stands, and the first way of fingers that close through air, change nothing
-but the time that they take. Both are read off the part's hulls: exact seen from above, careful in height.
+A descent beside the part and the first stretch of closing fingers change nothing where they meet nothing, so
+that they need not be simulated. Both follow from the part's hulls, exactly in the plane and
+conservatively in height.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ class Clearance:
 
     Attributes:
         free: The open hand can be placed at the grasp without a descent.
-        reach: Greatest distance from the middle of what stands between the pads, m; 0 where nothing does.
+        reach: Greatest distance of the part between the pads from the middle, m; 0 without a part there.
             Valid only if ``free``.
     """
 

@@ -20,7 +20,7 @@ MAX_SPEED = 3.0
 MAX_DRIFT = 1e-3
 """A part that moves more than this on the table before it is grasped was not at rest, m."""
 MAX_TURN = 0.02
-"""Nor was one that turns by more than this, rad."""
+"""The same for a turn, rad."""
 
 CODE = {name: i for i, name in enumerate(FAILURES)}
 
@@ -60,7 +60,9 @@ def judge(seen: Observed) -> tuple[Array, Array]:
         failure: (n,) uint8, index into `mskgrasp.core.grasp.FAILURES`; the earliest reason wins.
     """
     holds = seen.pads_touch & (seen.gap > MIN_GAP) & (seen.rise >= MIN_RISE)
-    overlap = seen.penetration > MAX_PENETRATION  # NaN compares false: unknown is no evidence
+    overlap = (
+        seen.penetration > MAX_PENETRATION
+    )  # NaN compares false: an unknown penetration is not counted as one
     steady = (seen.relative_speed < MAX_RELATIVE_SPEED) & ~overlap
     success = seen.settled & ~seen.collided & seen.held_closed & holds & steady
     xp = array_namespace(seen.gap)

@@ -19,8 +19,8 @@ from tasks.scene.arrays import arrays_for
 class HandContacts:
     """Contacts of the last simulation step.
 
-    On the CPU one pass over PhysX's contact report serves every question. On the GPU PhysX reports
-    forces alone, so penetration is unknown there (NaN).
+    On the CPU forces and penetration follow from PhysX's contact report. On the GPU PhysX reports forces
+    alone, so that penetration is unknown (NaN).
     """
 
     def __init__(self, scene: ManiSkillScene, agent: GraspPanda, part: Actor):
@@ -45,7 +45,8 @@ class HandContacts:
     def outer_force(self) -> Array:
         """(n,) net contact force of all else on the hand and, while it touches it, the part together, N.
 
-        The grip cancels so. On the hand alone it would not: PhysX reports no friction on the CPU.
+        The forces of the grip cancel in this sum. They would not on the hand alone: on the CPU PhysX reports
+        no friction.
         """
         if self._gpu:
             hand = self._agent.robot.get_net_contact_forces(HAND_LINKS).sum(dim=-2)

@@ -21,14 +21,14 @@ from tasks.robot.panda import GraspPanda
 from tasks.scene.arrays import arrays_for
 
 STILL_FINGER = 2e-3
-"""A finger slower than this, m/s, has met what it holds. Speeds are differences of positions: PhysX's
+"""A finger slower than this, m/s, has stopped. Speeds are differences of positions: PhysX's
 TGS solver reports the velocity of a pressed joint with the drive's impulse still in it."""
 STILL_S = 0.03
 """Fingers that did not move for this long have closed, s."""
 PEAK_ACCELERATION = 1.5
 """Of the hand on straight lines, m/s^2: the drives then overshoot by less than 0.4 mm."""
 FINGER_TIMEOUT_S = 0.5
-"""Fingers that never come to rest (the part slides through them) stop being waited for after this, s."""
+"""Time for which fingers that do not come to rest (the part slides through them) are waited for, s."""
 FINGER_MASS = 0.015
 """Of a finger of the Panda without its motor, kg."""
 CHECK_S = 0.02
@@ -70,7 +70,7 @@ class PandaMotion:
         self._coarse_hz = coarse_hz
         self.gpu = scene.gpu_sim_enabled
         self.arrays = arrays_for(scene)
-        """The kind that all methods return, and compute with; they take either."""
+        """Kind of array that all methods compute with and return; they take either kind."""
         self.n = scene.num_envs
         self._articulation = agent.robot._objs[0]
         self._arm_drives = [joint._objs[0] for joint in agent.arm_joints]
@@ -161,7 +161,7 @@ class PandaMotion:
             self._drive_fingers(float(self.finger_target[0]))
 
     def run_fingers(self, hands: Array) -> None:
-        """Makes the fingers of some hands (n,) close as they would long after a ramp began.
+        """Gives the fingers of some hands (n,) the stationary speed and lag of a ramp.
 
         A step has one target, which pulls a finger through its first half and brakes it through the second:
         where steps meet it is slower than in the mean, by the mean over a step of what the pull has added.

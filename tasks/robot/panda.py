@@ -143,11 +143,11 @@ class GraspPanda(Panda):
 
     def show(self, visible: bool) -> None:
         """Shows or hides the robot in rendered images; the overhead image is taken before the arm enters."""
-        for body in self._seen:
+        for body in self._render_bodies:
             body.visibility = 1.0 if visible else 0.0
 
     @cached_property
-    def _seen(self) -> list[sapien.render.RenderBodyComponent]:
+    def _render_bodies(self) -> list[sapien.render.RenderBodyComponent]:
         entities = [one.entity for link in self.robot.links for one in link._objs]
         found = [one.find_component_by_type(sapien.render.RenderBodyComponent) for one in entities]
         return [body for body in found if isinstance(body, sapien.render.RenderBodyComponent)]

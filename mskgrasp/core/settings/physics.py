@@ -1,6 +1,6 @@
 """Physics settings of the simulated cell.
 
-The reason for a default stands beside it; the measurements are in docs/physics.md.
+The reason for a default stands beside it; the measurements are in docs/results/physics_settings.md.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ class Physics(Config):
 
     @model_validator(mode="before")
     @classmethod
-    def _no_coarser_than_told(cls, values: Any) -> Any:
-        # Lowering rate_hz alone is legal.
+    def _coarse_rate_follows(cls, values: Any) -> Any:
+        # rate_hz may be lowered alone; coarse_rate_hz is then lowered with it.
         if isinstance(values, dict) and "coarse_rate_hz" not in values:
             rate, usual = values.get("rate_hz"), cls.model_fields["coarse_rate_hz"].default
             if isinstance(rate, int) and rate < usual:

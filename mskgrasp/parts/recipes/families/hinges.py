@@ -1,4 +1,4 @@
-"""Hinges at several angles, weld-on hinges, and parts that hold or clamp workpieces."""
+"""Hinges: butt hinges at several angles, block, strap, weld-on and corner hinges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Heads and joints of rods: fork heads, rod ends, angle joints; connecting rods, levers and cranks."""
+"""Heads and joints of rods: fork heads, rod ends, angle joints; connecting rods and levers."""
 
 from __future__ import annotations
 

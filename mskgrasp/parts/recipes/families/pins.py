@@ -44,7 +44,7 @@ ISO_2341_B_LENGTHS = {12: (75,), 16: (60, 100), 20: (90,), 22: (60, 120), 24: (8
 
 
 def recipes() -> Iterator[Recipe]:
-    """The built-in keys, pins and the first of the shafts."""
+    """The built-in keys, pins and stepped shafts."""
     row = table_row("din6885_parallel_key.csv", b_mm=16) | {"l_mm": 56.0}
     yield one(row, "parallel_key_a{b}x{h}x{l}", key_form_a, source="DIN 6885-1 form A", family="parallel_key")
     row = table_row("din6885_parallel_key.csv", b_mm=20) | {"l_mm": 80.0}

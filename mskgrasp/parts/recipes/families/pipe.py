@@ -118,7 +118,7 @@ def _tee(leg: h.Shape, branch: h.Shape, bore: float) -> h.Shape:
 def _elbow(first: h.Shape, second: h.Shape, bend: float, radius: float, bore: float) -> h.Shape:
     """Two legs along z, given from z = 0, led along x and against the bend; a sphere rounds the corner.
 
-    The hulls meet on the mitre plane, and a plane stands for the sphere.
+    The hulls meet on the mitre plane, and a plane represents the sphere.
     """
     angle = np.radians(180 - bend)
     directions = [np.array([1.0, 0, 0]), np.array([np.cos(angle), 0, np.sin(angle)])]
