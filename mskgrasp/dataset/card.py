@@ -140,7 +140,7 @@ def _median_and_tail(values: np.ndarray) -> tuple[float, float] | None:
 
 
 def tables(card: Card) -> list[Table]:
-    """Format the card as tables of text."""
+    """Title, headers and rows of each table of the card."""
     n, won = card.attempts, card.successes
     facts = [
         ("attempts", f"{n}"),
@@ -172,7 +172,7 @@ def tables(card: Card) -> list[Table]:
     return [
         (f"Dataset {card.name}", ("", ""), facts),
         ("Success by family", ("family", "parts", "attempts", "success (95 % interval)"), families),
-        ("Failures", ("reason", "attempts", "of all"), failures or [("none", "0", "0.0%")]),
+        ("Failures", ("reason", "attempts", "share"), failures or [("none", "0", "0.0%")]),
         ("Discarded", ("reason", "attempts"), discarded),
         ("Physics", ("setting", "value"), [(key, f"{value}") for key, value in card.physics.items()]),
         (
@@ -180,7 +180,7 @@ def tables(card: Card) -> list[Table]:
             ("setting", "value"),
             [(key, f"{value}") for key, value in card.noise.items() if value] or [("none", "")],
         ),
-        ("Made with", ("versions", "shards"), versions),
+        ("Software", ("versions", "shards"), versions),
     ]
 
 
