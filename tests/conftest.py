@@ -20,7 +20,7 @@ settings.register_profile("mskgrasp", deadline=None)
 settings.load_profile("mskgrasp")
 
 LONGEST = (
-    "parts/test_catalogue_parts.py",
+    "parts/recipes/test_families.py",
     "hal_contract/test_arm_contract.py",
     "collect/test_collect.py",
     "hal/franka/test_faults.py",
@@ -32,7 +32,7 @@ LONGEST = (
     "palletize/test_palletize.py",
     "sim_in_the_loop/test_precise_grasps.py",
 )
-"""Files that take a minute or more: begun first, so that no process is left alone with one at the end."""
+"""Files that take a minute or more: run first, so that no process is left alone with one at the end."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

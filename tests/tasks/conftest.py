@@ -55,7 +55,7 @@ def attempt(env: GraspDisplacementEnv, boxes: dict[str, Part]) -> Attempt:
 
 
 @pytest.fixture
-def lay(env: GraspDisplacementEnv, boxes: dict[str, Part]) -> Callable[[str], None]:
+def place(env: GraspDisplacementEnv, boxes: dict[str, Part]) -> Callable[[str], None]:
     """Lays a box far from the hand, in a fresh scene."""
 
     def run(part: str) -> None:

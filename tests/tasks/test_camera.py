@@ -21,7 +21,7 @@ def seeing(boxes):
     made.close()
 
 
-def lay(env, x: float, y: float) -> np.ndarray:
+def place(env, x: float, y: float) -> np.ndarray:
     env.reset(seed=0, options=dict(pose_base_obj=np.array([[x, y, 0.015, 1, 0, 0, 0]])))
     return env.capture_depth()[0].cpu().numpy()
 
@@ -29,7 +29,7 @@ def lay(env, x: float, y: float) -> np.ndarray:
 @pytest.mark.parametrize(("x", "y"), [(0.5, 0.0), (0.463, 0.071), (0.5671, -0.0433), (0.44, -0.08)])
 def test_every_pixel_shows_what_the_pinhole_says(seeing, x, y):
     """The box's top is 0.77 m below the camera; a pixel sees it if its centre's ray meets it."""
-    depth = lay(seeing, x, y)
+    depth = place(seeing, x, y)
     focal, centre = 365.5, 79.5
     rows, columns = np.mgrid[0:160, 0:160]
     base_x = 0.5 - (rows - centre) / focal * 0.77
@@ -42,14 +42,14 @@ def test_every_pixel_shows_what_the_pinhole_says(seeing, x, y):
 
 
 def test_the_robot_is_not_in_the_picture_unless_asked_for(seeing):
-    lay(seeing, 0.5, 0.0)  # at the task's home the hand hangs over the table
+    place(seeing, 0.5, 0.0)  # at the task's home the hand hangs over the table
     assert float(seeing.capture_depth().min()) > 0.7
     with_robot = seeing.capture_rgbd(with_robot=True)[1]
     assert float(with_robot.min()) < 0.7
 
 
 def test_the_seen_box_is_the_real_box(seeing):
-    depth = lay(seeing, 0.463, 0.071)
+    depth = place(seeing, 0.463, 0.071)
     view = view_part(
         depth,
         seeing.overhead.intrinsics(),

@@ -48,8 +48,8 @@ def test_a_descent_overshoots_by_less_than_half_the_table_clearance(env, boxes, 
     assert heights[-1] == pytest.approx(float(goal[0, 2]), abs=1e-4)
 
 
-def test_steps_are_coarse_as_long_as_they_are_asked_to_be(env, lay):
-    lay("lead")
+def test_steps_are_coarse_as_long_as_they_are_asked_to_be(env, place):
+    place("lead")
     motion, scene = env.motion, env.scene
     began = motion.seconds
     with pytest.raises(KeyboardInterrupt), motion.coarsely():
@@ -86,8 +86,8 @@ def test_heavy_parts_alone_are_lifted_coarsely_and_all_are_looked_at_finely(
     assert found[-1] == ("step", 1000, pytest.approx(0.02))
 
 
-def test_running_fingers_move_as_those_that_began_long_ago(env, lay):
-    lay("light")
+def test_running_fingers_move_as_those_that_began_long_ago(env, place):
+    place("light")
     motion, robot = env.motion, env.agent.robot
     home = torch.as_tensor(env.agent.rest_qpos[None, :7], dtype=torch.float64)
 
@@ -187,8 +187,8 @@ def test_a_coarse_lift_leaves_a_block_where_a_fine_one_does(env, attempt, monkey
     assert difference[:3].max() < 5e-5 and difference[3] < 1e-3
 
 
-def test_an_arm_arrives_exactly_and_keeps_its_fingers(env, lay):
-    lay("light")
+def test_an_arm_arrives_exactly_and_keeps_its_fingers(env, place):
+    place("light")
     motion, robot = env.motion, env.agent.robot
     goal = torch.tensor([[0.5, 0.05, 0.08, 0.4]])
     path = env.attempt._line(goal + torch.tensor([0.0, 0.0, 0.05, 0.0]), goal, env.physics.descend_speed)
@@ -222,8 +222,8 @@ def test_a_hand_that_rests_on_the_part_is_not_pressed_into_it(env, attempt, monk
     assert short[0] > 5e-5
 
 
-def test_an_arm_that_its_reflex_has_stopped_is_not_put_where_it_was_sent(env, lay):
-    lay("light")
+def test_an_arm_that_its_reflex_has_stopped_is_not_put_where_it_was_sent(env, place):
+    place("light")
     motion, robot = env.motion, env.agent.robot
     home = torch.as_tensor(env.agent.rest_qpos[None, :7], dtype=torch.float64)
     motion.place(home)
@@ -232,13 +232,13 @@ def test_an_arm_that_its_reflex_has_stopped_is_not_put_where_it_was_sent(env, la
     assert np.abs(robot.get_qpos()[0, :7].numpy() - home[0].numpy()).max() < 0.29
 
 
-def test_where_an_arm_is_on_its_path_does_not_depend_on_the_rate(env, lay, monkeypatch):
+def test_where_an_arm_is_on_its_path_does_not_depend_on_the_rate(env, place, monkeypatch):
     """Aimed at the ends of its steps it would be ahead, the more the longer they are."""
     goal = np.array([[0.5, 0.05, 0.15, 0.0]])
 
     def leads(rate: int) -> tuple[np.ndarray, np.ndarray]:
         """How far the hand is ahead of its path, every 20 ms, m; and the path's speed then, m/s."""
-        lay("light")
+        place("light")
         motion = env.motion
         monkeypatch.setattr(motion, "rate_hz", rate)
         env.scene.timestep = 1 / rate

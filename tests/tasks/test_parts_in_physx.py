@@ -39,13 +39,13 @@ def test_no_hull_lost_a_corner_in_physx(env, name):
 
 
 @pytest.mark.parametrize("name", PARTS)
-def test_parts_lie_still_where_they_are_laid(env, name):
+def test_parts_lie_still_where_they_are_placed(env, name):
     for seed in range(5):
         options = dict(parts=[name], reconfigure=True) if seed == 0 else {}
         env.reset(seed=seed, options=options)
-        laid = env.part_pose()
+        placed = env.part_pose()
         env.motion.step(env.motion.n_steps(0.2))
-        moved = (env.part_pose().position - laid.position).norm()
+        moved = (env.part_pose().position - placed.position).norm()
         assert float(moved) < 2e-4
 
 

@@ -117,7 +117,7 @@ def _import_all(command: Import, files: Sequence[Path], rows: list[_Row]) -> Non
             bar.set_description(path.name, refresh=False)
             try:
                 name = legal_name(path.stem if command.name is None else command.name)
-                there = (store.parts_folder() / name).is_dir()
+                replaced: list[str] = []
                 imported = import_file(
                     path,
                     name=name,
@@ -126,22 +126,25 @@ def _import_all(command: Import, files: Sequence[Path], rows: list[_Row]) -> Non
                     density=command.density,
                     licence=command.licence,
                     bodies="split" if command.split else "union" if command.union else "one",
-                    check_name=partial(_refuse_taken, taken, path),
+                    check_name=partial(_check_name, taken, path, replaced),
                 )
                 taken |= {part.name: path for part in imported.parts}
                 for part in imported.parts:
                     for warning in _warnings(part, imported.unit):
                         note(f"warning: {warning}")
-                rows.append(_row(path, imported, replaced=there))
+                rows.append(_row(path, imported, replaced=bool(replaced)))
             except MskgraspError as error:
                 rows.append(_Row(file=str(path), result="refused", remarks=(_without(str(error), path),)))
                 note(f"error: {error}")
             bar.update()
 
 
-def _refuse_taken(taken: dict[str, Path], path: Path, name: str) -> None:
+def _check_name(taken: dict[str, Path], path: Path, replaced: list[str], name: str) -> None:
+    """Refuses the name of a part that an earlier file was imported as; notes one of an older part."""
     if name in taken:
         raise BadPart(f"{path} would replace the part {name!r} of {taken[name]}: import it with --name")
+    if (store.parts_folder() / name).is_dir():
+        replaced.append(name)
 
 
 def _row(path: Path, imported: Imported, *, replaced: bool) -> _Row:

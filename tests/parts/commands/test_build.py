@@ -58,7 +58,7 @@ def test_the_program_builds_lists_and_draws(capsys, tmp_path):
         (("rate", "--data", "nowhere"), 1),
     ],
 )
-def test_mistakes_are_told_in_one_line(arguments, exit_code):
+def test_mistakes_are_reported_in_one_line(arguments, exit_code):
     with pytest.raises(MskgraspError) as caught:
         main(arguments)
     assert caught.value.exit_code == exit_code and "\n" not in str(caught.value)

@@ -153,6 +153,8 @@ def test_repairs_parts_and_names_are_in_the_table(importing, tmp_path):
     )
     assert re.search(r"^\s+pair-2\s+30\.0 x 20\.0 x 10\.0", lines[2])
     assert "would replace the part 'pair-1' of pair.stl: import it with --name" in lines[3]
+    lighter = importing("pair.stl", split=True, density=2700)
+    assert "replaced the part of that name" in lighter.stdout
 
 
 def test_an_unusual_size_or_weight_is_imported_with_a_warning(importing, tmp_path):
