@@ -9,8 +9,8 @@ from pydantic import Field, field_validator
 from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED
-from mskgrasp.palletize.placements import Correction
-from mskgrasp.palletize.slots import Slot, parse_target, read_slots
+from mskgrasp.palletize.pallet_slots import Slot, parse_target, read_slots
+from mskgrasp.palletize.placement_records import Correction
 from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.planning.planner import PlannerConfig
 

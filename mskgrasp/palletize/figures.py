@@ -14,9 +14,9 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.geometry import quat_to_matrix
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.palette import BLUE, FAINT, GREEN, INK, LINE, ORANGE
-from mskgrasp.palletize.placements import CORRECTIONS, Correction, Placement, compared, corrections_of
-from mskgrasp.palletize.slots import Slot
-from mskgrasp.palletize.views import Views
+from mskgrasp.palletize.height_maps import HeightMaps
+from mskgrasp.palletize.pallet_slots import Slot
+from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement, compared, corrections_of
 from mskgrasp.reports.style import saved_figure
 
 COLOURS: dict[Correction, str] = {"none": FAINT, "predicted": BLUE, "truth": GREEN}
@@ -28,13 +28,13 @@ _CUT = 0.004
 """Outlines are drawn at half this height, m."""
 
 
-def draw_placement(views: Views, placement: Placement, path: Path) -> None:
+def draw_placement(maps: HeightMaps, placement: Placement, path: Path) -> None:
     """Draws one placement: before with the grasp, after with the target; millimetres from the target."""
     with saved_figure(path, 9.2, 4.9) as figure:
         left, right = figure.subplots(1, 2)
-        _show_before(left, views)
+        _show_before(left, maps)
         left.set(title="before, with the grasp", xlabel="mm along base x", ylabel="mm along base y")
-        _show_after(right, views)
+        _show_after(right, maps)
         right.set(title=f"after, {TITLES[placement.correction]}", xlabel="mm from the target, along base x")
         figure.suptitle(f"{placement.part}: {outcome_text(placement)}", x=0.01, ha="left", fontsize=11)
 
@@ -48,18 +48,18 @@ def outcome_text(placement: Placement) -> str:
     return f"{placement.translation_error * _MM:.1f} mm, {np.degrees(placement.rotation_error):.1f}° off"
 
 
-def _axes(axes: Axes, views: Views, heights: np.ndarray) -> None:
-    half = views.side / 2 * _MM
-    top = max(views.top, 1e-3)
+def _axes(axes: Axes, maps: HeightMaps, heights: np.ndarray) -> None:
+    half = maps.side / 2 * _MM
+    top = max(maps.top, 1e-3)
     axes.imshow(heights, extent=(-half, half, -half, half), cmap="Greys", vmin=-0.15 * top, vmax=1.5 * top)
     axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
     axes.tick_params(length=2, labelsize=8)
 
 
-def _show_before(axes: Axes, views: Views) -> None:
-    _axes(axes, views, views.before)
-    _outline(axes, views, 0.0, INK, "-")
-    origin, theta = views.grasp[:2] * _MM, float(views.grasp[2])
+def _show_before(axes: Axes, maps: HeightMaps) -> None:
+    _axes(axes, maps, maps.before)
+    _outline(axes, maps, 0.0, INK, "-")
+    origin, theta = maps.grasp[:2] * _MM, float(maps.grasp[2])
     closing = np.array([-np.sin(theta), np.cos(theta)])
     reach = MAX_OPENING / 2 * _MM
     axes.plot(*np.stack([origin - reach * closing, origin + reach * closing]).T, color=BLUE, lw=1.2, ls="--")
@@ -69,14 +69,14 @@ def _show_before(axes: Axes, views: Views) -> None:
         axes.add_patch(pad)
 
 
-def _show_after(axes: Axes, views: Views) -> None:
-    if not views.after.size:
+def _show_after(axes: Axes, maps: HeightMaps) -> None:
+    if not maps.after.size:
         axes.text(0.5, 0.5, "not placed", transform=axes.transAxes, ha="center", color=ORANGE)
         axes.set(xticks=[], yticks=[])
         return
-    _axes(axes, views, views.after)
-    _outline(axes, views, views.turn, GREEN, "--")
-    _cross(axes, np.zeros(2), views.theta, 0.42 * views.side * _MM)
+    _axes(axes, maps, maps.after)
+    _outline(axes, maps, maps.turn, GREEN, "--")
+    _cross(axes, np.zeros(2), maps.theta, 0.42 * maps.side * _MM)
 
 
 def _cross(axes: Axes, at: np.ndarray, theta: float, length: float) -> None:
@@ -86,15 +86,15 @@ def _cross(axes: Axes, at: np.ndarray, theta: float, length: float) -> None:
         axes.plot(*np.stack([at - arm, at + arm]).T, color=GREEN, lw=width, alpha=0.9, zorder=6)
 
 
-def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> None:
+def _outline(axes: Axes, maps: HeightMaps, turn: float, colour: str, line: str) -> None:
     """Draws the part's outline before the grasp, turned about its centre."""
-    n = len(views.before)
-    pitch = views.side * _MM / n
+    n = len(maps.before)
+    pitch = maps.side * _MM / n
     steps = (np.arange(n) - (n - 1) / 2) * pitch
     x, y = np.meshgrid(steps, -steps)
     # Cut low, a thin plate counts as much as a high wall. A camera pixel is several of these: without the
     # blur the outline shows its stairs.
-    low = np.ascontiguousarray(np.minimum(views.before, min(_CUT, views.top)))
+    low = np.ascontiguousarray(np.minimum(maps.before, min(_CUT, maps.top)))
     smooth = cv2.GaussianBlur(low, (0, 0), 1.5 / pitch)
     level = [0.5 * max(float(smooth.max()), 1e-4)]
     cos, sin = np.cos(turn), np.sin(turn)
@@ -105,22 +105,22 @@ def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> N
 
 
 def draw_comparison(
-    rows: Sequence[tuple[Placement, dict[Correction, Views], dict[Correction, Placement]]], path: Path
+    rows: Sequence[tuple[Placement, dict[Correction, HeightMaps], dict[Correction, Placement]]], path: Path
 ) -> None:
     """Draws a row for each part: before the grasp, then after it under each correction, targets in green.
 
     Args:
-        rows: For each part one of its placements, and the views and placements by correction.
+        rows: For each part one of its placements, and the height maps and placements by correction.
         path: The picture, PNG.
     """
     names: list[Correction] = [name for name in CORRECTIONS if rows and name in rows[0][1]]
     with saved_figure(path, 2.45 * (1 + len(names)), 2.6 * max(1, len(rows)) + 0.2) as figure:
         grid = figure.subplots(max(1, len(rows)), 1 + len(names), squeeze=False)
-        for line, (first, views, placements) in zip(grid, rows, strict=False):
-            _show_before(line[0], next(iter(views.values())))
+        for line, (first, maps, placements) in zip(grid, rows, strict=False):
+            _show_before(line[0], next(iter(maps.values())))
             line[0].set_ylabel(first.part, fontsize=8)
             for axes, name in zip(line[1:], names, strict=True):
-                _show_after(axes, views[name])
+                _show_after(axes, maps[name])
                 axes.set_xlabel(outcome_text(placements[name]), fontsize=9, color=COLOURS[name])
             for axes in line:
                 axes.set(xticks=[], yticks=[])

@@ -15,13 +15,13 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.settings import Region
 from mskgrasp.palletize.figures import draw_placement, pallet_image
-from mskgrasp.palletize.placements import Correction, Placement
-from mskgrasp.palletize.slots import SEEN_TOLERANCE, Slot, first_reachable
-from mskgrasp.palletize.views import take_views, write_views
+from mskgrasp.palletize.height_maps import take_height_maps, write_height_maps
+from mskgrasp.palletize.pallet_slots import SEEN_TOLERANCE, Slot, first_reachable
+from mskgrasp.palletize.placement_records import Correction, Placement
 from mskgrasp.parts import find_part
 from mskgrasp.perception.footprint import seen_footprint
 from mskgrasp.perception.markers import planar_displacement
-from mskgrasp.planning.placing import Target, place, place_error, place_pose, turned_by
+from mskgrasp.planning.place_pose import Target, place, place_error, place_pose, turned_by
 from mskgrasp.planning.planner import GraspPlan, Planner
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.policies import RepeatedPlanner
@@ -64,7 +64,7 @@ class PickAndPlace:
     Args:
         engine: On a connected cell.
         planner: For that cell.
-        pictures: Folder for the picture and the views of every placement.
+        pictures: Folder for the picture and the height maps of every placement.
     """
 
     def __init__(self, engine: TrialEngine, planner: Planner, pictures: Path):
@@ -109,9 +109,9 @@ class PickAndPlace:
             self._tops = {}
         if done.placed:
             self._tops[task.index] = float(plan.view.size[2])
-        views = take_views(frame, after, plan, target, slot.theta)
-        write_views(views, self._pictures / f"{done.name}.npz")
-        draw_placement(views, done, self._pictures / f"{done.name}.png")
+        maps = take_height_maps(frame, after, plan, target, slot.theta)
+        write_height_maps(maps, self._pictures / f"{done.name}.npz")
+        draw_placement(maps, done, self._pictures / f"{done.name}.png")
         return done
 
     def picture(self, slots: list[Slot]) -> np.ndarray:

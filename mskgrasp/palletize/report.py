@@ -14,7 +14,9 @@ from rich.console import Console
 
 from mskgrasp.core.files import write_whole
 from mskgrasp.palletize.figures import draw_comparison, draw_errors, draw_pallets, outcome_text
-from mskgrasp.palletize.placements import (
+from mskgrasp.palletize.height_maps import read_height_maps
+from mskgrasp.palletize.pallet_slots import Slot
+from mskgrasp.palletize.placement_records import (
     CORRECTIONS,
     GOAL,
     Correction,
@@ -26,8 +28,6 @@ from mskgrasp.palletize.placements import (
     millimetres,
     summarise_placements,
 )
-from mskgrasp.palletize.slots import Slot
-from mskgrasp.palletize.views import read_views
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.html import write_html
 from mskgrasp.reports.section import Figure, Link, Section, Table, settings_section
@@ -55,7 +55,7 @@ def write_report(
 
     Args:
         config: Settings of the run.
-        out: Its folder, with the pictures and views of the placements in ``placements``.
+        out: Its folder, with the pictures and height maps of the placements in ``placements``.
         placements: All of them.
         slots: The targets.
 
@@ -147,9 +147,9 @@ def _examples(out: Path, placements: Sequence[Placement]) -> Section:
     rows = []
     for part in chosen:
         group = by_part[part]
-        views = {name: read_views(out / "placements" / f"{one.name}.npz") for name, one in group.items()}
-        views = {name: views[name] for name in CORRECTIONS if name in views}
-        rows.append((next(iter(group.values())), views, group))
+        maps = {name: read_height_maps(out / "placements" / f"{one.name}.npz") for name, one in group.items()}
+        maps = {name: maps[name] for name in CORRECTIONS if name in maps}
+        rows.append((next(iter(group.values())), maps, group))
     if not rows:
         return Section(title="Examples")
     draw_comparison(rows, out / "placed.png")

@@ -18,10 +18,10 @@ from mskgrasp.core.files import only_here
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
+from mskgrasp.palletize.pallet_slots import Slot, check_reach, check_room
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
-from mskgrasp.palletize.placements import CORRECTIONS, Correction, Placement
+from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
 from mskgrasp.palletize.report import write_report
-from mskgrasp.palletize.slots import Slot, check_reach, check_room
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import make_planner

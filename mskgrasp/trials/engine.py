@@ -24,7 +24,7 @@ from mskgrasp.core.grasp import (
 from mskgrasp.core.settings import Region, Tape
 from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
 from mskgrasp.perception.markers import Markers, find_markers
-from mskgrasp.planning.placing import displacement_of_point
+from mskgrasp.planning.place_pose import displacement_of_point
 from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.reports.grasp_figures import draw_plan
 

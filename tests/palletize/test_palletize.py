@@ -23,9 +23,9 @@ from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.palletize.__main__ import main
 from mskgrasp.palletize.config import PalletizeConfig
+from mskgrasp.palletize.pallet_slots import Slot
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
 from mskgrasp.palletize.run import palletize
-from mskgrasp.palletize.slots import Slot
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.planner import PlannerConfig
 from mskgrasp.trials.engine import TrialEngine

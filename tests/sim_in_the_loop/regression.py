@@ -21,7 +21,7 @@ from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.metrics import bootstrap_interval
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.palletize.config import PalletizeConfig
-from mskgrasp.palletize.placements import Placement
+from mskgrasp.palletize.placement_records import Placement
 from mskgrasp.palletize.run import palletize
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.options import parse

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 
-from mskgrasp.palletize.placements import Placement
+from mskgrasp.palletize.placement_records import Placement
 from tests.sim_in_the_loop.regression import PARTS, STORED, Row, compare, rows_of
 
 

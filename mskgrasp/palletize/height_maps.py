@@ -1,4 +1,4 @@
-"""Views of a placement from above, before and after."""
+"""Height maps of a placement from above, before and after."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.files import write_whole
 from mskgrasp.perception.footprint import pixel_pitch, seen_points
-from mskgrasp.planning.placing import Target
+from mskgrasp.planning.place_pose import Target
 from mskgrasp.planning.planner import GraspPlan
 
 _N = 200
 
 
 @dataclass(frozen=True, kw_only=True)
-class Views:
-    """Views of a placement from above, before and after: squares along the base's axes, metres.
+class HeightMaps:
+    """Height maps of a placement from above, before and after: squares along the base's axes, metres.
 
     Attributes:
         before: (n, n) heights over the table around the part before the grasp, its centre in the middle.
@@ -44,13 +44,13 @@ class Views:
     theta: float
 
 
-def take_views(
+def take_height_maps(
     before: RgbdFrame, after: RgbdFrame | None, plan: GraspPlan, target: Target, theta: float
-) -> Views:
-    """Views of a placement from its frames."""
+) -> HeightMaps:
+    """Height maps of a placement from its frames."""
     view = plan.view
     side = max(0.1, 1.6 * float(np.hypot(*view.size[:2])))
-    return Views(
+    return HeightMaps(
         before=_heights(before, view.centre_base[:2], side, view.table_z),
         after=np.empty((0, 0))
         if after is None
@@ -63,9 +63,9 @@ def take_views(
     )
 
 
-def write_views(views: Views, path: Path) -> None:
-    """Writes views as a compressed file, atomically."""
-    values: dict[str, Any] = {name: np.asarray(value) for name, value in asdict(views).items()}
+def write_height_maps(maps: HeightMaps, path: Path) -> None:
+    """Writes height maps as a compressed file, atomically."""
+    values: dict[str, Any] = {name: np.asarray(value) for name, value in asdict(maps).items()}
     for name in ("before", "after"):
         values[name] = values[name].astype(np.float32)
     buffer = io.BytesIO()
@@ -73,8 +73,8 @@ def write_views(views: Views, path: Path) -> None:
     write_whole(path, buffer.getvalue())
 
 
-def read_views(path: Path) -> Views:
-    """Reads a file of `write_views`.
+def read_height_maps(path: Path) -> HeightMaps:
+    """Reads a file of `write_height_maps`.
 
     Raises:
         BadDataset: The file is missing or damaged.
@@ -83,7 +83,7 @@ def read_views(path: Path) -> Views:
         with np.load(path, allow_pickle=False) as file:
             values = {name: file[name] for name in file.files}
         numbers = {name: float(values[name]) for name in ("side", "top", "turn", "theta")}
-        return Views(
+        return HeightMaps(
             before=values["before"], after=values["after"], grasp=values["grasp"].reshape(3), **numbers
         )
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:

@@ -19,7 +19,7 @@ from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.grasp import Grasp
 from mskgrasp.parts import Part
 from mskgrasp.perception.footprint import Footprint, usual_footprint
-from mskgrasp.planning.placing import Target, check_place
+from mskgrasp.planning.place_pose import Target, check_place
 
 SEEN_TOLERANCE = 0.003
 """A depth image shows a part's sides to about a pixel, m."""

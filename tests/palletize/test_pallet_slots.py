@@ -10,7 +10,7 @@ import pytest
 from hal import cell_from_yaml
 from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.core.geometry import wrap_half_turn
-from mskgrasp.palletize.slots import Slot, check_reach, check_room, parse_target, read_slots
+from mskgrasp.palletize.pallet_slots import Slot, check_reach, check_room, parse_target, read_slots
 from mskgrasp.parts import find_part
 from mskgrasp.perception.footprint import Footprint, footprint_of, seen_footprint, usual_footprint
 from tests.synthetic import REGION, TABLE_Z, Box, frame

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from mskgrasp.palletize.placements import (
+from mskgrasp.palletize.placement_records import (
     Correction,
     Placement,
     compared,
