@@ -168,8 +168,8 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     _show_heights(axes, heights, view.centre_base[:2], side, float(view.size[2]) * _MM)
     order = np.argsort(plan.qualities)
     grasps = plan.candidates[order]
-    closing = 0.0035 * np.stack([-np.sin(grasps[:, 3]), np.cos(grasps[:, 3])], axis=-1)
-    ends = np.stack([grasps[:, :2] - closing, grasps[:, :2] + closing], axis=1) * _MM
+    closing = 0.0035 * np.stack([-np.sin(grasps.theta), np.cos(grasps.theta)], axis=-1)
+    ends = np.stack([grasps.position[:, :2] - closing, grasps.position[:, :2] + closing], axis=1) * _MM
     lines = LineCollection(list(ends), cmap="viridis", linewidths=0.9, zorder=4)
     lines.set_array(plan.qualities[order])
     # Candidates of low quality must not hide the part.
@@ -181,7 +181,16 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     bar.set_label("predicted quality")
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     best = plan.candidates[plan.shortlist]
-    axes.plot(*(best[:, :2] * _MM).T, "o", ms=3.2, mfc="none", mec=INK, mew=0.6, zorder=5, label="shortlist")
+    axes.plot(
+        *(best.position[:, :2] * _MM).T,
+        "o",
+        ms=3.2,
+        mfc="none",
+        mec=INK,
+        mew=0.6,
+        zorder=5,
+        label="shortlist",
+    )
     _jaw(axes, plan.grasp.position, float(plan.grasp.theta))
     axes.legend(loc="lower left", fontsize=8)
     axes.set(xlabel="base x, mm", ylabel="base y, mm", title=f"{len(plan.candidates)} candidates")

@@ -45,7 +45,7 @@ def write_trial(path: Path, frame: RgbdFrame, plan: GraspPlan | None, after: Rgb
     if plan is not None:
         arrays |= {f"plan_{name}": getattr(plan, name) for name in (*_ARRAYS, *_NUMBERS)}
         arrays["plan_grasp"] = plan.grasp.as_vector()
-        arrays["plan_candidates"] = plan.candidates.astype(np.float32)
+        arrays["plan_candidates"] = plan.candidates.as_vector().astype(np.float32)
         view = plan.view
         arrays |= {
             "view_centre_base": view.centre_base,
@@ -136,7 +136,7 @@ def _plan(arrays: dict[str, np.ndarray]) -> GraspPlan:
             table_offset=float(arrays.get("view_table_offset", 0.0)),
         ),
         grasp=Grasp.from_vector(arrays["plan_grasp"].reshape(4)),
-        candidates=arrays["plan_candidates"].astype(np.float64).reshape(-1, 4),
+        candidates=Grasp.from_vector(arrays["plan_candidates"].astype(np.float64).reshape(-1, 4)),
         seconds={},
         **rest,
     )

@@ -59,6 +59,7 @@ def test_a_trial_comes_back_as_it_was_and_is_drawn(tmp_path: Path):
         if isinstance(value := getattr(plan, field.name), np.ndarray):
             np.testing.assert_allclose(getattr(planned, field.name), value, rtol=1e-6, err_msg=field.name)
     np.testing.assert_array_equal(planned.grasp.as_vector(), plan.grasp.as_vector())
+    np.testing.assert_allclose(planned.candidates.as_vector(), plan.candidates.as_vector(), rtol=1e-6)
     for name in ("centre_base", "size", "gyration_radius", "table_z", "table_offset"):
         np.testing.assert_allclose(getattr(planned.view, name), getattr(plan.view, name), err_msg=name)
     draw_trial(tmp_path, find_trial(tmp_path, one.key), tmp_path / "replay" / "one.png")
