@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mskgrasp.core.errors import BadModel, UsageError
-from mskgrasp.core.files import only_here, write_whole
+from mskgrasp.core.files import write_whole
 from mskgrasp.evaluate.comparison import compare
 from mskgrasp.evaluate.config import EvaluateConfig, Experiment
 from mskgrasp.evaluate.experiments import (
@@ -30,12 +30,12 @@ from mskgrasp.planning.run_inputs import model_digests, part_digests
 from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append, begin, read, rewrite
+from mskgrasp.runtime.run_folder import TRIALS, append, opened_run, read, rewrite
 from mskgrasp.simulation.versions import versions
 from mskgrasp.trials.cell_file import CellFile, read_cell
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import FOLDER
-from mskgrasp.trials.trial_runner import Setup, TrialTask, run_trials
+from mskgrasp.trials.trial_runner import SCENE_VERSION, Setup, TrialTask, run_trials
 
 PARTS: dict[Experiment, tuple[str, ...]] = {
     "success": ("validation",),
@@ -80,12 +80,7 @@ def evaluate(config: EvaluateConfig) -> dict[str, Any]:
         compared = load_compared(config.compare, config.models, config.lowess_data, list(parts), chunk)
     inputs = {"cell": cell.digest} | model_digests(config.models) | part_digests(parts.values())
     inputs |= compared.inputs if compared is not None else {}
-    begin(config, config.out, inputs, may_change=MAY_CHANGE)
-    with only_here(config.out) as alone:
-        if not alone:
-            raise UsageError(
-                f"another evaluation writes into {config.out}; wait for it, or choose another --out"
-            )
+    with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=MAY_CHANGE):
         tasks = scenes(parts, config.trials, config.seed, config.planner, compared)
         trials = _make_trials(config, cell, compared, tasks)
         if compared is not None:

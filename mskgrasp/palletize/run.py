@@ -14,7 +14,6 @@ from hal import cell_from_yaml
 from hal.operator import Operator
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import UsageError
-from mskgrasp.core.files import only_here
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
@@ -28,9 +27,12 @@ from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.run_inputs import inputs_of
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append, begin, file_digest, read
+from mskgrasp.runtime.run_folder import TRIALS, append, file_digest, opened_run, read
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.trials.engine import connected_engine
+
+SCENE_VERSION = 2
+"""Raised by every change after which `_pallets` draws other scenes from a seed."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +84,10 @@ def palletize(config: PalletizeConfig) -> dict[str, Any]:
     may_change = ["out", "trials", "corrections", "workers", "yes"]
     # Which part comes into which slot follows from all of them.
     may_change += ["parts", "n_parts"] if config.slots is None else []
-    begin(config, config.out, inputs, may_change=may_change)
-    with only_here(config.out) as mine:
-        if not mine:
-            raise UsageError(f"another run is at work in {config.out}; wait for it, or choose another --out")
+    with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
         make_folder(config.out / "placements")
         placements = _place_all(config, pallets, asks)
-    return write_report(config, config.out, placements, slots)
+        return write_report(config, config.out, placements, slots)
 
 
 def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[tuple[Correction, ...], bool]:

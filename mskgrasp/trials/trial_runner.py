@@ -25,6 +25,9 @@ from mskgrasp.trials.predictors import LOWESS, LowessPredictor, NetworkPredictor
 from mskgrasp.trials.trial import Policy, Trial, trial_key
 from mskgrasp.trials.trial_files import trial_file, write_trial
 
+SCENE_VERSION = 1
+"""Raised by every change after which `TrialRunner` draws other scenes from a seed."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrialTask:

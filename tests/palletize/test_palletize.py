@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,9 +26,10 @@ from mskgrasp.palletize.__main__ import main
 from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.pallet_slots import Slot
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
-from mskgrasp.palletize.run import palletize
+from mskgrasp.palletize.run import SCENE_VERSION, palletize
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.runtime.run_folder import INPUTS
 from mskgrasp.trials.engine import TrialEngine
 from tests.browser import Page
 from tests.hal.test_operator import REAL
@@ -94,6 +96,12 @@ def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_pa
 
     with pytest.raises(UsageError, match="other inputs.*seed differ"):
         palletize(config(out, seed=1))
+    inputs = json.loads((out / INPUTS).read_text())
+    assert inputs.pop("scene_version") == SCENE_VERSION
+    older = shutil.copytree(out, tmp_path / "older")
+    (older / INPUTS).write_text(json.dumps(inputs))
+    with pytest.raises(UsageError, match=f"scenes of version 1, this program draws version {SCENE_VERSION}"):
+        palletize(config(older))
 
     with Page(out / "report.html") as page:
         widths = page.evaluate("[...document.images].map(i => i.complete ? i.naturalWidth : 0)")
