@@ -7,13 +7,13 @@ import difflib
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.errors import UsageError
-from mskgrasp.evaluate.report import degrees, millimetres
 from mskgrasp.evaluate.summary import displacement_errors
 from mskgrasp.reports.grasp_figures import draw_plan
+from mskgrasp.reports.quantities import degrees, millimetres
+from mskgrasp.reports.style import saved_figure
 from mskgrasp.runtime.run_folder import TRIALS, read
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
@@ -98,14 +98,13 @@ def _displacement(mean: list[float], std: list[float]) -> str:
 
 
 def _draw_frame(frame: RgbdFrame, title: str, path: Path) -> None:
-    figure = Figure(figsize=(9, 4.6), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    left.imshow(frame.colour)
-    left.set_title("colour", loc="left", fontsize=10)
-    image = right.imshow(frame.depth, cmap="Greys_r")
-    right.set_title("depth, m", loc="left", fontsize=10)
-    figure.colorbar(image, ax=right, shrink=0.8)
-    for axes in (left, right):
-        axes.set(xticks=[], yticks=[])
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
-    figure.savefig(path, dpi=150)
+    with saved_figure(path, 9, 4.6) as figure:
+        left, right = figure.subplots(1, 2)
+        left.imshow(frame.colour)
+        left.set_title("colour")
+        image = right.imshow(frame.depth, cmap="Greys_r")
+        right.set_title("depth, m")
+        figure.colorbar(image, ax=right, shrink=0.8)
+        for axes in (left, right):
+            axes.set(xticks=[], yticks=[])
+        figure.suptitle(title, fontsize=11, x=0.01, ha="left")

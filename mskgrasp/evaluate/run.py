@@ -7,7 +7,6 @@ import os
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 from mskgrasp.core.errors import BadModel, UsageError
 from mskgrasp.core.files import write_whole
@@ -22,8 +21,8 @@ from mskgrasp.evaluate.experiments import (
 )
 from mskgrasp.evaluate.figures import draw_comparison, draw_errors, draw_success
 from mskgrasp.evaluate.replay_trial import describe_trial, draw_trial, find_trial, outcome_text
-from mskgrasp.evaluate.report import TITLES, conclusion, sections
-from mskgrasp.evaluate.summary import farthest_off, summarise, worst_trials
+from mskgrasp.evaluate.report import TITLES, Report, conclusion, sections
+from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise, worst_trials
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.run_inputs import model_digests, part_digests
@@ -56,7 +55,7 @@ def replay(out: Path, key: str) -> int:
     return 0
 
 
-def evaluate(config: EvaluateConfig) -> dict[str, Any]:
+def evaluate(config: EvaluateConfig) -> Report:
     """Executes the trials that are missing and sums them up.
 
     Raises:
@@ -166,36 +165,39 @@ def _with_predictions(
 
 def _report(
     config: EvaluateConfig, cell: CellFile, compared: Compared | None, trials: Sequence[Trial]
-) -> dict[str, Any]:
+) -> Report:
     """Writes the report and its pictures."""
-    body = summarise(trials) if compared is None else compare(trials, compared.predictors)
-    worst = worst_trials(trials) if compared is None else farthest_off(trials)
-    pictures = {trial.key: f"worst/{trial.key}.png" for trial in worst}
+    summary = summarise(trials) if compared is None else compare(trials, compared.predictors)
+    worst = worst_trials(trials) if compared is None else largest_errors(trials)
     settings = config.model_dump(mode="json", exclude={"replay"}) | dict(
         parts=sorted({trial.part for trial in trials}),
         noise=cell.noise or None,
     )
-    report = dict(
-        experiment=config.experiment,
-        **body,
-        trials=[dict(trial=trial.key, outcome=outcome_text(trial)) for trial in trials],
-        worst=[[pictures[trial.key], f"{trial.key}: {outcome_text(trial)}"] for trial in worst],
+    report = Report(
+        summary=summary,
+        trials={trial.key: outcome_text(trial) for trial in trials},
+        worst={_picture(trial): f"{trial.key}: {outcome_text(trial)}" for trial in worst},
         settings=settings,
         versions=versions(),
     )
     for earlier in (config.out / "worst").glob("*.png"):
         earlier.unlink()
     for trial in worst:
-        draw_trial(config.out, trial, config.out / pictures[trial.key])
-    if compared is None:
-        draw_success(report, config.out / "success.png")
+        draw_trial(config.out, trial, config.out / _picture(trial))
+    if isinstance(summary, SuccessSummary):
+        draw_success(summary, config.out / "success.png")
         draw_errors(trials, config.out / "errors.png")
     else:
-        draw_comparison(report, config.out / "displacement.png")
-    text = json.dumps(report, indent=1, allow_nan=False)
+        draw_comparison(summary, config.out / "displacement.png")
+    text = json.dumps(report.to_json(), indent=1, allow_nan=False)
     write_whole(config.out / "report.json", (text + "\n").encode())
     write_html(
-        config.out / "report.html", title=TITLES[config.experiment], conclusion=conclusion(report),
+        config.out / "report.html", title=TITLES[config.experiment], conclusion=conclusion(summary),
         sections=sections(report, config.out),
     )  # fmt: skip
     return report
+
+
+def _picture(trial: Trial) -> str:
+    """Path of a worst trial's picture in the run's folder."""
+    return f"worst/{trial.key}.png"

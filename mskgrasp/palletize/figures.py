@@ -16,7 +16,8 @@ from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.palette import BLUE, FAINT, GREEN, INK, LINE, ORANGE
 from mskgrasp.palletize.height_maps import HeightMaps
 from mskgrasp.palletize.pallet_slots import Slot
-from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement, compared, corrections_of
+from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
+from mskgrasp.palletize.summary import Group, compared_groups, corrections_of
 from mskgrasp.reports.style import saved_figure
 
 COLOURS: dict[Correction, str] = {"none": FAINT, "predicted": BLUE, "truth": GREEN}
@@ -105,7 +106,7 @@ def _outline(axes: Axes, maps: HeightMaps, turn: float, colour: str, line: str) 
 
 
 def draw_comparison(
-    rows: Sequence[tuple[Placement, dict[Correction, HeightMaps], dict[Correction, Placement]]], path: Path
+    rows: Sequence[tuple[Placement, dict[Correction, HeightMaps], Group]], path: Path
 ) -> None:
     """Draws a row for each part: before the grasp, then after it under each correction, targets in green.
 
@@ -131,7 +132,7 @@ def draw_comparison(
 
 def draw_errors(placements: Sequence[Placement], path: Path) -> None:
     """Draws the cumulative distribution of the errors, and the medians of each part."""
-    groups = compared(placements)
+    groups = compared_groups(placements)
     names = corrections_of(placements)
     with saved_figure(path, 11.5, 4.3) as figure:
         shift, turn, parts = figure.subplots(1, 3)
@@ -156,7 +157,7 @@ def draw_errors(placements: Sequence[Placement], path: Path) -> None:
             shift.text(0.5, 0.5, "no placement was measured", transform=shift.transAxes, ha="center")
 
 
-def _draw_parts(axes: Axes, groups: list[dict[Correction, Placement]]) -> None:
+def _draw_parts(axes: Axes, groups: list[Group]) -> None:
     if not groups or not {"none", "predicted"} <= set(groups[0]):
         axes.axis("off")
         return

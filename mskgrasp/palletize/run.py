@@ -6,7 +6,6 @@ import contextlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
 
 import cv2
 
@@ -21,6 +20,7 @@ from mskgrasp.palletize.pallet_slots import Slot, check_reach, check_room
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
 from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
 from mskgrasp.palletize.report import write_report
+from mskgrasp.palletize.summary import PlacementSummary
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import make_planner
@@ -60,7 +60,7 @@ class TaskGroup:
         return self if self.name else replace(self, done=self.done.union(told))
 
 
-def palletize(config: PalletizeConfig) -> dict[str, Any]:
+def palletize(config: PalletizeConfig) -> PlacementSummary:
     """Makes the placements that are missing and sums all up.
 
     Raises:

@@ -60,7 +60,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two trials by this process, before a camera that errs."""
     out = tmp_path_factory.mktemp("runs") / "alone"
     report = evaluate(config(out, trials=2, noise="kinect2"))
-    assert report["overall"]["trials"] == 2
+    assert report.summary.overall.trials == 2
     return out
 
 
@@ -82,8 +82,8 @@ def test_several_processes_go_on_with_a_run_and_make_the_very_same_trials(alone:
         depths = [read_trial(trial_file(run, key))[0].depth for run in (out, alone)]
         np.testing.assert_array_equal(*depths)
     assert not np.array_equal(*(read_trial(trial_file(out, f"hex_nut_m30-00{k}"))[0].depth for k in (0, 1)))
-    assert report == json.loads((out / "report.json").read_text())
-    assert report["overall"]["trials"] == 3 and report["settings"]["noise"] == "kinect2"
+    assert json.loads(json.dumps(report.to_json())) == json.loads((out / "report.json").read_text())
+    assert report.summary.overall.trials == 3 and report.settings["noise"] == "kinect2"
     assert (out / "success.png").exists() and len(list((out / "worst").glob("*.png"))) == 3
     with Page(out / "report.html") as page:
         widths = page.evaluate("[...document.images].map(i => i.complete ? i.naturalWidth : 0)")
@@ -148,7 +148,7 @@ def test_models_are_compared_and_another_one_joins_without_new_grasps_for_all(
     if best.measured is not None:
         assert set(best.predictions) == {"gcip_mv", "lowess"}
         assert best.predictions["gcip_mv"].mean == pytest.approx(best.predicted, abs=1e-6)
-    assert report["models"]["gcip_mv"]["quality"]["novel"]["trials"] == 1
+    assert report.summary.models["gcip_mv"].quality.novel.trials == 1
     assert (out / "displacement.png").exists()
 
     shutil.copytree(PRETRAINED, tmp_path / "other")
@@ -159,9 +159,9 @@ def test_models_are_compared_and_another_one_joins_without_new_grasps_for_all(
     report = evaluate(config(out, compare=both, **settings))
     assert set(trials(out)) == {*found, f"{part}-000-other"}
     assert same(trials(out)[f"{part}-000-lowess"], found[f"{part}-000-lowess"])
-    known = report["models"]["other"]["quality"]["known"]
-    assert known["trials"] == 1  # known to this one, novel to the other
-    assert known["translation_rmse"] == report["models"]["gcip_mv"]["quality"]["novel"]["translation_rmse"]
+    known = report.summary.models["other"].quality.known
+    assert known.trials == 1  # known to this one, novel to the other
+    assert known.translation_rmse == report.summary.models["gcip_mv"].quality.novel.translation_rmse
 
 
 def test_the_search_that_is_asked_for_is_the_one_that_is_evaluated(tmp_path: Path):
@@ -182,8 +182,8 @@ def test_tape_tells_what_the_tracker_knows_or_nothing(tmp_path: Path):
     assert np.isnan(off[2]) and np.hypot(*off[:2]) < 0.5e-3 and abs(np.degrees(off[3])) < 0.5
     assert pin.measured is None
     if pin.success:
-        assert report["overall"]["unmeasured"] == {"no room for tape": 1}
-    assert report["overall"]["measured"] == 1
+        assert report.summary.overall.unmeasured == {"no room for tape": 1}
+    assert report.summary.overall.measured == 1
     assert read_trial(trial_file(tmp_path / "out", washer.key))[2] is not None
 
 
@@ -227,7 +227,7 @@ def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
     with pytest.raises(UsageError, match="give --yes"):
         evaluate(config(out, trials=2))
     report = evaluate(config(out, trials=2, yes=True))
-    assert report["overall"]["trials"] == 2
+    assert report.summary.overall.trials == 2
 
 
 @pytest.mark.parametrize(

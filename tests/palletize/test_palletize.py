@@ -92,7 +92,7 @@ def test_a_run_that_lost_its_cell_goes_on_and_its_report_shows_everything(tmp_pa
     (out / "trials.jsonl").write_text("\n".join(first.splitlines()[:1]) + '\n{"part": "t_nu')
     report = palletize(config(out))
     assert [json.loads(line) for line in (out / "trials.jsonl").read_text().splitlines()] == lines
-    assert report["corrections"]["truth"]["placed"] == 1
+    assert report.corrections["truth"].placed == 1
 
     with pytest.raises(UsageError, match="other inputs.*seed differ"):
         palletize(config(out, seed=1))
