@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -120,6 +120,15 @@ def _statistics(trials: Sequence[Trial], label: str, predictor: Predictor) -> Po
         known=TrialStatistics.of([trial for trial in trials if predictor.knows(trial.part)], predicted),
         novel=TrialStatistics.of([trial for trial in trials if not predictor.knows(trial.part)], predicted),
     )
+
+
+def figure_names(labels: Iterable[str]) -> dict[str, str]:
+    """Assign names in the figure to labels: the paper's, except where another label has taken it."""
+    found: dict[str, str] = {}
+    for label in labels:
+        name = paper_label(label) or label
+        found[label if name in found else name] = label
+    return found
 
 
 def paper_label(label: str) -> str | None:

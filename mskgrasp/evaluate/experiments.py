@@ -58,7 +58,7 @@ def model_folders(compare: Iterable[str], models: Path) -> dict[str, Path]:
     folders: dict[str, Path] = {}
     for text in compare:
         label, _, folder = text.partition("=")
-        if not folder or not _LABEL.fullmatch(label) or label == LOWESS:
+        if not folder or not _LABEL.fullmatch(label) or label.lower() == LOWESS:
             raise UsageError(
                 f"--compare {text!r}: give label=folder, for example gcip_mv=models/gcip_mv; the label has "
                 f"letters, digits, '_', '+' and '.', begins with a letter, and is not {LOWESS!r}"
@@ -67,7 +67,7 @@ def model_folders(compare: Iterable[str], models: Path) -> dict[str, Path]:
             raise UsageError(f"--compare: two models are called {label!r}")
         folders[label] = Path(folder)
     own = models.resolve().name
-    return folders or {own if _LABEL.fullmatch(own) and own != LOWESS else "model": models}
+    return folders or {own if _LABEL.fullmatch(own) and own.lower() != LOWESS else "model": models}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,7 +27,7 @@ from mskgrasp.evaluate.comparison import (
     POLICY_NAMES,
     SIDES,
     DisplacementSummary,
-    paper_label,
+    figure_names,
 )
 from mskgrasp.evaluate.summary import Interval, SuccessSummary, displacement_errors, rms
 from mskgrasp.reports.style import saved_figure
@@ -119,7 +119,7 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
     parts together and appear in both rows. A bar without an error bar is of a single part.
     """
     models = summary.models
-    ours = {paper_label(label) or label: label for label in models}
+    ours = figure_names(models)
     order = [*PAPER, *(name for name in ours if name not in PAPER)]
     with saved_figure(path, 5 + 1.4 * len(order), 7.4) as figure:
         grid = figure.subplots(2, 2, sharex=True, sharey="col")

@@ -242,6 +242,7 @@ def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
         (dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml", workers=2), "there is one cell"),
         (dict(experiment="displacement", compare=("a-b=x",)), "label=folder"),
         (dict(experiment="displacement", compare=("a",)), "label=folder"),
+        (dict(experiment="displacement", compare=(f"LOWESS={PRETRAINED}",)), "is not 'lowess'"),
         (dict(experiment="displacement", compare=("a=typo",)), "no model.json in typo"),
         (dict(experiment="displacement", lowess_data=Path("typo")), "no dataset folder typo"),
         (dict(experiment="displacement", planner=PlannerConfig()), "both policies"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from mskgrasp.evaluate.comparison import PAPER, DisplacementSummary, compare, paper_label
+from mskgrasp.evaluate.comparison import PAPER, DisplacementSummary, compare, figure_names, paper_label
 from mskgrasp.evaluate.figures import draw_comparison, draw_errors, draw_success
 from mskgrasp.evaluate.report import Report, print_report, sections
 from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise, worst_trials
@@ -132,6 +132,12 @@ def test_the_papers_bars_stand_beside_the_models_they_are_of():
     bar = PAPER["GCIP-M+V"]["low_variance"]
     assert bar is not None and bar.translation_rmse == pytest.approx(0.0024)
     assert np.degrees(bar.rotation_rmse) == pytest.approx(7.01)
+
+
+def test_two_models_of_the_same_name_in_the_paper_both_appear_in_the_figure():
+    assert figure_names(["gcip_mv", "GCIP.M.V", "ours"]) == {
+        "GCIP-M+V": "gcip_mv", "GCIP.M.V": "GCIP.M.V", "ours": "ours"
+    }  # fmt: skip
 
 
 def test_the_worst_are_sure_failures_then_the_largest_errors():
