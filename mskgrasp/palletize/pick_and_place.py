@@ -85,6 +85,8 @@ class PickAndPlace:
             HalError: The cell was lost; nothing of this placement is kept.
             StoppedByOperator: The operator ended the run.
         """
+        if not task.keep:
+            self._tops = {}
         slot = task.slot
         failed = Placement(
             part=find_part(task.part).name, number=task.number, slot=task.index, correction=task.correction,
@@ -105,8 +107,6 @@ class PickAndPlace:
         if not slot.fits(footprint, SEEN_TOLERANCE):
             return replace(known, reason="slot too small")
         done, target, after = self._carry(frame, plan, slot.targets(footprint), known)
-        if not task.keep:
-            self._tops = {}
         if done.placed:
             self._tops[task.index] = float(plan.view.size[2])
         maps = take_height_maps(frame, after, plan, target, slot.theta)

@@ -24,6 +24,7 @@ from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.palletize.__main__ import main
 from mskgrasp.palletize.config import PalletizeConfig
+from mskgrasp.palletize.figures import pallet_image
 from mskgrasp.palletize.pallet_slots import Slot
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
 from mskgrasp.palletize.run import SCENE_VERSION, palletize
@@ -187,3 +188,21 @@ def test_a_cell_without_feeder_and_tracker_is_served_by_its_operator_and_measure
     assert placed.translation_error is not None
     assert np.hypot(*(true.position[:2] - [0.52, 0.05])) == pytest.approx(placed.translation_error, abs=4e-3)
     assert unknown.placed and unknown.translation_error is None and "--tape" in unknown.unmeasured
+
+
+def test_the_picture_of_a_pallet_whose_first_part_failed_uses_no_heights_of_the_previous_pallet(tmp_path):
+    cell = sapien_cell(SapienCellConfig(type="sapien", part=PART))
+    slots = [Slot(x=0.5, y=0.06, theta=0.0, size=(0.09, 0.08))]
+    placed = PlacementTask(part=PART, number=0, index=0, slot=slots[0], correction="none", seed=5, keep=False)
+    too_small = dataclasses.replace(placed, number=1, slot=Slot(x=0.5, y=0.06, theta=0.0, size=(0.02, 0.02)))
+    (tmp_path / "placements").mkdir()
+    with cell.connected():
+        planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=100), cell)
+        engine = TrialEngine(cell, Operator(cell, yes=True), picture=tmp_path / "next.png")
+        worker = PickAndPlace(engine, planner, tmp_path / "placements")
+        assert worker.run(placed).placed
+        flat = pallet_image(cell.camera.capture(), slots, cell.workspace.table_z, {})
+        assert not np.array_equal(worker.picture(slots), flat)
+        assert worker.run(too_small).reason == "slot too small"
+        flat = pallet_image(cell.camera.capture(), slots, cell.workspace.table_z, {})
+        np.testing.assert_array_equal(worker.picture(slots), flat)
