@@ -65,7 +65,10 @@ def evaluate(config: EvaluateConfig) -> Report:
     _check(config)
     models = open_model(config.models)
     words = config.parts or PARTS[config.experiment]
-    parts = _parts(part_names(words, models.meta.training, config.n_parts))
+    sources = part_names(words, models.meta.training, config.n_parts)
+    if not sources:
+        raise UsageError("--parts names no part that the model was not trained on; name another set or parts")
+    parts = {find_part(source).name: source for source in sources}
     if config.planner.policy == "low_variance" and not models.meta.network.variance:
         raise BadModel(
             f"{config.models} predicts no variance; use --planner.policy quality, or another model"
@@ -97,19 +100,6 @@ def _check(config: EvaluateConfig) -> None:
             "--experiment displacement shows all models the same candidates: leave --planner.refinements and "
             "--planner.check-fingers away"
         )
-
-
-def _parts(words: Sequence[str]) -> dict[str, str]:
-    """What the user called each part, by its name."""
-    parts: dict[str, str] = {}
-    for word in words:
-        name = find_part(word).name
-        if name in parts:
-            raise UsageError(f"--parts: {parts[name]} and {word} are both called {name!r}; leave one away")
-        parts[name] = word
-    if not parts:
-        raise UsageError("--parts names no part that the model was not trained on; name another set or parts")
-    return parts
 
 
 def _make_trials(

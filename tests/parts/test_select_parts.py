@@ -1,10 +1,14 @@
-"""Which parts a user's words mean, and how some of them are chosen."""
+"""Selection of parts by names, folders and sets."""
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import pytest
 
-from mskgrasp.core.errors import UnknownPart
+from mskgrasp.core.errors import UnknownPart, UsageError
+from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import evenly, part_names
 
 TRAINING = {
@@ -34,6 +38,12 @@ def test_sets_are_those_of_the_model_and_share_the_number_of_parts():
     }  # fmt: skip
 
 
-def test_an_unknown_part_is_told():
+def test_two_parts_of_one_name_are_refused(tmp_path: Path):
+    copy = shutil.copytree(find_part("hex_nut_m30").folder, tmp_path / "hex_nut_m30")
+    with pytest.raises(UsageError, match="both called 'hex_nut_m30'"):
+        part_names(("hex_nut_m30", str(copy)), TRAINING)
+
+
+def test_an_unknown_part_is_refused_with_a_similar_name():
     with pytest.raises(UnknownPart, match="hex_nut_m30"):
         part_names(("hex_nut_m3x",), TRAINING)
