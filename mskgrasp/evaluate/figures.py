@@ -1,4 +1,4 @@
-"""Figures of an evaluation: success, errors of displacement, comparison of models."""
+"""Figures of an evaluation: success, predicted displacements, comparison of models."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _BAR = 0.2
 
 
 def draw_success(summary: SuccessSummary, path: Path) -> None:
-    """Draws success by family, or by part where every family has one part, and the reasons of failures."""
+    """Draw success by family, or by part where every family has one part, and the reasons of failures."""
     overall = summary.overall
     by_family = len(summary.families) < len(summary.parts)
     groups = summary.families if by_family else summary.parts
@@ -78,7 +78,7 @@ def draw_success(summary: SuccessSummary, path: Path) -> None:
 
 
 def draw_errors(trials: Sequence[Trial], path: Path) -> None:
-    """Draws measured over predicted displacement of every success, with the predicted deviation."""
+    """Draw measured over predicted displacements of the successes, with predicted standard deviations."""
     measured = [trial for trial in trials if trial.measured is not None]
     predicted = np.array([trial.predicted for trial in measured]).reshape(-1, 4)
     deviation = np.array([trial.predicted_std for trial in measured]).reshape(-1, 4)
@@ -113,10 +113,10 @@ def _points(
 
 
 def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
-    """Draws each model's RMSE under both policies as in figure 5 of the paper, beside the paper's bars.
+    """Draw each model's RMSE under both policies as in figure 5 of the paper, beside the paper's bars.
 
     Rows: known and novel parts; columns: translation and rotation. The paper's bars are of known and novel
-    parts together and appear in both rows. A bar without an error bar is of a single part.
+    parts together and appear in both rows. A bar without an interval is of a single part.
     """
     models = summary.models
     ours = figure_names(models)
@@ -155,7 +155,7 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
 def _bar(
     axes: Axes, x: float, value: float | None, interval: Interval | None, scale: float, colour: str
 ) -> None:
-    """Draws an error with its interval; a dash where no trial was measured."""
+    """Draw an error with its interval; a dash where no trial was measured."""
     if value is None:
         axes.text(x, 0, "-", ha="center", va="bottom", color=colour)
         return

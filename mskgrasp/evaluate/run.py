@@ -1,4 +1,4 @@
-"""The paper's experiments on any cell: trials, summary and report."""
+"""Run of an experiment: its missing trials, summary and report."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ MAY_CHANGE = ("out", "trials", "parts", "n_parts", "compare", "lowess_data", "wo
 
 
 def replay(out: Path, key: str) -> int:
-    """Draws a stored trial of a run and says what came of it."""
+    """Draw a stored trial of a run and print its outcome."""
     trial = find_trial(out, key)
     picture = out / "replay" / f"{trial.key}.png"
     draw_trial(out, trial, picture)
@@ -56,10 +56,10 @@ def replay(out: Path, key: str) -> int:
 
 
 def evaluate(config: EvaluateConfig) -> Report:
-    """Executes the trials that are missing and sums them up.
+    """Execute the missing trials and report on all.
 
     Raises:
-        UsageError: The folder holds a run with other settings, another model or another cell.
+        UsageError: Settings do not fit together, or the folder holds a run with other inputs.
         MskgraspError: A model, a part or the cell cannot be used.
     """
     _check(config)
@@ -67,7 +67,7 @@ def evaluate(config: EvaluateConfig) -> Report:
     words = config.parts or PARTS[config.experiment]
     sources = part_names(words, models.meta.training, config.n_parts)
     if not sources:
-        raise UsageError("--parts names no part that the model was not trained on; name another set or parts")
+        raise UsageError("--parts names no held-out part; name another set or parts")
     parts = {find_part(source).name: source for source in sources}
     if config.planner.policy == "low_variance" and not models.meta.network.variance:
         raise BadModel(
@@ -75,7 +75,7 @@ def evaluate(config: EvaluateConfig) -> Report:
         )
     cell = read_cell(config.cell, noise=config.noise, measure=config.measure, tape=config.tape)
     if config.workers > 1 and not cell.simulated:
-        raise UsageError(f"--workers {config.workers}: there is one cell of {config.cell}; leave it away")
+        raise UsageError(f"--workers {config.workers}: {config.cell} is one cell; omit --workers")
     compared = None
     if config.experiment == "displacement":
         chunk = config.planner.chunk_size
@@ -92,20 +92,20 @@ def evaluate(config: EvaluateConfig) -> Report:
 
 def _check(config: EvaluateConfig) -> None:
     if config.experiment == "success" and (config.compare or config.lowess_data):
-        raise UsageError("--compare and --lowess-data are for --experiment displacement: add that")
+        raise UsageError("--compare and --lowess-data need --experiment displacement; add it")
     if config.experiment == "displacement" and config.planner.policy != "quality":
-        raise UsageError("--experiment displacement runs both policies: leave --planner.policy away")
+        raise UsageError("--experiment displacement runs both policies; omit --planner.policy")
     if config.experiment == "displacement" and config.planner.searches:
         raise UsageError(
-            "--experiment displacement shows all models the same candidates: leave --planner.refinements and "
-            "--planner.check-fingers away"
+            "--experiment displacement gives all models the same candidates; omit --planner.refinements and "
+            "--planner.check-fingers"
         )
 
 
 def _make_trials(
     config: EvaluateConfig, cell: CellFile, compared: Compared | None, tasks: Sequence[tuple[TrialTask, ...]]
 ) -> dict[str, Trial]:
-    """All trials of the folder by key, those that were missing made now."""
+    """Make the missing trials; all trials of the folder by key."""
     make_folder(config.out / FOLDER)
     for leftover in (config.out / FOLDER).glob("*.tmp"):
         leftover.unlink()
@@ -137,7 +137,7 @@ def _make_trials(
             n_lifted += trial.success
             bar.set_postfix_str(f"lifted {n_lifted / k:.0%}", refresh=False)
             bar.update()
-    # In the order of their names, whoever was first.
+    # Sorted: workers finish in any order.
     rewrite(config.out / TRIALS, (trials[key].to_json() for key in sorted(trials)))
     return trials
 
@@ -145,7 +145,7 @@ def _make_trials(
 def _with_predictions(
     config: EvaluateConfig, trials: dict[str, Trial], compared: Compared
 ) -> dict[str, Trial]:
-    """Adds what each model expects of the grasps of best quality, where that is not known yet."""
+    """Add the models' missing predictions for the grasps of the best quality."""
     bar = progress(trials.items(), title="predictions", unit="trial")
     more = {key: with_predictions(trial, config.out, compared.predictors) for key, trial in bar}
     if more != trials:
@@ -156,7 +156,7 @@ def _with_predictions(
 def _report(
     config: EvaluateConfig, cell: CellFile, compared: Compared | None, trials: Sequence[Trial]
 ) -> Report:
-    """Writes the report and its pictures."""
+    """Write the report and its pictures."""
     summary = summarise(trials) if compared is None else compare(trials, compared.predictors)
     worst = worst_trials(trials) if compared is None else largest_errors(trials)
     settings = config.model_dump(mode="json", exclude={"replay"}) | dict(

@@ -30,7 +30,7 @@ _CUT = 0.004
 
 
 def draw_placement(maps: HeightMaps, placement: Placement, path: Path) -> None:
-    """Draws one placement: before with the grasp, after with the target; millimetres from the target."""
+    """Draw one placement: before with the grasp, after with the target."""
     with saved_figure(path, 9.2, 4.9) as figure:
         left, right = figure.subplots(1, 2)
         _show_before(left, maps)
@@ -41,7 +41,7 @@ def draw_placement(maps: HeightMaps, placement: Placement, path: Path) -> None:
 
 
 def outcome_text(placement: Placement) -> str:
-    """The outcome of a placement in words."""
+    """Describe the outcome of a placement."""
     if not placement.placed:
         return f"not placed ({placement.reason})"
     if placement.translation_error is None or placement.rotation_error is None:
@@ -81,20 +81,20 @@ def _show_after(axes: Axes, maps: HeightMaps) -> None:
 
 
 def _cross(axes: Axes, at: np.ndarray, theta: float, length: float) -> None:
-    """Draws the target as in the paper: its centre, and its orientation as the longer arm."""
+    """Draw the target as in the paper: a cross whose longer arm is the orientation."""
     for angle, share, width in ((theta, 1.0, 1.6), (theta + np.pi / 2, 0.4, 1.0)):
         arm = share * length * np.array([np.cos(angle), np.sin(angle)])
         axes.plot(*np.stack([at - arm, at + arm]).T, color=GREEN, lw=width, alpha=0.9, zorder=6)
 
 
 def _outline(axes: Axes, maps: HeightMaps, turn: float, colour: str, line: str) -> None:
-    """Draws the part's outline before the grasp, turned about its centre."""
+    """Draw the part's outline before the grasp, turned about its centre."""
     n = len(maps.before)
     pitch = maps.side * _MM / n
     steps = (np.arange(n) - (n - 1) / 2) * pitch
     x, y = np.meshgrid(steps, -steps)
-    # Cut low, a thin plate counts as much as a high wall. A camera pixel is several of these: without the
-    # blur the outline shows its stairs.
+    # Clipped, a thin plate weighs as much as a high wall. A camera pixel covers several cells: without the
+    # blur the outline shows stairs.
     low = np.ascontiguousarray(np.minimum(maps.before, min(_CUT, maps.top)))
     smooth = cv2.GaussianBlur(low, (0, 0), 1.5 / pitch)
     level = [0.5 * max(float(smooth.max()), 1e-4)]
@@ -108,7 +108,7 @@ def _outline(axes: Axes, maps: HeightMaps, turn: float, colour: str, line: str) 
 def draw_comparison(
     rows: Sequence[tuple[Placement, dict[Correction, HeightMaps], Group]], path: Path
 ) -> None:
-    """Draws a row for each part: before the grasp, then after it under each correction, targets in green.
+    """Draw a row for each part: before the grasp, then placed under each correction, targets in green.
 
     Args:
         rows: For each part one of its placements, and the height maps and placements by correction.
@@ -131,7 +131,7 @@ def draw_comparison(
 
 
 def draw_errors(placements: Sequence[Placement], path: Path) -> None:
-    """Draws the cumulative distribution of the errors, and the medians of each part."""
+    """Draw the cumulative distribution of the errors, and the medians of each part."""
     groups = compared_groups(placements)
     names = corrections_of(placements)
     with saved_figure(path, 11.5, 4.3) as figure:
@@ -183,17 +183,17 @@ def _draw_parts(axes: Axes, groups: list[Group]) -> None:
 def pallet_image(
     frame: RgbdFrame, slots: Sequence[Slot], table_z: float, tops: Mapping[int, float]
 ) -> np.ndarray:
-    """The slots from above as (h, w, 3) uint8 RGB, base x up and y to the left; 1 mm per pixel.
+    """Rectify the slots from above: (h, w, 3) uint8 RGB, base x up and y to the left, 1 mm per pixel.
 
     Args:
-        frame: Image of the pallet, the arm out of view.
+        frame: Frame of the pallet, the arm out of view.
         slots: All slots.
         table_z: Height of the table, metres.
         tops: Height of the part in each filled slot, metres. In a slot of known size the parallax of the
             part's top is removed.
     """
     bounds = pallet_bounds(slots)
-    image = _seen_at(frame, bounds, table_z)
+    image = _rectified(frame, bounds, table_z)
     for index, top in tops.items():
         size = slots[index].size
         if size is not None:
@@ -202,27 +202,27 @@ def pallet_image(
             # Rows count from the greatest x, columns from the greatest y.
             rows = slice(*np.rint((bounds[1] - np.array([high[0], low[0]])) * _MM).astype(int))
             columns = slice(*np.rint((bounds[3] - np.array([high[1], low[1]])) * _MM).astype(int))
-            image[rows, columns] = _seen_at(frame, bounds, table_z + top)[rows, columns]
+            image[rows, columns] = _rectified(frame, bounds, table_z + top)[rows, columns]
     return image
 
 
-def _seen_at(frame: RgbdFrame, bounds: tuple[float, float, float, float], z: float) -> np.ndarray:
-    """A rectangle of the base at height z, rectified from a frame."""
+def _rectified(frame: RgbdFrame, bounds: tuple[float, float, float, float], z: float) -> np.ndarray:
+    """A horizontal rectangle at height z, base frame, rectified from a frame."""
     x_min, x_max, y_min, y_max = bounds
     colour = frame.colour if frame.fine_colour is None else frame.fine_colour
     scale = colour.shape[0] / frame.depth.shape[0]
     corners = np.array([[x_max, y_max], [x_max, y_min], [x_min, y_min], [x_min, y_max]])
     rotation = quat_to_matrix(np.asarray(frame.T_base_camera.quat_wxyz))
     points = (np.column_stack([corners, np.full(4, z)]) - frame.T_base_camera.position) @ rotation
-    seen = points @ np.asarray(frame.intrinsics).T
-    pixels = ((seen[:, :2] / seen[:, 2:] + 0.5) * scale - 0.5).astype(np.float32)
+    projected = points @ np.asarray(frame.intrinsics).T
+    pixels = ((projected[:, :2] / projected[:, 2:] + 0.5) * scale - 0.5).astype(np.float32)
     w, h = round((y_max - y_min) * _MM), round((x_max - x_min) * _MM)
     square = np.array([[0, 0], [w, 0], [w, h], [0, h]], dtype=np.float32)
     return cv2.warpPerspective(colour, cv2.getPerspectiveTransform(pixels, square), (w, h))
 
 
 def pallet_bounds(slots: Sequence[Slot]) -> tuple[float, float, float, float]:
-    """x_min, x_max, y_min, y_max around the slots, metres."""
+    """Bounds of the slots with a margin: x_min, x_max, y_min, y_max, metres."""
     half = [np.array(slot.size or (0.1, 0.1)) / 2 + 0.01 for slot in slots]
     low = np.min([[s.x, s.y] - h for s, h in zip(slots, half, strict=True)], axis=0)
     high = np.max([[s.x, s.y] + h for s, h in zip(slots, half, strict=True)], axis=0)
@@ -230,14 +230,14 @@ def pallet_bounds(slots: Sequence[Slot]) -> tuple[float, float, float, float]:
 
 
 def draw_pallets(images: dict[Correction, np.ndarray], slots: Sequence[Slot], title: str, path: Path) -> None:
-    """Draws a pallet under each correction, with targets in green and slot outlines in white."""
+    """Draw a pallet under each correction, with targets in green and slot outlines in white."""
     x_min, x_max, y_min, y_max = pallet_bounds(slots)
     height = 4.2 * (x_max - x_min) / max(y_max - y_min, 1e-6)
     with saved_figure(path, 4.2 * len(images), height + 0.9) as figure:
         for axes, (name, image) in zip(
             figure.subplots(1, len(images), squeeze=False)[0], images.items(), strict=True
         ):
-            # Right is -y and up is +x: the view from behind the robot.
+            # Right is -y and up is +x, as seen from behind the robot.
             axes.imshow(image, extent=(-y_max * _MM, -y_min * _MM, x_min * _MM, x_max * _MM))
             for slot in slots:
                 at = np.array([-slot.y, slot.x]) * _MM

@@ -1,4 +1,4 @@
-"""Height maps of a placement from above, before and after."""
+"""Height maps of a part before the grasp and after placing."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _N = 200
 
 @dataclass(frozen=True, kw_only=True)
 class HeightMaps:
-    """Height maps of a placement from above, before and after: squares along the base's axes, metres.
+    """Height maps of a part before the grasp and after placing: squares along the base's axes, metres.
 
     Attributes:
-        before: (n, n) heights over the table around the part before the grasp, its centre in the middle.
-        after: (n, n) the same around the target; empty where the part was not placed.
+        before: (n, n) heights above the table before the grasp, centred on the part.
+        after: (n, n) heights after placing, centred on the target; empty where the part was not placed.
         side: Edge length of both squares.
         top: Height of the part.
-        grasp: (3,) x, y from the part's centre, and theta.
+        grasp: (3,) x, y of the grasp relative to the part's centre, and theta.
         turn: Target turn of the part, radians.
         theta: Direction of its longer side at the target, radians.
     """
@@ -47,7 +47,7 @@ class HeightMaps:
 def take_height_maps(
     before: RgbdFrame, after: RgbdFrame | None, plan: GraspPlan, target: Target, theta: float
 ) -> HeightMaps:
-    """Height maps of a placement from its frames."""
+    """Compute the height maps of a placement from its frames."""
     view = plan.view
     side = max(0.1, 1.6 * float(np.hypot(*view.size[:2])))
     return HeightMaps(
@@ -64,7 +64,7 @@ def take_height_maps(
 
 
 def write_height_maps(maps: HeightMaps, path: Path) -> None:
-    """Writes height maps as a compressed file, atomically."""
+    """Write height maps as a compressed file, atomically."""
     values: dict[str, Any] = {name: np.asarray(value) for name, value in asdict(maps).items()}
     for name in ("before", "after"):
         values[name] = values[name].astype(np.float32)
@@ -74,7 +74,7 @@ def write_height_maps(maps: HeightMaps, path: Path) -> None:
 
 
 def read_height_maps(path: Path) -> HeightMaps:
-    """Reads a file of `write_height_maps`.
+    """Read a file of `write_height_maps`.
 
     Raises:
         BadDataset: The file is missing or damaged.
@@ -91,7 +91,7 @@ def read_height_maps(path: Path) -> HeightMaps:
 
 
 def _heights(frame: RgbdFrame, centre: np.ndarray, side: float, table_z: float) -> np.ndarray:
-    """(n, n) heights as seen orthographically from above, without parallax."""
+    """Orthographic heights (n, n) above the table, free of parallax."""
     points = seen_points(frame)
     cell = side / _N
     from_corner = (points[:, :2] - centre) * [1, -1] + side / 2
@@ -99,6 +99,6 @@ def _heights(frame: RgbdFrame, centre: np.ndarray, side: float, table_z: float) 
     columns, rows = np.floor(from_corner[inside] / cell).astype(int).T
     heights = np.zeros((_N, _N), dtype=np.float32)
     np.maximum.at(heights, (rows, columns), (points[inside, 2] - table_z).astype(np.float32))
-    # A pixel of the camera covers several cells, and the point is in the middle of it.
+    # A camera pixel covers several cells around its point.
     width = 2 * round(pixel_pitch(frame) / cell / 2) + 1
     return cv2.dilate(heights, cv2.getStructuringElement(cv2.MORPH_RECT, (width, width)))

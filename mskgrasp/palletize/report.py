@@ -1,4 +1,4 @@
-"""The report of a palletizing run: sections, figures and report.json."""
+"""Report of a palletizing run: sections, figures and ``report.json``."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _HEADER = (
 _DEFINITIONS = (
     "Error: distance of the placed part's centre from its target. Turn error: difference between the turn "
     "the part made and the turn commanded. Centre and direction of the longer side before the grasp are "
-    "those seen in the depth image, so no column includes the error of seeing them.",
+    "estimated from the depth image, so no column includes the error of that estimate.",
     "Correction none: the part is assumed not to move in the hand; predicted: displacement predicted by the "
     "network; truth: displacement measured in simulation, a lower bound. Goal: correcting by the prediction "
     f"leaves at most {GOAL:g} of the median error. Intervals: bootstrap over parts, 95 %.",
@@ -50,13 +50,13 @@ _DEFINITIONS = (
 def write_report(
     config: BaseModel, out: Path, placements: Sequence[Placement], slots: Sequence[Slot]
 ) -> PlacementSummary:
-    """Summarises a run and writes report.json, report.html and its figures.
+    """Summarise a run and write report.json, report.html and its figures.
 
     Args:
         config: Settings of the run.
-        out: Its folder, with the pictures and height maps of the placements in ``placements``.
-        placements: All of them.
-        slots: The targets.
+        out: Folder of the run, with the pictures and height maps of the placements in ``placements``.
+        placements: All placements of the run.
+        slots: All slots.
     """
     summary = summarise_placements(placements)
     text = json.dumps(summary.to_json(), indent=1, allow_nan=False)
@@ -82,7 +82,7 @@ def write_report(
 
 
 def print_report(summary: PlacementSummary, console: Console | None = None) -> None:
-    """Prints the counts and errors of each correction, and what correcting gains."""
+    """Print the counts and errors of each correction, and what correcting gains."""
     print_sections([_result(summary)], console)
 
 
@@ -142,7 +142,7 @@ def _ratio_text(ratio: float | None, interval: Interval | None) -> str:
 
 
 def _pallets(out: Path, placements: Sequence[Placement], slots: Sequence[Slot]) -> Section:
-    """Pictures of whole pallets, side by side by correction; empty without pallets."""
+    """Images of whole pallets, side by side by correction; empty without pallets."""
     figures = []
     for number in sorted({one.number for one in placements}):
         images: dict[Correction, np.ndarray] = {}

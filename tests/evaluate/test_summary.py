@@ -1,4 +1,4 @@
-"""What trials amount to: against numbers worked out by hand."""
+"""Summaries of trials, against numbers worked out by hand."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NOTHING = dict(
 
 
 class Model:
-    """Knows one part."""
+    """Trained on part a."""
 
     has_variance = True
 
@@ -50,7 +50,7 @@ def printed(summary: SuccessSummary | DisplacementSummary) -> str:
     return stream.getvalue()
 
 
-def test_errors_are_those_of_the_definition():
+def test_success_and_errors_follow_their_definitions():
     summary = summarise([trial(), trial(number=1, success=False, reason="missed", measured=None)])
     overall = summary.overall
     assert overall.trials == 2 and overall.successes == 1 and overall.success_rate == 0.5
@@ -61,8 +61,8 @@ def test_errors_are_those_of_the_definition():
     assert summary.families["nut"].reasons == {"missed": 1}
 
 
-def test_error_bars_are_over_parts_not_over_grasps():
-    """Two parts, one twice as far off: drawing parts again gives either, or both."""
+def test_intervals_are_over_parts_not_over_grasps():
+    """Two parts, one with twice the error: a resample holds either, or both."""
     far = [trial(part="b", number=k, measured=[-0.003, 0.008, 0.0, 0.1]) for k in range(50)]
     near = [trial(number=k, measured=[0.0, 0.004, 0.0, 0.1]) for k in range(50)]
     interval = summarise(far + near).overall.translation_interval
@@ -84,7 +84,7 @@ def test_without_a_success_errors_are_absent_not_zero(tmp_path: Path):
     assert len(list(tmp_path.glob("*.png"))) == 3
 
 
-def test_what_tape_did_not_measure_is_counted_and_is_no_number():
+def test_an_unmeasured_success_is_counted_and_has_no_error():
     unmeasured = trial(number=1, measured=None, unmeasured="one found: the larger square is seen, ...")
     planar = trial(measured=[0.0, 0.004, np.nan, -0.1], true=[0.0, 0.0043, 0.001, -0.1])
     summary = summarise([planar, unmeasured])
@@ -97,7 +97,7 @@ def test_what_tape_did_not_measure_is_counted_and_is_no_number():
     assert report_of(summary).to_json()["tape_against_truth"]["tilted"] == {"trials": 0}
 
 
-def test_a_part_that_hung_askew_is_told_apart_where_tape_measures():
+def test_tape_errors_of_tilted_parts_are_reported_apart():
     flat = trial(measured=[0.0, 0.004, np.nan, 0.0], true=[0.0, 0.004, 0.0, 0.0])
     tilted = trial(number=1, measured=[0.0, 0.004, np.nan, 0.0], true=[0.006, 0.004, 0.0, 0.0], tilt=0.2)
     found = summarise([flat, tilted]).tape_against_truth
@@ -106,7 +106,7 @@ def test_a_part_that_hung_askew_is_told_apart_where_tape_measures():
     assert found.tilted.translation_worst == pytest.approx(0.006)
 
 
-def test_models_are_compared_on_the_same_grasps_and_on_those_they_chose():
+def test_models_are_compared_on_shared_grasps_and_on_their_own():
     expected = {"one": Prediction(mean=[0.0, 0.001, 0.0, -0.1], std=[0.01] * 4)}
     best = [trial(predictions=expected), trial(part="b", predictions=expected, measured=[0.0, 0.0, 0.0, 0.0])]
     chosen = trial(policy="low_variance", chosen_by="one", predicted=[0.0, 0.0039, 0.0, -0.1])
@@ -126,7 +126,7 @@ def test_models_are_compared_on_the_same_grasps_and_on_those_they_chose():
     assert ("one", "high quality", "novel") in [row[:3] for row in section.tables[0].rows]
 
 
-def test_the_papers_bars_stand_beside_the_models_they_are_of():
+def test_labels_are_matched_with_the_papers_models():
     assert paper_label("gcip_mv") == paper_label("GCIP-M+V") == "GCIP-M+V"
     assert paper_label("lowess") == "LOWESS" and paper_label("ours") is None
     bar = PAPER["GCIP-M+V"]["low_variance"]
@@ -140,10 +140,10 @@ def test_two_models_of_the_same_name_in_the_paper_both_appear_in_the_figure():
     }  # fmt: skip
 
 
-def test_the_worst_are_sure_failures_then_the_largest_errors():
-    sure = trial(number=1, success=False, reason="missed", measured=None, quality=0.99)
-    unsure = trial(number=2, success=False, reason="missed", measured=None, quality=0.1)
+def x():
+    confident = trial(number=1, success=False, reason="missed", measured=None, quality=0.99)
+    doubtful = trial(number=2, success=False, reason="missed", measured=None, quality=0.1)
     turned = trial(number=3, measured=[0.003, 0.0, 0.0, 1.1])
-    trials = [trial(), unsure, turned, sure]
+    trials = [trial(), doubtful, turned, confident]
     assert [one.number for one in worst_trials(trials)] == [1, 2, 3, 0]
     assert [one.number for one in largest_errors(trials, 1)] == [3]
