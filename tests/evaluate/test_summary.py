@@ -140,7 +140,7 @@ def test_two_models_of_the_same_name_in_the_paper_both_appear_in_the_figure():
     }  # fmt: skip
 
 
-def x():
+def test_the_worst_are_confident_failures_then_the_largest_errors():
     confident = trial(number=1, success=False, reason="missed", measured=None, quality=0.99)
     doubtful = trial(number=2, success=False, reason="missed", measured=None, quality=0.1)
     turned = trial(number=3, measured=[0.003, 0.0, 0.0, 1.1])

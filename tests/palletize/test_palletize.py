@@ -121,12 +121,10 @@ def test_a_run_whose_cell_was_lost_is_resumed_and_reported(tmp_path, monkeypatch
         (dict(slots="none.yaml"), UsageError, "cannot read configuration .*none.yaml"),
         (dict(cell="real.yaml"), UsageError, "standard input is no terminal"),
         (dict(cell="real.yaml", yes=True, workers=2), UsageError, "--workers 2: .* is one cell"),
-        (dict(cell="real.yaml", yes=True, corrections=("truth",)), UsageError, "no tracker; legal: none, pred"),
+        (dict(cell="real.yaml", yes=True, corrections=("truth",)), UsageError, "no tracker; legal: none"),
     ],
 )  # fmt: skip
-def test_what_the_cell_cannot_do_is_refused_before_anything_moves(
-    tmp_path, monkeypatch, changes, error, message
-):
+def test_an_impossible_run_is_refused_before_anything_moves(tmp_path, monkeypatch, changes, error, message):
     (tmp_path / "small.yaml").write_text("slots: [{x: 0.5, y: 0.2, size: [0.02, 0.03]}]")
     (tmp_path / "real.yaml").write_text(yaml.safe_dump(REAL))
     monkeypatch.setattr("sys.stdin", io.StringIO())
