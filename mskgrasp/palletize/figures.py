@@ -12,12 +12,12 @@ from matplotlib.patches import Rectangle
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.geometry import quat_to_matrix
-from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.palette import BLUE, FAINT, GREEN, INK, LINE, ORANGE
 from mskgrasp.palletize.height_maps import HeightMaps
 from mskgrasp.palletize.pallet_slots import Slot
 from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
 from mskgrasp.palletize.summary import Group, compared_groups, corrections_of
+from mskgrasp.reports.grasp_figures import draw_jaw, show_heights
 from mskgrasp.reports.style import saved_figure
 
 COLOURS: dict[Correction, str] = {"none": FAINT, "predicted": BLUE, "truth": GREEN}
@@ -49,25 +49,10 @@ def outcome_text(placement: Placement) -> str:
     return f"{placement.translation_error * _MM:.1f} mm, {np.degrees(placement.rotation_error):.1f}° off"
 
 
-def _axes(axes: Axes, maps: HeightMaps, heights: np.ndarray) -> None:
-    half = maps.side / 2 * _MM
-    top = max(maps.top, 1e-3)
-    axes.imshow(heights, extent=(-half, half, -half, half), cmap="Greys", vmin=-0.15 * top, vmax=1.5 * top)
-    axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
-    axes.tick_params(length=2, labelsize=8)
-
-
 def _show_before(axes: Axes, maps: HeightMaps) -> None:
-    _axes(axes, maps, maps.before)
+    show_heights(axes, maps.before, (0.0, 0.0), maps.side, max(maps.top, 1e-3))
     _outline(axes, maps, 0.0, INK, "-")
-    origin, theta = maps.grasp[:2] * _MM, float(maps.grasp[2])
-    closing = np.array([-np.sin(theta), np.cos(theta)])
-    reach = MAX_OPENING / 2 * _MM
-    axes.plot(*np.stack([origin - reach * closing, origin + reach * closing]).T, color=BLUE, lw=1.2, ls="--")
-    for start in (reach, -reach - 8.0):
-        corner = origin + start * closing - 10.0 * np.array([np.cos(theta), np.sin(theta)])
-        pad = Rectangle(tuple(corner), 20.0, 8.0, angle=np.degrees(theta), fc=BLUE, ec="white", lw=0.8)
-        axes.add_patch(pad)
+    draw_jaw(axes, maps.grasp, float(maps.grasp[2]))
 
 
 def _show_after(axes: Axes, maps: HeightMaps) -> None:
@@ -75,7 +60,7 @@ def _show_after(axes: Axes, maps: HeightMaps) -> None:
         axes.text(0.5, 0.5, "not placed", transform=axes.transAxes, ha="center", color=ORANGE)
         axes.set(xticks=[], yticks=[])
         return
-    _axes(axes, maps, maps.after)
+    show_heights(axes, maps.after, (0.0, 0.0), maps.side, max(maps.top, 1e-3))
     _outline(axes, maps, maps.turn, GREEN, "--")
     _cross(axes, np.zeros(2), maps.theta, 0.42 * maps.side * _MM)
 
