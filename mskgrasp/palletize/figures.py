@@ -123,7 +123,7 @@ def draw_errors(placements: Sequence[Placement], path: Path) -> None:
         shift, turn, parts = figure.subplots(1, 3)
         for axes, error, scale, unit in (
             (shift, "translation", _MM, "mm"),
-            (turn, "rotation", 57.2958, "degrees"),
+            (turn, "rotation", 180 / np.pi, "degrees"),
         ):
             for name in names:
                 values = np.sort([getattr(group[name], f"{error}_error") * scale for group in groups])
