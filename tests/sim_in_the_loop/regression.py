@@ -33,12 +33,12 @@ HERE = Path(__file__).parent
 STORED = HERE / "regression.json"
 SCHEMA_VERSION = 1
 LEVEL = 0.99
-"""Of confidence: one false alarm in a hundred runs and figure."""
+"""Confidence level: one false alarm per figure in a hundred runs."""
 
 DESCRIPTION = """Plans, grasps, corrects and places a fixed set of parts in the simulated cell, and prints
-what has changed against the run stored in the repository, with intervals over parts.
+the differences from the run stored in the repository, with intervals over parts.
 
-Ends with 1 if anything is worse than chance explains. --store keeps this run as the stored one: commit it
+The exit status is 1 if a figure is worse than chance explains. --store replaces the stored run: commit it
 with the change that explains it."""
 
 
@@ -109,13 +109,13 @@ class RegressionConfig(Config):
     """Settings of a regression run."""
 
     out: Path = Path("out/regression")
-    """Folder of the palletizing run; a stopped one goes on. Delete it after a change of code."""
+    """Folder of the palletizing run; a stopped run is resumed. Delete it after a change of code."""
     trials: int = Field(default=4, ge=1)
-    """Trials a part; compared are those that the stored run has, too."""
+    """Trials per part; those that the stored run has, too, are compared."""
     workers: int = Field(default=1, ge=1)
     """Processes."""
     store: bool = False
-    """Keep this run as the stored one."""
+    """Store this run in place of the stored one."""
 
 
 def main() -> int:
