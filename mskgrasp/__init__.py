@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from mskgrasp.learning.grasp_models import Models, load_models
     from mskgrasp.parts.load import load_part
     from mskgrasp.parts.part import Part
-    from mskgrasp.planning.placing import Target, place_pose
+    from mskgrasp.planning.place_pose import Target, place_pose
     from mskgrasp.planning.planner import GraspPlan, Planner, PlannerConfig
 
 __version__ = "0.1.0"
@@ -45,7 +45,7 @@ _HOMES = {
     "mskgrasp.learning.grasp_models": ("Models", "load_models"),
     "mskgrasp.parts.load": ("load_part",),
     "mskgrasp.parts.part": ("Part",),
-    "mskgrasp.planning.placing": ("Target", "place_pose"),
+    "mskgrasp.planning.place_pose": ("Target", "place_pose"),
     "mskgrasp.planning.planner": ("GraspPlan", "Planner", "PlannerConfig"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

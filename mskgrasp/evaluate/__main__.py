@@ -10,12 +10,12 @@ DESCRIPTION = """Plans and executes grasps on a cell and reports the outcomes.
 --experiment success: how often the grasp of the best predicted quality lifts the part.
 --experiment displacement: how well models predict how the part moves in the hand, for grasps of the best
 quality and for those of low predicted variance among the best; --compare names the models, --lowess-data a
-dataset from which LOWESS predicts known parts. One grasp of the best quality serves all models.
+dataset from whose grasps LOWESS predicts. All models predict the same grasp of the best quality.
 
-Every trial is stored at once, with what was seen: a stopped run goes on where it was, with more parts, trials
-or models if need be, and --replay OUT TRIAL draws one again. Simulated cells work in parallel; the number of
-them changes nothing. Another cell is another YAML file; a real one asks its operator to place every part, and
-before the arm moves (--yes: it asks nothing)."""
+Every trial is stored at once with its frame: the same command resumes a stopped run, with more parts, trials
+or models if asked for, and --replay OUT TRIAL draws one again. Simulated cells run in parallel; their number
+does not change the results. A real cell asks its operator to place every part, and before the arm moves
+(--yes: it asks nothing)."""
 
 
 def main() -> int:

@@ -1,20 +1,39 @@
-"""The displacement experiment: models beside each other, on known and on novel parts, beside the paper's."""
+"""The displacement experiment: errors of models on known and novel parts, and those of the paper's models."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from mskgrasp.evaluate.summary import SCHEMA_VERSION, numbers, own_prediction, tape_against_truth
+from mskgrasp.evaluate.summary import (
+    SCHEMA_VERSION,
+    TapeComparison,
+    TrialStatistics,
+    compare_tape,
+    own_prediction,
+)
 from mskgrasp.trials.predictors import LOWESS, Predictor
 from mskgrasp.trials.trial import Policy, Prediction, Trial
 
+Side = Literal["known", "novel"]
 POLICIES: tuple[Policy, ...] = ("quality", "low_variance")
-POLICY_NAMES = {"quality": "high quality", "low_variance": "high quality and low variance"}
-SIDES = ("known", "novel")
+POLICY_NAMES: dict[Policy, str] = {
+    "quality": "high quality", "low_variance": "high quality and low variance",
+}  # fmt: skip
+SIDES: tuple[Side, ...] = ("known", "novel")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperErrors:
+    """RMSE of a model of the paper, metres and radians."""
+
+    translation_rmse: float
+    rotation_rmse: float
+
 
 _READ_OFF = {
     "LOWESS": ((1.00, 0.155), (1.23, 0.49)),
@@ -23,60 +42,96 @@ _READ_OFF = {
     "GCIP-M": ((0.46, 0.145), None),
     "GCIP-M+V": ((0.43, np.radians(8.29)), (0.24, np.radians(7.01))),
 }
-PAPER: dict[str, dict[str, Any]] = {
+PAPER: dict[str, dict[Policy, PaperErrors | None]] = {
     label: {
-        policy: None if bar is None else dict(translation_rmse=1e-2 * bar[0], rotation_rmse=float(bar[1]))
+        policy: bar and PaperErrors(translation_rmse=1e-2 * bar[0], rotation_rmse=float(bar[1]))
         for policy, bar in zip(POLICIES, bars, strict=True)
     }
     for label, bars in _READ_OFF.items()
 }
-"""RMSE of the paper's models, metres and radians (Zhao et al. 2019, figure 5, 50 known and 35 novel parts).
+"""Errors of the paper's models (Zhao et al. 2019, figure 5, 50 known and 35 novel parts).
 
-Read off the plot by a few per cent, but for those of GCIP-M+V, which the text gives.
+Read off the plot to a few per cent, except those of GCIP-M+V, which the text states.
 """
 
 
-def compare(trials: Sequence[Trial], predictors: Mapping[str, Predictor]) -> dict[str, Any]:
-    """What each model's predictions are worth with each policy, known and novel parts apart.
+@dataclass(frozen=True, kw_only=True)
+class PolicyStatistics:
+    """Statistics of one model under one policy, by whether the model was trained on the part."""
 
-    A model's novel parts are those that it was not made from. What is not measured is absent (None).
-    """
+    all: TrialStatistics
+    known: TrialStatistics
+    novel: TrialStatistics
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelStatistics:
+    """Statistics of one model; ``low_variance`` is None where its variances chose no grasp."""
+
+    has_variance: bool
+    quality: PolicyStatistics
+    low_variance: PolicyStatistics | None
+
+    def of(self, policy: Policy, side: Side) -> TrialStatistics | None:
+        """The statistics under a policy on known or on novel parts."""
+        found = self.quality if policy == "quality" else self.low_variance
+        return found and (found.known if side == "known" else found.novel)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DisplacementSummary:
+    """Errors of models by label and success by policy, beside the errors of the paper's models."""
+
+    experiment: Literal["displacement"] = "displacement"
+    schema_version: int = SCHEMA_VERSION
+    models: dict[str, ModelStatistics]
+    policies: dict[str, TrialStatistics]
+    tape_against_truth: TapeComparison | None
+    paper: dict[str, dict[Policy, PaperErrors | None]]
+
+
+def compare(trials: Sequence[Trial], predictors: Mapping[str, Predictor]) -> DisplacementSummary:
+    """Compute the errors of each model's predictions under each policy, on known and on novel parts."""
     best = [trial for trial in trials if not trial.chosen_by]
-    models, policies = {}, {POLICY_NAMES["quality"]: numbers(best)}
+    models, policies = {}, {POLICY_NAMES["quality"]: TrialStatistics.of(best)}
     for label, predictor in predictors.items():
         chosen = [trial for trial in trials if trial.chosen_by == label]
         if chosen:
-            policies[f"{POLICY_NAMES['low_variance']}, of {label}"] = numbers(chosen)
-        models[label] = dict(
+            policies[f"{POLICY_NAMES['low_variance']}, of {label}"] = TrialStatistics.of(chosen)
+        models[label] = ModelStatistics(
             has_variance=predictor.has_variance,
-            quality=_sides(best, label, predictor),
-            low_variance=_sides(chosen, label, predictor) if chosen else None,
+            quality=_statistics(best, label, predictor),
+            low_variance=_statistics(chosen, label, predictor) if chosen else None,
         )
-    return dict(
-        schema_version=SCHEMA_VERSION,
-        models=models,
-        policies=policies,
-        tape_against_truth=tape_against_truth(trials),
-        paper=PAPER,
+    return DisplacementSummary(
+        models=models, policies=policies, tape_against_truth=compare_tape(trials), paper=PAPER
     )
 
 
-def _sides(trials: Sequence[Trial], label: str, predictor: Predictor) -> dict[str, Any]:
-    if label == LOWESS:  # it has nothing to say of other parts
+def _statistics(trials: Sequence[Trial], label: str, predictor: Predictor) -> PolicyStatistics:
+    if label == LOWESS:  # fitted to known parts, it predicts no others
         trials = [trial for trial in trials if predictor.knows(trial.part)]
 
     def predicted(trial: Trial) -> Prediction | None:
         return own_prediction(trial) if trial.chosen_by else trial.predictions.get(label)
 
-    known, novel = (
-        [trial for trial in trials if predictor.knows(trial.part) is side] for side in (True, False)
+    return PolicyStatistics(
+        all=TrialStatistics.of(trials, predicted),
+        known=TrialStatistics.of([trial for trial in trials if predictor.knows(trial.part)], predicted),
+        novel=TrialStatistics.of([trial for trial in trials if not predictor.knows(trial.part)], predicted),
     )
-    return dict(
-        zip(("all", *SIDES), (numbers(one, predicted) for one in (trials, known, novel)), strict=True)
-    )
+
+
+def figure_names(labels: Iterable[str]) -> dict[str, str]:
+    """Assign names in the figure to labels: the paper's, except where another label has taken it."""
+    found: dict[str, str] = {}
+    for label in labels:
+        name = paper_label(label) or label
+        found[label if name in found else name] = label
+    return found
 
 
 def paper_label(label: str) -> str | None:
-    """The paper's name of a model that a user calls ``gcip_mv``, ``GCIP-M+V`` or the like."""
+    """Find the paper's name of a model that a user calls ``gcip_mv``, ``GCIP-M+V`` or the like."""
     plain = re.sub(r"[^a-z0-9]", "", label.lower())
     return next((name for name in PAPER if re.sub(r"[^a-z0-9]", "", name.lower()) == plain), None)

@@ -20,13 +20,13 @@ class EvaluateConfig(Config):
     """Settings of an evaluation."""
 
     models: Path = PRETRAINED
-    """Folder with model.safetensors and model.json; by default the shipped one. Its qualities count."""
+    """Folder with model.safetensors and model.json; by default the shipped one. It predicts the qualities."""
     experiment: Experiment = "success"
     """success: the policy of --planner.policy. displacement: both policies, known and novel parts apart."""
     cell: Path = SIMULATED_CELL
     """YAML file of the cell; by default the simulated one."""
     noise: Noise | None = None
-    """How a simulated camera errs (iid: 3 mm a pixel), instead of what its cell's file says."""
+    """Noise of a simulated camera (iid: 3 mm per pixel); overrides the cell's file."""
     measure: Literal["truth", "markers"] = "truth"
     """truth: the cell's tracker measures the displacement; markers: two squares of tape (docs/markers.md)."""
     tape: tuple[float, float] | None = None
@@ -34,26 +34,26 @@ class EvaluateConfig(Config):
     out: Path = Path("out/eval")
     """Folder for trials.jsonl, report.json and the pictures."""
     parts: tuple[str, ...] = ()
-    """Names or folders of parts, or sets: train (those the model knows), validation and test (that it never
-    saw), starter, catalogue. By default validation, for displacement train and validation."""
+    """Names or folders of parts, or sets: train (the model's training parts), validation and test (held out),
+    starter, catalogue. By default validation, for displacement train and validation."""
     n_parts: int = Field(default=0, ge=0)
-    """At most so many parts, evenly chosen, an equal share of every set; 0: all."""
+    """Greatest number of parts, evenly chosen, an equal share of every set; 0: all."""
     trials: int = Field(default=5, ge=1)
-    """Trials a part."""
+    """Trials per part."""
     compare: tuple[str, ...] = ()
     """Models of the displacement experiment, label=folder each; by default the one of --models."""
     lowess_data: Path | None = None
     """A collected dataset: LOWESS predicts the parts of which it holds grasps."""
     workers: int = Field(default=0, ge=0)
-    """Simulated cells at work at once; 0: one a core."""
+    """Simulated cells that run in parallel; 0: one per core."""
     yes: bool = False
-    """Ask no operator: on a real cell, too, the arm moves as soon as a grasp is planned."""
+    """Ask no operator: the arm moves as soon as a grasp is planned, on a real cell, too."""
     seed: int = Field(default=0, ge=0)
-    """Places, turns and candidates follow from it."""
+    """Determines the parts' placements and the candidates."""
     planner: PlannerConfig = PlannerConfig(policy="quality")
     """How grasps are chosen."""
     replay: tuple[Path, str] | None = None
-    """Draw a stored trial again and do nothing else: the folder of a run, and the trial's name."""
+    """Only draw a stored trial again: the folder of a run, and the trial's name."""
 
     @field_validator("compare", mode="before")
     @classmethod

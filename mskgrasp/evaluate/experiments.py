@@ -1,4 +1,4 @@
-"""Experiments: their trials and the models they compare."""
+"""Trials of an experiment, and the models that it compares."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from mskgrasp.trials.predictors import (
     LOWESS,
     LowessPredictor,
     NetworkPredictor,
+    PartObservation,
     Predictor,
-    Seen,
     fit_lowess,
     predict_one,
 )
@@ -27,16 +27,16 @@ from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
 from mskgrasp.trials.trial_runner import TrialTask
 
-# No hyphen: it parts a label from the number of a trial.
+# No hyphen: it separates the label from the number in a trial's name.
 _LABEL = re.compile(r"[A-Za-z][A-Za-z0-9_+.]*")
 
 
 def open_model(folder: Path) -> Models:
-    """The model of a folder that a user names.
+    """Load the model of a folder.
 
     Raises:
-        UsageError: There is none.
-        BadModel: It cannot be used.
+        UsageError: The folder holds no model.
+        BadModel: The model cannot be used.
     """
     if not (folder / DESCRIPTION).is_file():
         raise UsageError(
@@ -46,19 +46,19 @@ def open_model(folder: Path) -> Models:
 
 
 def model_folders(compare: Iterable[str], models: Path) -> dict[str, Path]:
-    """Labels and folders of the models to compare; the run's own alone where none are named.
+    """Parse the labels and folders of the models to compare; by default only the run's own model.
 
     Args:
         compare: ``label=folder`` each.
-        models: The run's own.
+        models: Folder of the run's own model.
 
     Raises:
-        UsageError: One is something else.
+        UsageError: An item is not ``label=folder`` with a legal label, or a label occurs twice.
     """
     folders: dict[str, Path] = {}
     for text in compare:
         label, _, folder = text.partition("=")
-        if not folder or not _LABEL.fullmatch(label) or label == LOWESS:
+        if not folder or not _LABEL.fullmatch(label) or label.lower() == LOWESS:
             raise UsageError(
                 f"--compare {text!r}: give label=folder, for example gcip_mv=models/gcip_mv; the label has "
                 f"letters, digits, '_', '+' and '.', begins with a letter, and is not {LOWESS!r}"
@@ -67,17 +67,17 @@ def model_folders(compare: Iterable[str], models: Path) -> dict[str, Path]:
             raise UsageError(f"--compare: two models are called {label!r}")
         folders[label] = Path(folder)
     own = models.resolve().name
-    return folders or {own if _LABEL.fullmatch(own) and own != LOWESS else "model": models}
+    return folders or {own if _LABEL.fullmatch(own) and own.lower() != LOWESS else "model": models}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Compared:
-    """The models whose displacements are compared.
+    """Models whose predicted displacements are compared.
 
     Attributes:
-        folders: Of the networks, by label.
-        predictors: Of all models, by label.
-        inputs: Digests of what they are made from.
+        folders: Folders of the networks by label.
+        predictors: All models by label.
+        inputs: Digests of the networks' weights and of the grasps that LOWESS is fitted to.
     """
 
     folders: dict[str, Path]
@@ -86,7 +86,7 @@ class Compared:
 
     @property
     def lowess(self) -> LowessPredictor | None:
-        """LOWESS, where it is among them."""
+        """LOWESS; None where it is not compared."""
         found = self.predictors.get(LOWESS)
         return found if isinstance(found, LowessPredictor) else None
 
@@ -99,12 +99,12 @@ class Compared:
 def load_compared(
     compare: Iterable[str], models: Path, lowess_data: Path | None, parts: list[str], chunk_size: int
 ) -> Compared:
-    """Loads the models of an experiment.
+    """Load the models of an experiment.
 
     Args:
         compare: ``label=folder`` each.
-        models: The run's own.
-        lowess_data: Dataset whose grasps of the very part LOWESS predicts from; None: no LOWESS.
+        models: Folder of the run's own model.
+        lowess_data: Dataset from whose grasps of the same part LOWESS predicts; None: no LOWESS.
         parts: Names of the parts.
         chunk_size: As in `mskgrasp.planning.planner.PlannerConfig`.
 
@@ -124,7 +124,7 @@ def load_compared(
         if not fits:
             raise UsageError(
                 f"--lowess-data {lowess_data} holds successful grasps of none of the parts; name parts that "
-                "are in it (--parts), or leave it away"
+                "are in it (--parts), or omit --lowess-data"
             )
         predictors[LOWESS] = LowessPredictor(fits)
         inputs |= {f"grasps of {part} for LOWESS": digest for part, digest in digests.items()}
@@ -134,21 +134,22 @@ def load_compared(
 def scenes(
     parts: Mapping[str, str], n_trials: int, seed: int, planner: PlannerConfig, compared: Compared | None
 ) -> list[tuple[TrialTask, ...]]:
-    """The trials of an experiment, those of one part and number together: they see the same.
+    """List the trials of an experiment by scene: those of one part and number share a scene.
 
-    A grasp of the best quality serves every model; each that knows its variance chooses another besides.
+    In the displacement experiment all models predict the grasp of the best quality, and each model with
+    variances, and LOWESS, chooses one more grasp in the scene.
 
     Args:
-        parts: What the user called each part, by its name.
-        n_trials: Of each part.
-        seed: Of the run.
-        planner: Its policy is that of the success experiment.
-        compared: Models of the displacement experiment; None for the other.
+        parts: Name or folder of each part as given by the user, by its name.
+        n_trials: Trials per part.
+        seed: Seed of the run.
+        planner: Settings with the policy of the success experiment.
+        compared: Models of the displacement experiment; None for the success experiment.
     """
     found = []
     for number in range(n_trials):
-        for name, word in parts.items():
-            task = TrialTask(part=name, source=word, number=number, seed=seed, policy=planner.policy)
+        for name, source in parts.items():
+            task = TrialTask(part=name, source=source, number=number, seed=seed, policy=planner.policy)
             if compared is None:
                 found.append((task,))
                 continue
@@ -163,7 +164,7 @@ def _knows(lowess: LowessPredictor | None, part: str) -> bool:
 
 
 def with_predictions(trial: Trial, run: Path, predictors: Mapping[str, Predictor]) -> Trial:
-    """A measured trial with what the models expected of its grasp, from the stored frame.
+    """Add the models' predictions for a measured trial's grasp of the best quality, from the stored frame.
 
     Raises:
         BadDataset: The trial's file cannot be read.
@@ -180,6 +181,6 @@ def with_predictions(trial: Trial, run: Path, predictors: Mapping[str, Predictor
     frame, plan, _ = read_trial(trial_file(run, trial.key))
     assert plan is not None  # it was measured
     pose = None if trial.pose_base_obj is None else Pose.from_vector(np.array(trial.pose_base_obj))
-    seen = Seen(part=trial.part, frame=frame, view=plan.view, pose_base_obj=pose)
-    more = {label: predict_one(predictors[label], seen, plan.grasp.as_vector()) for label in missing}
+    observation = PartObservation(part=trial.part, frame=frame, view=plan.view, pose_base_obj=pose)
+    more = {label: predict_one(predictors[label], observation, plan.grasp.as_vector()) for label in missing}
     return replace(trial, predictions=trial.predictions | more)

@@ -1,10 +1,9 @@
-"""Figures of an evaluation: success, errors of displacement, comparison of models."""
+"""Figures of an evaluation: success, predicted displacements, comparison of models."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,8 +21,15 @@ from mskgrasp.core.palette import (
     PALE_BLUE,
     RED,
 )  # fmt: skip
-from mskgrasp.evaluate.comparison import PAPER, POLICIES, POLICY_NAMES, SIDES, paper_label
-from mskgrasp.evaluate.summary import displacement_errors
+from mskgrasp.evaluate.comparison import (
+    PAPER,
+    POLICIES,
+    POLICY_NAMES,
+    SIDES,
+    DisplacementSummary,
+    figure_names,
+)
+from mskgrasp.evaluate.summary import Interval, SuccessSummary, displacement_errors, rms
 from mskgrasp.reports.style import saved_figure
 from mskgrasp.trials.trial import Trial
 
@@ -31,42 +37,40 @@ _COLOURS = {"dx": BLUE, "dy": ORANGE, "dz": FAINT, "turn": GREEN}
 _OURS = {"quality": BLUE, "low_variance": RED}
 _PAPERS = {"quality": MID_BLUE, "low_variance": MID_RED}
 _MOST_ROWS = 40
+_BAR = 0.2
+"""Width of a bar."""
 
 
-def draw_success(report: dict[str, Any], path: Path) -> None:
-    """Draws success by family, or by part where every family has one part, and the reasons of failures."""
-    overall = report["overall"]
-    by = "families" if len(report["families"]) < len(report["parts"]) else "parts"
-    rows = sorted(report[by].items(), key=lambda item: (item[1]["success_rate"], item[0]))
+def draw_success(summary: SuccessSummary, path: Path) -> None:
+    """Draw success by family, or by part where every family has one part, and the reasons of failures."""
+    overall = summary.overall
+    by_family = len(summary.families) < len(summary.parts)
+    groups = summary.families if by_family else summary.parts
+    rows = sorted(groups.items(), key=lambda item: (item[1].success_rate, item[0]))
     shown = rows[:_MOST_ROWS]
     with saved_figure(path, 10, 1.8 + 0.24 * max(len(shown), 6)) as figure:
         left, right = figure.subplots(1, 2, width_ratios=(3, 1))
         for y, (_, one) in enumerate(shown):
-            low, high = one["success_interval"]
-            left.plot([low, high], [y, y], color=FAINT, lw=2, solid_capstyle="butt")
-            left.plot(one["success_rate"], y, "o", color=_OURS["quality"], ms=5)
-        names = [f"{name} ({one['successes']} of {one['trials']})" for name, one in shown]
+            left.plot(one.success_interval, [y, y], color=FAINT, lw=2, solid_capstyle="butt")
+            left.plot(one.success_rate, y, "o", color=_OURS["quality"], ms=5)
+        names = [f"{name} ({one.successes} of {one.trials})" for name, one in shown]
         left.set_yticks(range(len(shown)), names, fontsize=8)
-        low, high = overall["success_interval"]
-        left.axvspan(low, high, color=PALE_BLUE, zorder=0, lw=0)
-        left.axvline(
-            overall["success_rate"],
-            color=_OURS["quality"],
-            lw=1.2,
-            label=f"all: {overall['success_rate']:.1%}",
-        )
-        paper = report["paper"]["simulated"]
+        if overall.success_rate is not None and overall.success_interval is not None:
+            left.axvspan(*overall.success_interval, color=PALE_BLUE, zorder=0, lw=0)
+            rate = overall.success_rate
+            left.axvline(rate, color=_OURS["quality"], lw=1.2, label=f"all: {rate:.1%}")
+        paper = summary.paper["simulated"]
         left.axvline(paper, color=INK, lw=1, ls="--", label=f"paper, simulated: {paper:.1%}")
         rest = f", the worst {len(shown)} of {len(rows)}" if len(rows) > len(shown) else ""
-        left.set_title(f"Lifted, by {'family' if by == 'families' else 'part'}{rest}")
+        left.set_title(f"Lifted, by {'family' if by_family else 'part'}{rest}")
         left.set(xlim=(-0.02, 1.02), xlabel="share of grasps, 95 % Wilson intervals")
         left.set_ylim(-0.7, len(shown) - 0.3)
         left.legend(fontsize=8, loc="upper left")
-        reasons = overall["reasons"]
+        reasons = overall.reasons
         right.barh(
             list(reasons) or ["none"], list(reasons.values()) or [0], color=_OURS["low_variance"], height=0.5
         )
-        right.set_title(f"Not lifted: {sum(reasons.values())} of {overall['trials']}")
+        right.set_title(f"Not lifted: {sum(reasons.values())} of {overall.trials}")
         right.xaxis.get_major_locator().set_params(integer=True)
         right.set_xlabel("grasps")
         right.set_ylim(-0.7, max(len(reasons), 5) - 0.3)
@@ -74,7 +78,7 @@ def draw_success(report: dict[str, Any], path: Path) -> None:
 
 
 def draw_errors(trials: Sequence[Trial], path: Path) -> None:
-    """Draws measured over predicted displacement of every success, with the predicted deviation."""
+    """Draw measured over predicted displacements of the successes, with predicted standard deviations."""
     measured = [trial for trial in trials if trial.measured is not None]
     predicted = np.array([trial.predicted for trial in measured]).reshape(-1, 4)
     deviation = np.array([trial.predicted_std for trial in measured]).reshape(-1, 4)
@@ -92,7 +96,7 @@ def draw_errors(trials: Sequence[Trial], path: Path) -> None:
             axes.set(xlim=(low, high), ylim=(low, high))
         rmse = ("none measured", "none measured")
         if measured:
-            distance, angle = (np.sqrt((e**2).mean()) for e in displacement_errors(predicted, true))
+            distance, angle = map(rms, displacement_errors(predicted, true))
             rmse = (f"RMSE {distance * 1e3:.1f} mm", f"RMSE {np.degrees(angle):.1f} deg")
         shift.set_title(f"Displacement in the hand: {rmse[0]}")
         turn.set_title(f"Turn in the hand: {rmse[1]}")
@@ -108,15 +112,15 @@ def _points(
     )
 
 
-def draw_comparison(report: dict[str, Any], path: Path) -> None:
-    """Draws each model's RMSE under both policies as in figure 5 of the paper, beside the paper's bars.
+def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
+    """Draw each model's RMSE under both policies as in figure 5 of the paper, beside the paper's bars.
 
     Rows: known and novel parts; columns: translation and rotation. The paper's bars are of known and novel
-    parts together and appear in both rows. A bar without an error bar is of a single part.
+    parts together and appear in both rows. A bar without an interval is of a single part.
     """
-    models = report["models"]
-    ours = {paper_label(label) or label: label for label in models}
-    order = [*(name for name in PAPER), *(name for name in ours if name not in PAPER)]
+    models = summary.models
+    ours = figure_names(models)
+    order = [*PAPER, *(name for name in ours if name not in PAPER)]
     with saved_figure(path, 5 + 1.4 * len(order), 7.4) as figure:
         grid = figure.subplots(2, 2, sharex=True, sharey="col")
         for row, side in zip(grid, SIDES, strict=True):
@@ -124,9 +128,16 @@ def draw_comparison(report: dict[str, Any], path: Path) -> None:
                 row, ("translation", "rotation"), (100.0, 180 / np.pi), ("cm", "degrees"), strict=True
             ):
                 for x, name in enumerate(order):
-                    # LOWESS is fitted to known parts.
-                    paper = {} if (name, side) == ("LOWESS", "novel") else PAPER.get(name, {})
-                    _bars(axes, x, models.get(ours.get(name, ""), {}), paper, side, kind, scale)
+                    for k, policy in enumerate(POLICIES):
+                        found = models[ours[name]].of(policy, side) if name in ours else None
+                        if found is not None and found.trials:
+                            value = getattr(found, f"{kind}_rmse")
+                            interval = getattr(found, f"{kind}_interval")
+                            _bar(axes, x + (k - 1.5) * _BAR, value, interval, scale, _OURS[policy])
+                        paper = PAPER.get(name, {}).get(policy)
+                        if paper is not None and (name, side) != ("LOWESS", "novel"):  # fitted to known parts
+                            value = getattr(paper, f"{kind}_rmse")
+                            _bar(axes, x + (k + 0.5) * _BAR, value, None, scale, _PAPERS[policy])
                 axes.set_title(f"{kind.capitalize()} RMSE, {side} parts")
                 axes.set_ylabel(unit)
                 labels = [name if ours.get(name, name) == name else f"{name}\n{ours[name]}" for name in order]
@@ -141,27 +152,14 @@ def draw_comparison(report: dict[str, Any], path: Path) -> None:
         figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=9)
 
 
-def _bars(
-    axes: Axes,
-    x: int,
-    model: dict[str, Any],
-    paper: dict[str, Any],
-    side: str,
-    kind: str,
-    scale: float,
+def _bar(
+    axes: Axes, x: float, value: float | None, interval: Interval | None, scale: float, colour: str
 ) -> None:
-    """Draws our bars on the left and the paper's on the right."""
-    width = 0.2
-    for k, policy in enumerate(POLICIES):
-        found = (model.get(policy) or {}).get(side)
-        if found is not None and found[f"{kind}_rmse"] is not None:
-            value, interval = found[f"{kind}_rmse"] * scale, found[f"{kind}_interval"]
-            axes.bar(x + (k - 1.5) * width, value, width, color=_OURS[policy])
-            if interval is not None:
-                reach = [[max(value - interval[0] * scale, 0)], [max(interval[1] * scale - value, 0)]]
-                axes.errorbar(x + (k - 1.5) * width, value, yerr=reach, color=INK, lw=1, capsize=2.5)
-        elif found is not None and found["trials"]:
-            axes.text(x + (k - 1.5) * width, 0, "-", ha="center", va="bottom", color=_OURS[policy])
-        bar = paper.get(policy)
-        if bar is not None:
-            axes.bar(x + (k + 0.5) * width, bar[f"{kind}_rmse"] * scale, width, color=_PAPERS[policy])
+    """Draw an error with its interval; a dash where no trial was measured."""
+    if value is None:
+        axes.text(x, 0, "-", ha="center", va="bottom", color=colour)
+        return
+    axes.bar(x, value * scale, _BAR, color=colour)
+    if interval is not None:
+        reach = [[max(value - interval[0], 0) * scale], [max(interval[1] - value, 0) * scale]]
+        axes.errorbar(x, value * scale, yerr=reach, color=INK, lw=1, capsize=2.5)

@@ -1,4 +1,4 @@
-"""A stored trial drawn again, without a cell: what was seen, planned, expected and measured."""
+"""Replay of a stored trial without a cell: its frame, plan, predictions and measurement."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ import difflib
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.errors import UsageError
-from mskgrasp.evaluate.report import degrees, millimetres
 from mskgrasp.evaluate.summary import displacement_errors
 from mskgrasp.reports.grasp_figures import draw_plan
+from mskgrasp.reports.quantities import degrees, millimetres
+from mskgrasp.reports.style import saved_figure
 from mskgrasp.runtime.run_folder import TRIALS, read
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
 
 
 def find_trial(run: Path, key: str) -> Trial:
-    """A trial of a run by its key.
+    """Find a trial of a run by its key.
 
     Raises:
-        UsageError: There is no such run, or no such trial in it.
-        BadDataset: The file of trials holds something else.
+        UsageError: The folder is no run, or has no such trial.
+        BadDataset: A line of the file of trials is not a trial.
     """
     if not (run / TRIALS).is_file():
         raise UsageError(f"no run of mskgrasp.evaluate in {run}: there is no {TRIALS}")
@@ -32,13 +32,13 @@ def find_trial(run: Path, key: str) -> Trial:
     if key not in trials:
         close = difflib.get_close_matches(key, trials, n=3, cutoff=0.4) or list(trials)[:3]
         raise UsageError(
-            f"no trial {key!r} in {run}; there are {', '.join(close)}, ... ({len(trials)} in all)"
+            f"no trial {key!r} in {run}; {len(trials)} trials, for example {', '.join(close) or 'none'}"
         )
     return trials[key]
 
 
 def draw_trial(run: Path, trial: Trial, path: Path) -> None:
-    """Draws a stored trial.
+    """Draw a stored trial.
 
     Raises:
         BadDataset: Its file is missing or damaged.
@@ -54,7 +54,7 @@ def draw_trial(run: Path, trial: Trial, path: Path) -> None:
 
 
 def outcome_text(trial: Trial) -> str:
-    """What came of a trial, in a line."""
+    """Describe the outcome of a trial in one line."""
     if not trial.success:
         return f"not lifted ({trial.reason})"
     if trial.measured is None:
@@ -71,7 +71,7 @@ def outcome_text(trial: Trial) -> str:
 
 
 def describe_trial(trial: Trial) -> str:
-    """A trial in words, a line for every model that predicted its displacement."""
+    """Describe a trial, with a line for every model that predicted its displacement."""
     lines = [f"{trial.key}  ({trial.family}; chosen by {trial.policy.replace('_', ' ')}; seed {trial.seed})"]
     lines.append(f"outcome    {outcome_text(trial)}")
     if trial.unmeasured:
@@ -98,14 +98,13 @@ def _displacement(mean: list[float], std: list[float]) -> str:
 
 
 def _draw_frame(frame: RgbdFrame, title: str, path: Path) -> None:
-    figure = Figure(figsize=(9, 4.6), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    left.imshow(frame.colour)
-    left.set_title("colour", loc="left", fontsize=10)
-    image = right.imshow(frame.depth, cmap="Greys_r")
-    right.set_title("depth, m", loc="left", fontsize=10)
-    figure.colorbar(image, ax=right, shrink=0.8)
-    for axes in (left, right):
-        axes.set(xticks=[], yticks=[])
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
-    figure.savefig(path, dpi=150)
+    with saved_figure(path, 9, 4.6) as figure:
+        left, right = figure.subplots(1, 2)
+        left.imshow(frame.colour)
+        left.set_title("colour")
+        image = right.imshow(frame.depth, cmap="Greys_r")
+        right.set_title("depth, m")
+        figure.colorbar(image, ax=right, shrink=0.8)
+        for axes in (left, right):
+            axes.set(xticks=[], yticks=[])
+        figure.suptitle(title, fontsize=11, x=0.01, ha="left")

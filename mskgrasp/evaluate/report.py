@@ -1,15 +1,19 @@
-"""The report of an evaluation as sections."""
+"""Report of an evaluation: its results, and their sections, tables and figures."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 
-from mskgrasp.evaluate.comparison import POLICIES, POLICY_NAMES, SIDES
+from mskgrasp.evaluate.comparison import POLICIES, POLICY_NAMES, SIDES, DisplacementSummary
+from mskgrasp.evaluate.summary import Interval, SuccessSummary, TrialStatistics
 from mskgrasp.reports.console import print_sections
+from mskgrasp.reports.quantities import counted, degrees, millimetres
 from mskgrasp.reports.section import Figure, Section, settings_section
 from mskgrasp.runtime.console_table import Link, Table
 
@@ -28,67 +32,97 @@ _ERRORS_EXPLAINED = (
 )
 _COMPARISON_EXPLAINED = (
     f"{_ERRORS_EXPLAINED} In brackets: 95 % interval over parts. Inside 90 % interval: share of the measured "
-    "values within the predicted central 90 %. Known parts are those a model was made from grasps of."
+    "values within the predicted central 90 %. Known parts are those a model was trained on."
 )
 
 
-def sections(report: dict[str, Any], folder: Path) -> list[Section]:
-    """The sections of a report, in order.
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Results of an evaluation.
 
-    Args:
-        report: As in ``report.json``.
-        folder: Of the run, with the figures.
+    Attributes:
+        summary: The numbers of its experiment.
+        trials: Outcomes in words, by trial.
+        worst: Captions of the pictures of the worst trials, by their paths in the run's folder.
+        settings: Settings of the run.
+        versions: Versions of the software.
     """
-    body = _success(report, folder) if report["experiment"] == "success" else _displacement(report, folder)
+
+    summary: SuccessSummary | DisplacementSummary
+    trials: dict[str, str]
+    worst: dict[str, str]
+    settings: dict[str, Any]
+    versions: dict[str, str]
+
+    def to_json(self) -> dict[str, Any]:
+        """Convert to the content of ``report.json``."""
+        summary = asdict(self.summary)
+        tape: dict[str, Any] = summary["tape_against_truth"] or {}
+        for name in tape.keys() - {"tilt"}:
+            if not tape[name]["trials"]:
+                tape[name] = dict(trials=0)
+        return dict(
+            summary,
+            trials=[dict(trial=name, outcome=outcome) for name, outcome in self.trials.items()],
+            worst=[list(pair) for pair in self.worst.items()],
+            settings=self.settings,
+            versions=self.versions,
+        )
+
+
+def sections(report: Report, folder: Path) -> list[Section]:
+    """Make the sections of a report from its results and the figures in the run's folder."""
+    summary = report.summary
+    is_success = isinstance(summary, SuccessSummary)
+    body = _success(summary, folder) if is_success else _displacement(summary, folder)
     return [
         *body,
-        _tape(report),
+        _tape(summary),
         _worst(report, folder),
-        settings_section(report["settings"], report["versions"]),
+        settings_section(report.settings, report.versions),
     ]
 
 
-def conclusion(report: dict[str, Any]) -> str:
-    """The result of an evaluation in one sentence."""
-    if report["experiment"] == "success":
-        overall = report["overall"]
-        if overall["success_rate"] is None:
+def conclusion(summary: SuccessSummary | DisplacementSummary) -> str:
+    """State the result of an evaluation in one sentence."""
+    if isinstance(summary, SuccessSummary):
+        overall = summary.overall
+        if overall.success_rate is None:
             return "No grasp was tried."
         text = (
-            f"{overall['success_rate']:.1%} of {overall['trials']} planned grasps lifted the part "
-            f"(95 % interval {interval_text(overall['success_interval'], digits=1)})"
+            f"{overall.success_rate:.1%} of {overall.trials} planned grasps lifted the part "
+            f"(95 % interval {interval_text(overall.success_interval, digits=1)})"
         )
-        if overall["translation_rmse"] is None:
+        if overall.translation_rmse is None:
             return text + "; no displacement was measured."
         return (
             f"{text}; RMSE of the predicted displacement in the hand: "
-            f"{millimetres(overall['translation_rmse'])} and {degrees(overall['rotation_rmse'])}."
+            f"{millimetres(overall.translation_rmse)} and {degrees(overall.rotation_rmse)}."
         )
-    label, model = next(iter(report["models"].items()))
+    label, model = next(iter(summary.models.items()))
     errors = [
-        f"{millimetres(model[policy][side]['translation_rmse'])} and "
-        f"{degrees(model[policy][side]['rotation_rmse'])} on {side} parts ({POLICY_NAMES[policy]} grasps)"
+        f"{millimetres(found.translation_rmse)} and {degrees(found.rotation_rmse)} on {side} parts "
+        f"({POLICY_NAMES[policy]} grasps)"
         for policy in POLICIES
         for side in SIDES
-        if model[policy] is not None and model[policy][side]["translation_rmse"] is not None
+        if (found := model.of(policy, side)) is not None and found.translation_rmse is not None
     ]
     return f"RMSE of {label}: {'; '.join(errors)}." if errors else "No displacement was measured."
 
 
-def print_report(report: dict[str, Any], folder: Path, console: Console | None = None) -> None:
-    """Prints the sections that fit a console."""
+def print_report(report: Report, folder: Path, console: Console | None = None) -> None:
+    """Print the sections that fit a console."""
     print_sections(sections(report, folder), console)
 
 
-def _success(report: dict[str, Any], folder: Path) -> list[Section]:
-    overall, parts, families = report["overall"], report["parts"], report["families"]
-    by_family = Section(title="Families", tables=[_success_table("family", families)])
+def _success(summary: SuccessSummary, folder: Path) -> list[Section]:
+    by_family = Section(title="Families", tables=[_success_table("family", summary.families)])
     return [
-        *([by_family] if len(families) < len(parts) else []),
+        *([by_family] if len(summary.families) < len(summary.parts) else []),
         Section(
             title="Parts",
-            text=[*_success_text(report), _ERRORS_EXPLAINED],
-            tables=[_success_table("part", parts, overall)],
+            text=[*_success_text(summary), _ERRORS_EXPLAINED],
+            tables=[_success_table("part", summary.parts, summary.overall)],
         ),
         Section(
             title="Figures",
@@ -107,7 +141,9 @@ def _success(report: dict[str, Any], folder: Path) -> list[Section]:
     ]
 
 
-def _success_table(what: str, groups: dict[str, Any], overall: dict[str, Any] | None = None) -> Table:
+def _success_table(
+    what: str, groups: Mapping[str, TrialStatistics], overall: TrialStatistics | None = None
+) -> Table:
     rows = [*groups.items(), *([("all", overall)] if overall is not None else [])]
     return Table(
         header=(what, *_SUCCESS_COLUMNS),
@@ -116,49 +152,49 @@ def _success_table(what: str, groups: dict[str, Any], overall: dict[str, Any] | 
     )
 
 
-def _success_row(one: dict[str, Any]) -> tuple[str, ...]:
+def _success_row(one: TrialStatistics) -> tuple[str, ...]:
     return (
-        f"{one['successes']} of {one['trials']}",
-        interval_text(one["success_interval"]),
-        millimetres(one["translation_rmse"]),
-        millimetres(one["translation_rmse_of_zero"]),
-        degrees(one["rotation_rmse"]),
-        degrees(one["rotation_rmse_of_zero"]),
-        counted(one["reasons"]),
+        f"{one.successes} of {one.trials}",
+        interval_text(one.success_interval),
+        millimetres(one.translation_rmse),
+        millimetres(one.translation_rmse_of_zero),
+        degrees(one.rotation_rmse),
+        degrees(one.rotation_rmse_of_zero),
+        counted(one.reasons),
     )
 
 
-def _success_text(report: dict[str, Any]) -> list[str]:
-    overall, paper = report["overall"], report["paper"]
-    rate = "-" if overall["success_rate"] is None else f"{overall['success_rate']:.1%}"
+def _success_text(summary: SuccessSummary) -> list[str]:
+    overall, paper = summary.overall, summary.paper
+    rate = "-" if overall.success_rate is None else f"{overall.success_rate:.1%}"
     lines = [
-        f"{rate} lifted, 95 % interval {interval_text(overall['success_interval'], digits=1)} (paper: "
+        f"{rate} lifted, 95 % interval {interval_text(overall.success_interval, digits=1)} (paper: "
         f"{paper['simulated']:.1%} simulated, {paper['real']:.1%} real)"
     ]
-    if overall["unmeasured"]:
-        n = sum(overall["unmeasured"].values())
-        lines.append(f"{n} of {overall['successes']} lifted not measured: {counted(overall['unmeasured'])}")
-    if overall["median_planning_s"] is not None:
-        lines.append(f"median planning time {overall['median_planning_s']:.2f} s")
+    if overall.unmeasured:
+        n = sum(overall.unmeasured.values())
+        lines.append(f"{n} of {overall.successes} lifted not measured: {counted(overall.unmeasured)}")
+    if overall.median_planning_s is not None:
+        lines.append(f"median planning time {overall.median_planning_s:.2f} s")
     return lines
 
 
-def _displacement(report: dict[str, Any], folder: Path) -> list[Section]:
+def _displacement(summary: DisplacementSummary, folder: Path) -> list[Section]:
     lifted = [
-        (name, f"{one['successes']} of {one['trials']}", interval_text(one["success_interval"]),
-         counted(one["reasons"]), counted(one["unmeasured"]))
-        for name, one in report["policies"].items()
+        (name, f"{one.successes} of {one.trials}", interval_text(one.success_interval),
+         counted(one.reasons), counted(one.unmeasured))
+        for name, one in summary.policies.items()
     ]  # fmt: skip
     rows = [
-        (label, POLICY_NAMES[policy], side, *_error_row(model[policy][side]))
+        (label, POLICY_NAMES[policy], side, *_error_row(found))
         for side in SIDES
-        for label, model in report["models"].items()
+        for label, model in summary.models.items()
         for policy in POLICIES
-        if model[policy] is not None and model[policy][side]["trials"]
+        if (found := model.of(policy, side)) is not None and found.trials
     ]
     paper = [
-        (label, POLICY_NAMES[policy], millimetres(bar["translation_rmse"]), degrees(bar["rotation_rmse"]))
-        for label, bars in report["paper"].items()
+        (label, POLICY_NAMES[policy], millimetres(bar.translation_rmse), degrees(bar.rotation_rmse))
+        for label, bars in summary.paper.items()
         for policy, bar in bars.items()
         if bar is not None
     ]
@@ -188,37 +224,36 @@ def _displacement(report: dict[str, Any], folder: Path) -> list[Section]:
     ]
 
 
-def _error_row(one: dict[str, Any]) -> tuple[str, ...]:
-    covered = one["coverage_90"]
+def _error_row(one: TrialStatistics) -> tuple[str, ...]:
     return (
-        f"{one['measured']} ({one['measured_parts']} parts)",
-        millimetres(one["translation_rmse"], one["translation_interval"]),
-        millimetres(one["translation_rmse_of_zero"]),
-        degrees(one["rotation_rmse"], one["rotation_interval"]),
-        degrees(one["rotation_rmse_of_zero"]),
-        "-" if covered is None else f"{np.mean(covered):.0%}",
+        f"{one.measured} ({one.measured_parts} parts)",
+        millimetres(one.translation_rmse, one.translation_interval),
+        millimetres(one.translation_rmse_of_zero),
+        degrees(one.rotation_rmse, one.rotation_interval),
+        degrees(one.rotation_rmse_of_zero),
+        "-" if one.coverage_90 is None else f"{np.mean(one.coverage_90):.0%}",
     )
 
 
-def _tape(report: dict[str, Any]) -> Section:
-    """Errors of measuring by tape, where simulation knows the truth; empty without."""
-    title, found = "Measured by tape, against the truth", report["tape_against_truth"]
+def _tape(summary: SuccessSummary | DisplacementSummary) -> Section:
+    """Errors of measuring by tape, where simulation knows the truth; else empty."""
+    title, found = "Measured by tape, against the truth", summary.tape_against_truth
     if found is None:
         return Section(title=title)
-    rows = []
-    for name in ("flat", "tilted"):
-        one = found[name]
-        if one["trials"]:
-            lengths, angles = (
-                [f"{scale * one[f'{kind}_{which}']:.2f} {unit}" for which in ("rmse", "worst")]
-                for kind, scale, unit in (("translation", 1e3, "mm"), ("rotation", 180 / np.pi, "deg"))
-            )
-            rows.append((name, one["trials"], *lengths, *angles))
+    rows = [
+        (
+            name, one.trials,
+            *(f"{1e3 * (value or 0.0):.2f} mm" for value in (one.translation_rmse, one.translation_worst)),
+            *(f"{np.degrees(value or 0.0):.2f} deg" for value in (one.rotation_rmse, one.rotation_worst)),
+        )
+        for name, one in (("flat", found.flat), ("tilted", found.tilted))
+        if one.trials
+    ]  # fmt: skip
     return Section(
         title=title,
         text=[
             "Errors in the plane. Tilted: parts that were tilted by more than "
-            f"{np.degrees(found['tilt']):.0f} degree in the hand, and lay flat again when put down."
+            f"{np.degrees(found.tilt):.0f} degree in the hand, and came to rest flat when put down."
         ],
         tables=[
             Table(
@@ -229,37 +264,16 @@ def _tape(report: dict[str, Any]) -> Section:
     )
 
 
-def _worst(report: dict[str, Any], folder: Path) -> Section:
+def _worst(report: Report, folder: Path) -> Section:
     figures = [
-        Figure(path=folder / name, caption=caption, name=Path(name).stem) for name, caption in report["worst"]
+        Figure(path=folder / path, caption=caption, name=Path(path).stem)
+        for path, caption in report.worst.items()
     ]
     rows = [(Link(text=one.name, to=one.name), one.caption.removeprefix(f"{one.name}: ")) for one in figures]
     tables = [Table(header=("trial", "outcome"), rows=rows)] if rows else []
     return Section(title="Worst trials", tables=tables, figures=figures, page_only=True)
 
 
-def millimetres(value: float | None, interval: list[float] | None = None) -> str:
-    """A length with its interval, if any; '-' for None."""
-    return _unit(value, interval, 1e3, "mm")
-
-
-def degrees(value: float | None, interval: list[float] | None = None) -> str:
-    """An angle with its interval, if any; '-' for None."""
-    return _unit(value, interval, 180 / np.pi, "deg")
-
-
-def _unit(value: float | None, interval: list[float] | None, scale: float, unit: str) -> str:
-    if value is None:
-        return "-"
-    around = "" if interval is None else f" [{interval[0] * scale:.1f}, {interval[1] * scale:.1f}]"
-    return f"{value * scale:.1f} {unit}{around}"
-
-
-def interval_text(interval: list[float] | None, digits: int = 0) -> str:
-    """An interval of a share; '-' for None."""
+def interval_text(interval: Interval | None, digits: int = 0) -> str:
+    """Format an interval of a share; '-' for None."""
     return "-" if interval is None else f"{interval[0]:.{digits}%} - {interval[1]:.{digits}%}"
-
-
-def counted(counts: dict[str, int]) -> str:
-    """Counts as text, ``missed 2, slipped 1``."""
-    return ", ".join(f"{reason} {n}" for reason, n in counts.items())

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -18,92 +19,168 @@ COVERED = 0.9
 """The central interval whose coverage is reported."""
 
 TILTED = float(np.radians(1.0))
-"""A part that hangs tilted by more than this is put down otherwise than it was held, radians."""
+"""A part tilted in the hand by more than this comes to rest in another pose than it was held in, radians."""
 
 PAPER_SUCCESS = {"simulated": 0.949, "real": 0.863}
-"""Share of novel parts' grasps that lifted (Zhao et al. 2019, evaluation in simulation and on the robot)."""
+"""Success rates on novel parts (Zhao et al. 2019, evaluation in simulation and on the robot)."""
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialStatistics:
+    """Success and displacement errors of some trials; metres, radians, intervals of 95 %.
+
+    What no trial measured is None, not zero.
+
+    Attributes:
+        success_interval: Wilson's.
+        reasons: Numbers of failures by reason.
+        unmeasured: Numbers of unmeasured successes by reason.
+        measured: Number of trials with a measured and a predicted displacement, which the errors are of.
+        translation_interval: Of the RMSE, by bootstrap over parts; None for a single part.
+        rotation_interval: The same of the turn.
+        translation_rmse_of_zero: Of predicting no displacement for the same grasps.
+        rotation_rmse_of_zero: The same of the turn.
+        coverage_90: Share of the measurements within the predicted central 90 %, by component; None where a
+            variance or a component is unknown.
+    """
+
+    trials: int
+    successes: int
+    success_rate: float | None
+    success_interval: Interval | None
+    reasons: dict[str, int]
+    unmeasured: dict[str, int]
+    median_planning_s: float | None
+    measured: int
+    measured_parts: int
+    translation_rmse: float | None
+    translation_interval: Interval | None
+    rotation_rmse: float | None
+    rotation_interval: Interval | None
+    translation_rmse_of_zero: float | None
+    rotation_rmse_of_zero: float | None
+    tilt_rms: float | None
+    coverage_90: list[float] | None
+
+    @classmethod
+    def of(
+        cls, trials: Sequence[Trial], prediction: Callable[[Trial], Prediction | None] | None = None
+    ) -> TrialStatistics:
+        """Compute the statistics of trials.
+
+        Args:
+            trials: In any order.
+            prediction: The prediction that is compared with the measurement, by default `own_prediction`; a
+                trial without one has no error.
+        """
+        n_success = sum(trial.success for trial in trials)
+        planning = [trial.planning_s for trial in trials if trial.planning_s is not None]
+        tilts = np.array([trial.tilt for trial in trials if trial.tilt is not None])
+        parts, measured, predicted, std = _measurements(trials, prediction or own_prediction)
+        errors = displacement_errors(predicted, measured)
+        errors_of_zero = displacement_errors(0 * predicted, measured)
+        known = len(parts) > 0 and np.isfinite(std).all() and np.isfinite(measured).all()
+        return cls(
+            trials=len(trials),
+            successes=n_success,
+            success_rate=n_success / len(trials) if trials else None,
+            success_interval=wilson_interval(n_success, len(trials)) if trials else None,
+            reasons=_counts(trial.reason for trial in trials if trial.reason),
+            unmeasured=_counts(trial.unmeasured.split(":")[0] for trial in trials if trial.unmeasured),
+            median_planning_s=float(np.median(planning)) if planning else None,
+            measured=len(parts),
+            measured_parts=len(set(parts.tolist())),
+            translation_rmse=_rms(errors[0]),
+            translation_interval=_interval(errors[0], parts),
+            rotation_rmse=_rms(errors[1]),
+            rotation_interval=_interval(errors[1], parts),
+            translation_rmse_of_zero=_rms(errors_of_zero[0]),
+            rotation_rmse_of_zero=_rms(errors_of_zero[1]),
+            tilt_rms=_rms(tilts),
+            coverage_90=coverage(predicted, std**2, measured, COVERED).tolist() if known else None,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TapeErrors:
+    """Errors of measuring by tape, in the plane; metres, radians, None without a trial."""
+
+    trials: int
+    translation_rmse: float | None = None
+    translation_worst: float | None = None
+    rotation_rmse: float | None = None
+    rotation_worst: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TapeComparison:
+    """Errors of measuring by tape, for parts held flat and for those tilted by more than ``tilt``, radians.
+
+    A tilted part comes to rest flat when it is put down, which moves it once more; tape includes that motion.
+    """
+
+    flat: TapeErrors
+    tilted: TapeErrors
+    tilt: float = TILTED
+
+
+@dataclass(frozen=True, kw_only=True)
+class SuccessSummary:
+    """Success of all trials, of each family and of each part, beside the paper's success rates."""
+
+    experiment: Literal["success"] = "success"
+    schema_version: int = SCHEMA_VERSION
+    overall: TrialStatistics
+    families: dict[str, TrialStatistics]
+    parts: dict[str, TrialStatistics]
+    tape_against_truth: TapeComparison | None
+    paper: dict[str, float]
+
+
+def summarise(trials: Sequence[Trial]) -> SuccessSummary:
+    """Summarise the trials of a success experiment."""
+    return SuccessSummary(
+        overall=TrialStatistics.of(trials),
+        families=_grouped(trials, lambda trial: trial.family),
+        parts=_grouped(trials, lambda trial: trial.part),
+        tape_against_truth=compare_tape(trials),
+        paper=PAPER_SUCCESS,
+    )
+
+
+def _grouped(trials: Sequence[Trial], name: Callable[[Trial], str]) -> dict[str, TrialStatistics]:
+    groups: dict[str, list[Trial]] = {}
+    for trial in trials:
+        groups.setdefault(name(trial), []).append(trial)
+    return {group: TrialStatistics.of(groups[group]) for group in sorted(groups)}
 
 
 def own_prediction(trial: Trial) -> Prediction | None:
-    """What the model that planned the trial expected."""
+    """The prediction of the model that planned the trial."""
     if trial.predicted is None or trial.predicted_std is None:
         return None
     return Prediction(mean=trial.predicted, std=trial.predicted_std)
 
 
-def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Success and displacement errors, of all trials, of each family and of each part.
-
-    Without a single measured success the errors are absent (None), not zero.
-    """
-    return dict(
-        schema_version=SCHEMA_VERSION,
-        overall=numbers(trials),
-        families=_each(trials, lambda trial: trial.family),
-        parts=_each(trials, lambda trial: trial.part),
-        tape_against_truth=tape_against_truth(trials),
-        paper=PAPER_SUCCESS,
-    )
-
-
-def _each(trials: Sequence[Trial], of: Callable[[Trial], str]) -> dict[str, Any]:
-    groups: dict[str, list[Trial]] = {}
-    for trial in trials:
-        groups.setdefault(of(trial), []).append(trial)
-    return {name: numbers(groups[name]) for name in sorted(groups)}
-
-
-def numbers(
-    trials: Sequence[Trial], prediction: Callable[[Trial], Prediction | None] = own_prediction
-) -> dict[str, Any]:
-    """Of some trials; metres and radians, intervals of 95 %.
-
-    Args:
-        trials: In any order.
-        prediction: Which of the predictions counts; a trial without it is not among the errors.
-    """
-    n_success = sum(trial.success for trial in trials)
-    planning = [trial.planning_s for trial in trials if trial.planning_s is not None]
-    return dict(
-        trials=len(trials),
-        successes=n_success,
-        success_rate=n_success / len(trials) if trials else None,
-        success_interval=list(wilson_interval(n_success, len(trials))) if trials else None,
-        reasons=_counted(trial.reason for trial in trials if trial.reason),
-        unmeasured=_counted(trial.unmeasured.split(":")[0] for trial in trials if trial.unmeasured),
-        median_planning_s=float(np.median(planning)) if planning else None,
-        **_errors(trials, prediction),
-    )
-
-
-def _counted(words: Iterable[str]) -> dict[str, int]:
+def _counts(words: Iterable[str]) -> dict[str, int]:
     return dict(sorted(Counter(words).items()))
 
 
-def _errors(trials: Sequence[Trial], prediction: Callable[[Trial], Prediction | None]) -> dict[str, Any]:
-    rows = [(t.part, t.measured, prediction(t)) for t in trials if t.measured is not None]
-    rows = [(part, measured, one) for part, measured, one in rows if one is not None]
-    parts = np.array([part for part, _, _ in rows])
-    true = np.array([measured for _, measured, _ in rows]).reshape(-1, 4)
-    expected = np.array([one.mean for _, _, one in rows]).reshape(-1, 4)
-    found: dict[str, Any] = dict(measured=len(rows), measured_parts=len(set(parts.tolist())))
-    for suffix, predicted in (("", expected), ("_of_zero", 0 * expected)):
-        for kind, errors in zip(
-            ("translation", "rotation"), displacement_errors(predicted, true), strict=True
-        ):
-            found[f"{kind}_rmse{suffix}"] = _rms(errors) if rows else None
-            if not suffix:
-                found[f"{kind}_interval"] = _interval(errors, parts)
-    tilts = np.array([trial.tilt for trial in trials if trial.tilt is not None])
-    found["tilt_rms"] = _rms(tilts) if len(tilts) else None
-    std = np.array([one.std for _, _, one in rows]).reshape(-1, 4)
-    told = np.isfinite(std).all() and np.isfinite(true).all() and len(rows) > 0
-    found["coverage_90"] = coverage(expected, std**2, true, COVERED).tolist() if told else None
-    return found
+def _measurements(
+    trials: Sequence[Trial], prediction: Callable[[Trial], Prediction | None]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Parts (n,), measured displacements, predicted means and standard deviations (n, 4)."""
+    pairs = [(trial, prediction(trial)) for trial in trials if trial.measured is not None]
+    rows = [(t.part, t.measured, one.mean, one.std) for t, one in pairs if one is not None]
+    parts, *vectors = zip(*rows, strict=True) if rows else ((), (), (), ())
+    measured, mean, std = (np.array(values, dtype=np.float64).reshape(-1, 4) for values in vectors)
+    return np.array(parts), measured, mean, std
 
 
 def displacement_errors(predicted: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distances (n,), metres, and angles (n,), radians, not negative, between displacements (n, 4).
+    """Compute distances (n,), metres, and absolute angles (n,), radians, between displacements (n, 4).
 
     Where dz was not measured (NaN) the distance is that in the plane.
     """
@@ -112,38 +189,38 @@ def displacement_errors(predicted: np.ndarray, measured: np.ndarray) -> tuple[np
     return np.linalg.norm(off[:, :3], axis=1), np.abs(wrap_angle(off[:, 3]))
 
 
-def _rms(errors: np.ndarray) -> float:
+def rms(errors: np.ndarray) -> float:
+    """Compute the root of the mean square."""
     return float(np.sqrt((errors**2).mean()))
 
 
-def _interval(errors: np.ndarray, parts: np.ndarray) -> list[float] | None:
-    """Of the RMSE, over parts; of a single part nothing can be said."""
+def _rms(errors: np.ndarray) -> float | None:
+    return rms(errors) if len(errors) else None
+
+
+def _interval(errors: np.ndarray, parts: np.ndarray) -> Interval | None:
     groups = [errors[parts == part] for part in np.unique(parts)]
-    return list(bootstrap_interval(groups, _rms)) if len(groups) > 1 else None
+    return bootstrap_interval(groups, rms) if len(groups) > 1 else None
 
 
-def tape_against_truth(trials: Sequence[Trial]) -> dict[str, Any] | None:
-    """How far tape measures from what a tracker says; None where not both are known.
-
-    A part that hung tilted in the hand lies flat when it is put down, and has moved otherwise by then: those
-    are told apart, for tape cannot know.
-    """
+def compare_tape(trials: Sequence[Trial]) -> TapeComparison | None:
+    """Compare displacements measured by tape with those of a tracker; None where not both are known."""
     both = [t for t in trials if t.measured is not None and t.true is not None]
     if not both:
         return None
-    tilted = [t for t in both if (t.tilt or 0.0) > TILTED]
-    return dict(
-        flat=_tape_errors([t for t in both if t not in tilted]), tilted=_tape_errors(tilted), tilt=TILTED
+    return TapeComparison(
+        flat=_tape_errors([t for t in both if (t.tilt or 0.0) <= TILTED]),
+        tilted=_tape_errors([t for t in both if (t.tilt or 0.0) > TILTED]),
     )
 
 
-def _tape_errors(trials: Sequence[Trial]) -> dict[str, Any]:
+def _tape_errors(trials: Sequence[Trial]) -> TapeErrors:
     if not trials:
-        return dict(trials=0)
+        return TapeErrors(trials=0)
     distance, angle = displacement_errors(
         np.array([t.true for t in trials]), np.array([t.measured for t in trials])
     )
-    return dict(
+    return TapeErrors(
         trials=len(trials),
         translation_rmse=_rms(distance),
         translation_worst=float(distance.max()),
@@ -153,25 +230,19 @@ def _tape_errors(trials: Sequence[Trial]) -> dict[str, Any]:
 
 
 def worst_trials(trials: Sequence[Trial], n: int = 10) -> list[Trial]:
-    """Failures of which most was expected, or predictions that were farthest off, the worst first.
-
-    A turn counts as the way of a point 3 cm away.
-    """
+    """Select failures by decreasing predicted quality, then trials by decreasing prediction error."""
     failed = sorted((t for t in trials if not t.success), key=lambda t: (-(t.quality or 0.0), t.key))
-    return [*failed, *sorted((t for t in trials if miss(t) is not None), key=_by_miss)][:n]
+    return [*failed, *largest_errors(trials, n)][:n]
 
 
-def farthest_off(trials: Sequence[Trial], n: int = 10) -> list[Trial]:
-    """Measured trials whose displacement was least expected, the worst first."""
-    return sorted((t for t in trials if miss(t) is not None), key=_by_miss)[:n]
+def largest_errors(trials: Sequence[Trial], n: int = 10) -> list[Trial]:
+    """Select the measured trials with the largest prediction errors, the largest first."""
+    measured = (trial for trial in trials if _error(trial) is not None)
+    return sorted(measured, key=lambda trial: (-(_error(trial) or 0.0), trial.key))[:n]
 
 
-def _by_miss(trial: Trial) -> tuple[float, str]:
-    return -(miss(trial) or 0.0), trial.key
-
-
-def miss(trial: Trial) -> float | None:
-    """How far the prediction was off, metres, a radian counted as 3 cm; None where nothing was measured."""
+def _error(trial: Trial) -> float | None:
+    """Error of the own prediction, metres, a radian counted as `TURN_LENGTH`; None where not measured."""
     if trial.measured is None or trial.predicted is None:
         return None
     distance, angle = displacement_errors(np.array([trial.predicted]), np.array([trial.measured]))

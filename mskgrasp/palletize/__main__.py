@@ -5,12 +5,12 @@ from __future__ import annotations
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
-DESCRIPTION = """Grasps parts, puts each into its target place, and measures its distance from the target.
+DESCRIPTION = """Grasps parts, places each at its target, and measures its distance from the target.
 
-Every trial is made once for each correction, with the same part in the same place: none (as if nothing
-moved in the hand), predicted (by the displacement network), truth (what the tracker saw: the best that any
-prediction could do). Writes report.html, report.json and pictures. Every finished placement is stored at
-once; a stopped run goes on where it was.
+Every trial is run once for each correction, with the same part in the same pose: none (as if the part did
+not move in the hand), predicted (by the displacement network), truth (measured by the tracker: the best that
+any prediction could achieve). Writes report.html, report.json and pictures. Every placement is stored at
+once; the same command resumes a stopped run.
 
 One target for all parts: --target 0.5,0.06,90
 

@@ -9,8 +9,8 @@ from pydantic import Field, field_validator
 from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED
-from mskgrasp.palletize.placements import Correction
-from mskgrasp.palletize.slots import Slot, parse_target, read_slots
+from mskgrasp.palletize.pallet_slots import Slot, parse_target, read_slots
+from mskgrasp.palletize.placement_records import Correction
 from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.planning.planner import PlannerConfig
 
@@ -25,24 +25,24 @@ class PalletizeConfig(Config):
     out: Path = Path("out/palletize")
     """Folder for trials.jsonl, report.html and the pictures."""
     parts: tuple[str, ...] = ("test",)
-    """Names, folders, or sets: test and validation (never seen by the model), starter, catalogue."""
+    """Names or folders of parts, or sets: test and validation (held out), starter, catalogue."""
     n_parts: int = Field(default=0, ge=0)
-    """At most so many of these parts, evenly chosen; 0: all."""
+    """Greatest number of parts, evenly chosen; 0: all."""
     trials: int = Field(default=3, ge=1)
-    """Trials a part; with --slots, pallets."""
+    """Trials per part; with --slots, number of pallets."""
     target: str = "0.5,0.06,90"
     """x and y of the centre, m (base), and the direction of the part's longer side from above, degrees."""
     slots: Path | None = None
-    """YAML file of slots instead, filled with the parts in turn; see configs/palletize/grid.yaml."""
+    """YAML file of slots in place of --target, filled with the parts in turn: configs/palletize/grid.yaml."""
     corrections: tuple[Correction, ...] = ()
-    """What is corrected by, of none, predicted, truth; by default all that the cell can."""
+    """Corrections to compare: none, predicted, truth; by default all that the cell supports."""
     tape: tuple[float, float] | None = None
-    """Sides of the two squares of tape on every part to measure by, m, such as 0.012 0.008; by default the
-    cell's tracker measures, and where it has none, nothing does."""
+    """Sides of the two tape squares on every part, m, such as 0.012 0.008, which measure the placement; by
+    default the cell's tracker measures, and without a tracker placements stay unmeasured."""
     seed: int = Field(default=0, ge=0)
-    """Places, turns and candidates follow from it."""
+    """Determines the parts' placements and the candidates."""
     workers: int = Field(default=1, ge=1, le=256)
-    """Processes, each with a simulated cell of its own; they change no result."""
+    """Processes, each with its own simulated cell; the results do not depend on their number."""
     yes: bool = False
     """Ask no operator: the arm moves as soon as a grasp is planned."""
     planner: PlannerConfig = PlannerConfig()
@@ -62,9 +62,9 @@ class PalletizeConfig(Config):
         return sides
 
     def squares(self) -> Tape | None:
-        """The tape to measure by."""
+        """The tape that measures; None: the tracker."""
         return None if self.tape is None else Tape(large=self.tape[0], small=self.tape[1])
 
     def all_slots(self) -> list[Slot]:
-        """The file's slots, or the one target."""
+        """The slots of the file, or the single target."""
         return [parse_target(self.target)] if self.slots is None else read_slots(self.slots)

@@ -12,11 +12,12 @@ from matplotlib.patches import Rectangle
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.geometry import quat_to_matrix
-from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.palette import BLUE, FAINT, GREEN, INK, LINE, ORANGE
-from mskgrasp.palletize.placements import CORRECTIONS, Correction, Placement, compared, corrections_of
-from mskgrasp.palletize.slots import Slot
-from mskgrasp.palletize.views import Views
+from mskgrasp.palletize.height_maps import HeightMaps
+from mskgrasp.palletize.pallet_slots import Slot
+from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
+from mskgrasp.palletize.summary import Group, compared_groups, corrections_of
+from mskgrasp.reports.grasp_figures import draw_jaw, show_heights
 from mskgrasp.reports.style import saved_figure
 
 COLOURS: dict[Correction, str] = {"none": FAINT, "predicted": BLUE, "truth": GREEN}
@@ -28,19 +29,19 @@ _CUT = 0.004
 """Outlines are drawn at half this height, m."""
 
 
-def draw_placement(views: Views, placement: Placement, path: Path) -> None:
-    """Draws one placement: before with the grasp, after with the target; millimetres from the target."""
+def draw_placement(maps: HeightMaps, placement: Placement, path: Path) -> None:
+    """Draw one placement: before with the grasp, after with the target."""
     with saved_figure(path, 9.2, 4.9) as figure:
         left, right = figure.subplots(1, 2)
-        _show_before(left, views)
+        _show_before(left, maps)
         left.set(title="before, with the grasp", xlabel="mm along base x", ylabel="mm along base y")
-        _show_after(right, views)
+        _show_after(right, maps)
         right.set(title=f"after, {TITLES[placement.correction]}", xlabel="mm from the target, along base x")
         figure.suptitle(f"{placement.part}: {outcome_text(placement)}", x=0.01, ha="left", fontsize=11)
 
 
 def outcome_text(placement: Placement) -> str:
-    """The outcome of a placement in words."""
+    """Describe the outcome of a placement."""
     if not placement.placed:
         return f"not placed ({placement.reason})"
     if placement.translation_error is None or placement.rotation_error is None:
@@ -48,53 +49,38 @@ def outcome_text(placement: Placement) -> str:
     return f"{placement.translation_error * _MM:.1f} mm, {np.degrees(placement.rotation_error):.1f}° off"
 
 
-def _axes(axes: Axes, views: Views, heights: np.ndarray) -> None:
-    half = views.side / 2 * _MM
-    top = max(views.top, 1e-3)
-    axes.imshow(heights, extent=(-half, half, -half, half), cmap="Greys", vmin=-0.15 * top, vmax=1.5 * top)
-    axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
-    axes.tick_params(length=2, labelsize=8)
+def _show_before(axes: Axes, maps: HeightMaps) -> None:
+    show_heights(axes, maps.before, (0.0, 0.0), maps.side, max(maps.top, 1e-3))
+    _outline(axes, maps, 0.0, INK, "-")
+    draw_jaw(axes, maps.grasp, float(maps.grasp[2]))
 
 
-def _show_before(axes: Axes, views: Views) -> None:
-    _axes(axes, views, views.before)
-    _outline(axes, views, 0.0, INK, "-")
-    origin, theta = views.grasp[:2] * _MM, float(views.grasp[2])
-    closing = np.array([-np.sin(theta), np.cos(theta)])
-    reach = MAX_OPENING / 2 * _MM
-    axes.plot(*np.stack([origin - reach * closing, origin + reach * closing]).T, color=BLUE, lw=1.2, ls="--")
-    for start in (reach, -reach - 8.0):
-        corner = origin + start * closing - 10.0 * np.array([np.cos(theta), np.sin(theta)])
-        pad = Rectangle(tuple(corner), 20.0, 8.0, angle=np.degrees(theta), fc=BLUE, ec="white", lw=0.8)
-        axes.add_patch(pad)
-
-
-def _show_after(axes: Axes, views: Views) -> None:
-    if not views.after.size:
+def _show_after(axes: Axes, maps: HeightMaps) -> None:
+    if not maps.after.size:
         axes.text(0.5, 0.5, "not placed", transform=axes.transAxes, ha="center", color=ORANGE)
         axes.set(xticks=[], yticks=[])
         return
-    _axes(axes, views, views.after)
-    _outline(axes, views, views.turn, GREEN, "--")
-    _cross(axes, np.zeros(2), views.theta, 0.42 * views.side * _MM)
+    show_heights(axes, maps.after, (0.0, 0.0), maps.side, max(maps.top, 1e-3))
+    _outline(axes, maps, maps.turn, GREEN, "--")
+    _cross(axes, np.zeros(2), maps.theta, 0.42 * maps.side * _MM)
 
 
 def _cross(axes: Axes, at: np.ndarray, theta: float, length: float) -> None:
-    """Draws the target as in the paper: its centre, and its orientation as the longer arm."""
+    """Draw the target as in the paper: a cross whose longer arm is the orientation."""
     for angle, share, width in ((theta, 1.0, 1.6), (theta + np.pi / 2, 0.4, 1.0)):
         arm = share * length * np.array([np.cos(angle), np.sin(angle)])
         axes.plot(*np.stack([at - arm, at + arm]).T, color=GREEN, lw=width, alpha=0.9, zorder=6)
 
 
-def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> None:
-    """Draws the part's outline before the grasp, turned about its centre."""
-    n = len(views.before)
-    pitch = views.side * _MM / n
+def _outline(axes: Axes, maps: HeightMaps, turn: float, colour: str, line: str) -> None:
+    """Draw the part's outline before the grasp, turned about its centre."""
+    n = len(maps.before)
+    pitch = maps.side * _MM / n
     steps = (np.arange(n) - (n - 1) / 2) * pitch
     x, y = np.meshgrid(steps, -steps)
-    # Cut low, a thin plate counts as much as a high wall. A camera pixel is several of these: without the
-    # blur the outline shows its stairs.
-    low = np.ascontiguousarray(np.minimum(views.before, min(_CUT, views.top)))
+    # Clipped, a thin plate weighs as much as a high wall. A camera pixel covers several cells: without the
+    # blur the outline shows stairs.
+    low = np.ascontiguousarray(np.minimum(maps.before, min(_CUT, maps.top)))
     smooth = cv2.GaussianBlur(low, (0, 0), 1.5 / pitch)
     level = [0.5 * max(float(smooth.max()), 1e-4)]
     cos, sin = np.cos(turn), np.sin(turn)
@@ -105,22 +91,22 @@ def _outline(axes: Axes, views: Views, turn: float, colour: str, line: str) -> N
 
 
 def draw_comparison(
-    rows: Sequence[tuple[Placement, dict[Correction, Views], dict[Correction, Placement]]], path: Path
+    rows: Sequence[tuple[Placement, dict[Correction, HeightMaps], Group]], path: Path
 ) -> None:
-    """Draws a row for each part: before the grasp, then after it under each correction, targets in green.
+    """Draw a row for each part: before the grasp, then placed under each correction, targets in green.
 
     Args:
-        rows: For each part one of its placements, and the views and placements by correction.
+        rows: For each part one of its placements, and the height maps and placements by correction.
         path: The picture, PNG.
     """
     names: list[Correction] = [name for name in CORRECTIONS if rows and name in rows[0][1]]
     with saved_figure(path, 2.45 * (1 + len(names)), 2.6 * max(1, len(rows)) + 0.2) as figure:
         grid = figure.subplots(max(1, len(rows)), 1 + len(names), squeeze=False)
-        for line, (first, views, placements) in zip(grid, rows, strict=False):
-            _show_before(line[0], next(iter(views.values())))
+        for line, (first, maps, placements) in zip(grid, rows, strict=False):
+            _show_before(line[0], next(iter(maps.values())))
             line[0].set_ylabel(first.part, fontsize=8)
             for axes, name in zip(line[1:], names, strict=True):
-                _show_after(axes, views[name])
+                _show_after(axes, maps[name])
                 axes.set_xlabel(outcome_text(placements[name]), fontsize=9, color=COLOURS[name])
             for axes in line:
                 axes.set(xticks=[], yticks=[])
@@ -130,14 +116,14 @@ def draw_comparison(
 
 
 def draw_errors(placements: Sequence[Placement], path: Path) -> None:
-    """Draws the cumulative distribution of the errors, and the medians of each part."""
-    groups = compared(placements)
+    """Draw the cumulative distribution of the errors, and the medians of each part."""
+    groups = compared_groups(placements)
     names = corrections_of(placements)
     with saved_figure(path, 11.5, 4.3) as figure:
         shift, turn, parts = figure.subplots(1, 3)
         for axes, error, scale, unit in (
             (shift, "translation", _MM, "mm"),
-            (turn, "rotation", 57.2958, "degrees"),
+            (turn, "rotation", 180 / np.pi, "degrees"),
         ):
             for name in names:
                 values = np.sort([getattr(group[name], f"{error}_error") * scale for group in groups])
@@ -156,7 +142,7 @@ def draw_errors(placements: Sequence[Placement], path: Path) -> None:
             shift.text(0.5, 0.5, "no placement was measured", transform=shift.transAxes, ha="center")
 
 
-def _draw_parts(axes: Axes, groups: list[dict[Correction, Placement]]) -> None:
+def _draw_parts(axes: Axes, groups: list[Group]) -> None:
     if not groups or not {"none", "predicted"} <= set(groups[0]):
         axes.axis("off")
         return
@@ -182,17 +168,17 @@ def _draw_parts(axes: Axes, groups: list[dict[Correction, Placement]]) -> None:
 def pallet_image(
     frame: RgbdFrame, slots: Sequence[Slot], table_z: float, tops: Mapping[int, float]
 ) -> np.ndarray:
-    """The slots from above as (h, w, 3) uint8 RGB, base x up and y to the left; 1 mm per pixel.
+    """Rectify the slots from above: (h, w, 3) uint8 RGB, base x up and y to the left, 1 mm per pixel.
 
     Args:
-        frame: Image of the pallet, the arm out of view.
+        frame: Frame of the pallet, the arm out of view.
         slots: All slots.
         table_z: Height of the table, metres.
         tops: Height of the part in each filled slot, metres. In a slot of known size the parallax of the
             part's top is removed.
     """
     bounds = pallet_bounds(slots)
-    image = _seen_at(frame, bounds, table_z)
+    image = _rectified(frame, bounds, table_z)
     for index, top in tops.items():
         size = slots[index].size
         if size is not None:
@@ -201,27 +187,27 @@ def pallet_image(
             # Rows count from the greatest x, columns from the greatest y.
             rows = slice(*np.rint((bounds[1] - np.array([high[0], low[0]])) * _MM).astype(int))
             columns = slice(*np.rint((bounds[3] - np.array([high[1], low[1]])) * _MM).astype(int))
-            image[rows, columns] = _seen_at(frame, bounds, table_z + top)[rows, columns]
+            image[rows, columns] = _rectified(frame, bounds, table_z + top)[rows, columns]
     return image
 
 
-def _seen_at(frame: RgbdFrame, bounds: tuple[float, float, float, float], z: float) -> np.ndarray:
-    """A rectangle of the base at height z, rectified from a frame."""
+def _rectified(frame: RgbdFrame, bounds: tuple[float, float, float, float], z: float) -> np.ndarray:
+    """A horizontal rectangle at height z, base frame, rectified from a frame."""
     x_min, x_max, y_min, y_max = bounds
     colour = frame.colour if frame.fine_colour is None else frame.fine_colour
     scale = colour.shape[0] / frame.depth.shape[0]
     corners = np.array([[x_max, y_max], [x_max, y_min], [x_min, y_min], [x_min, y_max]])
     rotation = quat_to_matrix(np.asarray(frame.T_base_camera.quat_wxyz))
     points = (np.column_stack([corners, np.full(4, z)]) - frame.T_base_camera.position) @ rotation
-    seen = points @ np.asarray(frame.intrinsics).T
-    pixels = ((seen[:, :2] / seen[:, 2:] + 0.5) * scale - 0.5).astype(np.float32)
+    projected = points @ np.asarray(frame.intrinsics).T
+    pixels = ((projected[:, :2] / projected[:, 2:] + 0.5) * scale - 0.5).astype(np.float32)
     w, h = round((y_max - y_min) * _MM), round((x_max - x_min) * _MM)
     square = np.array([[0, 0], [w, 0], [w, h], [0, h]], dtype=np.float32)
     return cv2.warpPerspective(colour, cv2.getPerspectiveTransform(pixels, square), (w, h))
 
 
 def pallet_bounds(slots: Sequence[Slot]) -> tuple[float, float, float, float]:
-    """x_min, x_max, y_min, y_max around the slots, metres."""
+    """Bounds of the slots with a margin: x_min, x_max, y_min, y_max, metres."""
     half = [np.array(slot.size or (0.1, 0.1)) / 2 + 0.01 for slot in slots]
     low = np.min([[s.x, s.y] - h for s, h in zip(slots, half, strict=True)], axis=0)
     high = np.max([[s.x, s.y] + h for s, h in zip(slots, half, strict=True)], axis=0)
@@ -229,14 +215,14 @@ def pallet_bounds(slots: Sequence[Slot]) -> tuple[float, float, float, float]:
 
 
 def draw_pallets(images: dict[Correction, np.ndarray], slots: Sequence[Slot], title: str, path: Path) -> None:
-    """Draws a pallet under each correction, with targets in green and slot outlines in white."""
+    """Draw a pallet under each correction, with targets in green and slot outlines in white."""
     x_min, x_max, y_min, y_max = pallet_bounds(slots)
     height = 4.2 * (x_max - x_min) / max(y_max - y_min, 1e-6)
     with saved_figure(path, 4.2 * len(images), height + 0.9) as figure:
         for axes, (name, image) in zip(
             figure.subplots(1, len(images), squeeze=False)[0], images.items(), strict=True
         ):
-            # Right is -y and up is +x: the view from behind the robot.
+            # Right is -y and up is +x, as seen from behind the robot.
             axes.imshow(image, extent=(-y_max * _MM, -y_min * _MM, x_min * _MM, x_max * _MM))
             for slot in slots:
                 at = np.array([-slot.y, slot.x]) * _MM

@@ -1,4 +1,4 @@
-"""Pick and place of one part, on any cell, with the placed part's error."""
+"""Pick and place of one part on any cell, and measurement of the placement error."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.settings import Region
 from mskgrasp.palletize.figures import draw_placement, pallet_image
-from mskgrasp.palletize.placements import Correction, Placement
-from mskgrasp.palletize.slots import SEEN_TOLERANCE, Slot, first_reachable
-from mskgrasp.palletize.views import take_views, write_views
+from mskgrasp.palletize.height_maps import take_height_maps, write_height_maps
+from mskgrasp.palletize.pallet_slots import SEEN_TOLERANCE, Slot, first_reachable
+from mskgrasp.palletize.placement_records import Correction, Placement
 from mskgrasp.parts import find_part
 from mskgrasp.perception.footprint import seen_footprint
 from mskgrasp.perception.markers import planar_displacement
-from mskgrasp.planning.placing import Target, place, place_error, place_pose, turned_by
+from mskgrasp.planning.place_pose import Target, place, place_error, place_pose, turned_by
 from mskgrasp.planning.planner import GraspPlan, Planner
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.policies import RepeatedPlanner
 
 _NEAR = 0.001
-"""Half a side of the region in which a placed part's tape is sought, m; `find_markers` adds its margin."""
+"""Half the side of the region searched for a placed part's tape, m; `find_markers` adds its margin."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlacementTask:
-    """A part to be put into a slot.
+    """Task of placing a part into a slot.
 
     Attributes:
-        part: Name or folder.
-        number: Which trial of the part, or which pallet.
-        index: Of the slot, from 0.
+        part: Name or folder of the part.
+        number: Index of the trial of the part, or of the pallet.
+        index: Index of the slot.
         slot: The slot.
-        correction: What is corrected by.
-        seed: Determines its place and turn, and the planner's candidates.
-        keep: What is on the pallet stays there.
+        correction: Displacement that is corrected for.
+        seed: Seed of the scene: determines the part's pose and the candidates.
+        keep: Parts on the pallet stay.
     """
 
     part: str
@@ -59,12 +59,12 @@ class PlacementTask:
 
 
 class PickAndPlace:
-    """Puts parts into slots.
+    """Pick and place of parts into slots.
 
     Args:
-        engine: On a connected cell.
-        planner: For that cell.
-        pictures: Folder for the picture and the views of every placement.
+        engine: Engine of a connected cell.
+        planner: Planner for that cell.
+        pictures: Folder for the picture and the height maps of every placement.
     """
 
     def __init__(self, engine: TrialEngine, planner: Planner, pictures: Path):
@@ -75,16 +75,18 @@ class PickAndPlace:
         self._tops: dict[int, float] = {}
 
     def run(self, task: PlacementTask, name: str = "") -> Placement:
-        """Puts one part into its slot and measures it; writes its picture.
+        """Place one part into its slot, measure it and write its picture.
 
         Args:
             task: The part and its slot.
             name: Title for the operator, such as "placement 3 of 20".
 
         Raises:
-            HalError: The cell was lost; nothing of this placement is kept.
+            HalError: The cell was lost; this placement is not stored.
             StoppedByOperator: The operator ended the run.
         """
+        if not task.keep:
+            self._tops = {}
         slot = task.slot
         failed = Placement(
             part=find_part(task.part).name, number=task.number, slot=task.index, correction=task.correction,
@@ -105,30 +107,28 @@ class PickAndPlace:
         if not slot.fits(footprint, SEEN_TOLERANCE):
             return replace(known, reason="slot too small")
         done, target, after = self._carry(frame, plan, slot.targets(footprint), known)
-        if not task.keep:
-            self._tops = {}
         if done.placed:
             self._tops[task.index] = float(plan.view.size[2])
-        views = take_views(frame, after, plan, target, slot.theta)
-        write_views(views, self._pictures / f"{done.name}.npz")
-        draw_placement(views, done, self._pictures / f"{done.name}.png")
+        maps = take_height_maps(frame, after, plan, target, slot.theta)
+        write_height_maps(maps, self._pictures / f"{done.name}.npz")
+        draw_placement(maps, done, self._pictures / f"{done.name}.png")
         return done
 
     def picture(self, slots: list[Slot]) -> np.ndarray:
-        """A picture (h, w, 3) of the pallet as it is now, the arm at home."""
+        """Capture an image (h, w, 3) of the pallet, the arm at home."""
         return pallet_image(self._cell.camera.capture(), slots, self._cell.workspace.table_z, self._tops)
 
     def _carry(
         self, frame: RgbdFrame, plan: GraspPlan, targets: Sequence[Target], known: Placement
     ) -> tuple[Placement, Target, RgbdFrame | None]:
-        """Grasps, places at the first target that the arm reaches, and measures.
+        """Grasp, place at the first target that the arm reaches, and measure.
 
         Returns:
-            The outcome, the target, and the frame afterwards; None where nothing was placed.
+            The outcome, the target, and the frame after placing; None where nothing was placed.
         """
         engine, target = self._engine, targets[0]
         try:
-            # Before anything moves, and not only when the part hangs in the hand.
+            # Refused before the grasp, rather than with the part in the hand.
             first_reachable(self._cell, [self._pose(plan, np.zeros(4), target) for target in targets])
         except OutOfWorkspace:
             return replace(known, reason="OutOfWorkspace"), target, None
@@ -141,12 +141,12 @@ class PickAndPlace:
         if measured is not None:
             known = replace(known, measured=measured.tolist())
         by = {"none": np.zeros(4), "predicted": plan.displacement, "truth": measured}[known.correction]
-        assert by is not None  # truth is refused where nothing tracks the part
+        assert by is not None  # truth is refused without a tracker
         for target in targets:
             try:
                 place(self._cell, self._pose(plan, by, target), engine.recover)
             except OutOfWorkspace:
-                continue  # the other way round, perhaps
+                continue  # the other target may be reached
             except MotionAborted as error:
                 engine.recover(error)
                 return replace(known, reason="collided"), target, None
@@ -170,7 +170,7 @@ class PickAndPlace:
         target: Target,
         done: Placement,
     ) -> Placement:
-        """The placement with its errors, by tape where the part carries it, else by the tracker."""
+        """Add the errors to a placement, measured by tape if the engine has it, else by the tracker."""
         centre, pose = plan.view.centre_base, self._engine.part_pose()
         if self._engine.tape is not None:
             try:
@@ -182,20 +182,20 @@ class PickAndPlace:
         elif before is not None and pose is not None:
             distance, angle = place_error(before, pose, centre[:2] - before.position[:2], target)
         else:
-            return replace(done, unmeasured="nothing tracks the part, and it carries no tape (--tape)")
+            return replace(done, unmeasured="no tracker and no tape (--tape)")
         return replace(done, translation_error=distance, rotation_error=angle)
 
     def _tape_motion(
         self, frame: RgbdFrame, after: RgbdFrame, centre: np.ndarray, target: Target
     ) -> tuple[np.ndarray, float]:
-        """Motion of the part's centre along base x and y, and its turn, by its tape.
+        """Measure the motion of the part's centre along base x and y, and its turn, by its tape.
 
         Raises:
-            MarkersNotFound: Both squares are not seen, before or after.
+            MarkersNotFound: A square is not detected before or after.
         """
         first = self._engine.find_tape(frame)
         around: Region = (target.x - _NEAR, target.x + _NEAR, target.y - _NEAR, target.y + _NEAR)
         second = self._engine.find_tape(after, around)
-        # With no turn the grasp frame has the base's axes.
+        # A grasp frame with theta 0 has the base's axes.
         dx, dy, turn = planar_displacement(first, second, np.zeros(4), centre)
         return np.array([dx, dy]), float(turn)

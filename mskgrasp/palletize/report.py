@@ -1,11 +1,10 @@
-"""The report of a palletizing run: sections, figures and report.json."""
+"""Report of a palletizing run: sections, figures and ``report.json``."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -14,27 +13,27 @@ from rich.console import Console
 
 from mskgrasp.core.files import write_whole
 from mskgrasp.palletize.figures import draw_comparison, draw_errors, draw_pallets, outcome_text
-from mskgrasp.palletize.placements import (
-    CORRECTIONS,
-    GOAL,
-    Correction,
-    Placement,
-    compared,
-    degrees,
-    gain_lines,
-    interval_text,
-    millimetres,
+from mskgrasp.palletize.height_maps import read_height_maps
+from mskgrasp.palletize.pallet_slots import Slot
+from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
+from mskgrasp.palletize.summary import (
+    Interval,
+    PlacementSummary,
+    compared_groups,
+    group_part,
     summarise_placements,
 )
-from mskgrasp.palletize.slots import Slot
-from mskgrasp.palletize.views import read_views
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.html import write_html
+from mskgrasp.reports.quantities import counted, degrees, millimetres
 from mskgrasp.reports.section import Figure, Section, settings_section
 from mskgrasp.runtime.console_table import Link, Table
 
+GOAL = 0.5
+"""Greatest share of the median error that correcting by the prediction is meant to leave."""
 WORST = 10
 _ROWS = 4
+_WORDS: dict[Correction, str] = {"predicted": "the prediction", "truth": "the truth"}
 _HEADER = (
     "correction", "placed", "measured", "median error", "95 % interval, mm", "median turn error",
     "95 % interval, deg", "not placed",
@@ -42,7 +41,7 @@ _HEADER = (
 _DEFINITIONS = (
     "Error: distance of the placed part's centre from its target. Turn error: difference between the turn "
     "the part made and the turn commanded. Centre and direction of the longer side before the grasp are "
-    "those seen in the depth image, so no column includes the error of seeing them.",
+    "estimated from the depth image, so no column includes the error of that estimate.",
     "Correction none: the part is assumed not to move in the hand; predicted: displacement predicted by the "
     "network; truth: displacement measured in simulation, a lower bound. Goal: correcting by the prediction "
     f"leaves at most {GOAL:g} of the median error. Intervals: bootstrap over parts, 95 %.",
@@ -51,20 +50,17 @@ _DEFINITIONS = (
 
 def write_report(
     config: BaseModel, out: Path, placements: Sequence[Placement], slots: Sequence[Slot]
-) -> dict[str, Any]:
-    """Summarises a run and writes report.json, report.html and its figures.
+) -> PlacementSummary:
+    """Summarise a run and write report.json, report.html and its figures.
 
     Args:
         config: Settings of the run.
-        out: Its folder, with the pictures and views of the placements in ``placements``.
-        placements: All of them.
-        slots: The targets.
-
-    Returns:
-        The content of report.json.
+        out: Folder of the run, with the pictures and height maps of the placements in ``placements``.
+        placements: All placements of the run.
+        slots: All slots.
     """
-    report = summarise_placements(placements)
-    text = json.dumps(report, indent=1, allow_nan=False)
+    summary = summarise_placements(placements)
+    text = json.dumps(summary.to_json(), indent=1, allow_nan=False)
     write_whole(out / "report.json", text.encode() + b"\n")
     draw_errors(placements, out / "errors.png")
     errors = Section(
@@ -73,55 +69,81 @@ def write_report(
         figures=[Figure(path=out / "errors.png", caption="Distribution of the errors, and medians by part")],
     )
     sections = [
-        _result(report),
+        _result(summary),
         errors,
         _pallets(out, placements, slots),
         _examples(out, placements),
-        _parts(report),
+        _parts(summary),
         _worst(out, placements),
         _lost(out, placements),
         settings_section(config.model_dump(mode="json")),
     ]
-    write_html(out / "report.html", title="Palletizing", conclusion=_conclusion(report), sections=sections)
-    return report
+    write_html(out / "report.html", title="Palletizing", conclusion=_conclusion(summary), sections=sections)
+    return summary
 
 
-def print_report(report: dict[str, Any], console: Console | None = None) -> None:
-    """Prints the counts and errors of each correction, and what correcting gains."""
-    print_sections([_result(report)], console)
+def print_report(summary: PlacementSummary, console: Console | None = None) -> None:
+    """Print the counts and errors of each correction, and what correcting gains."""
+    print_sections([_result(summary)], console)
 
 
-def _conclusion(report: dict[str, Any]) -> str:
-    counts = report["corrections"].values()
-    placed = f"{sum(row['placed'] for row in counts)} of {sum(row['tried'] for row in counts)} parts placed"
-    medians = [
-        f"{name} {millimetres(row['median_translation'])} and {degrees(row['median_rotation'])}"
-        for name, row in report["corrections"].items()
-    ]
-    if not report["compared"]:
+def _conclusion(summary: PlacementSummary) -> str:
+    rows = summary.corrections.values()
+    placed = f"{sum(row.placed for row in rows)} of {sum(row.tried for row in rows)} parts placed"
+    if not summary.compared:
         return f"{placed}; no error was measured under every correction."
+    medians = [
+        f"{name} {millimetres(row.median_translation)} and {degrees(row.median_rotation)}"
+        for name, row in summary.corrections.items()
+    ]
     return f"{placed}; median error by correction: {', '.join(medians)}."
 
 
-def _result(report: dict[str, Any]) -> Section:
+def _result(summary: PlacementSummary) -> Section:
     rows = [
         (
             name,
-            f"{row['placed']} of {row['tried']}",
-            row["measured"],
-            millimetres(row["median_translation"]),
-            interval_text(row["median_translation_interval"], 1e3),
-            degrees(row["median_rotation"]),
-            interval_text(row["median_rotation_interval"], 180 / np.pi),
-            ", ".join(f"{reason} {n}" for reason, n in row["reasons"].items()) or "-",
+            f"{row.placed} of {row.tried}",
+            row.measured,
+            millimetres(row.median_translation),
+            _interval_text(row.median_translation_interval, 1e3),
+            degrees(row.median_rotation),
+            _interval_text(row.median_rotation_interval, 180 / np.pi),
+            counted(row.reasons) or "-",
         )
-        for name, row in report["corrections"].items()
+        for name, row in summary.corrections.items()
     ]
-    return Section(title="Result", text=gain_lines(report), tables=[Table(header=_HEADER, rows=rows)])
+    return Section(title="Result", text=gain_lines(summary), tables=[Table(header=_HEADER, rows=rows)])
+
+
+def _interval_text(interval: Interval | None, scale: float, digits: int = 1) -> str:
+    return "-" if interval is None else " - ".join(f"{value * scale:.{digits}f}" for value in interval)
+
+
+def gain_lines(summary: PlacementSummary) -> list[str]:
+    """State what correcting gains."""
+    if not summary.compared:
+        return ["No placement was measured under every correction: errors are unknown."]
+    n, parts = summary.compared, summary.parts_compared
+    lines = [f"Medians are of {n} placements of {parts} parts, those measured under every correction."]
+    for name, gain in summary.gain.items():
+        ratio = _ratio_text(gain.translation_ratio, gain.translation_ratio_interval)
+        turn = _ratio_text(gain.rotation_ratio, gain.rotation_ratio_interval)
+        text = f"Corrected by {_WORDS[name]}, the median error is {ratio} of that without, the turn's {turn}"
+        if name == "predicted" and gain.translation_ratio is not None:
+            met = gain.translation_ratio <= GOAL
+            text += f"; the goal is {GOAL:g} at most: {'met' if met else 'not met'}"
+        lines.append(text + ".")
+    return lines
+
+
+def _ratio_text(ratio: float | None, interval: Interval | None) -> str:
+    text = "-" if ratio is None else f"{ratio:.2f}"
+    return text if interval is None else f"{text} ({_interval_text(interval, 1, digits=2)})"
 
 
 def _pallets(out: Path, placements: Sequence[Placement], slots: Sequence[Slot]) -> Section:
-    """Pictures of whole pallets, side by side by correction; empty without pallets."""
+    """Images of whole pallets, side by side by correction; empty without pallets."""
     figures = []
     for number in sorted({one.number for one in placements}):
         images: dict[Correction, np.ndarray] = {}
@@ -142,15 +164,15 @@ def _pallets(out: Path, placements: Sequence[Placement], slots: Sequence[Slot]) 
 
 def _examples(out: Path, placements: Sequence[Placement]) -> Section:
     """One placement of each of a few parts, before and after, side by side by correction."""
-    by_part = {group_part(group): group for group in reversed(compared(placements))}
+    by_part = {group_part(group): group for group in reversed(compared_groups(placements))}
     names = sorted(by_part)
     chosen = [names[int(i)] for i in np.linspace(0, len(names) - 1, min(_ROWS, len(names)))]
     rows = []
     for part in chosen:
         group = by_part[part]
-        views = {name: read_views(out / "placements" / f"{one.name}.npz") for name, one in group.items()}
-        views = {name: views[name] for name in CORRECTIONS if name in views}
-        rows.append((next(iter(group.values())), views, group))
+        maps = {name: read_height_maps(out / "placements" / f"{one.name}.npz") for name, one in group.items()}
+        maps = {name: maps[name] for name in CORRECTIONS if name in maps}
+        rows.append((next(iter(group.values())), maps, group))
     if not rows:
         return Section(title="Examples")
     draw_comparison(rows, out / "placed.png")
@@ -161,18 +183,13 @@ def _examples(out: Path, placements: Sequence[Placement]) -> Section:
     return Section(title="Examples", figures=[Figure(path=out / "placed.png", caption=caption)])
 
 
-def group_part(group: dict[Correction, Placement]) -> str:
-    """The part of a group of placements."""
-    return next(iter(group.values())).part
-
-
-def _parts(report: dict[str, Any]) -> Section:
-    names = list(report["corrections"])
+def _parts(summary: PlacementSummary) -> Section:
+    names = list(summary.corrections)
     rows = [
-        [part, row["compared"]]
-        + [millimetres(row["median_translation"][name]) for name in names]
-        + [degrees(row["median_rotation"][name]) for name in names]
-        for part, row in report["parts"].items()
+        [part, row.compared]
+        + [millimetres(row.median_translation[name]) for name in names]
+        + [degrees(row.median_rotation[name]) for name in names]
+        for part, row in summary.parts.items()
     ]
     header = ["part", "compared", *names, *(f"{name}, turn" for name in names)]
     return Section(

@@ -1,4 +1,4 @@
-"""A palletizing run: its placements, in one process or several, and their report."""
+"""Palletizing run: its placements, in one process or several, and their report."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import contextlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
 
 import cv2
 
@@ -14,33 +13,36 @@ from hal import cell_from_yaml
 from hal.operator import Operator
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import UsageError
-from mskgrasp.core.files import only_here
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
+from mskgrasp.palletize.pallet_slots import Slot, check_reach, check_room
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
-from mskgrasp.palletize.placements import CORRECTIONS, Correction, Placement
+from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
 from mskgrasp.palletize.report import write_report
-from mskgrasp.palletize.slots import Slot, check_reach, check_room
+from mskgrasp.palletize.summary import PlacementSummary
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.run_inputs import inputs_of
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append, begin, file_digest, read
+from mskgrasp.runtime.run_folder import TRIALS, append, file_digest, opened_run, read
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.trials.engine import connected_engine
+
+SCENE_VERSION = 2
+"""Raised by every change after which `_pallets` draws other scenes from a seed."""
 
 
 @dataclass(frozen=True)
 class TaskGroup:
-    """Tasks that are done one after another in the same process.
+    """Tasks done in sequence by one process: a pallet, or one trial under every correction.
 
     Attributes:
-        name: For the file of its picture; empty where they are not a pallet but trials each for itself.
-        tasks: In their order.
-        done: Keys of those that are stored already.
+        name: Name of a pallet's picture; empty for a trial.
+        tasks: The tasks in sequence.
+        done: Keys of the stored placements.
     """
 
     name: str
@@ -49,22 +51,22 @@ class TaskGroup:
 
     @property
     def title(self) -> str:
-        """For messages."""
+        """Title in messages."""
         return self.name or f"{self.tasks[0].part}, trial {self.tasks[0].number + 1},"
 
-    def after(self, n_told: int) -> TaskGroup:
-        """What is left when its process died; a simulated pallet stands empty again."""
-        told = [task.key for task in self.tasks if task.key not in self.done][:n_told]
-        return self if self.name else replace(self, done=self.done.union(told))
+    def after(self, n_finished: int) -> TaskGroup:
+        """The group without its finished tasks, after its process died; a simulated pallet is filled anew."""
+        finished = [task.key for task in self.tasks if task.key not in self.done][:n_finished]
+        return self if self.name else replace(self, done=self.done.union(finished))
 
 
-def palletize(config: PalletizeConfig) -> dict[str, Any]:
-    """Makes the placements that are missing and sums all up.
+def palletize(config: PalletizeConfig) -> PlacementSummary:
+    """Make the missing placements and report on all.
 
     Raises:
-        UsageError: The folder holds a run with other settings, a slot cannot be used, or there is nobody to
-            be asked.
-        HalError: The cell was lost; what is finished is stored.
+        UsageError: The folder holds a run with other inputs, a slot cannot be used, or an operator must be
+            asked but standard input is not a terminal.
+        HalError: The cell was lost; finished placements are stored.
     """
     models = load_models(config.models)
     names = part_names(config.parts, models.meta.training, config.n_parts)
@@ -80,19 +82,16 @@ def palletize(config: PalletizeConfig) -> dict[str, Any]:
     if config.slots is not None:
         inputs["slots"] = file_digest(config.slots)
     may_change = ["out", "trials", "corrections", "workers", "yes"]
-    # Which part comes into which slot follows from all of them.
+    # The parts determine which of them fills which slot.
     may_change += ["parts", "n_parts"] if config.slots is None else []
-    begin(config, config.out, inputs, may_change=may_change)
-    with only_here(config.out) as mine:
-        if not mine:
-            raise UsageError(f"another run is at work in {config.out}; wait for it, or choose another --out")
+    with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
         make_folder(config.out / "placements")
         placements = _place_all(config, pallets, asks)
-    return write_report(config, config.out, placements, slots)
+        return write_report(config, config.out, placements, slots)
 
 
 def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[tuple[Correction, ...], bool]:
-    """Refuses what cannot be done on this cell; nothing is connected, nothing moves.
+    """Refuse settings that this cell cannot execute, without connecting it.
 
     Returns:
         The corrections, and whether an operator will be asked.
@@ -100,17 +99,15 @@ def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[tuple[Correction
     cell = cell_from_yaml(config.cell)
     kind = read_yaml(config.cell).get("type")
     if config.workers > 1 and kind != "sapien":
-        raise UsageError(
-            f"--workers {config.workers}: {config.cell} is one cell of which there are not several"
-        )
+        raise UsageError(f"--workers {config.workers}: {config.cell} is one cell; omit --workers")
     asks = Operator(cell, yes=config.yes).asks
-    if kind in ("sapien", "devices"):  # a recording answers only what comes in its order
+    if kind in ("sapien", "devices"):  # a recording replays queries in its order only
         check_reach(cell, slots)
     can: tuple[Correction, ...] = CORRECTIONS if cell.tracker is not None else CORRECTIONS[:2]
     wanted = tuple(dict.fromkeys(config.corrections)) or can
     if not set(wanted) <= set(can):
         raise UsageError(
-            f"--corrections {' '.join(wanted)}: nothing in this cell tracks the part; legal: {', '.join(can)}"
+            f"--corrections {' '.join(wanted)}: this cell has no tracker; legal: {', '.join(can)}"
         )
     return wanted, asks
 
@@ -118,7 +115,7 @@ def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[tuple[Correction
 def _pallets(
     config: PalletizeConfig, names: list[str], slots: list[Slot], corrections: tuple[Correction, ...]
 ) -> list[list[PlacementTask]]:
-    """What belongs together: the slots of a pallet, or a trial of a part under every correction."""
+    """The tasks of each pallet, or of each trial of a part under every correction."""
 
     def task(name: str, number: int, index: int, correction: Correction) -> PlacementTask:
         # A part may fill several slots of a pallet, each of them another scene.
@@ -172,7 +169,7 @@ def _place_all(config: PalletizeConfig, pallets: list[list[PlacementTask]], asks
 
 @contextmanager
 def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], Iterator[Placement]]]:
-    """A connected cell with its planner, and the function that fills a pallet."""
+    """Connect a cell with its planner; the function that runs a group of tasks."""
     with connected_engine(
         config.cell, yes=config.yes, picture=config.out / "next.png", tape=config.squares()
     ) as engine:
@@ -182,7 +179,7 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
 
         def fill(pallet: TaskGroup) -> Iterator[Placement]:
             for number, task in enumerate(pallet.tasks, 1):
-                # A real pallet is as it was left; a simulated one is filled anew from its first slot.
+                # A real pallet keeps its parts; a simulated one is filled anew from its first slot.
                 if task.key in pallet.done and (engine.cell.feeder is None or not pallet.name):
                     continue
                 where = f"slot {number} of {len(pallet.tasks)}" if pallet.name else f"trial {task.number + 1}"

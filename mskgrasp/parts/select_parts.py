@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from mskgrasp.core.errors import UsageError
 from mskgrasp.parts.builtin import find_part, starter_names
 from mskgrasp.parts.catalogue import chosen_names
 
@@ -25,6 +26,7 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
 
     Raises:
         BadPart: A part is unknown.
+        UsageError: Two parts have the same name.
     """
     sets = []
     for word in words:
@@ -39,8 +41,14 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
     if n_parts:
         sets = [evenly(list(one), share) for one, share in zip(sets, _shares(sets, n_parts), strict=True)]
     names = list(dict.fromkeys(name for one in sets for name in one))
-    for name in names:
-        find_part(name)
+    sources: dict[str, str] = {}
+    for source in names:
+        name = find_part(source).name
+        if name in sources:
+            raise UsageError(
+                f"--parts: {sources[name]} and {source} are both called {name!r}; leave one away"
+            )
+        sources[name] = source
     return names
 
 

@@ -74,7 +74,7 @@ class GraspPlan:
         grasp_displacement_var: (4,) its variances; NaN if the network predicts none.
         score: Variance score of the grasp, square metres; NaN if the network predicts no variance.
         view: The detected part.
-        candidates: (n, 4) all grasps considered.
+        candidates: The n grasps considered, base frame.
         qualities: (n,) theirs.
         shortlist: (k,) indices of the candidates of best quality, best first.
         shortlist_scores: (k,) their variance scores, square metres.
@@ -89,7 +89,7 @@ class GraspPlan:
     grasp_displacement_var: np.ndarray
     score: float
     view: PartView
-    candidates: np.ndarray
+    candidates: Grasp
     qualities: np.ndarray
     shortlist: np.ndarray
     shortlist_scores: np.ndarray
@@ -107,7 +107,7 @@ class GraspPlan:
         centre: np.ndarray,
         seconds: dict[str, float],
     ) -> GraspPlan:
-        """Make the plan of the shortlist's grasp ``chosen``, for a part centre (3,), base frame."""
+        """Make the plan of the shortlist's grasp ``chosen``, of candidates (n, 4), for a part centre (3,)."""
         row, mean, variance = best.rows[chosen], best.mean[chosen], best.variance[chosen]
         centre_grasp = centre_in_grasp_frame(centre, candidates[row])
         return cls(
@@ -119,7 +119,7 @@ class GraspPlan:
             grasp_displacement_var=variance,
             score=float(best.scores[chosen]),
             view=view,
-            candidates=candidates,
+            candidates=Grasp.from_vector(candidates),
             qualities=qualities,
             shortlist=best.rows,
             shortlist_scores=best.scores,

@@ -22,5 +22,6 @@ def model_digests(models: Path, label: str = "") -> dict[str, str]:
 
 
 def part_digests(parts: Iterable[str]) -> dict[str, str]:
-    """Compute digests of parts, by name or folder."""
-    return {f"part {name}": find_part(name).content_hash for name in parts}
+    """Compute digests of parts, given by name or folder; a part is recorded by its name."""
+    found = [find_part(part) for part in parts]
+    return {f"part {part.name}": part.content_hash for part in found}

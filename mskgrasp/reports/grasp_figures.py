@@ -44,9 +44,10 @@ def _from_above(
     return patch[0, 0].numpy() * _MM
 
 
-def _show_heights(
+def show_heights(
     axes: Axes, heights: np.ndarray, centre: np.ndarray | tuple[float, float], side: float, top: float
 ) -> Any:
+    """Show heights (n, n), in the unit of ``top``, the greatest of them, in a square of ``side`` metres."""
     half = side / 2 * _MM
     x, y = centre[0] * _MM, centre[1] * _MM
     image = axes.imshow(
@@ -62,10 +63,10 @@ def _show_heights(
     return image
 
 
-def _jaw(
+def draw_jaw(
     axes: Axes, origin: np.ndarray, theta: float, opening: float = MAX_OPENING, scale: float = 1.0
 ) -> None:
-    """The open hand seen from above: two pads and the line along which they close, to scale (mm)."""
+    """Draw the open hand from above: two pads and the line along which they close, to scale (mm)."""
     closing = np.array([-np.sin(theta), np.cos(theta)])
     origin = np.asarray(origin[:2]) * _MM
     reach = opening / 2 * _MM
@@ -164,12 +165,12 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     # The plane of the part's top: there the picture is free of parallax.
     square = np.array([*view.centre_base[:2], view.table_z + view.size[2], 0.0])
     heights = _from_above(frame.depth, frame.intrinsics, frame.T_base_camera, view.table_z, square, side)
-    _show_heights(axes, heights, view.centre_base[:2], side, float(view.size[2]) * _MM)
+    show_heights(axes, heights, view.centre_base[:2], side, float(view.size[2]) * _MM)
     _outline(axes, heights, view.centre_base[:2] * _MM, side)
     order = np.argsort(plan.qualities)
     grasps = plan.candidates[order]
     dots = axes.scatter(
-        *(grasps[:, :2] * _MM).T,
+        *(grasps.position[:, :2] * _MM).T,
         c=plan.qualities[order],
         s=2.5,
         lw=0,
@@ -183,10 +184,10 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     # Without predicted variances all scores are NaN: the order by quality remains.
     few = plan.candidates[plan.shortlist[np.argsort(plan.shortlist_scores, kind="stable")[:_FEW]]]
-    for x, y, _, theta in few:
-        _closing_line(axes, np.array([x, y]) * _MM, theta)
+    for position, theta in zip(few.position, few.theta, strict=True):
+        _closing_line(axes, position[:2] * _MM, float(theta))
     axes.plot([], [], color=BLUE, lw=1.0, alpha=0.6, marker="|", label=f"{len(few)} of best score")
-    _jaw(axes, plan.grasp.position, float(plan.grasp.theta))
+    draw_jaw(axes, plan.grasp.position, float(plan.grasp.theta))
     axes.plot([], [], color=BLUE, lw=1.4, ls=(0, (4, 2)), marker="s", label="chosen grasp")
     axes.legend(loc="lower left", fontsize=8)
     axes.set(xlabel="base x, mm", ylabel="base y, mm", title=f"{len(plan.candidates)} candidates")
@@ -210,8 +211,8 @@ def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.nda
         frame.depth, frame.intrinsics, frame.T_base_camera, plan.view.table_z, plan.grasp.as_vector(), side
     )
     top = float(plan.view.size[2]) * _MM
-    _show_heights(axes, heights, (0.0, 0.0), side, top)
-    _jaw(axes, np.zeros(2), 0.0)
+    show_heights(axes, heights, (0.0, 0.0), side, top)
+    draw_jaw(axes, np.zeros(2), 0.0)
     centre = plan.grasp.T_base_grasp.inverse().apply(plan.view.centre_base)[:2] * _MM
     shift, turn = plan.displacement[:2] * _MM, float(plan.displacement[3])
     _outlines(axes, heights, np.zeros(2), side, centre, shift, turn)
@@ -332,10 +333,10 @@ def _draw_attempt(axes: Axes, attempts: Attempts, info: ShardInfo, row: int) -> 
     square = np.array([*centre[:2], centre[2], 0.0])
     depth = u16_to_depth(attempts.depth[row])
     heights = _from_above(depth, info.intrinsics, info.T_base_camera, info.table_z, square, side)
-    _show_heights(axes, heights, centre[:2], side, max(float(heights.max()), 1.0))
+    show_heights(axes, heights, centre[:2], side, max(float(heights.max()), 1.0))
     axes.set(xticks=[], yticks=[])
     success = bool(attempts.success[row])
-    _jaw(axes, grasp, float(grasp[3]), scale=0.6)
+    draw_jaw(axes, grasp, float(grasp[3]), scale=0.6)
     if success:
         displacement = attempts.displacement[row].astype(np.float64)
         cos, sin = np.cos(grasp[3]), np.sin(grasp[3])

@@ -4,33 +4,62 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 from mskgrasp.core.config import Config, read_config, write_config
 from mskgrasp.core.errors import BadDataset, UsageError
-from mskgrasp.core.files import write_whole
+from mskgrasp.core.files import LOCK, only_here, write_whole
 from mskgrasp.runtime.cli import make_folder
 
 Record = TypeVar("Record")
 SETTINGS = "config.yaml"
 INPUTS = "inputs.json"
 TRIALS = "trials.jsonl"
+_SCENE_VERSION = "scene_version"
 
 
-def begin(config: Config, out: Path, inputs: Mapping[str, str], *, may_change: Collection[str]) -> None:
-    """Opens the folder of a run: a new one, or one that was started with the same settings and inputs.
+@contextmanager
+def opened_run(
+    config: Config,
+    out: Path,
+    inputs: Mapping[str, str],
+    *,
+    scene_version: int,
+    may_change: Collection[str],
+) -> Iterator[None]:
+    """Opens the folder of a run, locked until the end of the block.
+
+    The folder is new, or of a run that was started with the same settings, inputs and scenes.
 
     Args:
         config: Settings of the run.
         out: The folder.
         inputs: Digests of the files and parts that the results depend on, by their names in messages.
+        scene_version: Version of the formula that draws the scenes from the seed; a folder without one has 1.
         may_change: Names of settings that may differ when a run is resumed.
 
     Raises:
-        UsageError: The folder holds another run, or other files.
+        UsageError: The folder holds another run or other files, or another process writes to it.
+        BadDataset: The record of the folder's inputs is damaged.
     """
+    known = _compatible_inputs(config, out, inputs, scene_version, may_change)
+    make_folder(out)
+    with only_here(out) as alone:
+        if not alone:
+            raise UsageError(f"another run is writing to {out}; wait for it, or choose another --out")
+        write_config(config, out / SETTINGS)
+        record = known | dict(inputs) | {_SCENE_VERSION: scene_version}
+        write_whole(out / INPUTS, (json.dumps(record, indent=1) + "\n").encode())
+        yield
+
+
+def _compatible_inputs(
+    config: Config, out: Path, inputs: Mapping[str, str], scene_version: int, may_change: Collection[str]
+) -> dict[str, Any]:
+    """The inputs recorded in a folder, with which the run is compatible; none for a new folder."""
     settings, fingerprint = out / SETTINGS, out / INPUTS
     if settings.exists() and fingerprint.exists():
         before = read_config(type(config), settings)
@@ -39,18 +68,32 @@ def begin(config: Config, out: Path, inputs: Mapping[str, str], *, may_change: C
             for name in type(config).model_fields
             if name not in may_change and getattr(before, name) != getattr(config, name)
         ]
-        known = json.loads(fingerprint.read_text(encoding="utf-8"))
+        known = _read_inputs(fingerprint)
         changed += [name for name, value in inputs.items() if known.get(name, value) != value]
         if changed:
             raise UsageError(
                 f"{out} was started with other inputs ({', '.join(changed)} differ); choose another --out"
             )
-        inputs = known | dict(inputs)
-    elif out.is_dir() and any(out.iterdir()):
+        stored = known.get(_SCENE_VERSION, 1)
+        if stored != scene_version:
+            raise UsageError(
+                f"{out} has scenes of version {stored}, this program draws version {scene_version}: the same "
+                "seed places parts differently; choose another --out"
+            )
+        return known
+    if out.is_dir() and any(path.name != LOCK for path in out.iterdir()):
         raise UsageError(f"--out {out} holds other files; choose a new folder")
-    make_folder(out)
-    write_config(config, settings)
-    write_whole(fingerprint, (json.dumps(dict(inputs), indent=1) + "\n").encode())
+    return {}
+
+
+def _read_inputs(path: Path) -> dict[str, Any]:
+    try:
+        known = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        known = None
+    if not isinstance(known, dict):
+        raise BadDataset(f"{path} is not a record of a run's inputs; choose another --out")
+    return known
 
 
 def file_digest(path: Path) -> str:

@@ -1,1 +1,1 @@
-"""Trials on a cell: looking, planning, grasping, measuring."""
+"""Trials on a cell: presentation, capture, planning, grasping, measurement."""

@@ -1,4 +1,4 @@
-"""Cell of a run: its YAML file, with the command line's overrides for a simulated one."""
+"""Cell file of a run, with the command line's overrides."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.settings import Tape
 
-# As in hal.sim.noise, which brings the simulator along.
+# As in hal.sim.noise, which imports the simulator.
 Noise = Literal["off", "iid", "kinect2"]
 SIMULATED = "sapien"
 FINE = 3
-"""Pixels of colour along one of depth, as a Kinect v2 has them, where tape is measured."""
+"""Colour pixels per depth pixel along one axis where tape is measured, about as a Kinect v2 has."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CellFile:
-    """A cell's settings.
+    """A cell file with the command line's overrides.
 
     Attributes:
-        path: Of the user's file.
-        values: Its contents with the command line's overrides.
-        tape: Sizes of the squares to measure by; None where a tracker measures.
+        path: The user's file.
+        values: Its contents with the overrides.
+        tape: Sizes of the tape squares that measure; None where a tracker measures.
     """
 
     path: Path
@@ -38,24 +38,24 @@ class CellFile:
 
     @property
     def simulated(self) -> bool:
-        """Whether the cell is simulated, so that several may run at once."""
+        """Whether the cell is simulated, so that several can run in parallel."""
         return self.values.get("type") == SIMULATED
 
     @property
     def noise(self) -> str:
-        """How a simulated camera errs; empty for another cell."""
+        """Noise of a simulated camera; empty for another cell."""
         noise = self.values.get("noise", "off") or "off"
         return "" if not self.simulated else noise if isinstance(noise, str) else noise.get("model", "off")
 
     @property
     def digest(self) -> str:
-        """Of the values."""
+        """SHA-256 of the values."""
         return hashlib.sha256(self._text().encode()).hexdigest()
 
     def write(self, folder: Path) -> Path:
-        """The file to open: a simulated cell's values in the folder, else the user's own.
+        """Write a simulated cell's values into the folder; the path of the file to open.
 
-        Files that another cell's file names lie beside it: it stays where it is.
+        The file of another cell is opened in place, since it names files relative to its own folder.
         """
         if not self.simulated:
             return self.path
@@ -69,26 +69,26 @@ class CellFile:
 def read_cell(
     path: Path, *, noise: Noise | None, measure: Literal["truth", "markers"], tape: tuple[float, float] | None
 ) -> CellFile:
-    """Reads a cell's file and what is to be other.
+    """Read a cell file and apply overrides.
 
     Args:
-        path: Of the file.
-        noise: Of a simulated camera, instead of the file's.
-        measure: Markers need tape, and colour finer than depth; a simulated cell gets both.
+        path: The file.
+        noise: Noise of a simulated camera; None: as in the file.
+        measure: ``markers`` adds tape, and colour finer than depth, to a simulated cell.
         tape: Sides of the larger and the smaller square, metres; None: the file's, or 12 and 8 mm.
 
     Raises:
         BadConfig: The file or a value is not valid.
-        UsageError: Something is asked for that is not for this cell.
+        UsageError: An override does not apply to this cell.
     """
     values = read_yaml(path)
     simulated = values.get("type") == SIMULATED
     if tape is not None and measure != "markers":
-        raise UsageError("--tape is how large the squares are that --measure markers looks for; add that")
+        raise UsageError("--tape needs --measure markers; add it")
     if noise is not None:
         if not simulated:
             raise UsageError(
-                f"--noise is for a simulated cell; {path} is of type {values.get('type')!r}: leave it away"
+                f"--noise is for a simulated cell; {path} is of type {values.get('type')!r}: omit --noise"
             )
         kept = values.get("noise")
         values["noise"] = (kept if isinstance(kept, dict) else {}) | {"model": noise}
@@ -99,5 +99,5 @@ def read_cell(
             squares = squares or values.get("tape") or {}
             values |= {"tape": squares, "colour_scale": max(FINE, values.get("colour_scale", 1))}
         squares = check_config(Tape, squares, "--tape" if tape else f"{path}: tape")
-    cell_from_values(values, path)  # a wrong file is refused here, not by a worker
+    cell_from_values(values, path)  # refuses an invalid file before any worker starts
     return CellFile(path=path, values=values, tape=squares)

@@ -1,4 +1,4 @@
-"""Engine of trials on any cell: presents a part, captures, plans, grasps, measures, recovers."""
+"""Steps of a trial on any cell: presentation, capture, planning, grasping, measurement, recovery."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from mskgrasp.core.grasp import (
 from mskgrasp.core.settings import Region, Tape
 from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
 from mskgrasp.perception.markers import Markers, find_markers
-from mskgrasp.planning.placing import displacement_of_point
+from mskgrasp.planning.place_pose import displacement_of_point
 from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.reports.grasp_figures import draw_plan
 
@@ -32,19 +32,19 @@ _MAX_DEPTH = np.iinfo(np.uint16).max * DEPTH_UNIT
 
 
 class PlansGrasps(Protocol):
-    """Chooses a grasp in a frame: `mskgrasp.planning.planner.Planner`, or another."""
+    """Interface of planners, such as `mskgrasp.planning.planner.Planner`."""
 
     def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
-        """Plans a grasp of the part that a frame shows."""
+        """Plan a grasp of the part in a frame."""
         ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedGrasp:
-    """A part on the table as it was seen, and the grasp planned for it.
+    """Captured part and the grasp planned for it.
 
     Attributes:
-        frame: The part before the grasp.
+        frame: The part at rest before the grasp.
         plan: None where no grasp was found.
         reason: Name of the error where no grasp was found; else empty.
         no_tape: Why the part carries no tape although tape measures; else empty.
@@ -58,14 +58,14 @@ class PlannedGrasp:
 
 @dataclass(frozen=True, kw_only=True)
 class ExecutedGrasp:
-    """Outcome of a grasp.
+    """Outcome of an executed grasp.
 
     Attributes:
         reason: Why the part was not lifted and held; empty where it was.
-        result: The arm's own measurements; None where it refused the grasp before it moved.
+        result: Measurements of the arm; None where it refused the grasp before moving.
         before: ``T_base_obj`` before the grasp; None without a tracker.
         displacement: (4,) object displacement; None where the grasp failed or without a tracker.
-        tilt: The same of the tilt, radians.
+        tilt: Tilt of the part in the hand, radians; None as before.
     """
 
     reason: str
@@ -76,11 +76,11 @@ class ExecutedGrasp:
 
     @property
     def aborted(self) -> str:
-        """Why the arm stopped on the way and must recover; empty where it did not."""
+        """Why the arm was stopped and must be recovered; empty where it was not."""
         return "" if self.result is None else self.result.aborted or ""
 
     def displacement_of_centre(self, plan: GraspPlan) -> np.ndarray | None:
-        """The displacement (4,) of the part's seen centre; its tilt is left out."""
+        """Displacement (4,) of the part's detected centre; the tilt is ignored."""
         if self.displacement is None or self.before is None:
             return None
         origin, centre = (
@@ -91,13 +91,13 @@ class ExecutedGrasp:
 
 
 class TrialEngine:
-    """Steps that all trials on a connected cell share.
+    """Steps of all trials on a connected cell.
 
     Args:
-        cell: Connected.
-        operator: Is asked before the arm moves and after a contact, if the cell has one.
-        picture: File for the picture of the next grasp, drawn for the operator.
-        tape: Sizes of the squares of tape to measure by; None: the cell's tracker measures, if it has one.
+        cell: The connected cell.
+        operator: Confirms motions and recoveries, if the cell asks an operator.
+        picture: File for the picture of the planned grasp that the operator confirms.
+        tape: Sizes of the tape squares that measure; None: the cell's tracker measures, if it has one.
     """
 
     def __init__(
@@ -114,10 +114,10 @@ class TrialEngine:
         self._picture = picture
 
     def home(self) -> None:
-        """Brings the arm home, out of the camera's sight; after a contact on the way it tries once more.
+        """Move the arm home, out of the camera's view; after a contact, recover and try once more.
 
         Raises:
-            MotionAborted: Something still holds it.
+            MotionAborted: A second contact.
         """
         try:
             go_home(self.cell)
@@ -126,10 +126,10 @@ class TrialEngine:
             go_home(self.cell)
 
     def recover(self, error: MotionAborted) -> None:
-        """Lets the arm move again after a contact; where an operator is asked, when they agree.
+        """Recover the arm after a contact, with the operator's consent where one is asked.
 
         Raises:
-            Stopped: The contact was somebody's stop.
+            Stopped: The arm was stopped by a person.
             StoppedByOperator: The operator ended the run.
         """
         if isinstance(error, Stopped):
@@ -137,7 +137,7 @@ class TrialEngine:
         self._operator.recover(self.cell, str(error))
 
     def capture(self) -> RgbdFrame:
-        """A frame, its depth as a file holds it: what is planned on it can be planned again from the file."""
+        """Capture a frame with depth rounded as in a file, so that a stored trial can be planned again."""
         frame = self.cell.camera.capture()
         depth = np.where(frame.depth > _MAX_DEPTH, np.nan, frame.depth)
         return replace(frame, depth=u16_to_depth(depth_to_u16(depth)))
@@ -152,17 +152,17 @@ class TrialEngine:
         keep: bool = False,
         then: str = "",
     ) -> PlannedGrasp:
-        """Has a part placed on the table, captures it and plans its grasp.
+        """Have a part placed on the table, capture it and plan its grasp.
 
-        Where an operator is asked, this repeats until a grasp is planned and they let the arm move.
+        Where an operator is asked, repeat until a grasp is planned and confirmed.
 
         Args:
             part: Name or folder.
             seed: Determines a feeder's placement and the candidates.
-            planner: Chooses the grasp.
+            planner: Plans the grasp.
             name: Title of the trial for the operator.
             keep: Parts outside the region stay, as on a pallet.
-            then: For the operator: what follows the grasp.
+            then: Motion after the grasp, in words for the operator.
 
         Raises:
             HalError: The cell was lost.
@@ -189,7 +189,7 @@ class TrialEngine:
                 return PlannedGrasp(frame=frame, plan=plan, no_tape=no_tape)
 
     def grasp(self, plan: GraspPlan) -> ExecutedGrasp:
-        """Executes a planned grasp and measures the part in the hand by the cell's tracker, if it has one.
+        """Execute a planned grasp and measure the displacement by the cell's tracker, if it has one.
 
         Raises:
             HalError: The cell was lost.
@@ -211,7 +211,7 @@ class TrialEngine:
         )
 
     def put_back(self, plan: GraspPlan) -> None:
-        """Puts a lifted part down where it was grasped; a contact on the way ends that, and no trial."""
+        """Put a lifted part down where it was grasped; a contact ends this motion, not the trial."""
         try:
             put_down(self.cell, plan.grasp)
         except MotionAborted as error:
@@ -222,14 +222,14 @@ class TrialEngine:
         return None if self.cell.tracker is None else self.cell.tracker.part_pose()
 
     def find_tape(self, frame: RgbdFrame, region: Region | None = None) -> Markers:
-        """Both squares of tape in a frame.
+        """Find both tape squares in a frame.
 
         Args:
-            frame: At home.
-            region: Where the part is; None: the cell's region.
+            frame: Captured with the arm at home.
+            region: Region of the part; None: the cell's region.
 
         Raises:
-            MarkersNotFound: They are not both seen.
+            MarkersNotFound: A square is not detected.
         """
         assert self.tape is not None
         workspace = self.cell.workspace
@@ -240,17 +240,17 @@ class TrialEngine:
 
 @contextmanager
 def connected_engine(path: Path, *, yes: bool, picture: Path, tape: Tape | None) -> Iterator[TrialEngine]:
-    """An engine on the cell of a YAML file, connected until the end of the block.
+    """Connect the cell of a YAML file until the end of the block.
 
     Raises:
-        UsageError: An operator must be asked, and standard input is no terminal.
+        UsageError: An operator must be asked, but standard input is not a terminal.
         HalError: The cell cannot be connected.
     """
     cell = cell_from_yaml(path)
     operator = Operator(cell, yes=yes)
     n_threads = torch.get_num_threads()
     if cell.arm.simulated:
-        # Networks round by the number of threads, and near-equal grasps would change places.
+        # Rounding depends on the number of threads, and would reorder near-equal grasps.
         torch.set_num_threads(1)
     try:
         with cell.connected():

@@ -1,4 +1,4 @@
-"""Trial of one planned grasp: the grasp, and the displacement measured by tracker or by tape."""
+"""Execution of one planned grasp and measurement of its displacement, by tracker or by tape."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from mskgrasp.trials.trial import Trial
 
 @dataclass(frozen=True, kw_only=True)
 class TrialRecord:
-    """A trial and what it was made from.
+    """A trial with its frames and plan.
 
     Attributes:
         trial: The outcome.
-        frame: The part before the grasp.
+        frame: The part at rest before the grasp.
         plan: None where no grasp was found.
-        after: The part put down again, where tape was looked for.
+        after: The part put down again, where it was captured to measure tape.
         in_hand: The hand still holds the part.
-        aborted: Why the arm stopped and must recover; empty where it did not.
+        aborted: Why the arm was stopped and must be recovered; empty where it was not.
     """
 
     trial: Trial
@@ -40,16 +40,16 @@ class TrialRecord:
 def run_trial(
     engine: TrialEngine, planned: PlannedGrasp, *, part: str, number: int, seed: int
 ) -> TrialRecord:
-    """Executes a planned grasp and measures it; `finish` then frees the hand.
+    """Execute a planned grasp and measure it; `finish` then frees the hand.
 
-    Where tape measures, the part is put down where it was grasped and the arm goes home.
+    To measure tape, the part is put down where it was grasped and the arm moves home.
 
     Args:
-        engine: On the cell where the part was presented.
-        planned: As `TrialEngine.present` returned it.
-        part: Name of the part, for the record.
-        number: Index of the trial among those of the part, for the record.
-        seed: Of the scene, for the record.
+        engine: Engine of the cell on which the part was presented.
+        planned: Result of `TrialEngine.present`.
+        part: Name of the part.
+        number: Index of the trial among those of the part.
+        seed: Seed of the scene.
 
     Raises:
         HalError: The cell was lost.
@@ -89,7 +89,7 @@ def run_trial(
 
 
 def finish(engine: TrialEngine, record: TrialRecord) -> None:
-    """Frees the hand after a trial: recovers from a contact, or puts a lifted part down again."""
+    """Free the hand after a trial: recover from a contact, or put a lifted part down."""
     if record.aborted:
         engine.recover(MotionAborted(record.aborted))
     elif record.in_hand and record.plan is not None:
@@ -99,22 +99,22 @@ def finish(engine: TrialEngine, record: TrialRecord) -> None:
 def _measure_by_tape(
     engine: TrialEngine, trial: Trial, frame: RgbdFrame, plan: GraspPlan, width: float
 ) -> TrialRecord:
-    """Puts the part down where it was grasped and measures its tape; a doubtful measurement is refused."""
+    """Put the part down where it was grasped and measure its tape; implausible measurements are rejected."""
     after, in_hand = None, True
     try:
         before = engine.find_tape(frame)
         try:
-            # To the very place: a part that falls shifts.
+            # To the grasp pose itself, since a dropped part shifts.
             lower(engine.cell, plan.grasp)
         except MotionAborted as error:
             engine.recover(error)
-            raise MarkersNotFound("not put down: the part hangs lower in the hand than it lay") from error
+            raise MarkersNotFound("not put down: the part met the table above the grasp pose") from error
         in_hand = False
         try:
             let_go(engine.cell, plan.grasp, opening=safe_opening(plan))
         except MotionAborted as error:
             engine.recover(error)
-            raise MarkersNotFound("touched: the hand met something as it let go and rose") from error
+            raise MarkersNotFound("touched: the hand met something as it retracted") from error
         engine.home()
         after = engine.capture()
         moved = planar_displacement(
@@ -132,10 +132,10 @@ def _measure_by_tape(
 
 
 def safe_opening(plan: GraspPlan) -> float:
-    """How far the fingers may open about the part once it is displaced as planned, metres.
+    """Compute the greatest opening at which the fingers clear the displaced part, metres.
 
-    The fully open fingers cleared the part on the way down; since then it has moved towards one of them. Its
-    turn is left out.
+    The fully open fingers cleared the undisplaced part. The displacement along the closing direction, plus
+    two standard deviations, is subtracted on both sides; the turn is ignored.
     """
     aside = abs(plan.displacement[1]) + 2 * np.nan_to_num(plan.displacement_std[1])
     return max(0.0, MAX_OPENING - 2 * float(aside))

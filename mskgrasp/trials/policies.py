@@ -1,4 +1,4 @@
-"""Policies of the paper's experiments: by quality, or by a model's variance among the best."""
+"""Planners of the paper's policies: best quality, or lowest variance of a model among the best."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ from hal.cell import PartTracker
 from mskgrasp.core.grasp import PartView
 from mskgrasp.planning.planner import GraspPlan, Planner, Shortlist, select, shortlist, variance_score
 from mskgrasp.planning.scoring import Scene, qualities
-from mskgrasp.trials.predictors import Predictor, Seen
+from mskgrasp.trials.predictors import PartObservation, Predictor
 
 
 class Candidates:
-    """Candidates over a frame with their predicted qualities; those of the last frame are remembered.
+    """Candidates of a frame with their predicted qualities; those of the last frame are cached.
 
-    The policies of an experiment meet the same part at the same place: what the quality network says of it is
-    the same, too, and is by far the most that planning costs.
+    The policies of an experiment plan in equal frames, and most of the planning time goes to qualities.
     """
 
     def __init__(self, planner: Planner):
@@ -29,10 +28,10 @@ class Candidates:
     def of(
         self, frame: RgbdFrame, rng: np.random.Generator
     ) -> tuple[PartView, np.ndarray, np.ndarray, float]:
-        """The part's view, candidates (n, 4), their qualities (n,), and the seconds that it took.
+        """Sample candidates: view of the part, candidates (n, 4), qualities (n,), time taken, seconds.
 
         Raises:
-            NoPartFound: The frame shows none.
+            NoPartFound: No part is detected.
         """
         key = _frame_key(frame, rng)
         if self._last is None or self._last[0] != key:
@@ -50,18 +49,18 @@ def _frame_key(frame: RgbdFrame, rng: np.random.Generator) -> bytes:
 
 
 class RepeatedPlanner:
-    """A planner that returns its last plan for the same frame and candidates, as under other corrections."""
+    """Planner that returns its last plan for an equal frame and generator, as under several corrections."""
 
     def __init__(self, planner: Planner):
         self._planner = planner
         self._last: tuple[bytes, GraspPlan] | None = None
 
     def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
-        """Plans a grasp of the part that a frame shows.
+        """Plan a grasp of the part in a frame.
 
         Raises:
-            NoPartFound: The frame shows none.
-            NoGraspFound: No candidate is of the demanded quality.
+            NoPartFound: No part is detected.
+            NoGraspFound: No candidate has the required quality.
         """
         key = _frame_key(frame, rng)
         if self._last is None or self._last[0] != key:
@@ -71,14 +70,14 @@ class RepeatedPlanner:
 
 @dataclass(frozen=True)
 class Chooser:
-    """Plans with the qualities of one model and the displacements of another.
+    """Planner with the qualities of one model and the displacements of another.
 
     Attributes:
-        candidates: Where the qualities come from.
-        predictor: Predicts the displacement, and with the policy ``low_variance`` decides by its variances.
+        candidates: Source of candidates and qualities.
+        predictor: Predicts displacements, and the variances of the policy ``low_variance``.
         policy: As in `mskgrasp.planning.planner.PlannerConfig`.
-        part: Name of what lies on the table.
-        tracker: Source of its pose for a predictor that needs it.
+        part: Name of the part on the table.
+        tracker: Source of its pose for a predictor that needs it; None: no pose.
     """
 
     candidates: Candidates
@@ -88,19 +87,19 @@ class Chooser:
     tracker: PartTracker | None
 
     def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
-        """Plans a grasp of the part that a frame shows.
+        """Plan a grasp of the part in a frame.
 
         Raises:
-            NoPartFound: The frame shows none.
-            NoGraspFound: No candidate is of the demanded quality.
+            NoPartFound: No part is detected.
+            NoGraspFound: No candidate has the required quality.
         """
         config = self.candidates.planner.config.model_copy(update={"policy": self.policy})
         view, candidates, found, scoring_s = self.candidates.of(frame, rng)
         scored = time.perf_counter()
         rows = shortlist(found, config.top_fraction)
         pose = None if self.tracker is None else self.tracker.part_pose()
-        seen = Seen(part=self.part, frame=frame, view=view, pose_base_obj=pose)
-        mean, variance, centre = self.predictor.predict(seen, candidates[rows])
+        observation = PartObservation(part=self.part, frame=frame, view=view, pose_base_obj=pose)
+        mean, variance, centre = self.predictor.predict(observation, candidates[rows])
         best = Shortlist(rows, mean, variance, variance_score(variance, view.gyration_radius))
         chosen = select(found[rows], best.scores, config)
         selecting_s = time.perf_counter() - scored

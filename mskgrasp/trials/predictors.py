@@ -1,4 +1,4 @@
-"""Models of the displacement that are compared: networks, and LOWESS on grasps of the very part."""
+"""Models of the grasp displacement: networks, and LOWESS over grasps of the same part."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ LOWESS = "lowess"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seen:
-    """Inputs of a predictor: a part before it is grasped.
+class PartObservation:
+    """Input of a predictor: a part at rest before the grasp.
 
     Attributes:
-        part: Its name.
-        frame: The picture of it.
-        view: Where it is seen there.
-        pose_base_obj: Its pose, where a tracker reports it; networks do not use it.
+        part: Name of the part.
+        frame: The frame.
+        view: The part as detected in the frame.
+        pose_base_obj: Pose of the part; None without a tracker. Networks ignore it.
     """
 
     part: str
@@ -50,15 +50,17 @@ class Predictor(Protocol):
         ...
 
     def knows(self, part: str) -> bool:
-        """Whether grasps of this part were among those it was made from."""
+        """Whether the model was trained on grasps of this part."""
         ...
 
-    def predict(self, seen: Seen, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of grasps (n, 4), base frame.
+    def predict(
+        self, observation: PartObservation, grasps: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Predict the grasp displacement of grasps (n, 4), base frame.
 
         Returns:
-            Mean (n, 4) of the grasp displacement, its variances (n, 4), NaN where it tells none, both metres
-            and radians along the axes of the grasp frame; the part's centre (3,) that it speaks of, base.
+            Mean (n, 4) and variances (n, 4), NaN where it predicts none, metres and radians along the axes of
+            the grasp frame; the point (3,) of the part that the displacement is of, base frame.
         """
         ...
 
@@ -76,48 +78,52 @@ class NetworkPredictor:
         return self.models.meta.network.variance
 
     def knows(self, part: str) -> bool:
-        """Whether the part was among those of training."""
+        """Whether the part is a training part."""
         return part in self.models.meta.training.get("training_parts", ())
 
-    def predict(self, seen: Seen, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """From the depth image alone."""
-        scene = Scene.of(seen.frame, seen.view, seen.view.table_z, self.models.device)
+    def predict(
+        self, observation: PartObservation, grasps: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Predict from the depth image."""
+        scene = Scene.of(observation.frame, observation.view, observation.view.table_z, self.models.device)
         mean, variance = displacements(self.models, scene, grasps, self.chunk_size)
-        return mean, variance, seen.view.centre_base
+        return mean, variance, observation.view.centre_base
 
 
 @dataclass(frozen=True)
 class LowessPredictor:
-    """Kernel regression over the recorded grasps of each known part."""
+    """LOWESS of each known part."""
 
     fits: dict[str, Lowess]
     has_variance: bool = True
 
     def knows(self, part: str) -> bool:
-        """Whether there are recorded grasps of it."""
+        """Whether there is a fit of the part."""
         return part in self.fits
 
-    def predict(self, seen: Seen, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """From the part's pose.
+    def predict(
+        self, observation: PartObservation, grasps: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Predict from the part's pose.
 
         Raises:
-            NoGraspFound: The part, or its pose, is not known.
+            NoGraspFound: The part or its pose is unknown.
         """
-        if seen.pose_base_obj is None or seen.part not in self.fits:
-            raise NoGraspFound(f"LOWESS needs the pose of '{seen.part}' and recorded grasps of it")
-        pose = seen.pose_base_obj
+        if observation.pose_base_obj is None or observation.part not in self.fits:
+            raise NoGraspFound(f"LOWESS needs the pose of '{observation.part}' and recorded grasps of it")
+        pose = observation.pose_base_obj
         n = len(grasps)
         poses = Pose(
             position=np.tile(np.asarray(pose.position, dtype=np.float64), (n, 1)),
             quat_wxyz=np.tile(np.asarray(pose.quat_wxyz, dtype=np.float64), (n, 1)),
         )
-        mean, variance = self.fits[seen.part].predict(poses, grasps)
+        mean, variance = self.fits[observation.part].predict(poses, grasps)
         return mean, variance, np.asarray(pose.position, dtype=np.float64)
 
 
-def predict_one(predictor: Predictor, seen: Seen, grasp: np.ndarray) -> Prediction:
-    """What a model expects of one grasp (4,), as an object displacement."""
-    mean, variance, centre = predictor.predict(seen, np.asarray(grasp, dtype=np.float64)[None])
+def predict_one(predictor: Predictor, observation: PartObservation, grasp: np.ndarray) -> Prediction:
+    """Predict the object displacement of one grasp (4,)."""
+    mean, variance, centre = predictor.predict(observation, np.asarray(grasp, dtype=np.float64)[None])
     centre_grasp = centre_in_grasp_frame(centre, np.asarray(grasp, dtype=np.float64))
     covariance = object_displacement_covariance(mean[0], variance[0], centre_grasp)
     return Prediction(
@@ -127,13 +133,13 @@ def predict_one(predictor: Predictor, seen: Seen, grasp: np.ndarray) -> Predicti
 
 
 def fit_lowess(data: Path, parts: list[str]) -> tuple[dict[str, Lowess], dict[str, str]]:
-    """LOWESS of those parts of which a dataset holds at least two successful grasps.
+    """Fit LOWESS to each part of which a dataset holds at least two successful grasps.
 
     Returns:
-        The fits by part, and the digest of the grasps that each is made from.
+        Fits by part, and the digest of the grasps of each.
 
     Raises:
-        BadDataset: The folder is no dataset, or a shard is damaged.
+        BadDataset: The folder is not a dataset, or a shard is damaged.
     """
     shards: dict[str, list[Path]] = {}
     for path in list_shards(data):

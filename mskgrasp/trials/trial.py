@@ -1,4 +1,4 @@
-"""Record of one trial: what was planned, and its outcome."""
+"""Record of one trial: the planned grasp and its outcome."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _LEGAL_KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """A model's expectation of a grasp: object displacement, axes of the grasp frame, metres and radians.
+    """Predicted object displacement, axes of the grasp frame, metres and radians.
 
     Attributes:
         mean: (4,).
@@ -32,26 +32,26 @@ class Trial:
     Attributes:
         part: Name of the part.
         number: Index of the trial among those of the part.
-        seed: Determines the part's place, its turn and the candidates.
-        success: The part was lifted and held, as far as the cell can measure: the arm measures the gap of its
-            fingers, a tracker how far the part has risen; neither sees contact or penetration.
+        seed: Seed of the scene: determines the part's placement and the candidates.
+        success: The part was lifted and held, judged by the gap of the fingers and, with a tracker, by the
+            part's rise; contact and penetration are not measured.
         reason: Why not; empty where it was.
-        grasp: (4,) the executed grasp; None, as all that follows, where no grasp was found.
-        quality: Predicted.
+        grasp: (4,) the executed grasp; None, as the plan's other values, where no grasp was found.
+        quality: Predicted probability of success.
         predicted: (4,) expected object displacement, metres and radians.
         predicted_std: (4,) its standard deviations; NaN where the model predicts none.
-        measured: (4,) object displacement; None where not successful or not measured. Of markers, dz is NaN:
-            they measure the motion in the plane.
-        tilt: Measured tilt, radians, or None.
-        planning_s: Seconds that planning took.
-        family: Kind of part.
-        policy: How the grasp was chosen.
-        chosen_by: Label of the model whose variances chose it; empty where there is but one.
+        measured: (4,) object displacement; None where not successful or not measured. dz is NaN where
+            markers measured, which give the motion in the plane.
+        tilt: Measured tilt, radians; None as before.
+        planning_s: Planning time, seconds.
+        family: Family of the part.
+        policy: Policy of the planner.
+        chosen_by: Label of the model whose variances chose the grasp; empty for the run's own model.
         unmeasured: Why a success was not measured; empty where it was.
-        true: (4,) where markers measure, the tracker's displacement of the very point whose motion they
-            measure, the part's seen centre; None without a tracker.
-        pose_base_obj: (7,) x y z qw qx qy qz of the part before the grasp, where a tracker reports it.
-        predictions: Expectations of other models for this grasp, by label.
+        true: (4,) where markers measure, the tracker's displacement of the same point, the part's detected
+            centre; None without a tracker.
+        pose_base_obj: (7,) x y z qw qx qy qz of the part before the grasp; None without a tracker.
+        predictions: Predictions of the compared models for this grasp, by label.
     """
 
     part: str
@@ -76,19 +76,19 @@ class Trial:
 
     @property
     def key(self) -> str:
-        """Name of the trial in its run, for people and for files."""
+        """Name of the trial in its run."""
         return trial_key(self.part, self.number, self.chosen_by)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values; NaN (an unknown deviation, a dz that was not measured) becomes None."""
+        """Convert to plain values; NaN (an unknown standard deviation, an unmeasured dz) becomes None."""
         return _nan_to_none(asdict(self))
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Trial:
-        """The trial that `to_json` wrote.
+        """Convert the values of `to_json` to a trial.
 
         Raises:
-            TypeError, ValueError, KeyError: The values are no trial.
+            TypeError, ValueError, KeyError: The values are not a trial.
         """
         values = dict(values)
         for name in ("predicted_std", "measured"):

@@ -1,4 +1,4 @@
-"""Trial on disk: the frame before the grasp, the plan, and the frame afterwards, if any."""
+"""Files of trials: the frame before the grasp, the plan, and the frame after it, if any."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _NUMBERS = ("quality", "score")
 
 
 def trial_file(run: Path, key: str) -> Path:
-    """File of the trial of a key."""
+    """Path of the trial of a key."""
     return run / FOLDER / f"{key}.npz"
 
 
 def write_trial(path: Path, frame: RgbdFrame, plan: GraspPlan | None, after: RgbdFrame | None) -> None:
-    """Writes a trial, whole or not at all; the fine colour is kept where there is a frame afterwards.
+    """Write a trial atomically; fine colour images are kept where there is a frame after the grasp.
 
     Raises:
         OSError: The disk is full or not writable.
@@ -45,7 +45,7 @@ def write_trial(path: Path, frame: RgbdFrame, plan: GraspPlan | None, after: Rgb
     if plan is not None:
         arrays |= {f"plan_{name}": getattr(plan, name) for name in (*_ARRAYS, *_NUMBERS)}
         arrays["plan_grasp"] = plan.grasp.as_vector()
-        arrays["plan_candidates"] = plan.candidates.astype(np.float32)
+        arrays["plan_candidates"] = plan.candidates.as_vector().astype(np.float32)
         view = plan.view
         arrays |= {
             "view_centre_base": view.centre_base,
@@ -62,7 +62,7 @@ def write_trial(path: Path, frame: RgbdFrame, plan: GraspPlan | None, after: Rgb
 
 
 def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | None]:
-    """Reads what `write_trial` wrote; of the candidates, metres and radians to six digits.
+    """Read a file of `write_trial`; candidates are stored in single precision.
 
     Raises:
         BadDataset: The file is missing, damaged, or of another schema.
@@ -136,7 +136,7 @@ def _plan(arrays: dict[str, np.ndarray]) -> GraspPlan:
             table_offset=float(arrays.get("view_table_offset", 0.0)),
         ),
         grasp=Grasp.from_vector(arrays["plan_grasp"].reshape(4)),
-        candidates=arrays["plan_candidates"].astype(np.float64).reshape(-1, 4),
+        candidates=Grasp.from_vector(arrays["plan_candidates"].astype(np.float64).reshape(-1, 4)),
         seconds={},
         **rest,
     )

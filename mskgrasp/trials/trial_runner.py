@@ -25,18 +25,21 @@ from mskgrasp.trials.predictors import LOWESS, LowessPredictor, NetworkPredictor
 from mskgrasp.trials.trial import Policy, Trial, trial_key
 from mskgrasp.trials.trial_files import trial_file, write_trial
 
+SCENE_VERSION = 1
+"""Raised by every change after which `TrialRunner` draws other scenes from a seed."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrialTask:
-    """A trial to be made.
+    """Task of a trial.
 
     Attributes:
         part: Name of the part.
         source: Its name or its folder.
-        number: Which trial of it; trials of one part and number see the same scene.
-        seed: Of the run.
-        policy: How the grasp is chosen.
-        chosen_by: Label of the model whose variances choose it; empty: the run's own.
+        number: Index of the trial; trials of one part and number share a scene.
+        seed: Seed of the run.
+        policy: Policy of the planner.
+        chosen_by: Label of the model whose variances choose the grasp; empty: the run's own model.
     """
 
     part: str
@@ -54,16 +57,16 @@ class TrialTask:
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """What the trials of a run share.
+    """Settings of all trials of a run.
 
     Attributes:
         cell: YAML file of the cell.
-        models: Folder of the model whose qualities count, and that predicts where no other does.
-        planner: How grasps are chosen.
-        choosers: Folders of the models that choose by their variances, by label.
+        models: Folder of the run's own model, which predicts all qualities.
+        planner: Settings of the planner.
+        choosers: Folders of the models that choose grasps by their variances, by label.
         lowess: LOWESS of the known parts.
-        tape: Sizes of the squares of tape to measure by; None: the cell's tracker measures.
-        must_measure: Trials that nothing measures are worth nothing.
+        tape: Sizes of the tape squares that measure; None: the cell's tracker measures.
+        must_measure: Refuse a cell that cannot measure displacements.
         yes: Ask no operator.
         out: Folder of the run.
     """
@@ -80,20 +83,18 @@ class Setup:
 
 
 class TrialRunner:
-    """Makes trials on a connected cell.
+    """Runner of trials on a connected cell.
 
     Raises:
-        UsageError: The cell lacks a tracker that the trials need.
+        UsageError: The trials need a tracker, and the cell has none.
     """
 
     def __init__(self, engine: TrialEngine, setup: Setup):
         cell = engine.cell
         if cell.tracker is None and setup.must_measure and setup.tape is None:
-            raise UsageError("nothing in this cell tracks the part: measure by tape, --measure markers")
+            raise UsageError("this cell has no tracker; measure by tape: --measure markers")
         if cell.tracker is None and setup.lowess:
-            raise UsageError(
-                "LOWESS needs the part's pose and nothing in this cell tracks it: leave --lowess-data away"
-            )
+            raise UsageError("LOWESS needs the part's pose, and this cell has no tracker; omit --lowess-data")
         self._engine = engine
         self._setup = setup
         planner = make_planner(setup.models, setup.planner, cell)
@@ -106,7 +107,7 @@ class TrialRunner:
             self._predictors[LOWESS] = LowessPredictor(setup.lowess)
 
     def run(self, task: TrialTask) -> Iterator[Trial]:
-        """Makes a trial, writes its file and yields it; only then the arm puts the part down.
+        """Run a trial, write its file, yield it, and only then put the part down.
 
         Raises:
             HalError: The cell was lost.
@@ -139,24 +140,24 @@ class TrialRunner:
 
 
 SceneTasks = tuple[TrialTask, ...]
-"""Trials on one scene: one process makes them, and predicts the qualities of its candidates once."""
+"""Trials in one scene, run by one process, which predicts the qualities of its candidates once."""
 
 
 def run_trials(setup: Setup, scenes: Sequence[SceneTasks], n_workers: int) -> Generator[Trial, None, None]:
-    """Makes the trials of scenes, each yielded once its file is written; closing it stops all.
+    """Run the trials of scenes, yielding each once its file is written; closing the generator stops all.
 
-    The outcome of a trial depends neither on the number of processes nor on which of them makes it. A trial
-    whose process dies, or whose simulated cell is lost, is made again by another.
+    The outcome of a trial does not depend on the processes. A trial whose process dies, or whose simulated
+    cell is lost, is repeated by another process.
 
     Raises:
-        HalError: The one cell was lost; a real one may not be built again behind its operator's back.
-        WorkerFailed: A trial failed for a reason that another try cannot remove.
+        HalError: The only cell was lost; a real cell is not reconnected without its operator.
+        WorkerFailed: A trial failed for a reason that repeating it cannot remove.
     """
     work = Work(
         _trial_bench,
         setup,
         name=lambda scene: f"trial {scene[0].key}",
-        rest=lambda scene, n_told: scene[n_told:] or None,
+        rest=lambda scene, n_finished: scene[n_finished:] or None,
         remedy="leave its part out with --parts",
         lost_by=(HalError,),
     )

@@ -1,4 +1,4 @@
-"""The experiments as a program, in the simulated cell with the small trained model."""
+"""Evaluations in the simulated cell with the shipped model."""
 
 from __future__ import annotations
 
@@ -57,19 +57,19 @@ def program(*options: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two trials by this process, before a camera that errs."""
+    """Two trials by one process, with camera noise."""
     out = tmp_path_factory.mktemp("runs") / "alone"
     report = evaluate(config(out, trials=2, noise="kinect2"))
-    assert report["overall"]["trials"] == 2
+    assert report.summary.overall.trials == 2
     return out
 
 
 def same(one: Trial, other: Trial) -> bool:
-    """But for the seconds that planning took."""
+    """Equal except for the planning time."""
     return dict(one.to_json(), planning_s=0) == dict(other.to_json(), planning_s=0)
 
 
-def test_several_processes_go_on_with_a_run_and_make_the_very_same_trials(alone: Path, tmp_path: Path):
+def test_several_processes_resume_a_run_with_equal_trials(alone: Path, tmp_path: Path):
     out, expected = tmp_path / "stopped", trials(alone)
     shutil.copytree(alone, out)
     first = (out / TRIALS).read_text().splitlines(keepends=True)[0]
@@ -82,8 +82,8 @@ def test_several_processes_go_on_with_a_run_and_make_the_very_same_trials(alone:
         depths = [read_trial(trial_file(run, key))[0].depth for run in (out, alone)]
         np.testing.assert_array_equal(*depths)
     assert not np.array_equal(*(read_trial(trial_file(out, f"hex_nut_m30-00{k}"))[0].depth for k in (0, 1)))
-    assert report == json.loads((out / "report.json").read_text())
-    assert report["overall"]["trials"] == 3 and report["settings"]["noise"] == "kinect2"
+    assert json.loads(json.dumps(report.to_json())) == json.loads((out / "report.json").read_text())
+    assert report.summary.overall.trials == 3 and report.settings["noise"] == "kinect2"
     assert (out / "success.png").exists() and len(list((out / "worst").glob("*.png"))) == 3
     with Page(out / "report.html") as page:
         widths = page.evaluate("[...document.images].map(i => i.complete ? i.naturalWidth : 0)")
@@ -93,7 +93,7 @@ def test_several_processes_go_on_with_a_run_and_make_the_very_same_trials(alone:
 
 
 def hold_a_worker_at_its_first_trial(held: list[Process]) -> None:
-    """Stops a process that has a scene to render and no trial to show yet; it is given its trial at once."""
+    """Stop a worker once it has loaded the renderer, which is within its first trial."""
     while not held:
         for worker in multiprocessing.active_children():
             if "libvulkan_" in Path(f"/proc/{worker.pid}/maps").read_text():
@@ -103,7 +103,7 @@ def hold_a_worker_at_its_first_trial(held: list[Process]) -> None:
         time.sleep(0.01)
 
 
-def test_a_process_that_dies_costs_no_trial(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+def test_a_trial_whose_process_dies_is_repeated(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
     planner = PlannerConfig(policy="quality", n_candidates=20)
     (tmp_path / "trials").mkdir()
     setup = Setup(cell=SIMULATED_CELL, models=PRETRAINED, planner=planner, out=tmp_path)
@@ -112,7 +112,7 @@ def test_a_process_that_dies_costs_no_trial(tmp_path: Path, capfd: pytest.Captur
     holding = threading.Thread(target=hold_a_worker_at_its_first_trial, args=(held,), daemon=True)
     holding.start()
     made = run_trials(setup, tasks, 2)
-    first = next(made)  # of the other process
+    first = next(made)  # by the other process
     holding.join(timeout=0)
     held[0].kill()
     others = list(made)
@@ -134,21 +134,19 @@ def test_a_run_with_other_settings_or_another_model_is_refused(alone: Path, tmp_
         evaluate(config(alone, trials=3, noise="kinect2", models=models))
 
 
-def test_models_are_compared_and_another_one_joins_without_new_grasps_for_all(
-    collected: Path, tmp_path: Path
-):
+def test_models_are_compared_and_one_added_later_repeats_no_grasp(collected: Path, tmp_path: Path):
     out, part = tmp_path / "out", "parallel_key_a16x10x56"
     settings = dict(experiment="displacement", parts=(part,), lowess_data=collected)
     report = evaluate(config(out, compare=(f"gcip_mv={PRETRAINED}",), **settings))
     found = trials(out)
     assert set(found) == {f"{part}-000", f"{part}-000-gcip_mv", f"{part}-000-lowess"}
     frames = [read_trial(trial_file(out, key))[0].depth for key in found]
-    assert all(np.array_equal(frames[0], frame) for frame in frames)  # every policy sees the same
+    assert all(np.array_equal(frames[0], frame) for frame in frames)  # one scene for every policy
     best = found[f"{part}-000"]
     if best.measured is not None:
         assert set(best.predictions) == {"gcip_mv", "lowess"}
         assert best.predictions["gcip_mv"].mean == pytest.approx(best.predicted, abs=1e-6)
-    assert report["models"]["gcip_mv"]["quality"]["novel"]["trials"] == 1
+    assert report.summary.models["gcip_mv"].quality.novel.trials == 1
     assert (out / "displacement.png").exists()
 
     shutil.copytree(PRETRAINED, tmp_path / "other")
@@ -159,12 +157,12 @@ def test_models_are_compared_and_another_one_joins_without_new_grasps_for_all(
     report = evaluate(config(out, compare=both, **settings))
     assert set(trials(out)) == {*found, f"{part}-000-other"}
     assert same(trials(out)[f"{part}-000-lowess"], found[f"{part}-000-lowess"])
-    known = report["models"]["other"]["quality"]["known"]
-    assert known["trials"] == 1  # known to this one, novel to the other
-    assert known["translation_rmse"] == report["models"]["gcip_mv"]["quality"]["novel"]["translation_rmse"]
+    known = report.summary.models["other"].quality.known
+    assert known.trials == 1  # known to this one, novel to the other
+    assert known.translation_rmse == report.summary.models["gcip_mv"].quality.novel.translation_rmse
 
 
-def test_the_search_that_is_asked_for_is_the_one_that_is_evaluated(tmp_path: Path):
+def test_refinement_is_used_in_the_evaluation(tmp_path: Path):
     evaluate(config(tmp_path, planner=PlannerConfig(policy="quality", n_candidates=60, refinements=2)))
     (key,) = trials(tmp_path)
     _, plan, _ = read_trial(trial_file(tmp_path, key))
@@ -172,7 +170,7 @@ def test_the_search_that_is_asked_for_is_the_one_that_is_evaluated(tmp_path: Pat
     assert plan.quality == plan.qualities.max() > plan.qualities[:60].max()
 
 
-def test_tape_tells_what_the_tracker_knows_or_nothing(tmp_path: Path):
+def test_tape_agrees_with_the_tracker_or_measures_nothing(tmp_path: Path):
     report = evaluate(
         config(tmp_path / "out", measure="markers", parts=("washer_m36", "parallel_pin_12x60"), trials=1)
     )
@@ -182,13 +180,13 @@ def test_tape_tells_what_the_tracker_knows_or_nothing(tmp_path: Path):
     assert np.isnan(off[2]) and np.hypot(*off[:2]) < 0.5e-3 and abs(np.degrees(off[3])) < 0.5
     assert pin.measured is None
     if pin.success:
-        assert report["overall"]["unmeasured"] == {"no room for tape": 1}
-    assert report["overall"]["measured"] == 1
+        assert report.summary.overall.unmeasured == {"no room for tape": 1}
+    assert report.summary.overall.measured == 1
     assert read_trial(trial_file(tmp_path / "out", washer.key))[2] is not None
 
 
-def test_a_run_without_a_success_and_a_trial_drawn_again(tmp_path: Path):
-    """As a user types it: nothing is good enough, so nothing is grasped."""
+def test_a_run_without_a_success_reports_and_its_trial_is_replayed(tmp_path: Path):
+    """As on the command line; no candidate has the required quality."""
     out = tmp_path / "out"
     done = program(
         "--models", str(PRETRAINED), "--parts", "hex_nut_m30", "--trials", "1", "--workers", "1",
@@ -204,8 +202,8 @@ def test_a_run_without_a_success_and_a_trial_drawn_again(tmp_path: Path):
     assert (out / "replay" / "hex_nut_m30-000.png").exists()
 
 
-class Person(io.StringIO):
-    """Answers that a person types."""
+class Answers(io.StringIO):
+    """Answers typed by an operator."""
 
     def isatty(self) -> bool:
         return True
@@ -214,9 +212,9 @@ class Person(io.StringIO):
 def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
-    """The simulated cell, taken for a real one: n, and the part is laid anew; then y; q before the second."""
+    """The simulated cell posing as a real one: n (present again), y, and q before the second trial."""
     monkeypatch.setattr(SapienArm, "simulated", False)
-    monkeypatch.setattr(sys, "stdin", Person("n\ny\nq\n"))
+    monkeypatch.setattr(sys, "stdin", Answers("n\ny\nq\n"))
     out = tmp_path / "out"
     with pytest.raises(StoppedByOperator):
         evaluate(config(out, trials=2))
@@ -227,7 +225,7 @@ def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
     with pytest.raises(UsageError, match="give --yes"):
         evaluate(config(out, trials=2))
     report = evaluate(config(out, trials=2, yes=True))
-    assert report["overall"]["trials"] == 2
+    assert report.summary.overall.trials == 2
 
 
 @pytest.mark.parametrize(
@@ -239,19 +237,23 @@ def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
         (dict(tape=(0.012, 0.008)), "--measure markers"),
         (dict(measure="markers", tape=(0.008, 0.012)), "at least 1.25 times"),
         (dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml", noise="iid"), "for a simulated cell"),
-        (dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml", workers=2), "there is one cell"),
+        (
+            dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml", workers=2),
+            "one cell; omit --workers",
+        ),
         (dict(experiment="displacement", compare=("a-b=x",)), "label=folder"),
         (dict(experiment="displacement", compare=("a",)), "label=folder"),
+        (dict(experiment="displacement", compare=(f"LOWESS={PRETRAINED}",)), "is not 'lowess'"),
         (dict(experiment="displacement", compare=("a=typo",)), "no model.json in typo"),
         (dict(experiment="displacement", lowess_data=Path("typo")), "no dataset folder typo"),
         (dict(experiment="displacement", planner=PlannerConfig()), "both policies"),
         (
             dict(experiment="displacement", planner=PlannerConfig(policy="quality", refinements=1)),
-            "leave --planner.refinements",
+            "omit --planner.refinements",
         ),
     ],
 )
-def test_what_cannot_be_used_is_told_in_a_line_and_leaves_nothing(
+def test_unusable_settings_are_refused_in_one_line_and_leave_no_folder(
     changes: dict[str, Any], message: str, tmp_path: Path
 ):
     from mskgrasp.core.errors import MskgraspError
@@ -262,7 +264,7 @@ def test_what_cannot_be_used_is_told_in_a_line_and_leaves_nothing(
     assert "\n" not in str(raised.value) and not (tmp_path / "out").exists()
 
 
-def test_models_may_be_named_in_a_file_too():
+def test_models_to_compare_can_be_a_mapping_in_a_file():
     named = EvaluateConfig.model_validate(dict(models="m", compare={"gcip_mv": "models/a"}))
     assert named.compare == ("gcip_mv=models/a",)
     with pytest.raises((BadConfig, ValueError)):

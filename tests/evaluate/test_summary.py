@@ -1,4 +1,4 @@
-"""What trials amount to: against numbers worked out by hand."""
+"""Summaries of trials, against numbers worked out by hand."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from mskgrasp.evaluate.comparison import PAPER, compare, paper_label
+from mskgrasp.evaluate.comparison import PAPER, DisplacementSummary, compare, figure_names, paper_label
 from mskgrasp.evaluate.figures import draw_comparison, draw_errors, draw_success
-from mskgrasp.evaluate.report import print_report, sections
-from mskgrasp.evaluate.summary import farthest_off, summarise, worst_trials
+from mskgrasp.evaluate.report import Report, print_report, sections
+from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise, worst_trials
 from mskgrasp.trials.trial import Prediction, Trial
 
 
@@ -32,7 +32,7 @@ NOTHING = dict(
 
 
 class Model:
-    """Knows one part."""
+    """Trained on part a."""
 
     has_variance = True
 
@@ -40,99 +40,110 @@ class Model:
         return part == "a"
 
 
-def printed(report: dict) -> str:
+def report_of(summary: SuccessSummary | DisplacementSummary) -> Report:
+    return Report(summary=summary, trials={}, worst={}, settings={}, versions={})
+
+
+def printed(summary: SuccessSummary | DisplacementSummary) -> str:
     stream = io.StringIO()
-    print_report(report, Path("out"), Console(file=stream, width=200))
+    print_report(report_of(summary), Path("out"), Console(file=stream, width=200))
     return stream.getvalue()
 
 
-def as_report(body: dict, experiment: str = "success") -> dict:
-    return dict(experiment=experiment, worst=[], settings={}, versions={}) | body
+def test_success_and_errors_follow_their_definitions():
+    summary = summarise([trial(), trial(number=1, success=False, reason="missed", measured=None)])
+    overall = summary.overall
+    assert overall.trials == 2 and overall.successes == 1 and overall.success_rate == 0.5
+    assert overall.translation_rmse == pytest.approx(0.005)
+    assert overall.rotation_rmse == pytest.approx(0.2)
+    assert overall.translation_rmse_of_zero == pytest.approx(0.004)
+    assert overall.translation_interval is None  # a single part has no spread over parts
+    assert summary.families["nut"].reasons == {"missed": 1}
 
 
-def test_errors_are_those_of_the_definition():
-    body = summarise([trial(), trial(number=1, success=False, reason="missed", measured=None)])
-    numbers = body["overall"]
-    assert numbers["trials"] == 2 and numbers["successes"] == 1 and numbers["success_rate"] == 0.5
-    assert numbers["translation_rmse"] == pytest.approx(0.005)
-    assert numbers["rotation_rmse"] == pytest.approx(0.2)
-    assert numbers["translation_rmse_of_zero"] == pytest.approx(0.004)
-    assert numbers["translation_interval"] is None  # of one part nothing can be said
-    assert body["families"]["nut"]["reasons"] == {"missed": 1}
-
-
-def test_error_bars_are_over_parts_not_over_grasps():
-    """Two parts, one twice as far off: drawing parts again gives either, or both."""
+def test_intervals_are_over_parts_not_over_grasps():
+    """Two parts, one with twice the error: a resample holds either, or both."""
     far = [trial(part="b", number=k, measured=[-0.003, 0.008, 0.0, 0.1]) for k in range(50)]
     near = [trial(number=k, measured=[0.0, 0.004, 0.0, 0.1]) for k in range(50)]
-    low, high = summarise(far + near)["overall"]["translation_interval"]
-    assert low == pytest.approx(0.005) and high == pytest.approx(0.010)
+    interval = summarise(far + near).overall.translation_interval
+    assert interval == pytest.approx((0.005, 0.010))
 
 
 def test_without_a_success_errors_are_absent_not_zero(tmp_path: Path):
     trials = [trial(**NOTHING)]
-    report = as_report(summarise(trials))
-    numbers = report["overall"]
-    assert numbers["translation_rmse"] is None and numbers["median_planning_s"] is None
-    assert numbers["reasons"] == {"NoPartFound": 1}
-    assert "0 of 1" in printed(report) and " - " in printed(report) and "nan" not in printed(report)
-    draw_success(report, tmp_path / "success.png")
+    summary = summarise(trials)
+    assert summary.overall.translation_rmse is None and summary.overall.median_planning_s is None
+    assert summary.overall.reasons == {"NoPartFound": 1}
+    assert "0 of 1" in printed(summary) and " - " in printed(summary) and "nan" not in printed(summary)
+    draw_success(summary, tmp_path / "success.png")
     draw_errors(trials, tmp_path / "errors.png")
-    compared = as_report(compare(trials, {"one": Model()}), "displacement")
-    assert compared["models"]["one"]["quality"]["known"]["translation_rmse"] is None
+    compared = compare(trials, {"one": Model()})
+    assert compared.models["one"].quality.known.translation_rmse is None
     assert "nan" not in printed(compared)
     draw_comparison(compared, tmp_path / "displacement.png")
     assert len(list(tmp_path.glob("*.png"))) == 3
 
 
-def test_what_tape_did_not_measure_is_counted_and_is_no_number():
+def test_an_unmeasured_success_is_counted_and_has_no_error():
     unmeasured = trial(number=1, measured=None, unmeasured="one found: the larger square is seen, ...")
     planar = trial(measured=[0.0, 0.004, np.nan, -0.1], true=[0.0, 0.0043, 0.001, -0.1])
-    report = as_report(summarise([planar, unmeasured]))
-    assert report["overall"]["unmeasured"] == {"one found": 1}
-    assert report["overall"]["measured"] == 1 and report["overall"]["successes"] == 2
-    assert report["overall"]["translation_rmse"] == pytest.approx(0.005)
-    assert report["tape_against_truth"]["flat"]["translation_rmse"] == pytest.approx(0.0003)
-    assert "1 of 2 lifted not measured: one found 1" in printed(report)
+    summary = summarise([planar, unmeasured])
+    assert summary.overall.unmeasured == {"one found": 1}
+    assert summary.overall.measured == 1 and summary.overall.successes == 2
+    assert summary.overall.translation_rmse == pytest.approx(0.005)
+    assert summary.tape_against_truth is not None
+    assert summary.tape_against_truth.flat.translation_rmse == pytest.approx(0.0003)
+    assert "1 of 2 lifted not measured: one found 1" in printed(summary)
+    assert report_of(summary).to_json()["tape_against_truth"]["tilted"] == {"trials": 0}
 
 
-def test_a_part_that_hung_askew_is_told_apart_where_tape_measures():
-    lying = trial(measured=[0.0, 0.004, np.nan, 0.0], true=[0.0, 0.004, 0.0, 0.0])
-    askew = trial(number=1, measured=[0.0, 0.004, np.nan, 0.0], true=[0.006, 0.004, 0.0, 0.0], tilt=0.2)
-    found = summarise([lying, askew])["tape_against_truth"]
-    assert found["flat"] == dict(found["flat"], trials=1, translation_worst=0.0)
-    assert found["tilted"]["translation_worst"] == pytest.approx(0.006)
+def test_tape_errors_of_tilted_parts_are_reported_apart():
+    flat = trial(measured=[0.0, 0.004, np.nan, 0.0], true=[0.0, 0.004, 0.0, 0.0])
+    tilted = trial(number=1, measured=[0.0, 0.004, np.nan, 0.0], true=[0.006, 0.004, 0.0, 0.0], tilt=0.2)
+    found = summarise([flat, tilted]).tape_against_truth
+    assert found is not None and found.flat.trials == found.tilted.trials == 1
+    assert found.flat.translation_worst == 0.0
+    assert found.tilted.translation_worst == pytest.approx(0.006)
 
 
-def test_models_are_compared_on_the_same_grasps_and_on_those_they_chose():
+def test_models_are_compared_on_shared_grasps_and_on_their_own():
     expected = {"one": Prediction(mean=[0.0, 0.001, 0.0, -0.1], std=[0.01] * 4)}
     best = [trial(predictions=expected), trial(part="b", predictions=expected, measured=[0.0, 0.0, 0.0, 0.0])]
     chosen = trial(policy="low_variance", chosen_by="one", predicted=[0.0, 0.0039, 0.0, -0.1])
-    report = as_report(compare([*best, chosen], {"one": Model(), "other": Model()}), "displacement")
-    one = report["models"]["one"]
-    assert one["quality"]["known"]["translation_rmse"] == pytest.approx(0.003)
-    assert one["quality"]["novel"]["translation_rmse"] == pytest.approx(0.001)
-    assert one["quality"]["novel"]["rotation_rmse"] == pytest.approx(0.1)
-    assert one["low_variance"]["known"]["translation_rmse"] == pytest.approx(0.0001)
-    assert one["quality"]["known"]["coverage_90"] == [1.0, 1.0, 1.0, 1.0]
-    assert report["models"]["other"]["low_variance"] is None
-    assert report["models"]["other"]["quality"]["known"]["translation_rmse"] is None
-    section = next(s for s in sections(report, Path("out")) if s.title == "Displacement in the hand")
+    summary = compare([*best, chosen], {"one": Model(), "other": Model()})
+    one = summary.models["one"]
+    assert one.quality.known.translation_rmse == pytest.approx(0.003)
+    assert one.quality.novel.translation_rmse == pytest.approx(0.001)
+    assert one.quality.novel.rotation_rmse == pytest.approx(0.1)
+    assert one.low_variance is not None
+    assert one.low_variance.known.translation_rmse == pytest.approx(0.0001)
+    assert one.quality.known.coverage_90 == [1.0, 1.0, 1.0, 1.0]
+    assert summary.models["other"].low_variance is None
+    assert summary.models["other"].quality.known.translation_rmse is None
+    section = next(
+        s for s in sections(report_of(summary), Path("out")) if s.title == "Displacement in the hand"
+    )
     assert ("one", "high quality", "novel") in [row[:3] for row in section.tables[0].rows]
 
 
-def test_the_papers_bars_stand_beside_the_models_they_are_of():
+def test_labels_are_matched_with_the_papers_models():
     assert paper_label("gcip_mv") == paper_label("GCIP-M+V") == "GCIP-M+V"
     assert paper_label("lowess") == "LOWESS" and paper_label("ours") is None
     bar = PAPER["GCIP-M+V"]["low_variance"]
-    assert bar["translation_rmse"] == pytest.approx(0.0024)
-    assert np.degrees(bar["rotation_rmse"]) == pytest.approx(7.01)
+    assert bar is not None and bar.translation_rmse == pytest.approx(0.0024)
+    assert np.degrees(bar.rotation_rmse) == pytest.approx(7.01)
 
 
-def test_the_worst_are_sure_failures_then_the_farthest_off():
-    sure = trial(number=1, success=False, reason="missed", measured=None, quality=0.99)
-    unsure = trial(number=2, success=False, reason="missed", measured=None, quality=0.1)
+def test_two_models_of_the_same_name_in_the_paper_both_appear_in_the_figure():
+    assert figure_names(["gcip_mv", "GCIP.M.V", "ours"]) == {
+        "GCIP-M+V": "gcip_mv", "GCIP.M.V": "GCIP.M.V", "ours": "ours"
+    }  # fmt: skip
+
+
+def test_the_worst_are_confident_failures_then_the_largest_errors():
+    confident = trial(number=1, success=False, reason="missed", measured=None, quality=0.99)
+    doubtful = trial(number=2, success=False, reason="missed", measured=None, quality=0.1)
     turned = trial(number=3, measured=[0.003, 0.0, 0.0, 1.1])
-    trials = [trial(), unsure, turned, sure]
+    trials = [trial(), doubtful, turned, confident]
     assert [one.number for one in worst_trials(trials)] == [1, 2, 3, 0]
-    assert [one.number for one in farthest_off(trials, 1)] == [3]
+    assert [one.number for one in largest_errors(trials, 1)] == [3]

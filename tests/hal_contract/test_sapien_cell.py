@@ -11,7 +11,7 @@ import pytest
 from hal import Cell, execute_grasp, go_home, let_go, put_down
 from hal.errors import MotionAborted, NeedsRecovery, Stopped
 from mskgrasp.core.grasp import Grasp, pose_base_tcp
-from mskgrasp.planning.placing import place
+from mskgrasp.planning.place_pose import place
 
 
 @pytest.mark.parametrize("theta", [0.0, 1.2, -1.5])

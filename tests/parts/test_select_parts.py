@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import pytest
 
-from mskgrasp.core.errors import UnknownPart
-from mskgrasp.parts import build_part, starter_names
+from mskgrasp.core.errors import UnknownPart, UsageError
+from mskgrasp.parts import build_part, find_part, starter_names
 from mskgrasp.parts.catalogue import entry_of, make_index, read_index, write_index
 from mskgrasp.parts.select_parts import evenly, part_names
 
@@ -53,3 +56,9 @@ def test_a_held_out_set_of_the_catalogue_leaves_out_what_the_model_was_trained_o
 
 def test_all_is_the_starter_set_and_a_part_named_twice_counts_once():
     assert part_names(("all", "washer_m36"), {}, 0) == list(starter_names())
+
+
+def test_two_parts_of_one_name_are_refused(tmp_path: Path):
+    copy = shutil.copytree(find_part("hex_nut_m30").folder, tmp_path / "hex_nut_m30")
+    with pytest.raises(UsageError, match="both called 'hex_nut_m30'"):
+        part_names(("hex_nut_m30", str(copy)), TRAINING)

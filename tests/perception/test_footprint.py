@@ -34,6 +34,15 @@ def test_a_seen_box_has_its_sides_and_direction_within_a_pixel(yaw):
     assert abs(float(wrap_half_turn(np.asarray(found.theta - yaw)))) < 0.04
 
 
+def test_the_low_plate_of_a_bracket_is_part_of_its_footprint():
+    """A plate of 4 mm with a wall of 40 mm."""
+    plate = Box(x=0.47, y=0.0, yaw=0.5, size=(0.08, 0.03, 0.004))
+    wall = Box(x=0.47 + 0.038 * np.cos(0.5), y=0.038 * np.sin(0.5), yaw=0.5, size=(0.004, 0.03, 0.04))
+    found = seen_footprint(synthetic.frame([plate, wall]), table_z=TABLE_Z, region=REGION, min_height=0.002)
+    assert abs(found.theta - 0.5) < np.radians(3.0)
+    np.testing.assert_allclose(found.sides, [0.08, 0.03], atol=0.003)
+
+
 def test_an_empty_table_has_no_footprint():
     with pytest.raises(NoPartFound):
         seen_footprint(synthetic.frame([]), table_z=TABLE_Z, region=REGION, min_height=0.002)

@@ -28,10 +28,10 @@ from tests.synthetic import REGION, Box
 
 def test_the_planned_grasp_is_the_least_uncertain_of_the_best():
     plan = planner(PlannerConfig(n_candidates=600, top_fraction=0.05)).plan(FRAME, np.random.default_rng(0))
-    centre = centre_in_grasp_frame(plan.view.centre_base, plan.candidates)
+    centre = plan.candidates.T_base_grasp.inverse().apply(plan.view.centre_base)
     best = np.argsort(np.abs(centre[:, 0]))[:30]  # quality falls with |centre x|
     expected = plan.candidates[best[np.argmin(centre[best, 1])]]  # and variance rises with centre y
-    assert np.allclose(plan.grasp.as_vector(), expected)
+    assert np.allclose(plan.grasp.as_vector(), expected.as_vector())
     assert set(plan.shortlist.tolist()) == set(best.tolist())
     assert plan.quality == plan.qualities[plan.shortlist].max() or plan.quality >= plan.qualities[best].min()
     assert plan.score == plan.shortlist_scores.min()
@@ -143,9 +143,11 @@ def test_a_grasp_beside_which_something_stands_is_left_out():
     assert fingers_free(scene, grasps).tolist() == [False, True, True, False]
     checked = planner(PlannerConfig(n_candidates=400, check_fingers=True))
     plan = checked.plan(frame, np.random.default_rng(0))
-    assert fingers_free(scene, plan.candidates[plan.shortlist]).all() and len(plan.shortlist) == 12
+    assert (
+        fingers_free(scene, plan.candidates[plan.shortlist].as_vector()).all() and len(plan.shortlist) == 12
+    )
     free = planner(PlannerConfig(n_candidates=400)).plan(frame, np.random.default_rng(0))
-    assert not fingers_free(scene, free.candidates[free.shortlist]).all()
+    assert not fingers_free(scene, free.candidates[free.shortlist].as_vector()).all()
 
 
 @pytest.mark.parametrize("policy", ["low_variance", "quality"])
@@ -162,11 +164,12 @@ def test_refinement_finds_better_grasps_within_the_parts_box(policy):
         assert refined.quality > first.quality
     else:
         assert refined.score < first.score
-    assert np.array_equal(refined.candidates[:200], first.candidates) and len(refined.candidates) > 200
-    local = refined.view.T_base_box.inverse().apply(refined.candidates[:, :3])
+    assert np.array_equal(refined.candidates[:200].as_vector(), first.candidates.as_vector())
+    assert len(refined.candidates) > 200
+    local = refined.view.T_base_box.inverse().apply(refined.candidates.position)
     assert (np.abs(local[:, :2]) <= refined.view.size[:2] / 2 + 1e-9).all()
-    assert (refined.candidates[:, 2] >= 0.0105 - 1e-9).all()
-    assert (np.abs(refined.candidates[:, 3]) <= np.pi / 2).all()
+    assert (refined.candidates.position[:, 2] >= 0.0105 - 1e-9).all()
+    assert (np.abs(refined.candidates.theta) <= np.pi / 2).all()
     assert (np.diff(refined.qualities[refined.shortlist]) <= 0).all()
 
 

@@ -17,3 +17,12 @@ def test_the_digests_name_every_input_and_change_with_its_content(tmp_path, monk
     make_box(tmp_path / "other", "block", (0.05, 0.03, 0.021), 0.1)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
     assert part_digests(["block"]) != {"part block": before["part block"]}
+
+
+def test_another_folder_with_a_part_of_the_same_name_is_another_input(tmp_path):
+    folders = [
+        make_box(tmp_path / name, "block", (0.05, 0.03, height), 0.1).folder
+        for name, height in (("a", 0.02), ("b", 0.021))
+    ]
+    first, second = (part_digests([str(folder)]) for folder in folders)
+    assert set(first) == set(second) == {"part block"} and first != second

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -21,7 +22,7 @@ from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.metrics import bootstrap_interval
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.palletize.config import PalletizeConfig
-from mskgrasp.palletize.placements import Placement
+from mskgrasp.palletize.placement_records import Placement
 from mskgrasp.palletize.run import palletize
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.options import parse
@@ -30,33 +31,95 @@ from tests.sim_in_the_loop.record import PARTS
 
 HERE = Path(__file__).parent
 STORED = HERE / "regression.json"
+SCHEMA_VERSION = 1
 LEVEL = 0.99
-"""Of confidence: one false alarm in a hundred runs and figure."""
-
-Row = dict[str, Any]
+"""Confidence level: one false alarm per figure in a hundred runs."""
 
 DESCRIPTION = """Plans, grasps, corrects and places a fixed set of parts in the simulated cell, and prints
-what has changed against the run stored in the repository, with intervals over parts.
+the differences from the run stored in the repository, with intervals over parts.
 
-Ends with 1 if anything is worse than chance explains. --store keeps this run as the stored one: commit it
+The exit status is 1 if a figure is worse than chance explains. --store replaces the stored run: commit it
 with the change that explains it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One trial of the fixed set; metres and radians, None where the part was not held or not measured.
+
+    Attributes:
+        part: Name of the part.
+        number: Index of the trial.
+        held: The part was lifted.
+        translation: Error of the predicted displacement.
+        rotation: Error of the predicted turn.
+        placed: Placement error, corrected by the prediction.
+        placed_plainly: Placement error without correction.
+    """
+
+    part: str
+    number: int
+    held: bool
+    translation: float | None
+    rotation: float | None
+    placed: float | None
+    placed_plainly: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredRun:
+    """A stored run: digest of the weights, and its trials."""
+
+    weights: str
+    rows: list[Row]
+    schema_version: int = SCHEMA_VERSION
+
+
+def read_stored(path: Path = STORED) -> StoredRun:
+    """Reads the stored run.
+
+    Raises:
+        BadDataset: The file holds something else.
+    """
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        found = StoredRun(**values | dict(rows=[Row(**row) for row in values["rows"]]))
+    except (ValueError, TypeError, KeyError) as error:
+        raise BadDataset(f"{path} is not a stored regression run; make one with --store") from error
+    if found.schema_version != SCHEMA_VERSION:
+        raise BadDataset(f"{path} has schema version {found.schema_version}, legal: {SCHEMA_VERSION}")
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """A figure of the trials that both runs have, and its difference; None where no trial has it."""
+
+    title: str
+    unit: str
+    scale: float
+    n: int
+    stored: float | None = None
+    now: float | None = None
+    interval: tuple[float, float] | None = None
+    p: float | None = None
+    verdict: Literal["worse", "as before", "better", "unknown"] = "unknown"
 
 
 class RegressionConfig(Config):
     """Settings of a regression run."""
 
     out: Path = Path("out/regression")
-    """Folder of the palletizing run; a stopped one goes on. Delete it after a change of code."""
+    """Folder of the palletizing run; a stopped run is resumed. Delete it after a change of code."""
     trials: int = Field(default=4, ge=1)
-    """Trials a part; compared are those that the stored run has, too."""
+    """Trials per part; those that the stored run has, too, are compared."""
     workers: int = Field(default=1, ge=1)
     """Processes."""
     store: bool = False
-    """Keep this run as the stored one."""
+    """Store this run in place of the stored one."""
 
 
 def main() -> int:
-    """Runs, prints, and stores where told to."""
+    """Runs, prints, and stores where asked to."""
     config = parse(
         RegressionConfig, prog="python -m tests.sim_in_the_loop.regression", description=DESCRIPTION
     )
@@ -64,17 +127,18 @@ def main() -> int:
     weights = file_digest(PRETRAINED / "model.safetensors")[:16]
     worse = False
     if STORED.exists():
-        stored = json.loads(STORED.read_text(encoding="utf-8"))
-        if stored["weights"] != weights:
-            print(f"the stored run was made with other weights ({stored['weights']}, now {weights})")
-        if not config.store or _pairs(stored["rows"], rows):
-            figures = compare(stored["rows"], rows)
-            print_figures(figures, Console(width=110))
-            worse = any(figure["verdict"] == "worse" for figure in figures)
+        stored = read_stored()
+        if stored.weights != weights:
+            print(f"the stored run was made with other weights ({stored.weights}, now {weights})")
+        if not config.store or _pairs(stored.rows, rows):
+            differences = compare(stored.rows, rows)
+            print_differences(differences, Console(width=110))
+            worse = any(one.verdict == "worse" for one in differences)
     elif not config.store:
         raise UsageError(f"no {STORED}: make one with --store")
     if config.store:
-        values = dict(schema_version=1, weights=weights, rows=rows)
+        run = StoredRun(weights=weights, rows=rows)
+        values = dict(schema_version=run.schema_version) | asdict(run)
         write_whole(STORED, (json.dumps(values, indent=1, allow_nan=False) + "\n").encode())
         print(f"stored {len(rows)} trials in {STORED.name}")
         return 0
@@ -82,7 +146,7 @@ def main() -> int:
 
 
 def run_set(config: RegressionConfig) -> list[Row]:
-    """Makes the trials, and what is compared of each."""
+    """Makes the trials, and a row of each."""
     settings = PalletizeConfig(
         out=config.out, parts=PARTS, trials=config.trials, corrections=("none", "predicted"),
         workers=config.workers,
@@ -93,7 +157,7 @@ def run_set(config: RegressionConfig) -> list[Row]:
 
 
 def rows_of(placements: Sequence[Placement]) -> list[Row]:
-    """A row for each trial: whether the part was held, how far the prediction was off, where it was put.
+    """Makes a row of each trial.
 
     Raises:
         BadDataset: A trial lacks a correction.
@@ -109,7 +173,7 @@ def rows_of(placements: Sequence[Placement]) -> list[Row]:
         held = one.measured is not None and one.predicted is not None
         error = np.subtract(one.predicted, one.measured) if held else np.full(4, math.nan)
         rows.append(
-            dict(
+            Row(
                 part=part,
                 number=number,
                 held=held,
@@ -123,59 +187,63 @@ def rows_of(placements: Sequence[Placement]) -> list[Row]:
 
 
 def _pairs(stored: Sequence[Row], now: Sequence[Row]) -> list[tuple[Row, Row]]:
-    before = {(row["part"], row["number"]): row for row in stored}
-    return [(before[key], row) for row in now if (key := (row["part"], row["number"])) in before]
+    before = {(row.part, row.number): row for row in stored}
+    return [(before[key], row) for row in now if (key := (row.part, row.number)) in before]
 
 
-def compare(stored: Sequence[Row], now: Sequence[Row]) -> list[dict[str, Any]]:
-    """Figures of trials that both runs have, their difference and what to make of it."""
+def compare(stored: Sequence[Row], now: Sequence[Row]) -> list[Difference]:
+    """Compares the trials that both runs have."""
     pairs = _pairs(stored, now)
     if not pairs:
         raise UsageError("the stored run has none of these trials: store another with --store")
-    found = [_held(pairs)]
-    for name, title, scale, unit, statistic in (
-        ("translation", "RMSE of the displacement", 1e3, "mm", _rms),
-        ("rotation", "RMSE of the turn", 180 / math.pi, "deg", _rms),
-        ("placed", "median placement error", 1e3, "mm", _median),
-        ("placed_plainly", "the same without correction", 1e3, "mm", _median),
-    ):
-        found.append(_errors(pairs, name, statistic) | dict(title=title, scale=scale, unit=unit))
-    return found
+    return [
+        _held(pairs),
+        _errors(pairs, "translation", _rms, title="RMSE of the displacement", scale=1e3, unit="mm"),
+        _errors(pairs, "rotation", _rms, title="RMSE of the turn", scale=180 / math.pi, unit="deg"),
+        _errors(pairs, "placed", _median, title="median placement error", scale=1e3, unit="mm"),
+        _errors(pairs, "placed_plainly", _median, title="the same without correction", scale=1e3, unit="mm"),
+    ]
 
 
-def _held(pairs: list[tuple[Row, Row]]) -> dict[str, Any]:
-    lost = sum(old["held"] and not new["held"] for old, new in pairs)
-    gained = sum(new["held"] and not old["held"] for old, new in pairs)
-    then, today = (np.mean([pair[i]["held"] for pair in pairs]) for i in (0, 1))
+def _held(pairs: list[tuple[Row, Row]]) -> Difference:
+    lost = sum(old.held and not new.held for old, new in pairs)
+    gained = sum(new.held and not old.held for old, new in pairs)
+    then, today = (float(np.mean([pair[i].held for pair in pairs])) for i in (0, 1))
     # McNemar's exact test: of the trials that changed, half change either way by chance.
-    p = binomtest(lost, lost + gained).pvalue if lost + gained else 1.0
+    p = float(binomtest(lost, lost + gained).pvalue) if lost + gained else 1.0
     verdict = "as before" if p > 1 - LEVEL else "worse" if lost > gained else "better"
-    return dict(
-        title="held", n=len(pairs), stored=float(then), now=float(today), interval=None, p=float(p),
-        verdict=verdict, scale=100.0, unit="%",
-    )  # fmt: skip
+    return Difference(
+        title="held", unit="%", scale=100.0, n=len(pairs), stored=then, now=today, p=p, verdict=verdict
+    )
 
 
 def _errors(
-    pairs: list[tuple[Row, Row]], name: str, statistic: Callable[[np.ndarray], float]
-) -> dict[str, Any]:
+    pairs: list[tuple[Row, Row]],
+    name: str,
+    statistic: Callable[[np.ndarray], float],
+    *,
+    title: str,
+    scale: float,
+    unit: str,
+) -> Difference:
     by_part: dict[str, list[tuple[float, float]]] = {}
     for old, new in pairs:
-        if old[name] is not None and new[name] is not None:
-            by_part.setdefault(old["part"], []).append((old[name], new[name]))
-    values = [np.array(one) for one in by_part.values()]
-    if not values:
-        return dict(n=0, stored=None, now=None, interval=None, p=None, verdict="unknown")
+        values = getattr(old, name), getattr(new, name)
+        if None not in values:
+            by_part.setdefault(old.part, []).append(values)
+    groups = [np.array(one) for one in by_part.values()]
+    if not groups:
+        return Difference(title=title, unit=unit, scale=scale, n=0)
 
     def difference(rows: np.ndarray) -> float:
         return statistic(rows[:, 1]) - statistic(rows[:, 0])
 
-    every = np.concatenate(values)
-    low, high = bootstrap_interval(values, difference, level=LEVEL)
-    verdict = "worse" if low > 0 else "better" if high < 0 else "as before"
-    return dict(
-        n=len(every), stored=statistic(every[:, 0]), now=statistic(every[:, 1]), interval=[low, high], p=None,
-        verdict=verdict,
+    every = np.concatenate(groups)
+    low, high = bootstrap_interval(groups, difference, level=LEVEL)
+    return Difference(
+        title=title, unit=unit, scale=scale, n=len(every), stored=statistic(every[:, 0]),
+        now=statistic(every[:, 1]), interval=(low, high),
+        verdict="worse" if low > 0 else "better" if high < 0 else "as before",
     )  # fmt: skip
 
 
@@ -187,24 +255,23 @@ def _median(values: np.ndarray) -> float:
     return float(np.median(values))
 
 
-def print_figures(figures: Sequence[dict[str, Any]], console: Console) -> None:
-    """A row a figure."""
+def print_differences(differences: Sequence[Difference], console: Console) -> None:
+    """Prints a row for each figure."""
     table = Table(title="The loop, against the stored run")
     for name in ("figure", "trials", "stored", "now", "difference", f"{LEVEL:.0%}", ""):
         table.add_column(name, justify="left" if name in ("figure", "") else "right")
-    for figure in figures:
-        scale, unit = figure["scale"], figure["unit"]
-        if figure["stored"] is None:
-            table.add_row(figure["title"], "0", "-", "-", "-", "-", figure["verdict"])
+    for one in differences:
+        if one.stored is None or one.now is None:
+            table.add_row(one.title, "0", "-", "-", "-", "-", one.verdict)
             continue
-        then, today, interval = figure["stored"] * scale, figure["now"] * scale, figure["interval"]
-        if interval is None:
-            spread = f"p {figure['p']:.2f}"
+        then, today = one.stored * one.scale, one.now * one.scale
+        if one.interval is None:
+            spread = f"p {one.p:.2f}"
         else:
-            spread = " .. ".join(f"{end * scale:+.2f}" for end in interval)
+            spread = " .. ".join(f"{end * one.scale:+.2f}" for end in one.interval)
         table.add_row(
-            figure["title"], str(figure["n"]), f"{then:.2f} {unit}", f"{today:.2f} {unit}",
-            f"{today - then:+.2f}", spread, figure["verdict"],
+            one.title, str(one.n), f"{then:.2f} {one.unit}", f"{today:.2f} {one.unit}",
+            f"{today - then:+.2f}", spread, one.verdict,
         )  # fmt: skip
     console.print(table)
 

@@ -1,32 +1,36 @@
-"""The comparison with the stored run: the same is the same, worse is told, and chance is no reason."""
+"""Comparison with the stored run."""
 
 from __future__ import annotations
 
-import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 
-from mskgrasp.palletize.placements import Placement
-from tests.sim_in_the_loop.regression import PARTS, STORED, Row, compare, rows_of
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.palletize.placement_records import Placement
+from tests.sim_in_the_loop.regression import PARTS, Row, compare, read_stored, rows_of
 
 
 def stored() -> list[Row]:
-    return json.loads(STORED.read_text())["rows"]
+    return read_stored().rows
 
 
 def verdicts(now: list[Row]) -> dict[str, str]:
-    return {figure["title"]: figure["verdict"] for figure in compare(stored(), now)}
+    return {one.title: one.verdict for one in compare(stored(), now)}
 
 
 def test_the_stored_run_is_the_fixed_set_and_equals_itself():
     rows = stored()
-    assert {row["part"] for row in rows} == set(PARTS) and len(rows) >= 4 * len(PARTS)
+    assert {row.part for row in rows} == set(PARTS) and len(rows) >= 4 * len(PARTS)
     assert set(verdicts(rows).values()) == {"as before"}
 
 
-def test_worse_predictions_are_told_and_better_ones_too():
+def test_worse_and_better_predictions_are_reported():
     def scaled(factor: float) -> list[Row]:
-        return [row | {"translation": row["translation"] and factor * row["translation"]} for row in stored()]
+        return [replace(row, translation=row.translation and factor * row.translation) for row in stored()]
 
     assert verdicts(scaled(1.5))["RMSE of the displacement"] == "worse"
     assert verdicts(scaled(0.6))["RMSE of the displacement"] == "better"
@@ -34,13 +38,15 @@ def test_worse_predictions_are_told_and_better_ones_too():
     assert verdicts(scaled(1.5))["RMSE of the turn"] == "as before"
 
 
-def test_a_single_lost_grasp_is_chance_and_many_are_not():
+def test_one_lost_grasp_is_within_chance_and_ten_are_not():
     rows = stored()
-    held = [k for k, row in enumerate(rows) if row["held"]]
+    held = [k for k, row in enumerate(rows) if row.held]
 
     def without(n: int) -> list[Row]:
-        lost = dict(held=False, translation=None, rotation=None, placed=None, placed_plainly=None)
-        return [row | lost if k in held[:n] else row for k, row in enumerate(rows)]
+        lost: dict[str, Any] = dict(
+            held=False, translation=None, rotation=None, placed=None, placed_plainly=None
+        )
+        return [replace(row, **lost) if k in held[:n] else row for k, row in enumerate(rows)]
 
     assert verdicts(without(1))["held"] == "as before"
     assert verdicts(without(10))["held"] == "worse"
@@ -56,9 +62,18 @@ def test_rows_hold_what_was_predicted_and_measured():
         return Placement(**(values | changes))  # type: ignore[arg-type]
 
     (row,) = rows_of([placement("none", 0.004), placement("predicted", 0.001)])
-    assert row["held"] and np.isclose(row["translation"], 0.005)
-    assert np.isclose(row["rotation"], 2 * np.pi - 6.2)
-    assert (row["placed_plainly"], row["placed"]) == (0.004, 0.001)
+    assert row.held and row.translation == pytest.approx(0.005)
+    assert row.rotation == pytest.approx(2 * np.pi - 6.2)
+    assert (row.placed_plainly, row.placed) == (0.004, 0.001)
     lost = [placement(name, None, placed=False, measured=None) for name in ("none", "predicted")]
     (row,) = rows_of(lost)
-    assert not row["held"] and row["translation"] is None
+    assert not row.held and row.translation is None
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"rows": []}', '{"weights": "a", "rows": [{"part": "b"}]}'])
+def test_a_file_that_is_no_stored_run_is_an_error_of_one_line(tmp_path: Path, text: str):
+    path = tmp_path / "regression.json"
+    path.write_text(text)
+    with pytest.raises(BadDataset, match="is not a stored regression run; make one with --store") as raised:
+        read_stored(path)
+    assert "\n" not in str(raised.value)

@@ -1,4 +1,4 @@
-"""What the command line says of a cell beside its file."""
+"""Cell files with overrides of the command line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mskgrasp.trials.cell_file import read_cell
 CELLS = Path(__file__).parents[2] / "configs" / "cells"
 
 
-def test_noise_takes_the_place_of_the_files_and_keeps_its_settings(tmp_path: Path):
+def test_noise_overrides_the_files_model_and_keeps_its_settings(tmp_path: Path):
     path = tmp_path / "cell.yaml"
     path.write_text("type: sapien\nnoise: {model: iid, seed: 3}\n")
     plain = read_cell(path, noise=None, measure="truth", tape=None)
@@ -26,7 +26,7 @@ def test_noise_takes_the_place_of_the_files_and_keeps_its_settings(tmp_path: Pat
     assert written["noise"] == {"model": "kinect2", "seed": 3}
 
 
-def test_tape_is_stuck_where_it_is_measured_by(tmp_path: Path):
+def test_measuring_by_markers_adds_tape_to_a_simulated_cell(tmp_path: Path):
     sapien = CELLS / "sapien.yaml"
     found = read_cell(sapien, noise=None, measure="markers", tape=None)
     assert found.tape is not None and found.tape.sides == (0.012, 0.008) and found.values["colour_scale"] == 3
@@ -38,8 +38,8 @@ def test_tape_is_stuck_where_it_is_measured_by(tmp_path: Path):
     assert found.tape is not None and found.tape.sides == (0.009, 0.006) and found.values["colour_scale"] == 4
 
 
-def test_a_real_cells_file_stays_where_it_is(tmp_path: Path):
-    """Files that it names lie beside it."""
+def test_a_real_cells_file_is_used_in_place(tmp_path: Path):
+    """It names files relative to its own folder."""
     real = CELLS / "panda_kinect2.yaml"
     found = read_cell(real, noise=None, measure="markers", tape=None)
     assert found.write(tmp_path) == real and not list(tmp_path.iterdir())

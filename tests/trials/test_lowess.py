@@ -1,4 +1,4 @@
-"""LOWESS knows a part's displacements from grasps like the one that is asked for, wherever the part lies."""
+"""Kernel regression of displacements: accuracy, symmetry, and behaviour far from all grasps."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests import synthetic
 
 
 def attempts(n: int, seed: int) -> tuple[Pose, np.ndarray, np.ndarray]:
-    """Poses of a box, grasps that hold it, and their grasp displacements."""
+    """Poses of a box, successful grasps of it, and their grasp displacements."""
     rng = np.random.default_rng(seed)
     positions, quaternions, grasps, moved = [], [], [], []
     while len(grasps) < n:
@@ -32,34 +32,34 @@ def attempts(n: int, seed: int) -> tuple[Pose, np.ndarray, np.ndarray]:
     return pose, np.array(grasps), np.array(moved)
 
 
-def test_what_similar_grasps_did_is_expected_again():
-    known, asked = attempts(600, 0), attempts(100, 1)
-    mean, variance = Lowess.fit(*known).predict(*asked[:2])
-    error = np.abs(asked[2] - mean)
-    at_rest = np.abs(asked[2])
+def test_displacements_of_similar_grasps_are_predicted():
+    known, test = attempts(600, 0), attempts(100, 1)
+    mean, variance = Lowess.fit(*known).predict(*test[:2])
+    error = np.abs(test[2] - mean)
+    at_rest = np.abs(test[2])
     assert np.median(error[:, 1]) < 0.35 * np.median(at_rest[:, 1])
     assert np.median(wrap_angle(error[:, 3])) < 0.35 * np.median(at_rest[:, 3])
     assert (variance >= 0).all() and np.isfinite(variance).all()
 
 
-def test_a_turned_scene_is_the_same_scene():
+def test_half_a_turn_of_the_jaw_changes_no_prediction():
     poses, grasps, moved = attempts(200, 2)
     model = Lowess.fit(poses, grasps, moved)
     mean, variance = model.predict(poses, grasps)
-    # The same grasps named by the other end of the jaw: theta half a turn on, x and y the other way round.
+    # Half a turn of the jaw reverses x and y of the grasp frame.
     turned = grasps + np.array([0, 0, 0, np.pi])
     again, same = model.predict(poses, turned)
     np.testing.assert_allclose(again, mean * [-1, -1, 1, 1], atol=1e-12)
     np.testing.assert_allclose(same, variance, atol=1e-12)
 
 
-def test_far_from_all_grasps_the_nearest_one_decides_without_nan():
+def test_far_from_all_grasps_the_prediction_is_finite():
     poses, grasps, moved = attempts(20, 3)
     mean, _ = Lowess.fit(poses, grasps, moved).predict(poses, grasps + np.array([5.0, 0, 0, 0]))
     assert np.isfinite(mean).all()
 
 
-def test_one_grasp_is_too_few():
+def test_one_grasp_is_refused():
     poses, grasps, moved = attempts(1, 4)
     with pytest.raises(ValueError, match="at least two"):
         Lowess.fit(poses, grasps, moved)

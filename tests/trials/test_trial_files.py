@@ -1,4 +1,4 @@
-"""Trials on disk: what was seen and planned comes back as it was; what is no trial is refused."""
+"""Files of trials: frames and plans are read back equal, damaged files are refused."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests import synthetic
 from tests.evaluate.test_summary import trial
 
 
-def seen() -> RgbdFrame:
+def captured() -> RgbdFrame:
     """A box on the table, with a hole in the image."""
     box = synthetic.Box(x=0.5, y=0.01, yaw=0.4, size=(0.06, 0.03, 0.03))
     frame = synthetic.frame([box])
@@ -38,7 +38,7 @@ def stored(run: Path, one: Trial) -> tuple[RgbdFrame, GraspPlan]:
         table_z=synthetic.TABLE_Z,
         region=synthetic.REGION,
     )
-    frame = seen()
+    frame = captured()
     plan = planner.plan(frame, np.random.default_rng(0))
     plan = dataclasses.replace(plan, view=dataclasses.replace(plan.view, table_offset=-0.002))
     write_trial(trial_file(run, one.key), frame, plan, None)
@@ -46,28 +46,29 @@ def stored(run: Path, one: Trial) -> tuple[RgbdFrame, GraspPlan]:
     return frame, plan
 
 
-def test_a_trial_comes_back_as_it_was_and_is_drawn(tmp_path: Path):
+def test_a_trial_is_read_back_equal_and_drawn(tmp_path: Path):
     one = trial(predictions={"m": Prediction(mean=[0.0] * 4, std=[np.nan] * 4)}, chosen_by="gcip_mv")
     frame, plan = stored(tmp_path, one)
     assert one.key == "a-000-gcip_mv"
     again, planned, after = read_trial(trial_file(tmp_path, one.key))
     np.testing.assert_allclose(again.depth, frame.depth, atol=1e-6)
     np.testing.assert_array_equal(again.T_base_camera.position, frame.T_base_camera.position)
-    assert after is None and again.fine_colour is None  # kept where tape is looked for again
+    assert after is None and again.fine_colour is None  # stored only with a frame after the grasp
     assert planned is not None
     for field in dataclasses.fields(planned):
         if isinstance(value := getattr(plan, field.name), np.ndarray):
             np.testing.assert_allclose(getattr(planned, field.name), value, rtol=1e-6, err_msg=field.name)
     np.testing.assert_array_equal(planned.grasp.as_vector(), plan.grasp.as_vector())
+    np.testing.assert_allclose(planned.candidates.as_vector(), plan.candidates.as_vector(), rtol=1e-6)
     for name in ("centre_base", "size", "gyration_radius", "table_z", "table_offset"):
         np.testing.assert_allclose(getattr(planned.view, name), getattr(plan.view, name), err_msg=name)
     draw_trial(tmp_path, find_trial(tmp_path, one.key), tmp_path / "replay" / "one.png")
     assert (tmp_path / "replay" / "one.png").stat().st_size > 10_000
 
 
-def test_a_trial_without_a_plan_shows_what_was_seen(tmp_path: Path):
+def test_a_trial_without_a_plan_is_drawn_as_its_frame(tmp_path: Path):
     one = trial(success=False, reason="NoPartFound", grasp=None, predicted=None, measured=None)
-    write_trial(trial_file(tmp_path, one.key), seen(), None, seen())
+    write_trial(trial_file(tmp_path, one.key), captured(), None, captured())
     frame, plan, after = read_trial(trial_file(tmp_path, one.key))
     assert plan is None and after is not None and after.fine_colour is not None
     assert frame.fine_colour is not None
@@ -75,7 +76,7 @@ def test_a_trial_without_a_plan_shows_what_was_seen(tmp_path: Path):
     assert (tmp_path / "one.png").exists()
 
 
-def test_lines_survive_the_file_and_a_line_cut_short(tmp_path: Path):
+def test_trials_are_read_back_equal_and_an_incomplete_last_line_is_removed(tmp_path: Path):
     path = tmp_path / "trials.jsonl"
     first = trial(predicted_std=[np.nan] * 4, measured=[0.1, 0.2, np.nan, 0.3])
     lines = [json.dumps(one.to_json(), allow_nan=False) for one in (first, trial(number=1))]
@@ -89,7 +90,7 @@ def test_lines_survive_the_file_and_a_line_cut_short(tmp_path: Path):
         read(path, Trial.from_json)
 
 
-def test_a_name_that_leads_out_of_the_folder_is_no_trial(tmp_path: Path):
+def test_a_part_name_with_a_path_is_refused(tmp_path: Path):
     append(tmp_path / TRIALS, trial().to_json() | {"part": "../../etc/passwd"})
     with pytest.raises(BadDataset, match="not a trial"):
         find_trial(tmp_path, "../../etc/passwd-000")
@@ -109,9 +110,9 @@ def test_a_damaged_file_is_an_error_of_one_line(tmp_path: Path, content: bytes):
     assert "\n" not in str(raised.value)
 
 
-def test_unknown_runs_and_trials_are_told(tmp_path: Path):
+def test_an_unknown_run_or_trial_is_refused_with_the_known_ones(tmp_path: Path):
     with pytest.raises(UsageError, match="no run of mskgrasp.evaluate"):
         find_trial(tmp_path, "a-000")
     append(tmp_path / TRIALS, trial().to_json())
-    with pytest.raises(UsageError, match="no trial 'a-001' .* a-000"):
+    with pytest.raises(UsageError, match="no trial 'a-001' .* for example a-000"):
         find_trial(tmp_path, "a-001")

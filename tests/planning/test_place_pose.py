@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mskgrasp.core.geometry import Pose, quat_about_z, wrap_angle
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, lowest_grasp_z, pose_base_grasp
-from mskgrasp.planning.placing import Target, displacement_of_point, place_error, place_pose
+from mskgrasp.planning.place_pose import Target, displacement_of_point, place_error, place_pose
 
 near = st.floats(-0.04, 0.04)
 angle = st.floats(-3.0, 3.0)

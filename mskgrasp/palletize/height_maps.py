@@ -1,4 +1,4 @@
-"""Views of a placement from above, before and after."""
+"""Height maps of a part before the grasp and after placing."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.files import write_whole
 from mskgrasp.perception.footprint import pixel_pitch, seen_points
-from mskgrasp.planning.placing import Target
+from mskgrasp.planning.place_pose import Target
 from mskgrasp.planning.planner import GraspPlan
 
 _N = 200
 
 
 @dataclass(frozen=True, kw_only=True)
-class Views:
-    """Views of a placement from above, before and after: squares along the base's axes, metres.
+class HeightMaps:
+    """Height maps of a part before the grasp and after placing: squares along the base's axes, metres.
 
     Attributes:
-        before: (n, n) heights over the table around the part before the grasp, its centre in the middle.
-        after: (n, n) the same around the target; empty where the part was not placed.
+        before: (n, n) heights above the table before the grasp, centred on the part.
+        after: (n, n) heights after placing, centred on the target; empty where the part was not placed.
         side: Edge length of both squares.
         top: Height of the part.
-        grasp: (3,) x, y from the part's centre, and theta.
+        grasp: (3,) x, y of the grasp relative to the part's centre, and theta.
         turn: Target turn of the part, radians.
         theta: Direction of its longer side at the target, radians.
     """
@@ -44,13 +44,13 @@ class Views:
     theta: float
 
 
-def take_views(
+def take_height_maps(
     before: RgbdFrame, after: RgbdFrame | None, plan: GraspPlan, target: Target, theta: float
-) -> Views:
-    """Views of a placement from its frames."""
+) -> HeightMaps:
+    """Compute the height maps of a placement from its frames."""
     view = plan.view
     side = max(0.1, 1.6 * float(np.hypot(*view.size[:2])))
-    return Views(
+    return HeightMaps(
         before=_heights(before, view.centre_base[:2], side, view.table_z),
         after=np.empty((0, 0))
         if after is None
@@ -63,9 +63,9 @@ def take_views(
     )
 
 
-def write_views(views: Views, path: Path) -> None:
-    """Writes views as a compressed file, atomically."""
-    values: dict[str, Any] = {name: np.asarray(value) for name, value in asdict(views).items()}
+def write_height_maps(maps: HeightMaps, path: Path) -> None:
+    """Write height maps as a compressed file, atomically."""
+    values: dict[str, Any] = {name: np.asarray(value) for name, value in asdict(maps).items()}
     for name in ("before", "after"):
         values[name] = values[name].astype(np.float32)
     buffer = io.BytesIO()
@@ -73,8 +73,8 @@ def write_views(views: Views, path: Path) -> None:
     write_whole(path, buffer.getvalue())
 
 
-def read_views(path: Path) -> Views:
-    """Reads a file of `write_views`.
+def read_height_maps(path: Path) -> HeightMaps:
+    """Read a file of `write_height_maps`.
 
     Raises:
         BadDataset: The file is missing or damaged.
@@ -83,7 +83,7 @@ def read_views(path: Path) -> Views:
         with np.load(path, allow_pickle=False) as file:
             values = {name: file[name] for name in file.files}
         numbers = {name: float(values[name]) for name in ("side", "top", "turn", "theta")}
-        return Views(
+        return HeightMaps(
             before=values["before"], after=values["after"], grasp=values["grasp"].reshape(3), **numbers
         )
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
@@ -91,7 +91,7 @@ def read_views(path: Path) -> Views:
 
 
 def _heights(frame: RgbdFrame, centre: np.ndarray, side: float, table_z: float) -> np.ndarray:
-    """(n, n) heights as seen orthographically from above, without parallax."""
+    """Orthographic heights (n, n) above the table, free of parallax."""
     points = seen_points(frame)
     cell = side / _N
     from_corner = (points[:, :2] - centre) * [1, -1] + side / 2
@@ -99,6 +99,6 @@ def _heights(frame: RgbdFrame, centre: np.ndarray, side: float, table_z: float) 
     columns, rows = np.floor(from_corner[inside] / cell).astype(int).T
     heights = np.zeros((_N, _N), dtype=np.float32)
     np.maximum.at(heights, (rows, columns), (points[inside, 2] - table_z).astype(np.float32))
-    # A pixel of the camera covers several cells, and the point is in the middle of it.
+    # A camera pixel covers several cells around its point.
     width = 2 * round(pixel_pitch(frame) / cell / 2) + 1
     return cv2.dilate(heights, cv2.getStructuringElement(cv2.MORPH_RECT, (width, width)))

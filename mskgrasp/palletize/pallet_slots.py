@@ -1,4 +1,4 @@
-"""Slots for parts: a target on the command line, or the slots of a pallet in a YAML file."""
+"""Slots of a pallet, from a YAML file or a single target of the command line, and their checks."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.grasp import Grasp
 from mskgrasp.parts import Part
 from mskgrasp.perception.footprint import Footprint, usual_footprint
-from mskgrasp.planning.placing import Target, check_place
+from mskgrasp.planning.place_pose import Target, check_place
 
 SEEN_TOLERANCE = 0.003
-"""A depth image shows a part's sides to about a pixel, m."""
+"""Error of a part's sides in a depth image, about a pixel, m."""
 _ANGLES = np.radians([-90.0, -45.0, 0.0, 45.0])
 
 
 @dataclass(frozen=True, kw_only=True)
 class Slot:
-    """A place for one part.
+    """Slot for one part.
 
     Attributes:
-        x: Of the part's centre, base frame, metres.
+        x: Target of the part's centre, base frame, metres.
         y: The same.
-        theta: Direction of the part's longer side seen from above, radians from base x; a depth image
-            does not show which way round it is, and a half turn more is the same.
-        size: How much room there is along base x and y, metres; None where it does not matter.
+        theta: Direction of the part's longer side seen from above, radians from base x; half a turn more is
+            equivalent, since a depth image does not distinguish both.
+        size: Extent along base x and y, metres; None: not checked.
     """
 
     x: float
@@ -44,17 +44,17 @@ class Slot:
     size: tuple[float, float] | None = None
 
     def targets(self, footprint: Footprint) -> tuple[Target, Target]:
-        """Both ways round for a part that lies so; first the lesser turn, in which less moves in the hand."""
+        """Both equivalent targets of a part with a footprint, the smaller turn first."""
         turn = float(wrap_half_turn(np.asarray(self.theta - footprint.theta)))
         other = turn - float(np.copysign(np.pi, turn))
         return Target(x=self.x, y=self.y, theta=turn), Target(x=self.x, y=self.y, theta=other)
 
     def fits(self, footprint: Footprint, tolerance: float = 0.0) -> bool:
-        """Whether a part has room in it, turned to the slot's direction."""
+        """Whether a part, turned to the slot's direction, fits into the slot."""
         if self.size is None:
             return True
-        room = footprint.extent(self.theta)
-        return bool(np.all(room <= np.array(self.size) + tolerance))
+        extent = footprint.extent(self.theta)
+        return bool(np.all(extent <= np.array(self.size) + tolerance))
 
 
 _Length = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -63,15 +63,15 @@ _Count = Annotated[int, Field(ge=1, le=100)]
 
 
 class SlotEntry(Config):
-    """A slot in a file."""
+    """Slot in a file."""
 
     x: _Coordinate
     y: _Coordinate
-    """Of the part's centre, base frame, m."""
+    """Target of the part's centre, base frame, m."""
     theta_deg: float = Field(default=0.0, allow_inf_nan=False)
-    """Direction of its longer side, degrees from base x."""
+    """Direction of the part's longer side, degrees from base x."""
     size: tuple[_Length, _Length] | None = None
-    """Room along base x and y, m; null: not checked."""
+    """Extent along base x and y, m; null: not checked."""
 
     def slot(self) -> Slot:
         """The slot."""
@@ -79,18 +79,18 @@ class SlotEntry(Config):
 
 
 class Grid(Config):
-    """Slots in rows and columns."""
+    """Grid of slots."""
 
     first: tuple[_Coordinate, _Coordinate]
     """x and y of the slot nearest to the base's origin, m."""
     pitch: tuple[_Length, _Length]
-    """From slot to slot along x and y, m."""
+    """Distance between slots along x and y, m."""
     n: tuple[_Count, _Count]
-    """Slots along x and y."""
+    """Number of slots along x and y."""
     theta_deg: float = Field(default=0.0, allow_inf_nan=False)
     """Direction of the parts' longer side, degrees from base x."""
     size: tuple[_Length, _Length] | None = None
-    """Room in each along x and y, m; null: the pitch."""
+    """Extent of each slot along x and y, m; null: the pitch."""
 
     @model_validator(mode="after")
     def _check(self) -> Grid:
@@ -102,13 +102,13 @@ class Grid(Config):
 
 
 class SlotsFile(Config):
-    """Contents of a file of slots: a grid, a list, or both."""
+    """File of slots: a grid, a list, or both."""
 
     grid: Grid | None = None
     slots: tuple[SlotEntry, ...] = ()
 
     def all_slots(self) -> list[Slot]:
-        """Those of the grid, along x first, then those of the list."""
+        """The slots of the grid, along x first, then those of the list."""
         found = []
         if self.grid is not None:
             grid = self.grid
@@ -126,10 +126,10 @@ class SlotsFile(Config):
 
 
 def parse_target(text: str) -> Slot:
-    """``x,y,theta`` in metres and degrees.
+    """Parse ``x,y,theta`` in metres and degrees.
 
     Raises:
-        ValueError: It is something else.
+        ValueError: The text is not three finite numbers.
     """
     try:
         x, y, theta = (float(word) for word in text.split(","))
@@ -141,11 +141,11 @@ def parse_target(text: str) -> Slot:
 
 
 def read_slots(path: Path) -> list[Slot]:
-    """The slots of a file such as ``configs/palletize/grid.yaml``.
+    """Read a file of slots, such as ``configs/palletize/grid.yaml``.
 
     Raises:
-        BadConfig: It cannot be read, or says something else.
-        UsageError: It holds no slot.
+        BadConfig: The file cannot be read, or a value is not valid.
+        UsageError: The file holds no slot.
     """
     slots = read_config(SlotsFile, path).all_slots()
     if not slots:
@@ -154,17 +154,17 @@ def read_slots(path: Path) -> list[Slot]:
 
 
 def check_reach(cell: Cell, slots: Sequence[Slot]) -> None:
-    """Refuses slots where the arm cannot put a part that it holds at any angle, before anything moves.
+    """Refuse slots at which the arm cannot place a part grasped at every angle, before anything moves.
 
     Raises:
-        UsageError: Says which, and what is legal.
+        UsageError: A slot is out of reach.
     """
     for number, slot in enumerate(slots, 1):
         for theta in _ANGLES:
             over = np.array([slot.x, slot.y, cell.workspace.table_z + 0.02])
-            ways = [Grasp(position=over, theta=np.asarray(theta + turn)) for turn in (0.0, np.pi)]
+            poses = [Grasp(position=over, theta=np.asarray(theta + turn)) for turn in (0.0, np.pi)]
             try:
-                first_reachable(cell, ways)
+                first_reachable(cell, poses)
             except OutOfWorkspace as error:
                 name = "the target" if len(slots) == 1 else f"slot {number}"
                 raise UsageError(
@@ -173,10 +173,10 @@ def check_reach(cell: Cell, slots: Sequence[Slot]) -> None:
 
 
 def first_reachable(cell: Cell, poses: Sequence[Grasp]) -> int:
-    """Index of the first of some poses of the hand at which the arm can let go of a part.
+    """Find the index of the first hand pose at which the arm can place a part.
 
     Raises:
-        OutOfWorkspace: It reaches none; why not the first.
+        OutOfWorkspace: The arm reaches none; the reason for the first.
     """
     refused = []
     for index, pose in enumerate(poses):
@@ -189,10 +189,10 @@ def first_reachable(cell: Cell, poses: Sequence[Grasp]) -> int:
 
 
 def check_room(pairs: Iterable[tuple[Part, Slot]]) -> None:
-    """Refuses parts that do not fit into their slot as they come to lie most often.
+    """Refuse parts that do not fit into their slots in their most probable stable pose.
 
     Raises:
-        UsageError: Says which, how large they are, and the remedy.
+        UsageError: Parts are too large; the message gives their sizes.
     """
     too_large: dict[str, str] = {}
     room = ""
@@ -206,6 +206,6 @@ def check_room(pairs: Iterable[tuple[Part, Slot]]) -> None:
             room = f"{1e3 * slot.size[0]:g} x {1e3 * slot.size[1]:g} mm"
     if too_large:
         raise UsageError(
-            f"a slot of {room} is smaller than {', '.join(too_large.values())}; give the slots more room, "
+            f"a slot of {room} is smaller than {', '.join(too_large.values())}; enlarge the slots, "
             "turn them (theta_deg), or choose other --parts"
         )

@@ -1,4 +1,4 @@
-"""Slots: what may stand in their file, what fits into them, and what lies how."""
+"""Slots: their file, the parts that fit, and the reach of the arm."""
 
 from __future__ import annotations
 
@@ -10,60 +10,32 @@ import pytest
 from hal import cell_from_yaml
 from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.core.geometry import wrap_half_turn
-from mskgrasp.palletize.slots import Slot, check_reach, check_room, parse_target, read_slots
+from mskgrasp.palletize.pallet_slots import Slot, check_reach, check_room, parse_target, read_slots
 from mskgrasp.parts import find_part
-from mskgrasp.perception.footprint import Footprint, footprint_of, seen_footprint, usual_footprint
-from tests.synthetic import REGION, TABLE_Z, Box, frame
+from mskgrasp.perception.footprint import Footprint, usual_footprint
 
 REPOSITORY = Path(__file__).parents[2]
 GRID = REPOSITORY / "configs" / "palletize" / "grid.yaml"
 
 
-@pytest.mark.parametrize("yaw", np.radians([-80.0, -30.0, 0.0, 20.0, 65.0]))
-def test_a_depth_image_tells_how_a_part_lies(yaw):
-    box = Box(x=0.47, y=0.02, yaw=float(yaw), size=(0.06, 0.03, 0.025))
-    seen = frame([box])
-    found = seen_footprint(seen, table_z=TABLE_Z, region=REGION, min_height=0.002)
-    assert abs(wrap_half_turn(np.asarray(found.theta - yaw))) < np.radians(3.0)
-    np.testing.assert_allclose(found.sides, [0.06, 0.03], atol=0.003)
-
-
-def test_a_low_part_of_it_counts_too():
-    """A bracket: a plate of 4 mm with a wall of 40 mm."""
-    plate = Box(x=0.47, y=0.0, yaw=0.5, size=(0.08, 0.03, 0.004))
-    wall = Box(x=0.47 + 0.038 * np.cos(0.5), y=0.038 * np.sin(0.5), yaw=0.5, size=(0.004, 0.03, 0.04))
-    seen = frame([plate, wall])
-    found = seen_footprint(seen, table_z=TABLE_Z, region=REGION, min_height=0.002)
-    assert abs(found.theta - 0.5) < np.radians(3.0)
-    np.testing.assert_allclose(found.sides, [0.08, 0.03], atol=0.003)
-
-
-def test_the_footprint_of_a_rectangle_is_itself():
-    corners = np.array([[1, 2], [1, -2], [-1, -2], [-1, 2]]) * 0.01
-    cos, sin = np.cos(0.4), np.sin(0.4)
-    found = footprint_of(corners @ np.array([[cos, sin], [-sin, cos]]) + [0.5, 0.1])
-    np.testing.assert_allclose(found.sides, [0.04, 0.02], atol=1e-6)
-    assert abs(wrap_half_turn(np.asarray(found.theta - (0.4 + np.pi / 2)))) < 1e-5
-
-
-def test_both_ways_round_differ_by_half_a_turn_and_the_first_turns_less():
+def test_both_targets_differ_by_half_a_turn_and_the_first_turns_less():
     slot = Slot(x=0.5, y=0.1, theta=0.2)
-    for lies in (-1.4, 0.2, 0.3, 1.1):
-        first, second = slot.targets(Footprint(sides=np.array([0.06, 0.03]), theta=lies))
-        assert abs(wrap_half_turn(np.asarray(lies + first.theta - slot.theta))) < 1e-9
+    for direction in (-1.4, 0.2, 0.3, 1.1):
+        first, second = slot.targets(Footprint(sides=np.array([0.06, 0.03]), theta=direction))
+        assert abs(wrap_half_turn(np.asarray(direction + first.theta - slot.theta))) < 1e-9
         assert abs(abs(first.theta - second.theta) - np.pi) < 1e-9
         assert abs(first.theta) <= np.pi / 2 + 1e-9
 
 
-def test_a_turned_part_needs_other_room():
-    lies = Footprint(sides=np.array([0.08, 0.02]), theta=0.0)
-    assert Slot(x=0, y=0, theta=0.0, size=(0.081, 0.021)).fits(lies)
-    assert not Slot(x=0, y=0, theta=np.pi / 2, size=(0.081, 0.021)).fits(lies)
-    assert not Slot(x=0, y=0, theta=np.pi / 4, size=(0.07, 0.07)).fits(lies)
-    assert Slot(x=0, y=0, theta=np.pi / 4).fits(lies)
+def test_a_turned_slot_needs_another_size():
+    footprint = Footprint(sides=np.array([0.08, 0.02]), theta=0.0)
+    assert Slot(x=0, y=0, theta=0.0, size=(0.081, 0.021)).fits(footprint)
+    assert not Slot(x=0, y=0, theta=np.pi / 2, size=(0.081, 0.021)).fits(footprint)
+    assert not Slot(x=0, y=0, theta=np.pi / 4, size=(0.07, 0.07)).fits(footprint)
+    assert Slot(x=0, y=0, theta=np.pi / 4).fits(footprint)
 
 
-def test_the_shipped_grid_is_reached_by_its_cell():
+def test_the_shipped_grid_is_within_reach_of_its_cell():
     slots = read_slots(GRID)
     assert len(slots) == 6 and len({(slot.x, slot.y) for slot in slots}) == 6
     check_reach(cell_from_yaml(REPOSITORY / "configs" / "palletize" / "cell.yaml"), slots)
@@ -99,7 +71,7 @@ def test_a_slot_smaller_than_a_part_is_named_with_both_sizes():
         ("- {x: 0.5, y: 0.1}", BadConfig, "expected a mapping"),
     ],
 )  # fmt: skip
-def test_a_wrong_file_is_one_line(tmp_path, text, error, message):
+def test_an_invalid_file_is_an_error_of_one_line(tmp_path, text, error, message):
     path = tmp_path / "slots.yaml"
     path.write_text(text)
     with pytest.raises(error, match=message) as caught:
@@ -108,6 +80,6 @@ def test_a_wrong_file_is_one_line(tmp_path, text, error, message):
 
 
 @pytest.mark.parametrize("text", ["0.5,0.1", "a,b,c", "0.5,nan,0", "0.5 0.1 0"])
-def test_a_wrong_target_is_refused(text):
+def test_an_invalid_target_is_refused(text):
     with pytest.raises(ValueError, match="target must be"):
         parse_target(text)

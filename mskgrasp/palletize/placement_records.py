@@ -1,0 +1,66 @@
+"""Record of one placement."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+Correction = Literal["none", "predicted", "truth"]
+CORRECTIONS: tuple[Correction, Correction, Correction] = ("none", "predicted", "truth")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placement:
+    """Outcome of placing one part once; metres and radians.
+
+    Attributes:
+        part: Name of the part.
+        number: Index of the trial of the part, or of the pallet.
+        slot: Index of the slot.
+        correction: Displacement that was corrected for.
+        target: x, y of the part's centre and direction of its longer side, base frame.
+        placed: The part was released at the target.
+        reason: Why not; empty where it was.
+        grasp: (4,) the executed grasp; None, as all that follows, where no grasp was found.
+        predicted: (4,) expected displacement of the part's detected centre in the hand.
+        measured: (4,) its true displacement; None where nothing tracks the part.
+        translation_error: Distance of the placed part's centre from its target; None where not placed or not
+            measured.
+        rotation_error: Absolute error of its turn; None as before.
+        unmeasured: Why a placed part was not measured; empty where it was.
+    """
+
+    part: str
+    number: int
+    slot: int
+    correction: Correction
+    target: tuple[float, float, float]
+    placed: bool
+    reason: str
+    grasp: list[float] | None = None
+    predicted: list[float] | None = None
+    measured: list[float] | None = None
+    translation_error: float | None = None
+    rotation_error: float | None = None
+    unmeasured: str = ""
+
+    @property
+    def key(self) -> tuple[str, int, int, Correction]:
+        """Identifies the placement in its run."""
+        return self.part, self.number, self.slot, self.correction
+
+    @property
+    def name(self) -> str:
+        """Name of the placement's files."""
+        return f"{self.part}-{self.number:03d}-{self.slot:02d}-{self.correction}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> Placement:
+        """The placement that `to_json` converted."""
+        x, y, theta = values["target"]
+        rest: dict[str, Any] = {name: value for name, value in values.items() if name != "target"}
+        return cls(target=(x, y, theta), **rest)
