@@ -6,13 +6,10 @@ A worker that dies takes nothing with it: the results it has not delivered are c
 from __future__ import annotations
 
 import contextlib
-import sys
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic
-
-from tqdm import tqdm
 
 from mskgrasp.runtime.executor import (
     Delivered,
@@ -26,6 +23,7 @@ from mskgrasp.runtime.executor import (
     WorkerFailed,
 )
 from mskgrasp.runtime.local_executor import LocalExecutor
+from mskgrasp.runtime.progress import note
 
 REMEDY = "run the same command again, with fewer --workers if memory was short"
 
@@ -166,5 +164,4 @@ def results(
             if isinstance(event, JobResult):
                 yield event.result
             elif isinstance(event, JobLost):
-                message = f"a process was lost ({event.reason}); {work.name(event.retry)} is made again"
-                tqdm.write(message, file=sys.stderr)
+                note(f"a process was lost ({event.reason}); {work.name(event.retry)} is made again")

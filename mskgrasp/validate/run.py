@@ -5,12 +5,10 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from tqdm import tqdm
-
 from mskgrasp.core.settings.physics import LEAST_RATE_HZ
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.runtime.cli import make_folder
-from mskgrasp.runtime.progress import progress
+from mskgrasp.runtime.progress import Bar, progress
 from mskgrasp.validate.body_scene import BodyScene
 from mskgrasp.validate.closed_form import Check, run_checks
 from mskgrasp.validate.compare import Comparison, cheapest, compare, complaints
@@ -109,5 +107,5 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
     return found
 
 
-def _advance(bar: tqdm, by: int = 1) -> None:
+def _advance(bar: Bar, by: int = 1) -> None:
     bar.update(by)

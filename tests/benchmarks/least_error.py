@@ -18,11 +18,11 @@ import numpy as np
 import torch
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
 
 from mskgrasp.core.geometry import quat_about_z, quat_multiply, wrap_angle
 from mskgrasp.core.settings import ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import chosen_names, find_part
+from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.worker_process import one_thread_a_process
 from mskgrasp.simulation.shard import FIELDS, Simulator, draw_attempt, impossible
 
@@ -48,7 +48,7 @@ def main() -> None:
     jobs = [(name, options.grasps, options.repeats, *spread) for spread in SPREADS for name in picked]
     context = multiprocessing.get_context("spawn")  # a forked simulator shares the parent's driver state
     with one_thread_a_process(), ProcessPoolExecutor(options.workers, mp_context=context) as pool:
-        done = list(tqdm(pool.map(_simulate, *zip(*jobs, strict=True)), total=len(jobs), unit="part"))
+        done = list(progress(pool.map(_simulate, *zip(*jobs, strict=True)), total=len(jobs), unit="part"))
     for k, (place, turn) in enumerate(SPREADS):
         rows = np.concatenate(done[k * len(picked) : (k + 1) * len(picked)])
         table.add_row(f"{1e3 * place:g}", f"{turn:g}", *least_errors(rows))
