@@ -210,4 +210,4 @@ def print_figures(figures: Sequence[dict[str, Any]], console: Console) -> None:
 
 
 if __name__ == "__main__":
-    run(main)
+    run("tests.sim_in_the_loop.regression", main)
