@@ -256,6 +256,40 @@ def test_a_program_that_is_ended_in_mid_motion_leaves_an_arm_at_rest(
         arm.move_gripper(0.05)
 
 
+@pytest.mark.parametrize("op", ["state", "stop"])
+def test_a_driver_that_hangs_ends_after_its_program(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path, op: str
+):
+    """A robot that answers nothing any more, and a program that is killed before its request is overdue."""
+    code = (
+        "import sys, threading, time\n"
+        "from hal import cell_from_yaml\n"
+        "with cell_from_yaml(__import__('pathlib').Path(sys.argv[1])).arm as arm:\n"
+        "    print(arm._link.pid, flush=True)\n"
+        "    sys.stdin.readline()\n"
+        "    threading.Thread(target=lambda: arm._link.ask(sys.argv[2], timeout_s=5), daemon=True).start()\n"
+        "    time.sleep(0.5)\n"
+        "    print('asked', flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    path = write_cell(tmp_path, driver, robot.host)
+    with subprocess.Popen(
+        [sys.executable, "-c", code, path, op], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as program:
+        assert program.stdin is not None and program.stdout is not None
+        driver_state = Path(f"/proc/{program.stdout.readline().strip()}/stat")
+        robot.freeze()
+        program.stdin.write("\n")
+        program.stdin.flush()
+        assert program.stdout.readline().strip() == "asked"
+        program.kill()
+    deadline = time.monotonic() + TIMEOUT_S
+    while driver_state.exists() and driver_state.read_text().rpartition(")")[2].split()[0] != "Z":
+        assert time.monotonic() < deadline, "the driver outlives its program"
+        time.sleep(0.1)
+    robot.process.send_signal(signal.SIGCONT)
+
+
 def test_a_grasp_that_misses_is_the_same_outcome_however_it_is_reported(
     driver: DriverName, robot: FakeRobot, tmp_path: Path
 ):
