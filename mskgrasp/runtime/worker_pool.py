@@ -33,6 +33,11 @@ def whole(job: Job, n_results: int) -> Job:
     return job
 
 
+def unless_delivered(job: Job, n_results: int) -> Job | None:
+    """The job itself while its only result has not been delivered; then nothing."""
+    return None if n_results else job
+
+
 @dataclass(frozen=True)
 class JobResult(Generic[Job, Result]):
     """One result of a job, which may have more."""
@@ -69,8 +74,11 @@ class Work(Generic[Settings, Job, Result]):
     """Argument of `context`; pickled."""
     name: Callable[[Job], str] = str
     """The job's name in messages."""
-    rest: Callable[[Job, int], Job | None] = whole
-    """What remains of a job after so many results, when its worker has died; None: nothing."""
+    rest: Callable[[Job, int], Job | None] = unless_delivered
+    """What remains of a job after so many results, when its worker has died; None: nothing.
+
+    A job of several results needs another than the default.
+    """
     remedy: str = REMEDY
     """What the user can do about a job that cost too many workers."""
     lost_by: tuple[type[Exception], ...] = ()

@@ -126,6 +126,23 @@ def test_an_error_that_a_fresh_process_may_be_free_of_is_tried_again(capfd: pyte
 
 
 @contextmanager
+def dying(folder: Path) -> Iterator[Callable[[int], Iterator[int]]]:
+    """Dies after its only result, once."""
+
+    def work(job: int) -> Iterator[int]:
+        yield job
+        if not (folder / "died").exists():
+            (folder / "died").touch()
+            os._exit(9)
+
+    yield work
+
+
+def test_an_only_result_that_was_delivered_is_not_delivered_again(tmp_path: Path):
+    assert sorted(results(Work(dying, tmp_path), [1, 2, 3], 1, apart=True)) == [1, 2, 3]
+
+
+@contextmanager
 def signals(_: None) -> Iterator[Callable[[int], Iterator[bool]]]:
     yield lambda job: iter([signal.getsignal(signal.SIGINT) is signal.SIG_IGN])
 
