@@ -49,7 +49,10 @@ def parse_arguments(
 
 def _explain(event: _errors.ParseErrorEvent, arguments: Sequence[str], legal: Sequence[str]) -> str:
     match event:
-        case _errors.UnrecognizedArgs(tokens=[first, *_]) if first.startswith("-"):
+        case (
+            _errors.UnrecognizedArgs(tokens=[first, *_])
+            | _errors.MissingArgs(unrecognized_tokens=[first, *_])
+        ) if first.startswith("-"):
             similar = difflib.get_close_matches(first.partition("=")[0], legal)
             return f"unknown option {first}" + (f"; similar: {', '.join(similar)}" if similar else "")
         case _errors.UnrecognizedArgs(tokens=[first, *_]):

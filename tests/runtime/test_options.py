@@ -121,6 +121,7 @@ class Drink:
         (["drnk"], "unknown command 'drnk'; legal: eat, drink"),
         (["eat"], "missing: fruit (STR)" + HELP),
         (["eat", "pear", "--peaces", "2"], "unknown option --peaces; similar: --n-pieces" + HELP),
+        (["eat", "--peaces", "2"], "unknown option --peaces; similar: --n-pieces" + HELP),
         (["drink", "water"], "unexpected argument 'water'" + HELP),
         (["eat", "pear", "--n-pieces"], "--n-pieces needs INT; program eat --help lists what is legal"),
     ],
