@@ -20,7 +20,7 @@ from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.workers import make_shards
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
-from mskgrasp.core.files import LOCK, only_here
+from mskgrasp.core.files import LOCK, exclusive_lock
 from mskgrasp.core.shipped import config_file
 from mskgrasp.dataset import read_shard, shard_path
 from mskgrasp.parts import Part, chosen_names, find_part
@@ -67,7 +67,7 @@ def collect(config: CollectConfig) -> None:
     check_out(config)
     with contextlib.nullcontext() if config.cluster is None else connected(config.cluster):
         make_folder(config.out)
-        with only_here(config.out) as alone:
+        with exclusive_lock(config.out) as alone:
             if not alone:
                 raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
             _collect(config, [part for _, part in parts])
@@ -87,7 +87,7 @@ def sampled(names: list[str], count: int) -> list[str]:
 
 
 def _collect(config: CollectConfig, parts: list[Part]) -> None:
-    begin(config)
+    prepare_folder(config)
     everything = plan_shards(config, parts)
     hashes = {part.name: part.content_hash for part in parts}
     missing = [task for task in everything if not is_done(config.out, task, hashes[task.part])]
@@ -179,7 +179,7 @@ def _is_leftover(path: Path) -> bool:
     return path.name == LOCK or (path.name.startswith("config.yaml.") and path.suffix == ".tmp")
 
 
-def begin(config: CollectConfig) -> None:
+def prepare_folder(config: CollectConfig) -> None:
     """Opens the dataset's folder, and deletes half-written files of a killed run."""
     if not (config.out / "config.yaml").exists():
         write_config(config, config.out / "config.yaml")

@@ -14,7 +14,7 @@ from hal import cell_from_yaml
 from hal.operator import Operator
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import UsageError
-from mskgrasp.core.files import only_here
+from mskgrasp.core.files import exclusive_lock
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
@@ -28,7 +28,7 @@ from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.run_inputs import inputs_of
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append, begin, file_digest, read
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, file_digest, open_run_folder, read_trials
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.trials.engine import connected_engine
 
@@ -82,8 +82,8 @@ def palletize(config: PalletizeConfig) -> dict[str, Any]:
     may_change = ["out", "trials", "corrections", "workers", "yes"]
     # Which part comes into which slot follows from all of them.
     may_change += ["parts", "n_parts"] if config.slots is None else []
-    begin(config, config.out, inputs, may_change=may_change)
-    with only_here(config.out) as mine:
+    open_run_folder(config, config.out, inputs, may_change=may_change)
+    with exclusive_lock(config.out) as mine:
         if not mine:
             raise UsageError(f"another run is at work in {config.out}; wait for it, or choose another --out")
         make_folder(config.out / "placements")
@@ -145,7 +145,7 @@ def _pallets(
 
 
 def _place_all(config: PalletizeConfig, pallets: list[list[PlacementTask]], asks: bool) -> list[Placement]:
-    found = {one.key: one for one in read(config.out / TRIALS, Placement.from_json)}
+    found = {one.key: one for one in read_trials(config.out / TRIALS, Placement.from_json)}
     keys = [task.key for pallet in pallets for task in pallet]
     missing = [
         TaskGroup(
@@ -164,7 +164,7 @@ def _place_all(config: PalletizeConfig, pallets: list[list[PlacementTask]], asks
         with contextlib.closing(placed), bar:
             for placement in placed:
                 if placement.key not in found:
-                    append(config.out / TRIALS, placement.to_json())
+                    append_trial(config.out / TRIALS, placement.to_json())
                     found[placement.key] = placement
                     bar.update()
     return [found[key] for key in keys]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,7 +20,9 @@ INPUTS = "inputs.json"
 TRIALS = "trials.jsonl"
 
 
-def begin(config: Config, out: Path, inputs: Mapping[str, str], *, may_change: Collection[str]) -> None:
+def open_run_folder(
+    config: Config, out: Path, inputs: Mapping[str, str], *, may_change: Collection[str]
+) -> None:
     """Opens the folder of a run: a new one, or one that was started with the same settings and inputs.
 
     Args:
@@ -50,7 +53,7 @@ def begin(config: Config, out: Path, inputs: Mapping[str, str], *, may_change: C
         raise UsageError(f"--out {out} holds other files; choose a new folder")
     make_folder(out)
     write_config(config, settings)
-    fingerprint.write_text(json.dumps(dict(inputs), indent=1) + "\n", encoding="utf-8")
+    write_whole(fingerprint, (json.dumps(dict(inputs), indent=1) + "\n").encode())
 
 
 def file_digest(path: Path) -> str:
@@ -65,18 +68,18 @@ def file_digest(path: Path) -> str:
         raise UsageError(f"cannot read {path}: {error.strerror}") from error
 
 
-def append(path: Path, values: Mapping[str, Any]) -> None:
+def append_trial(path: Path, values: Mapping[str, Any]) -> None:
     """Appends a line to a file of trials; NaN is refused, since JSON has none."""
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(values, allow_nan=False) + "\n")
 
 
-def rewrite(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
+def rewrite_trials(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
     """Replaces a file of trials atomically."""
     write_whole(path, "".join(json.dumps(one, allow_nan=False) + "\n" for one in lines).encode())
 
 
-def read(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
+def read_trials(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
     """Reads the stored trials in order; removes an incomplete last line, which a killed run leaves.
 
     Raises:
@@ -84,15 +87,15 @@ def read(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
     """
     if not path.exists():
         return []
-    lines = path.read_text(encoding="utf-8").split("\n")
+    *lines, incomplete = path.read_bytes().split(b"\n")
     found = []
-    for i, line in enumerate(lines[:-1]):
+    for i, line in enumerate(lines):
         try:
             found.append(make(json.loads(line)))
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise BadDataset(
                 f"{path}: line {i + 1} is not a trial; delete it or choose another --out"
             ) from error
-    if lines[-1]:
-        path.write_text("\n".join(lines[:-1]) + ("\n" if len(lines) > 1 else ""), encoding="utf-8")
+    if incomplete:
+        os.truncate(path, path.stat().st_size - len(incomplete))
     return found

@@ -17,11 +17,11 @@ from mskgrasp.validate.convergence import draw_grasps, run_settings
 from mskgrasp.validate.fidelity import check_parts
 from mskgrasp.validate.report import (
     draw,
-    impossible,
     print_checks,
     print_convergence,
+    print_discards,
     print_fidelity,
-    print_impossible,
+    summarise_discards,
     write_json,
 )
 
@@ -99,8 +99,8 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
         for floor in (FLOOR, CELL_FLOOR)
     }
     print_convergence(config, found, chosen)
-    seen = impossible(outcomes[config.production])
-    print_impossible(seen)
+    seen = summarise_discards(outcomes[config.production])
+    print_discards(seen)
     results["convergence"] = {name: one.as_dict() for name, one in found.items()}
     results["cheapest_that_adds_nothing"] = chosen
     results["impossible"] = vars(seen)

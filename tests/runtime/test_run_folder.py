@@ -1,39 +1,78 @@
-"""Which parts a user's words mean, and how some of them are chosen."""
+"""Folders of runs: resumed with the same inputs, and whole whenever a run is killed."""
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+from typing import Any
+
 import pytest
 
-from mskgrasp.core.errors import UnknownPart
-from mskgrasp.parts.select_parts import evenly, part_names
-
-TRAINING = {
-    "training_parts": ["hex_nut_m30", "hex_nut_m20", "washer_m36"],
-    "validation_parts": ["hinge_60x30", "t_nut_m16x18"],
-}
-
-
-def test_few_parts_are_spread_and_more_include_them():
-    names = [f"p{k:03d}" for k in range(300)]
-    ten = evenly(names, 10)
-    places = [int(name[1:]) for name in ten]
-    assert max(b - a for a, b in zip(places, [*places[1:], 300], strict=True)) <= 60
-    for n in range(1, 60):
-        assert len(evenly(names, n)) == n and set(evenly(names, n)) <= set(evenly(names, n + 1))
-    assert evenly(["b", "a"], 5) == ["a", "b"]
+from mskgrasp.core.config import Config
+from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.runtime.run_folder import (
+    INPUTS,
+    TRIALS,
+    append_trial,
+    open_run_folder,
+    read_trials,
+    rewrite_trials,
+)
 
 
-def test_sets_are_those_of_the_model_and_share_the_number_of_parts():
-    assert part_names(("train",), TRAINING) == TRAINING["training_parts"]
-    assert part_names(("validation", "hex_nut_m30"), TRAINING)[-1] == "hex_nut_m30"
-    assert len(part_names(("train", "validation"), TRAINING, 2)) == 2
-    found = part_names(("train", "validation"), TRAINING, 4)
-    assert len(found) == 4 and set(found) > set(TRAINING["validation_parts"])
-    assert set(part_names(("train", "validation"), TRAINING, 50)) == {
-        *TRAINING["training_parts"], *TRAINING["validation_parts"]
-    }  # fmt: skip
+class RunConfig(Config):
+    """Settings."""
+
+    seed: int = 0
+    workers: int = 1
 
 
-def test_an_unknown_part_is_told():
-    with pytest.raises(UnknownPart, match="hex_nut_m30"):
-        part_names(("hex_nut_m3x",), TRAINING)
+def _open(out: Path, inputs: dict[str, str], **settings: Any) -> None:
+    open_run_folder(RunConfig(**settings), out, inputs, may_change=["workers"])
+
+
+def test_a_run_is_resumed_with_the_same_inputs_only(tmp_path: Path):
+    out = tmp_path / "run"
+    _open(out, {"model": "a"})
+    _open(out, {"model": "a", "part nut": "b"}, workers=2)
+    for inputs, settings, named in (
+        ({"model": "c"}, {}, "model"),
+        ({"part nut": "c"}, {}, "part nut"),
+        ({}, {"seed": 1}, "seed"),
+    ):
+        with pytest.raises(UsageError, match=named):
+            _open(out, inputs, **settings)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "notes.txt").touch()
+    with pytest.raises(UsageError, match="holds other files"):
+        _open(tmp_path / "other", {})
+
+
+def test_a_resumed_run_replaces_its_inputs_at_once(tmp_path: Path):
+    _open(tmp_path, {"model": "a"})
+    before = tmp_path.parent / f"{tmp_path.name}-before.json"
+    os.link(tmp_path / INPUTS, before)
+    _open(tmp_path, {"part nut": "b"})
+    assert "nut" in (tmp_path / INPUTS).read_text() and "nut" not in before.read_text()
+
+
+def test_an_incomplete_last_line_is_removed_and_the_others_stay_where_they_are(tmp_path: Path):
+    path = tmp_path / TRIALS
+    assert read_trials(path, dict) == []
+    append_trial(path, {"n": 1})
+    append_trial(path, {"n": 2})
+    inode, whole = path.stat().st_ino, path.read_bytes()
+    with path.open("ab") as file:
+        file.write(b'{"n": "\xc3')  # a kill may also divide a character
+    assert read_trials(path, dict) == [{"n": 1}, {"n": 2}]
+    assert path.read_bytes() == whole and path.stat().st_ino == inode
+    append_trial(path, {"n": 3})
+    rewrite_trials(path, reversed(read_trials(path, dict)))
+    assert [one["n"] for one in read_trials(path, dict)] == [3, 2, 1]
+
+
+def test_a_line_that_is_no_trial_is_named(tmp_path: Path):
+    path = tmp_path / TRIALS
+    path.write_text('{"n": 1}\nn = 2\n')
+    with pytest.raises(BadDataset, match="line 2 is not a trial"):
+        read_trials(path, dict)

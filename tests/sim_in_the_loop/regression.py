@@ -88,7 +88,7 @@ def run_set(config: RegressionConfig) -> list[Row]:
         workers=config.workers,
     )  # fmt: skip
     palletize(settings)
-    placements = read(config.out / TRIALS, Placement.from_json)
+    placements = read_trials(config.out / TRIALS, Placement.from_json)
     return rows_of([one for one in placements if one.number < config.trials])
 
 
