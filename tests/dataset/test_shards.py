@@ -11,11 +11,9 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import object_displacement
 from mskgrasp.dataset import (
     Attempts,
-    depth_to_u16,
     list_shards,
     read_shard,
     shard_path,
-    u16_to_depth,
     write_shard,
 )
 from tests import synthetic
@@ -77,26 +75,6 @@ def test_depth_is_stored_one_compressed_image_a_chunk_and_units_are_told(shard):
         assert depth.chunks == (1, 160, 160) and depth.compression == "gzip" and depth.shuffle
         assert "0.1 mm" in depth.attrs["unit"] and file["grasp"].attrs["frame"] == "base"
         assert file["failure"].attrs["failure_names"][0] == "none"
-
-
-def test_depth_survives_storage_to_half_a_step_and_invalid_stays_invalid():
-    depth = np.array([[0.8, 0.123456, np.nan, 6.5535]], np.float32)
-    again = u16_to_depth(depth_to_u16(depth))
-    assert np.isnan(again[0, 2])
-    assert np.nanmax(np.abs(again - depth)) <= 0.5e-4 + 1e-6
-
-
-@pytest.mark.parametrize("depth", [800.0, -0.1])
-def test_a_depth_that_cannot_be_metres_is_refused(depth):
-    assert "outside 0..6.5535" in complaint(lambda: depth_to_u16(np.array([depth])))
-
-
-def test_attempts_join_in_order(attempts):
-    joined = Attempts.concatenate([attempts, attempts])
-    assert len(joined) == 24 and np.array_equal(joined.grasp[12:], attempts.grasp)
-    smaller = dataclasses.replace(attempts, depth=attempts.depth[:, :80])
-    assert "different sizes" in complaint(lambda: Attempts.concatenate([attempts, smaller]))
-    assert "no attempts" in complaint(lambda: Attempts.concatenate([]))
 
 
 def test_a_shard_without_attempts_says_that_all_were_discarded(tmp_path, attempts):

@@ -114,28 +114,40 @@ class Drink:
     """Drink."""
 
 
+@dataclass(frozen=True)
+class Pay:
+    """Pay."""
+
+    amount: float
+    """How much."""
+
+
+COMMANDS = {"eat": Eat, "drink": Drink, "pay": Pay}
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "a command is missing; legal: eat, drink" + HELP),
-        (["drnk"], "unknown command 'drnk'; legal: eat, drink"),
+        ([], "a command is missing; legal: eat, drink, pay" + HELP),
+        (["drnk"], "unknown command 'drnk'; legal: eat, drink, pay"),
         (["eat"], "missing: fruit (STR)" + HELP),
         (["eat", "pear", "--peaces", "2"], "unknown option --peaces; similar: --n-pieces" + HELP),
-        (["eat", "--peaces", "2"], "unknown option --peaces; similar: --n-pieces" + HELP),
+        (["pay", "--amont", "2"], "unknown option --amont; similar: --amount" + HELP),
+        (["pay"], "missing: --amount (FLOAT)" + HELP),
         (["drink", "water"], "unexpected argument 'water'" + HELP),
         (["eat", "pear", "--n-pieces"], "--n-pieces needs INT; program eat --help lists what is legal"),
     ],
 )
 def test_a_wrong_command_is_one_line_with_what_is_legal(arguments, message, capsys):
     with pytest.raises(UsageError) as caught:
-        parse_command({"eat": Eat, "drink": Drink}, prog="program", description="Does.", argv=arguments)
+        parse_command(COMMANDS, prog="program", description="Does.", argv=arguments)
     assert str(caught.value) == message
     assert capsys.readouterr() == ("", "")
 
 
 def test_a_command_is_read_with_its_options():
     read = parse_command(
-        {"eat": Eat, "drink": Drink},
+        COMMANDS,
         prog="program",
         description="Does.",
         argv=["eat", "pear", "--n-pieces=3"],

@@ -25,7 +25,7 @@ from mskgrasp.palletize.placements import Placement
 from mskgrasp.palletize.run import palletize
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.options import parse
-from mskgrasp.runtime.run_folder import TRIALS, file_digest, read
+from mskgrasp.runtime.run_folder import TRIALS, file_digest, read_trials
 from tests.sim_in_the_loop.record import PARTS
 
 HERE = Path(__file__).parent

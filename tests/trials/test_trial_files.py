@@ -14,7 +14,7 @@ from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.evaluate.replay_trial import draw_trial, find_trial
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.planning.planner import GraspPlan, Planner, PlannerConfig
-from mskgrasp.runtime.run_folder import TRIALS, append, read
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, read_trials
 from mskgrasp.trials.trial import Prediction, Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file, write_trial
 from tests import synthetic
@@ -42,7 +42,7 @@ def stored(run: Path, one: Trial) -> tuple[RgbdFrame, GraspPlan]:
     plan = planner.plan(frame, np.random.default_rng(0))
     plan = dataclasses.replace(plan, view=dataclasses.replace(plan.view, table_offset=-0.002))
     write_trial(trial_file(run, one.key), frame, plan, None)
-    append(run / TRIALS, one.to_json())
+    append_trial(run / TRIALS, one.to_json())
     return frame, plan
 
 
@@ -80,17 +80,17 @@ def test_lines_survive_the_file_and_a_line_cut_short(tmp_path: Path):
     first = trial(predicted_std=[np.nan] * 4, measured=[0.1, 0.2, np.nan, 0.3])
     lines = [json.dumps(one.to_json(), allow_nan=False) for one in (first, trial(number=1))]
     path.write_text(lines[0] + "\n" + lines[1][:40])
-    (found,) = read(path, Trial.from_json)
+    (found,) = read_trials(path, Trial.from_json)
     assert found.key == "a-000" and np.isnan(found.predicted_std).all()
     np.testing.assert_array_equal(found.measured, first.measured)
     assert path.read_text() == lines[0] + "\n"
     path.write_text("no json\n")
     with pytest.raises(BadDataset, match="line 1 is not a trial"):
-        read(path, Trial.from_json)
+        read_trials(path, Trial.from_json)
 
 
 def test_a_name_that_leads_out_of_the_folder_is_no_trial(tmp_path: Path):
-    append(tmp_path / TRIALS, trial().to_json() | {"part": "../../etc/passwd"})
+    append_trial(tmp_path / TRIALS, trial().to_json() | {"part": "../../etc/passwd"})
     with pytest.raises(BadDataset, match="not a trial"):
         find_trial(tmp_path, "../../etc/passwd-000")
 
@@ -112,6 +112,6 @@ def test_a_damaged_file_is_an_error_of_one_line(tmp_path: Path, content: bytes):
 def test_unknown_runs_and_trials_are_told(tmp_path: Path):
     with pytest.raises(UsageError, match="no run of mskgrasp.evaluate"):
         find_trial(tmp_path, "a-000")
-    append(tmp_path / TRIALS, trial().to_json())
+    append_trial(tmp_path / TRIALS, trial().to_json())
     with pytest.raises(UsageError, match="no trial 'a-001' .* a-000"):
         find_trial(tmp_path, "a-001")
