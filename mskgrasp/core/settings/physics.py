@@ -71,7 +71,7 @@ class Physics(Config):
 
     @model_validator(mode="before")
     @classmethod
-    def _no_coarser_than_told(cls, values: Any) -> Any:
+    def _no_coarser_than_given(cls, values: Any) -> Any:
         # Lowering rate_hz alone is legal.
         if isinstance(values, dict) and "coarse_rate_hz" not in values:
             rate, usual = values.get("rate_hz"), cls.model_fields["coarse_rate_hz"].default
