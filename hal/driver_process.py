@@ -6,6 +6,7 @@ answers are JSON objects, one a line, on its standard input and output; plain by
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import select
@@ -233,20 +234,27 @@ class AnswerPipe:
             finally:
                 if "alarm_s" in request:
                     signal.alarm(0)
-            reply: dict[str, Any] = {"result": answer.result}
+            line = self._line(request, answer.payload, result=answer.result)
             payload = answer.payload
         except BaseException as error:  # every exception of a vendor must reach the program
             fault = explain(error)
-            reply = {"error": type(fault).__name__, "message": str(fault)}
-        reply |= {"id": request["id"], "n_bytes": sum(len(part) for part in payload)}
-        with self._lock:
-            self._stream.write(json.dumps(reply).encode() + b"\n")
+            line = self._line(request, error=type(fault).__name__, message=str(fault))
+        # A program that is gone reads nothing; the requests end next, and the driver releases its device.
+        with self._lock, contextlib.suppress(BrokenPipeError):
+            self._stream.write(line)
             for part in payload:
                 self._stream.write(part)
             self._stream.flush()
+
+    @staticmethod
+    def _line(request: Mapping[str, Any], payload: Sequence[bytes | memoryview] = (), **reply: Any) -> bytes:
+        n_bytes = sum(len(part) for part in payload)
+        return json.dumps({"id": request["id"], "n_bytes": n_bytes, **reply}).encode() + b"\n"
 
 
 def requests() -> Iterator[dict[str, Any]]:
     """Requests on standard input, until the program closes it or dies."""
     for line in sys.stdin:
+        if not line.endswith("\n"):
+            return  # the program died while it wrote
         yield json.loads(line)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import runpy
-import signal
+import importlib
 import sys
+
+from mskgrasp.runtime.cli import run
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
 PROGRAMS = {
     "parts": ("mskgrasp.parts", "build, import, list and show parts"),
@@ -37,12 +39,17 @@ def main() -> None:
         print("\nmskgrasp PROGRAM --help explains the options of a program.")
         sys.exit(0)
     if name not in PROGRAMS:
-        print(f"error: no program is called {name!r}; legal: {', '.join(PROGRAMS)}", file=sys.stderr)
+        print(f"mskgrasp: no program is called {name!r}; legal: {', '.join(PROGRAMS)}", file=sys.stderr)
         sys.exit(2)
     del sys.argv[1]
-    # Ctrl-C waits for `mskgrasp.runtime.cli.run`: a library whose import it interrupts may swallow it.
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    runpy.run_module(PROGRAMS[name][0], run_name="__main__", alter_sys=True)
+    module, _ = PROGRAMS[name]
+    run(module, lambda: _run_program(module))
+
+
+def _run_program(module: str) -> int | None:
+    with ctrl_c_deferred():
+        program = importlib.import_module(f"{module}.__main__")
+    return program.main()
 
 
 if __name__ == "__main__":

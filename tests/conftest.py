@@ -32,7 +32,7 @@ LONGEST = (
     "palletize/test_palletize.py",
     "sim_in_the_loop/test_precise_grasps.py",
 )
-"""Files that take a minute or more: run first, so that no process is left alone with one at the end."""
+"""Files that take a minute or more: started first, so that no process is left alone with one at the end."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

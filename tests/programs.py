@@ -54,5 +54,5 @@ def run_here(main: Callable[[], int | None], *arguments: str) -> Ended:
         pytest.raises(SystemExit) as ended,
     ):
         patch.setattr(sys, "argv", ["program", *arguments])
-        cli.run(main)
+        cli.run("program", main)
     return Ended(int(ended.value.code or 0), printed.getvalue(), complained.getvalue())

@@ -14,7 +14,7 @@ from hal.franka.faults import ERRORS
 _EXIT_S = 2.0
 """Time a driver has to stop the arm and end, s; then its process is killed."""
 _ALARM_S = 5
-"""A driver still connecting this long after its deadline is ended by the kernel, s."""
+"""A driver that hangs this long after its deadline is ended by the kernel: its program may be gone, s."""
 
 
 class DriverLink:
@@ -39,7 +39,7 @@ class DriverLink:
                 "connect",
                 timeout_s=connect_timeout_s,
                 settings=asdict(settings),
-                alarm_s=math.ceil(connect_timeout_s) + _ALARM_S,
+                alarm_s=_alarm_s(connect_timeout_s),
             )
         except NoAnswer as error:
             self.close()
@@ -67,6 +67,8 @@ class DriverLink:
                 process was killed, so that the robot stopped.
             HalError: The driver's own error.
         """
+        if op in ("state", "stop"):  # answered in the thread that would notice the program's end
+            values["alarm_s"] = _alarm_s(timeout_s)
         try:
             return self._process.ask(op, timeout_s=timeout_s, **values).result
         except ProcessEnded as error:
@@ -80,3 +82,7 @@ class DriverLink:
     def close(self) -> None:
         """Stops the arm and ends the process; safe to call twice."""
         self._process.close()
+
+
+def _alarm_s(timeout_s: float) -> int:
+    return math.ceil(timeout_s) + _ALARM_S

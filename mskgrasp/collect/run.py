@@ -9,8 +9,6 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from tqdm import tqdm
-
 from mskgrasp.collect.cluster import (
     check_cluster,
     connected,
@@ -22,7 +20,7 @@ from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.workers import make_shards
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
-from mskgrasp.core.files import LOCK, only_here
+from mskgrasp.core.files import LOCK, exclusive_lock
 from mskgrasp.core.shipped import config_file
 from mskgrasp.dataset import read_shard, shard_path
 from mskgrasp.parts import Part, chosen_names, find_part
@@ -30,6 +28,7 @@ from mskgrasp.parts.catalogue import ratings, read_index, spread
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 from mskgrasp.runtime.options import parse
+from mskgrasp.runtime.progress import note, progress
 from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult
 from mskgrasp.simulation.shard_task import ShardTask
 from mskgrasp.simulation.versions import other_versions
@@ -68,7 +67,7 @@ def collect(config: CollectConfig) -> None:
     check_out(config)
     with contextlib.nullcontext() if config.cluster is None else connected(config.cluster):
         make_folder(config.out)
-        with only_here(config.out) as alone:
+        with exclusive_lock(config.out) as alone:
             if not alone:
                 raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
             _collect(config, [part for _, part in parts])
@@ -88,7 +87,7 @@ def sampled(names: list[str], count: int) -> list[str]:
 
 
 def _collect(config: CollectConfig, parts: list[Part]) -> None:
-    begin(config)
+    prepare_folder(config)
     everything = plan_shards(config, parts)
     hashes = {part.name: part.content_hash for part in parts}
     missing = [task for task in everything if not is_done(config.out, task, hashes[task.part])]
@@ -128,7 +127,7 @@ def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:
     rated = ratings() if bounds.min_success is not None or bounds.max_success is not None else {}
     parts: list[tuple[str, Part]] = []
     easy_or_hard = 0
-    for name in tqdm(config.parts, desc="parts", unit="part", leave=False, disable=None):
+    for name in progress(config.parts, title="parts", unit="part"):
         part = find_part(name)
         rating = rated.get(part.content_hash)
         if not bounds.takes_length(part.longest_axis):
@@ -180,7 +179,7 @@ def _is_leftover(path: Path) -> bool:
     return path.name == LOCK or (path.name.startswith("config.yaml.") and path.suffix == ".tmp")
 
 
-def begin(config: CollectConfig) -> None:
+def prepare_folder(config: CollectConfig) -> None:
     """Opens the dataset's folder, and deletes half-written files of a killed run."""
     if not (config.out / "config.yaml").exists():
         write_config(config, config.out / "config.yaml")
@@ -236,10 +235,7 @@ def _simulate(config: CollectConfig, tasks: list[ShardTask], parts: list[Part], 
     total: Counter[int] = Counter()
     by_shard: dict[ShardTask, Counter[int]] = {}
     workers: set[str] = set()
-    bar = tqdm(
-        total=done + sum(task.n for task in tasks), initial=done, unit="grasp", dynamic_ncols=True,
-        smoothing=0.05, mininterval=0.5 if sys.stderr.isatty() else 15.0, file=sys.stderr,
-    )  # fmt: skip
+    bar = progress(total=done + sum(task.n for task in tasks), done=done, unit="grasp", keep=True)
     if config.cluster is None:
         events = make_shards(config, tasks, _n_workers(config, tasks))
     else:
@@ -256,7 +252,7 @@ def _simulate(config: CollectConfig, tasks: list[ShardTask], parts: list[Part], 
                 case JobLost(job=task, reason=reason, n_results=undone):
                     total.subtract(by_shard.pop(task, Counter()))
                     bar.update(-undone)
-                    bar.write(f"a worker died ({reason}); its shard is made again", file=sys.stderr)
+                    note(f"a worker died ({reason}); its shard is made again")
                 case JobDone(worker=worker):
                     workers.add(worker)
     finally:

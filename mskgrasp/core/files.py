@@ -41,7 +41,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 @contextmanager
-def only_here(folder: Path) -> Iterator[bool]:
+def exclusive_lock(folder: Path) -> Iterator[bool]:
     """Locks a folder until the end of the block; gives False if another process holds the lock.
 
     The operating system releases the lock when a process ends for whatever reason; its empty file remains.

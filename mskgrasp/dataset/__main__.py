@@ -12,4 +12,4 @@ def main() -> int | None:
 
 
 if __name__ == "__main__":
-    run(main)
+    run("mskgrasp.dataset", main)

@@ -36,4 +36,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    run(main)
+    run("mskgrasp.evaluate", main)

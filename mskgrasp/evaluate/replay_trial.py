@@ -14,7 +14,7 @@ from mskgrasp.evaluate.summary import displacement_errors
 from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.reports.quantities import degrees, millimetres
 from mskgrasp.reports.style import saved_figure
-from mskgrasp.runtime.run_folder import TRIALS, read
+from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
 
@@ -28,7 +28,7 @@ def find_trial(run: Path, key: str) -> Trial:
     """
     if not (run / TRIALS).is_file():
         raise UsageError(f"no run of mskgrasp.evaluate in {run}: there is no {TRIALS}")
-    trials = {trial.key: trial for trial in read(run / TRIALS, Trial.from_json)}
+    trials = {trial.key: trial for trial in read_trials(run / TRIALS, Trial.from_json)}
     if key not in trials:
         close = difflib.get_close_matches(key, trials, n=3, cutoff=0.4) or list(trials)[:3]
         raise UsageError(

@@ -29,7 +29,7 @@ from mskgrasp.planning.run_inputs import model_digests, part_digests
 from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append, opened_run, read, rewrite
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials, rewrite_trials
 from mskgrasp.simulation.versions import versions
 from mskgrasp.trials.cell_file import CellFile, read_cell
 from mskgrasp.trials.trial import Trial
@@ -109,7 +109,7 @@ def _make_trials(
     make_folder(config.out / FOLDER)
     for leftover in (config.out / FOLDER).glob("*.tmp"):
         leftover.unlink()
-    trials = {trial.key: trial for trial in read(config.out / TRIALS, Trial.from_json)}
+    trials = {trial.key: trial for trial in read_trials(config.out / TRIALS, Trial.from_json)}
     missing = [tuple(task for task in scene if task.key not in trials) for scene in tasks]
     missing = [scene for scene in missing if scene]
     if not missing:
@@ -132,13 +132,13 @@ def _make_trials(
     n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
     with closing(run_trials(setup, missing, n_workers)) as made, bar:
         for k, trial in enumerate(made, 1):
-            append(config.out / TRIALS, trial.to_json())
+            append_trial(config.out / TRIALS, trial.to_json())
             trials[trial.key] = trial
             n_lifted += trial.success
             bar.set_postfix_str(f"lifted {n_lifted / k:.0%}", refresh=False)
             bar.update()
     # Sorted: workers finish in any order.
-    rewrite(config.out / TRIALS, (trials[key].to_json() for key in sorted(trials)))
+    rewrite_trials(config.out / TRIALS, (trials[key].to_json() for key in sorted(trials)))
     return trials
 
 
@@ -149,7 +149,7 @@ def _with_predictions(
     bar = progress(trials.items(), title="predictions", unit="trial")
     more = {key: with_predictions(trial, config.out, compared.predictors) for key, trial in bar}
     if more != trials:
-        rewrite(config.out / TRIALS, (more[key].to_json() for key in sorted(more)))
+        rewrite_trials(config.out / TRIALS, (more[key].to_json() for key in sorted(more)))
     return more
 
 

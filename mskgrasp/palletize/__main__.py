@@ -33,4 +33,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    run(main)
+    run("mskgrasp.palletize", main)

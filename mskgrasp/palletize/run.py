@@ -27,7 +27,7 @@ from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.run_inputs import inputs_of
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append, file_digest, opened_run, read
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, file_digest, opened_run, read_trials
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.trials.engine import connected_engine
 
@@ -142,7 +142,7 @@ def _pallets(
 
 
 def _place_all(config: PalletizeConfig, pallets: list[list[PlacementTask]], asks: bool) -> list[Placement]:
-    found = {one.key: one for one in read(config.out / TRIALS, Placement.from_json)}
+    found = {one.key: one for one in read_trials(config.out / TRIALS, Placement.from_json)}
     keys = [task.key for pallet in pallets for task in pallet]
     missing = [
         TaskGroup(
@@ -161,7 +161,7 @@ def _place_all(config: PalletizeConfig, pallets: list[list[PlacementTask]], asks
         with contextlib.closing(placed), bar:
             for placement in placed:
                 if placement.key not in found:
-                    append(config.out / TRIALS, placement.to_json())
+                    append_trial(config.out / TRIALS, placement.to_json())
                     found[placement.key] = placement
                     bar.update()
     return [found[key] for key in keys]

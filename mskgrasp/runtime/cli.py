@@ -34,13 +34,14 @@ def explain_os_error(error: OSError) -> str:
     return f"{error.strerror or error}{place}; {remedy}"
 
 
-def run(main: Callable[[], int | None]) -> None:
+def run(program: str, main: Callable[[], int | None]) -> None:
     """Runs a program's ``main`` and ends the process: 0, 1 failure, 2 usage, 130 Ctrl-C.
 
     An error that a user can repair becomes one line on standard error; anything else is a defect and
     keeps its traceback.
 
     Args:
+        program: Name of the program, before its errors.
         main: The program; a ``__main__`` imports it here, by `ctrl_c_deferred`, and not before, so that
             Ctrl-C meanwhile has the same effect as later.
     """
@@ -48,7 +49,7 @@ def run(main: Callable[[], int | None]) -> None:
     try:
         code = main() or 0
     except MskgraspError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"{program}: {error}", file=sys.stderr)
         code = error.exit_code
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one must not interrupt the exit
@@ -60,6 +61,6 @@ def run(main: Callable[[], int | None]) -> None:
     except OSError as error:
         if error.filename is None and error.errno not in _FULL:
             raise
-        print(f"error: {explain_os_error(error)}", file=sys.stderr)
+        print(f"{program}: {explain_os_error(error)}", file=sys.stderr)
         code = 1
     sys.exit(code)

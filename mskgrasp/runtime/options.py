@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import itertools
+import operator
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import tyro
 from pydantic import BaseModel
 from tyro.constructors import ConstructorRegistry, StructConstructorSpec, StructTypeInfo
 
 from mskgrasp.core.config import check_config, read_config
-from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.errors import BadConfig, UsageError
+from mskgrasp.runtime.option_errors import parse_arguments
 
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
+CommandT = TypeVar("CommandT")
 
 
 def parse(
@@ -39,6 +43,7 @@ def parse(
 
     Raises:
         BadConfig: The file or an override is not valid.
+        UsageError: An option is unknown, or has no value or one of another type.
     """
     rest, path = _take_config_option(list(sys.argv[1:] if argv is None else argv))
     path = path or default_config
@@ -47,9 +52,36 @@ def parse(
     # Without a file there may be required options: tyro asks for them.
     known: dict[str, Any] = {} if default is None else {"default": default}
     description += note if default_config else ""
-    parsed = tyro.cli(model, prog=prog, description=description, args=rest, registry=_registry, **known)
+    parsed = parse_arguments(
+        model, rest, prog=prog, also_legal=["--config"], description=description, registry=_registry, **known
+    )
     # No warnings: types are checked next.
     return check_config(model, parsed.model_dump(warnings=False), "command line", name=_option)
+
+
+def parse_command(
+    commands: Mapping[str, type[CommandT]], *, prog: str, description: str, argv: Sequence[str] | None = None
+) -> CommandT:
+    """Reads a command and its options.
+
+    Args:
+        commands: Dataclasses by the command's name; each field is an option, the docstrings are the help.
+        prog: As for `parse`.
+        description: As for `parse`.
+        argv: As for `parse`.
+
+    Raises:
+        UsageError: The command or an option is unknown, or an option has no value or one of another type.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    name = arguments[0] if arguments else ""
+    if name and name not in commands and not name.startswith("-"):
+        raise UsageError(f"unknown command {name!r}; legal: {', '.join(commands)}")
+    kinds = [Annotated[kind, tyro.conf.subcommand(name)] for name, kind in commands.items()]
+    union = functools.reduce(operator.or_, kinds)
+    return parse_arguments(
+        union, arguments, prog=prog, options_of=commands.get(name), description=description
+    )
 
 
 def _take_config_option(arguments: list[str]) -> tuple[list[str], Path | None]:

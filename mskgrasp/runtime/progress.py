@@ -8,6 +8,8 @@ from typing import Any, TextIO
 
 from tqdm import tqdm
 
+Bar = tqdm
+"""A progress bar."""
 _LINE_EVERY_S = 20.0
 """Interval of the lines where standard error is no terminal."""
 _TRANSIENT_DELAY_S = 1.0
@@ -38,7 +40,7 @@ def progress(
     title: str | None = None,
     keep: bool = False,
     hidden: bool = False,
-) -> tqdm:
+) -> Bar:
     """A progress bar on standard error; where that is no terminal, a line every 20 s.
 
     Args:
@@ -62,18 +64,18 @@ def progress(
             delay=0.0 if keep else _LINE_EVERY_S,
         )
     )  # fmt: skip
-    return tqdm(
+    return Bar(
         items, total=total, initial=done, desc=title, unit=unit, leave=keep, disable=hidden, smoothing=0.05,
         **shown,
     )  # fmt: skip
 
 
-def advance_to(bar: tqdm, done: int, total: int) -> None:
+def advance_to(bar: Bar, done: int, total: int) -> None:
     """Moves a bar to ``done`` of ``total``, which may only now be known."""
     bar.total = total
     bar.update(done - bar.n)
 
 
-def note(message: str) -> None:
-    """Writes a line to standard error, above any bar."""
-    tqdm.write(message, file=sys.stderr)
+def note(message: str, stream: TextIO | None = None) -> None:
+    """Writes a line above any bar, to standard error or the given stream."""
+    Bar.write(message, file=sys.stderr if stream is None else stream)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any, TypeVar
 
 from mskgrasp.core.config import Config, read_config, write_config
 from mskgrasp.core.errors import BadDataset, UsageError
-from mskgrasp.core.files import LOCK, only_here, write_whole
+from mskgrasp.core.files import LOCK, exclusive_lock, write_whole
 from mskgrasp.runtime.cli import make_folder
 
 Record = TypeVar("Record")
@@ -47,7 +48,7 @@ def opened_run(
     """
     known = _compatible_inputs(config, out, inputs, scene_version, may_change)
     make_folder(out)
-    with only_here(out) as alone:
+    with exclusive_lock(out) as alone:
         if not alone:
             raise UsageError(f"another run is writing to {out}; wait for it, or choose another --out")
         write_config(config, out / SETTINGS)
@@ -108,18 +109,18 @@ def file_digest(path: Path) -> str:
         raise UsageError(f"cannot read {path}: {error.strerror}") from error
 
 
-def append(path: Path, values: Mapping[str, Any]) -> None:
+def append_trial(path: Path, values: Mapping[str, Any]) -> None:
     """Appends a line to a file of trials; NaN is refused, since JSON has none."""
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(values, allow_nan=False) + "\n")
 
 
-def rewrite(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
+def rewrite_trials(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
     """Replaces a file of trials atomically."""
     write_whole(path, "".join(json.dumps(one, allow_nan=False) + "\n" for one in lines).encode())
 
 
-def read(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
+def read_trials(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
     """Reads the stored trials in order; removes an incomplete last line, which a killed run leaves.
 
     Raises:
@@ -127,15 +128,15 @@ def read(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
     """
     if not path.exists():
         return []
-    lines = path.read_text(encoding="utf-8").split("\n")
+    *lines, incomplete = path.read_bytes().split(b"\n")
     found = []
-    for i, line in enumerate(lines[:-1]):
+    for i, line in enumerate(lines):
         try:
             found.append(make(json.loads(line)))
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise BadDataset(
                 f"{path}: line {i + 1} is not a trial; delete it or choose another --out"
             ) from error
-    if lines[-1]:
-        write_whole(path, "".join(f"{line}\n" for line in lines[:-1]).encode())
+    if incomplete:
+        os.truncate(path, path.stat().st_size - len(incomplete))
     return found

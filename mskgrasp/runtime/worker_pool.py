@@ -6,13 +6,10 @@ A worker that dies takes nothing with it: the results it has not delivered are c
 from __future__ import annotations
 
 import contextlib
-import sys
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic
-
-from tqdm import tqdm
 
 from mskgrasp.runtime.executor import (
     Delivered,
@@ -26,6 +23,7 @@ from mskgrasp.runtime.executor import (
     WorkerFailed,
 )
 from mskgrasp.runtime.local_executor import LocalExecutor
+from mskgrasp.runtime.progress import note
 
 REMEDY = "run the same command again, with fewer --workers if memory was short"
 
@@ -33,6 +31,11 @@ REMEDY = "run the same command again, with fewer --workers if memory was short"
 def whole(job: Job, n_results: int) -> Job:
     """The job itself: its results so far are void once its worker dies."""
     return job
+
+
+def unless_delivered(job: Job, n_results: int) -> Job | None:
+    """The job itself while its only result has not been delivered; then nothing."""
+    return None if n_results else job
 
 
 @dataclass(frozen=True)
@@ -71,8 +74,11 @@ class Work(Generic[Settings, Job, Result]):
     """Argument of `context`; pickled."""
     name: Callable[[Job], str] = str
     """The job's name in messages."""
-    rest: Callable[[Job, int], Job | None] = whole
-    """What remains of a job after so many results, when its worker has died; None: nothing."""
+    rest: Callable[[Job, int], Job | None] = unless_delivered
+    """What remains of a job after so many results, when its worker has died; None: nothing.
+
+    A job of several results needs another than the default.
+    """
     remedy: str = REMEDY
     """What the user can do about a job that cost too many workers."""
     lost_by: tuple[type[Exception], ...] = ()
@@ -166,5 +172,4 @@ def results(
             if isinstance(event, JobResult):
                 yield event.result
             elif isinstance(event, JobLost):
-                message = f"a process was lost ({event.reason}); {work.name(event.retry)} is made again"
-                tqdm.write(message, file=sys.stderr)
+                note(f"a process was lost ({event.reason}); {work.name(event.retry)} is made again")

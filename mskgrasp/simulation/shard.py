@@ -83,7 +83,7 @@ class Simulator:
                 continue
             outcome = env.try_grasp(torch.as_tensor(grasp, device=env.device))
             row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
-            reason = impossible(outcome, row)
+            reason = discard_reason(outcome, row)
             if reason:
                 discarded[reason] += 1
                 yield -1
@@ -139,7 +139,7 @@ def draw_attempt(
     return depth, sample_grasps(view, 1, np.random.default_rng(grasp_seed)).astype(np.float32)
 
 
-def impossible(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> str:
+def discard_reason(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> str:
     """Why an attempt cannot have happened; empty where it can."""
     if not all(np.isfinite(row[name]).all() for name in FIELDS if name.startswith("pose")):
         return "not_finite"

@@ -7,6 +7,7 @@ import io
 import json
 import math
 import os
+import sys
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -14,7 +15,6 @@ from typing import Any
 
 import torch
 from rich.console import Console
-from tqdm import tqdm
 
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import UsageError
@@ -24,7 +24,7 @@ from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.trainer import Reporter, split, train
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.options import parse
-from mskgrasp.runtime.progress import advance_to, progress
+from mskgrasp.runtime.progress import Bar, advance_to, note, progress
 from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
 from mskgrasp.train.figures import draw_curves, draw_uncertainty
 
@@ -36,7 +36,7 @@ class _ProgressBar(Reporter):
 
     def __init__(self, log: Path):
         self._log = log
-        self._bar: tqdm | None = None
+        self._bar: Bar | None = None
         self._name, self._epochs = "", 0
 
     def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:
@@ -54,7 +54,7 @@ class _ProgressBar(Reporter):
     def epoch(self, history: list[dict[str, Any]]) -> None:
         row = history[-1]
         _write(self._log, _table(history))
-        tqdm.write(f"{self._name} {row['epoch']:3d}/{self._epochs}  {_line(row)}")
+        note(f"{self._name} {row['epoch']:3d}/{self._epochs}  {_line(row)}", sys.stdout)
 
     def close(self) -> None:
         """Ends the bar."""

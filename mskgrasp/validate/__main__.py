@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from mskgrasp.core.shipped import config_file
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
-from mskgrasp.runtime.options import parse
 
 DESCRIPTION = """Shows whether simulated labels are right: run it after changing a setting or a part.
 
@@ -18,6 +16,8 @@ validate.png; ends with 1 if a check fails or the settings under test add someth
 def main() -> int:
     """Parses, checks, reports."""
     with ctrl_c_deferred():
+        from mskgrasp.core.shipped import config_file
+        from mskgrasp.runtime.options import parse
         from mskgrasp.validate.config import ValidateConfig
     config = parse(
         ValidateConfig,
@@ -31,4 +31,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    run(main)
+    run("mskgrasp.validate", main)

@@ -32,7 +32,7 @@ _MARKERS = "o^sDvP"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Impossible:
+class DiscardSummary:
     """Worst values among the labels of the setting under test, and how many attempts the collector drops.
 
     Attributes:
@@ -50,7 +50,7 @@ class Impossible:
     dropped: dict[str, int]
 
 
-def impossible(outcomes: Outcomes) -> Impossible:
+def summarise_discards(outcomes: Outcomes) -> DiscardSummary:
     """Counts the physically impossible outcomes and the worst values of the others."""
     way = np.linalg.norm(outcomes.displacement[:, :3], axis=1)
     reasons = {
@@ -60,7 +60,7 @@ def impossible(outcomes: Outcomes) -> Impossible:
         "not_finite": outcomes.success & ~np.isfinite(outcomes.displacement).all(axis=1),
     }
     kept = ~np.any(list(reasons.values()), axis=0)
-    return Impossible(
+    return DiscardSummary(
         attempts=len(kept),
         penetration=float(outcomes.penetration[kept].max(initial=0.0)),
         fastest=float(outcomes.fastest[kept].max(initial=0.0)),
@@ -126,7 +126,7 @@ def print_convergence(
     _print(f"Grasps against {REFERENCE}", Table(header=header, rows=rows), *cheapest)
 
 
-def print_impossible(found: Impossible) -> None:
+def print_discards(found: DiscardSummary) -> None:
     """Prints what the collector would drop, and the worst of what it would keep."""
     dropped = ", ".join(f"{count} {name}" for name, count in found.dropped.items() if count) or "none"
     print(

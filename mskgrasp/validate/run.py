@@ -5,12 +5,10 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from tqdm import tqdm
-
 from mskgrasp.core.settings.physics import LEAST_RATE_HZ
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.runtime.cli import make_folder
-from mskgrasp.runtime.progress import progress
+from mskgrasp.runtime.progress import Bar, progress
 from mskgrasp.validate.body_scene import BodyScene
 from mskgrasp.validate.closed_form import Check, run_checks
 from mskgrasp.validate.compare import Comparison, cheapest, compare, complaints
@@ -19,11 +17,11 @@ from mskgrasp.validate.convergence import draw_grasps, run_settings
 from mskgrasp.validate.fidelity import check_parts
 from mskgrasp.validate.report import (
     draw,
-    impossible,
     print_checks,
     print_convergence,
+    print_discards,
     print_fidelity,
-    print_impossible,
+    summarise_discards,
     write_json,
 )
 
@@ -101,13 +99,13 @@ def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, A
         for floor in (FLOOR, CELL_FLOOR)
     }
     print_convergence(config, found, chosen)
-    seen = impossible(outcomes[config.production])
-    print_impossible(seen)
+    seen = summarise_discards(outcomes[config.production])
+    print_discards(seen)
     results["convergence"] = {name: one.as_dict() for name, one in found.items()}
     results["cheapest_that_adds_nothing"] = chosen
     results["impossible"] = vars(seen)
     return found
 
 
-def _advance(bar: tqdm, by: int = 1) -> None:
+def _advance(bar: Bar, by: int = 1) -> None:
     bar.update(by)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -18,12 +17,12 @@ import numpy as np
 import torch
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
 
 from mskgrasp.core.config import read_config
 from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.trainer import LearningConfig, Sides, split, train
+from mskgrasp.runtime.progress import progress
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -95,7 +94,7 @@ def main() -> None:
     }
     known: dict[tuple[int, int, float], Samples] = {}
     found = {}
-    for name, config in tqdm(chosen.items(), unit="network", file=sys.stderr, disable=None):
+    for name, config in progress(chosen.items(), unit="network"):
         look = (*config.network.patch_shape, config.network.patch_side)
         if look not in known:
             known[look] = read_samples(options.data, config.network).of_parts_between(*config.success_range)

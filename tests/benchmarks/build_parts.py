@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import sys
 import tempfile
 import time
 from collections import defaultdict
@@ -19,7 +18,8 @@ import numpy as np
 import trimesh
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
+
+from mskgrasp.runtime.progress import progress
 
 STAGES = ("draw", "hulls", "fit", "rest", "write")
 
@@ -52,7 +52,7 @@ def measure(per_family: int, only: str | None) -> None:
     }
     warm_up(chosen)
     seconds: dict[str, np.ndarray] = {}
-    with tqdm(total=sum(map(len, chosen.values())), unit="part", file=sys.stderr, disable=None) as bar:
+    with progress(total=sum(map(len, chosen.values())), unit="part") as bar:
         for family, names in sorted(chosen.items()):
             rows = []
             for name in names:

@@ -15,11 +15,11 @@ import numpy as np
 import torch
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
 
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.settings import ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import chosen_names, find_part
+from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.worker_process import one_thread_a_process
 from mskgrasp.simulation.shard import Simulator, draw_attempt
 
@@ -45,7 +45,7 @@ def main() -> None:
     jobs = [(name, options.grasps) for names in picked for name in names]
     context = multiprocessing.get_context("spawn")  # a forked simulator shares the parent's driver state
     with one_thread_a_process(), ProcessPoolExecutor(options.workers, mp_context=context) as pool:
-        done = dict(tqdm(pool.map(_lift, *zip(*jobs, strict=True)), total=len(jobs), unit="part"))
+        done = dict(progress(pool.map(_lift, *zip(*jobs, strict=True)), total=len(jobs), unit="part"))
     table = Table(box=None, pad_edge=False, header_style="bold")
     for header in ("grams", "grasps", "lifted", "", "S agrees", "mm", "degrees", "overlap mm"):
         table.add_column(header, justify="right")

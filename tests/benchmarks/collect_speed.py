@@ -13,7 +13,6 @@ import argparse
 import json
 import logging
 import os
-import sys
 import tempfile
 import time
 from collections import defaultdict
@@ -32,7 +31,6 @@ from mani_skill.envs.scene import ManiSkillScene
 from mani_skill.utils.structs.render_camera import RenderCamera
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
 
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.run import plan_shards
@@ -41,6 +39,7 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import PAD_REACH
 from mskgrasp.core.settings import REGION, ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import Part, find_part, starter_names
+from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.worker_pool import JobResult
 from mskgrasp.simulation.shard import Simulator, draw_attempt
 from mskgrasp.simulation.shard_task import ShardTask
@@ -83,7 +82,7 @@ def side_by_side(parts: list[Part], n: int) -> dict[str, dict[str, float]]:
     programs = {"maniskill": PlainManiSkill(parts[0]), "raw": Raw()}
     seconds: dict[str, float] = defaultdict(float)
     lifted: dict[str, int] = defaultdict(int)
-    with tqdm(total=len(parts) * n * 3, unit="grasp", file=sys.stderr, disable=None) as bar:
+    with progress(total=len(parts) * n * 3, unit="grasp") as bar:
         ours.shard(parts[0], 1)  # shaders are compiled, caches filled
         inside = 0.0
         for number, part in enumerate(parts):
@@ -264,7 +263,7 @@ def throughput(parts: list[Part], shards: int, workers: int) -> dict[str, float]
         # Workers start one after the other, and end so: neither end belongs to the steady state.
         first, last = 10 * workers, total - 25 * workers
         done, began, ended, most = 0, 0.0, 0.0, 0.0
-        with tqdm(total=total, unit="grasp", desc=f"{workers} workers", file=sys.stderr, disable=None) as bar:
+        with progress(total=total, unit="grasp", title=f"{workers} workers") as bar:
             for event in make_shards(config, tasks, workers):
                 if not isinstance(event, JobResult):
                     continue
@@ -293,7 +292,7 @@ def endure(parts: list[Part], n: int) -> None:
         total = sum(task.n for task in tasks)
         done, tenths = 0, []
         began = None
-        with tqdm(total=total, unit="grasp", file=sys.stderr, disable=None) as bar:
+        with progress(total=total, unit="grasp") as bar:
             for event in make_shards(config, tasks, 1):
                 if not isinstance(event, JobResult):
                     continue

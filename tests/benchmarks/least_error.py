@@ -18,13 +18,13 @@ import numpy as np
 import torch
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
 
 from mskgrasp.core.geometry import quat_about_z, quat_multiply, wrap_angle
 from mskgrasp.core.settings import ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import chosen_names, find_part
+from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.worker_process import one_thread_a_process
-from mskgrasp.simulation.shard import FIELDS, Simulator, draw_attempt, impossible
+from mskgrasp.simulation.shard import FIELDS, Simulator, discard_reason, draw_attempt
 
 SPREADS = ((1e-5, 0.01), (1e-4, 0.1), (3e-4, 0.3), (1e-3, 1.0))
 """Deviations of the part's place along each axis of the table, m, and of its turn, degrees."""
@@ -48,7 +48,7 @@ def main() -> None:
     jobs = [(name, options.grasps, options.repeats, *spread) for spread in SPREADS for name in picked]
     context = multiprocessing.get_context("spawn")  # a forked simulator shares the parent's driver state
     with one_thread_a_process(), ProcessPoolExecutor(options.workers, mp_context=context) as pool:
-        done = list(tqdm(pool.map(_simulate, *zip(*jobs, strict=True)), total=len(jobs), unit="part"))
+        done = list(progress(pool.map(_simulate, *zip(*jobs, strict=True)), total=len(jobs), unit="part"))
     for k, (place, turn) in enumerate(SPREADS):
         rows = np.concatenate(done[k * len(picked) : (k + 1) * len(picked)])
         table.add_row(f"{1e3 * place:g}", f"{turn:g}", *least_errors(rows))
@@ -100,7 +100,7 @@ def _simulate(name: str, grasps: int, repeats: int, place: float, turn_deg: floa
             outcome = env.attempt.run(torch.as_tensor(grasp))
             row = {field: outcome[field][0].numpy() for field in FIELDS}
             # What a dataset cannot hold, no predictor is judged on.
-            own.append(np.full(4, np.nan) if impossible(outcome, row) else row["displacement"])
+            own.append(np.full(4, np.nan) if discard_reason(outcome, row) else row["displacement"])
         rows.append(own)
     env.close()
     return np.array(rows, dtype=np.float64).reshape(-1, repeats, 4)

@@ -11,7 +11,6 @@ import argparse
 import json
 import os
 import resource
-import sys
 import time
 from pathlib import Path
 
@@ -19,7 +18,6 @@ import numpy as np
 import torch
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
 
 from hal import RgbdFrame, open_cell
 from mskgrasp.core.config import read_config
@@ -30,6 +28,7 @@ from mskgrasp.learning.trainer import LearningConfig
 from mskgrasp.parts import starter_names
 from mskgrasp.planning.for_cell import present
 from mskgrasp.planning.planner import Planner, PlannerConfig
+from mskgrasp.runtime.progress import progress
 
 REPOSITORY = Path(__file__).parents[2]
 STAGES = ("sample", "score", "select")
@@ -58,7 +57,7 @@ def main() -> None:
     shown = frames(options.frames)
     for one in planners.values():
         one.plan(shown[0], np.random.default_rng(0))  # kernels are chosen, caches filled
-    for number, frame in enumerate(tqdm(shown, unit="frame", file=sys.stderr, disable=None)):
+    for number, frame in enumerate(progress(shown, unit="frame")):
         for name, one in planners.items():
             for repeat in range(options.repeats if name == "ours" else 1):
                 rng = np.random.default_rng([number, repeat])

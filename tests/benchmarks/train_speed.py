@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,12 +16,12 @@ from pathlib import Path
 import torch
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
 
 from mskgrasp.core.config import read_config
 from mskgrasp.learning.grasp_models import build_models
 from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.trainer import LearningConfig, Stage, describe, split
+from mskgrasp.runtime.progress import progress
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -40,7 +39,7 @@ def main() -> None:
     for header in ("GQN samples/s", "GDN samples/s", "share in the network"):
         table.add_column(header, justify="right")
     found: dict[str, dict[str, float]] = {}
-    for name in tqdm(("default", "paper"), unit="network", file=sys.stderr, disable=None):
+    for name in progress(("default", "paper"), unit="network"):
         config = read_config(LearningConfig, REPOSITORY / "configs" / "train" / f"{name}.yaml")
         found[name] = measure(random_samples(config, options.samples), config, device, options.seconds / 2)
         rates = (f"{found[name][stage]:.0f}" for stage in ("gqn", "gdn"))

@@ -17,7 +17,7 @@ import yaml
 
 from mskgrasp.collect.run import is_done, main
 from mskgrasp.core.errors import BadDataset
-from mskgrasp.core.files import only_here
+from mskgrasp.core.files import exclusive_lock
 from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.simulation.shard_task import ShardTask
 from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, command
@@ -168,9 +168,9 @@ def test_shards_of_other_software_are_not_added_to(collected, tmp_path):
 def test_two_collections_do_not_write_into_one_folder(collected, tmp_path):
     out = tmp_path / "data"
     shutil.copytree(collected, out)
-    with only_here(out) as alone, only_here(out) as both:
+    with exclusive_lock(out) as alone, exclusive_lock(out) as both:
         assert alone and not both
         done = run_here(main, *arguments(out))
     assert done.returncode == 2 and "another collection is writing" in done.stderr
-    with only_here(out) as alone:
+    with exclusive_lock(out) as alone:
         assert alone

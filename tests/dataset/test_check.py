@@ -122,7 +122,7 @@ def test_a_damaged_image_is_named(data):
         "pose_tcp_obj_after",
     ],
 )
-def test_a_flipped_bit_in_a_number_is_told_by_the_others(data, column):
+def test_a_flipped_bit_in_a_number_is_reported_by_the_others(data, column):
     path, row = held(data)
     with h5py.File(path) as file:
         stored = file[column]

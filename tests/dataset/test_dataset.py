@@ -26,7 +26,7 @@ def test_shards_of_one_part_alone(collected):
     assert found and set(found) == {name}
 
 
-def test_an_unknown_column_and_a_missing_folder_are_told_apart(collected, tmp_path):
+def test_an_unknown_column_and_a_missing_folder_are_distinguished(collected, tmp_path):
     with pytest.raises(UsageError, match=r"no column grip; legal: depth, grasp"):
         open_dataset(collected).columns("grip")
     with pytest.raises(BadDataset, match="no dataset folder"):

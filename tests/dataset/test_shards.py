@@ -11,11 +11,9 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import object_displacement
 from mskgrasp.dataset import (
     Attempts,
-    depth_to_u16,
     list_shards,
     read_shard,
     shard_path,
-    u16_to_depth,
     write_shard,
 )
 from tests import synthetic
@@ -71,32 +69,12 @@ def test_the_same_attempts_give_the_same_bytes(tmp_path, attempts):
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
-def test_depth_is_stored_one_compressed_image_a_chunk_and_units_are_told(shard):
+def test_depth_is_stored_one_compressed_image_a_chunk_and_units_are_reported(shard):
     with h5py.File(shard) as file:
         depth = file["depth"]
         assert depth.chunks == (1, 160, 160) and depth.compression == "gzip" and depth.shuffle
         assert "0.1 mm" in depth.attrs["unit"] and file["grasp"].attrs["frame"] == "base"
         assert file["failure"].attrs["failure_names"][0] == "none"
-
-
-def test_depth_survives_storage_to_half_a_step_and_invalid_stays_invalid():
-    depth = np.array([[0.8, 0.123456, np.nan, 6.5535]], np.float32)
-    again = u16_to_depth(depth_to_u16(depth))
-    assert np.isnan(again[0, 2])
-    assert np.nanmax(np.abs(again - depth)) <= 0.5e-4 + 1e-6
-
-
-@pytest.mark.parametrize("depth", [800.0, -0.1])
-def test_a_depth_that_cannot_be_metres_is_refused(depth):
-    assert "outside 0..6.5535" in complaint(lambda: depth_to_u16(np.array([depth])))
-
-
-def test_attempts_join_in_order(attempts):
-    joined = Attempts.concatenate([attempts, attempts])
-    assert len(joined) == 24 and np.array_equal(joined.grasp[12:], attempts.grasp)
-    smaller = dataclasses.replace(attempts, depth=attempts.depth[:, :80])
-    assert "different sizes" in complaint(lambda: Attempts.concatenate([attempts, smaller]))
-    assert "no attempts" in complaint(lambda: Attempts.concatenate([]))
 
 
 def test_a_shard_without_attempts_says_that_all_were_discarded(tmp_path, attempts):
@@ -119,20 +97,20 @@ def test_shards_are_listed_in_order_without_unfinished_ones(tmp_path, attempts):
     assert [path.name for path in list_shards(tmp_path)] == ["a-0000.h5", "b-0000.h5"]
 
 
-def test_missing_and_empty_folders_are_told_apart(tmp_path):
+def test_missing_and_empty_folders_are_distinguished(tmp_path):
     assert "no dataset folder" in complaint(lambda: list_shards(tmp_path / "nowhere"))
     assert "no shards" in complaint(lambda: list_shards(tmp_path))
     assert "no shard" in complaint(lambda: read_shard(tmp_path / "shards" / "a-0000.h5"))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 0.6, 0.99])
-def test_a_truncated_shard_is_told(shard, share):
+def test_a_truncated_shard_is_reported(shard, share):
     data = shard.read_bytes()
     shard.write_bytes(data[: int(share * len(data))])
     assert shard.name in complaint(lambda: read_shard(shard))
 
 
-def test_a_shard_with_a_damaged_image_is_told(shard):
+def test_a_shard_with_a_damaged_image_is_reported(shard):
     with h5py.File(shard) as file:
         place = file["depth"].id.get_chunk_info(4)
     data = bytearray(shard.read_bytes())
@@ -141,7 +119,7 @@ def test_a_shard_with_a_damaged_image_is_told(shard):
     assert "damaged" in complaint(lambda: read_shard(shard))
 
 
-def test_foreign_files_are_told(tmp_path):
+def test_foreign_files_are_reported(tmp_path):
     text, other = tmp_path / "a.h5", tmp_path / "b.h5"
     text.write_text("hello")
     with h5py.File(other, "w") as file:
@@ -163,7 +141,7 @@ def replace(name, array):
     return change
 
 
-def test_other_schema_versions_and_missing_arrays_are_told(shard):
+def test_other_schema_versions_and_missing_arrays_are_reported(shard):
     edit(shard, lambda file: file.attrs.__setitem__("schema_version", 99))
     assert "schema version 99" in complaint(lambda: read_shard(shard))
     edit(shard, lambda file: file.attrs.__setitem__("schema_version", dataset.SCHEMA_VERSION))
@@ -171,12 +149,12 @@ def test_other_schema_versions_and_missing_arrays_are_told(shard):
     assert "lacks the array tilt" in complaint(lambda: read_shard(shard))
 
 
-def test_a_missing_attribute_is_told(shard):
+def test_a_missing_attribute_is_reported(shard):
     edit(shard, lambda file: file.attrs.__delitem__("region"))
     assert "region" in complaint(lambda: read_shard(shard))
 
 
-def test_a_wrong_type_or_shape_is_told(shard):
+def test_a_wrong_type_or_shape_is_reported(shard):
     edit(shard, replace("depth", np.zeros((12, 160, 160), np.float32)))
     assert "depth is float32, must be uint16" in complaint(lambda: read_shard(shard))
     edit(shard, replace("depth", np.zeros((11, 160, 160), np.uint16)))
@@ -189,7 +167,7 @@ def broken(attempts: Attempts, name: str, row: int, value) -> Attempts:
     return dataclasses.replace(attempts, **{name: array})
 
 
-def test_an_array_that_claims_to_be_enormous_is_told_and_not_read(shard):
+def test_an_array_that_claims_to_be_enormous_is_reported_and_not_read(shard):
     def change(file):
         del file["tilt"]
         file.create_dataset("tilt", shape=(10**12,), dtype="float32", chunks=(1024,))
@@ -198,7 +176,7 @@ def test_an_array_that_claims_to_be_enormous_is_told_and_not_read(shard):
     assert "tilt claims the shape (1000000000000,)" in complaint(lambda: read_shard(shard))
 
 
-def test_an_attribute_that_is_no_object_is_told(shard):
+def test_an_attribute_that_is_no_object_is_reported(shard):
     edit(shard, lambda file: file.attrs.__setitem__("discarded", "[1]"))
     assert "discarded is no JSON object" in complaint(lambda: read_shard(shard))
 

@@ -29,7 +29,7 @@ from mskgrasp.evaluate.run import evaluate
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.planning.planner import PlannerConfig
-from mskgrasp.runtime.run_folder import TRIALS, read
+from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
 from mskgrasp.trials.trial_runner import Setup, run_trials
@@ -47,7 +47,7 @@ def config(out: Path, **changes: Any) -> EvaluateConfig:
 
 
 def trials(out: Path) -> dict[str, Trial]:
-    return {trial.key: trial for trial in read(out / TRIALS, Trial.from_json)}
+    return {trial.key: trial for trial in read_trials(out / TRIALS, Trial.from_json)}
 
 
 def program(*options: str) -> subprocess.CompletedProcess[str]:

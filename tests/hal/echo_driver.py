@@ -10,6 +10,9 @@ from typing import Any
 from hal.driver_process import Answer, AnswerPipe, requests
 from hal.errors import CommunicationLost, HalError
 
+RELEASED = 7
+"""Exit code of a driver that has served until the requests ended."""
+
 
 def perform(request: dict[str, Any]) -> Answer:
     match request["op"]:
@@ -18,6 +21,8 @@ def perform(request: dict[str, Any]) -> Answer:
             return Answer(result=request["value"], payload=[bytes(request["n_bytes"])])
         case "fail":
             raise ValueError("no such value")
+        case "odd":
+            return Answer(result=object())
         case "hang":
             time.sleep(60)
         case "crash":
@@ -33,3 +38,4 @@ if __name__ == "__main__":
     pipe = AnswerPipe()
     for each in requests():
         pipe.answer(each, lambda each=each: perform(each), explain)
+    os._exit(RELEASED)

@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -10,6 +13,7 @@ import pytest
 
 from hal.driver_process import DriverProcess, NoAnswer, ProcessEnded
 from hal.errors import CommunicationLost
+from tests.hal.echo_driver import RELEASED
 
 
 @pytest.fixture
@@ -67,6 +71,34 @@ def test_a_crash_is_reported_with_the_last_line_of_the_log(process: DriverProces
     process.ask("echo", timeout_s=60, value=0, n_bytes=0)
     with pytest.raises(ProcessEnded, match=r"ended by SIGSEGV"):
         process.ask("crash", timeout_s=60)
+
+
+def _driver() -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "tests.hal.echo_driver"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+
+
+def test_a_driver_whose_program_dies_before_the_answer_releases_its_device():
+    with _driver() as driver:
+        assert driver.stdin is not None and driver.stdout is not None
+        driver.stdout.close()
+        request = {"id": 1, "op": "echo", "value": 0, "n_bytes": 3_000_000}
+        driver.communicate(json.dumps(request).encode() + b"\n")
+        assert driver.returncode == RELEASED
+
+
+def test_a_driver_whose_program_dies_while_it_writes_a_request_releases_its_device():
+    with _driver() as driver:
+        assert driver.stdin is not None
+        driver.communicate(b'{"id": 1, "op": "ec')
+        assert driver.returncode == RELEASED
+
+
+def test_an_answer_that_is_no_json_is_an_error_of_the_driver(process: DriverProcess):
+    with pytest.raises(CommunicationLost, match="explained: .*not JSON serializable"):
+        process.ask("odd", timeout_s=60)
+    assert process.ask("echo", timeout_s=60, value=1, n_bytes=0).result == 1
 
 
 def test_the_kernel_ends_a_driver_whose_alarm_rings(process: DriverProcess):

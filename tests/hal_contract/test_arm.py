@@ -119,10 +119,10 @@ def test_a_recovery_that_fails_is_none(arm: ToyArm, monkeypatch):
 
 
 def test_a_command_of_another_thread_waits_for_the_end_of_the_first(arm: ToyArm, monkeypatch):
-    begun, go_on, seen = threading.Event(), threading.Event(), []
+    started, go_on, seen = threading.Event(), threading.Event(), []
 
     def slow(joints: np.ndarray, _: float) -> None:
-        begun.set()
+        started.set()
         assert go_on.wait(TIMEOUT_S)
         arm._joints = joints.copy()
 
@@ -132,7 +132,7 @@ def test_a_command_of_another_thread_waits_for_the_end_of_the_first(arm: ToyArm,
     first = threading.Thread(target=lambda: arm.move_to_joints(joints_at(0.5, 0.0, 0.5)))
     second = threading.Thread(target=lambda: arm.move_gripper(0.05))
     first.start()
-    assert begun.wait(TIMEOUT_S)
+    assert started.wait(TIMEOUT_S)
     second.start()
     second.join(0.1)
     assert second.is_alive() and not seen

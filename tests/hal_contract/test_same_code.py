@@ -1,7 +1,7 @@
 """The same program on two cells: SAPIEN's arm, and an FR3 that franky drives over the real wire protocol.
 
-Camera and scene are the same rendered ones, so the plans are the same, and so must the commands be: whatever
-an arm is told, to the last digit, apart from what a program derives from where the arm says that it stands.
+Camera and scene are the same rendered ones, so the plans are the same, and so must the commands be that
+the arm receives, to the last digit, apart from what a program derives from where the arm says that it stands.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ def record(arm: Arm, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Any, di
     def listen(name: str) -> None:
         command = getattr(arm, name)
 
-        def told(*args: Any, **settings: Any) -> Any:
+        def recorded(*args: Any, **settings: Any) -> Any:
             seen.append((name, args[0], settings))
             return command(*args, **settings)
 
-        monkeypatch.setattr(arm, name, told)
+        monkeypatch.setattr(arm, name, recorded)
 
     for name in COMMANDS:
         listen(name)
@@ -66,7 +66,7 @@ def pick_and_place(cell: Cell, planner: Planner) -> np.ndarray:
 def test_the_same_program_sends_the_same_commands_to_both_arms(tmp_path: Path, monkeypatch):
     torch.manual_seed(0)
     models = load_models(PRETRAINED)
-    told, grasps = [], []
+    commands, grasps = [], []
     planner = None
     with franky_sim() as robot:
         for path in (CELLS / "sapien.yaml", write_cell(tmp_path, "franky", robot.host, {"driver": "sapien"})):
@@ -79,16 +79,16 @@ def test_the_same_program_sends_the_same_commands_to_both_arms(tmp_path: Path, m
                     region=cell.workspace.region,
                 )
             with cell.connected():
-                if len(told) == 1:
+                if len(commands) == 1:
                     robot.order("part 0.046")  # the nut is 46 mm across its flats
-                told.append(record(cell.arm, monkeypatch))
+                commands.append(record(cell.arm, monkeypatch))
                 grasps.append(pick_and_place(cell, planner))
 
     assert grasps[0].tolist() == grasps[1].tolist()
-    assert [name for name, _, _ in told[0]] == [name for name, _, _ in told[1]]
-    assert len(told[0]) > 10
+    assert [name for name, _, _ in commands[0]] == [name for name, _, _ in commands[1]]
+    assert len(commands[0]) > 10
     derived = 0
-    for (name, first, how), (_, second, how_too) in zip(*told, strict=True):
+    for (name, first, how), (_, second, how_too) in zip(*commands, strict=True):
         assert how == how_too
         if isinstance(first, Pose):
             if first.as_vector().tolist() == second.as_vector().tolist():

@@ -45,13 +45,13 @@ def change_description(folder, change):
     (folder / "model.json").write_text(json.dumps(values))
 
 
-def test_missing_files_are_told(tmp_path, folder):
+def test_missing_files_are_reported(tmp_path, folder):
     assert "no model.json" in complaint(tmp_path / "nowhere")
     (folder / "model.safetensors").unlink()
     assert "no model.safetensors" in complaint(folder)
 
 
-def test_damaged_files_are_told(folder):
+def test_damaged_files_are_reported(folder):
     data = (folder / "model.safetensors").read_bytes()
     (folder / "model.safetensors").write_bytes(data[: len(data) // 2])
     assert "damaged" in complaint(folder)
@@ -59,7 +59,7 @@ def test_damaged_files_are_told(folder):
     assert "damaged" in complaint(folder)
 
 
-def test_weights_that_are_not_finite_are_told_and_never_saved(folder):
+def test_weights_that_are_not_finite_are_reported_and_never_saved(folder):
     change_weights(folder, lambda weights: weights["gdn.mean_head.0.bias"].fill_(torch.nan))
     assert "gdn.mean_head.0.bias is not finite" in complaint(folder)
     models = small_models()
@@ -70,7 +70,7 @@ def test_weights_that_are_not_finite_are_told_and_never_saved(folder):
     assert not (folder / "new").exists()
 
 
-def test_a_description_of_another_patch_or_network_is_told(folder):
+def test_a_description_of_another_patch_or_network_is_reported(folder):
     change_description(folder, lambda values: values["network"].update(patch_pixels=64))
     assert "patches of 64 pixels" in complaint(folder)
     change_description(folder, lambda values: values["network"].update(patch_pixels=32, variance=False))
@@ -79,7 +79,7 @@ def test_a_description_of_another_patch_or_network_is_told(folder):
     assert "colour" in complaint(folder)
 
 
-def test_other_schema_versions_and_missing_weights_are_told(folder):
+def test_other_schema_versions_and_missing_weights_are_reported(folder):
     change_weights(folder, lambda weights: weights.pop("gqn.head.0.weight"))
     assert "lacks weight gqn.head.0.weight" in complaint(folder)
     change_description(folder, lambda values: values.update(schema_version=7))

@@ -85,7 +85,7 @@ def scenes(models: Models, n: int = 5) -> tuple[torch.Tensor, torch.Tensor, torc
 
 
 @pytest.mark.parametrize(("flipped", "signs"), VIEWS.values(), ids=VIEWS)
-def test_equal_grasps_are_told_the_same_displacement(models, flipped, signs):
+def test_equal_grasps_are_reported_the_same_displacement(models, flipped, signs):
     patches, centre, height = scenes(models)
     signs = torch.tensor(signs, dtype=torch.float32)
     mean, variance = models.grasp_displacement(patches, centre, height)

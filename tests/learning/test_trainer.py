@@ -38,7 +38,7 @@ def test_validation_never_sees_a_part_of_training(samples):
 
 
 @pytest.mark.parametrize(("success", "words"), [(True, "no failure"), (False, "no success")])
-def test_data_of_one_outcome_are_told(samples, success, words):
+def test_data_of_one_outcome_are_reported(samples, success, words):
     alike = dataclasses.replace(samples, success=torch.full((len(samples),), success))
     with pytest.raises(BadDataset, match=words):
         split(alike, PATCH)

@@ -84,7 +84,7 @@ def test_what_stands_outside_the_region_is_not_the_part():
         (render([Box(x=0.6, y=0.0, yaw=0.0, size=(0.04, 0.04, 0.03))]), "outside the region"),
     ],
 )
-def test_an_image_without_a_part_is_told_in_one_line(depth, words):
+def test_an_image_without_a_part_is_reported_in_one_line(depth, words):
     with pytest.raises(NoPartFound, match=words) as caught:
         synthetic.view(depth)
     assert "\n" not in str(caught.value)

@@ -65,7 +65,7 @@ def test_the_object_displacement_is_converted_with_the_estimated_centre():
     assert np.allclose(plan.displacement[:2], np.array([cos * x - sin * y, sin * x + cos * y]) - centre[:2])
 
 
-def test_demands_that_no_candidate_meets_and_empty_tables_are_told():
+def test_demands_that_no_candidate_meets_and_empty_tables_are_reported():
     with pytest.raises(NoGraspFound, match="min_quality"):
         planner(PlannerConfig(n_candidates=50, min_quality=0.99)).plan(FRAME, np.random.default_rng(0))
     with pytest.raises(NoPartFound):

@@ -25,7 +25,7 @@ def test_the_quality_network_sees_every_second_pixel_of_the_middle_of_the_same_p
     assert torch.allclose(whole[..., ::2, 8:25:2], coarse, atol=1e-6)
 
 
-def test_a_network_that_sees_the_part_is_told_the_angle():
+def test_a_network_that_sees_the_part_is_reported_the_angle():
     torch.manual_seed(5)
     network = PatchNetworkConfig(
         image="object", patch_pixels=32, channels=4, trunk_width=8, action_width=8, head_width=8, dropout=0.0

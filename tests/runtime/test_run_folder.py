@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,11 +15,11 @@ from mskgrasp.runtime.run_folder import (
     INPUTS,
     SETTINGS,
     TRIALS,
-    append,
+    append_trial,
     file_digest,
     opened_run,
-    read,
-    rewrite,
+    read_trials,
+    rewrite_trials,
 )
 
 
@@ -112,29 +111,36 @@ def test_an_input_that_joined_later_is_remembered(tmp_path: Path):
 
 def test_lines_come_back_in_order_and_nan_is_refused(tmp_path: Path):
     path = tmp_path / TRIALS
-    assert read(path, dict) == []
+    assert read_trials(path, dict) == []
     for number in range(3):
-        append(path, {"number": number})
+        append_trial(path, {"number": number})
     with pytest.raises(ValueError, match="JSON compliant"):
-        append(path, {"error": float("nan")})
-    assert [line["number"] for line in read(path, dict)] == [0, 1, 2]
-    rewrite(path, reversed(read(path, dict)))
-    assert [line["number"] for line in read(path, dict)] == [2, 1, 0]
+        append_trial(path, {"error": float("nan")})
+    assert [line["number"] for line in read_trials(path, dict)] == [0, 1, 2]
+    rewrite_trials(path, reversed(read_trials(path, dict)))
+    assert [line["number"] for line in read_trials(path, dict)] == [2, 1, 0]
 
 
-def test_an_incomplete_line_is_removed_by_replacing_the_file(tmp_path: Path):
-    path, before = tmp_path / TRIALS, tmp_path / "before"
-    path.write_text('{"number": 0}\n{"num')
-    os.link(path, before)  # keeps the old content only if the file is not written to in place
-    assert read(path, dict) == [{"number": 0}]
-    assert path.read_text() == '{"number": 0}\n' and before.read_text().endswith('{"num')
+def test_an_incomplete_last_line_is_removed_and_the_others_stay_where_they_are(tmp_path: Path):
+    path = tmp_path / TRIALS
+    assert read_trials(path, dict) == []
+    append_trial(path, {"n": 1})
+    append_trial(path, {"n": 2})
+    inode, whole = path.stat().st_ino, path.read_bytes()
+    with path.open("ab") as file:
+        file.write(b'{"n": "\xc3')  # a kill may also divide a character
+    assert read_trials(path, dict) == [{"n": 1}, {"n": 2}]
+    assert path.read_bytes() == whole and path.stat().st_ino == inode
+    append_trial(path, {"n": 3})
+    rewrite_trials(path, reversed(read_trials(path, dict)))
+    assert [one["n"] for one in read_trials(path, dict)] == [3, 2, 1]
 
 
 def test_a_line_that_is_no_trial_is_named(tmp_path: Path):
     path = tmp_path / TRIALS
     path.write_text('{"number": 0}\nnonsense\n')
     with pytest.raises(BadDataset, match="line 2 is not a trial"):
-        read(path, dict)
+        read_trials(path, dict)
 
 
 def test_a_digest_is_of_the_content_and_a_missing_file_is_an_error(tmp_path: Path):

@@ -126,6 +126,23 @@ def test_an_error_that_a_fresh_process_may_be_free_of_is_tried_again(capfd: pyte
 
 
 @contextmanager
+def dying(folder: Path) -> Iterator[Callable[[int], Iterator[int]]]:
+    """Dies after its only result, once."""
+
+    def work(job: int) -> Iterator[int]:
+        yield job
+        if not (folder / "died").exists():
+            (folder / "died").touch()
+            os._exit(9)
+
+    yield work
+
+
+def test_an_only_result_that_was_delivered_is_not_delivered_again(tmp_path: Path):
+    assert sorted(results(Work(dying, tmp_path), [1, 2, 3], 1, apart=True)) == [1, 2, 3]
+
+
+@contextmanager
 def signals(_: None) -> Iterator[Callable[[int], Iterator[bool]]]:
     yield lambda job: iter([signal.getsignal(signal.SIGINT) is signal.SIG_IGN])
 
@@ -162,7 +179,7 @@ def start_and_interrupt(*arguments, start=util.spawnv_passfds):
 util.spawnv_passfds = start_and_interrupt
 for _ in range({threads}):
     threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
-run(lambda: list(worker_pool.results(worker_pool.Work(bench, 3), [1, 2], 2)))
+run("program", lambda: list(worker_pool.results(worker_pool.Work(bench, 3), [1, 2], 2)))
 """
     assert interrupted(code) == (130, STOPPED)
 
@@ -181,22 +198,31 @@ def main():
     Scene()
     time.sleep(60)
 
-run(main)
+run("program", main)
 """
     assert interrupted(code) == (130, STOPPED)
 
 
-@pytest.mark.parametrize("library", ["yaml", "numpy", "torch"])
-def test_ctrl_c_while_a_program_imports_is_not_lost(library: str):
-    program = subprocess.Popen(
-        [sys.executable, "-m", "mskgrasp.plan"], stderr=subprocess.PIPE, text=True,
+@pytest.mark.parametrize(
+    ("program", "library"),
+    [
+        ("mskgrasp.plan", "yaml"),
+        ("mskgrasp.plan", "numpy"),
+        ("mskgrasp.plan", "torch"),
+        ("mskgrasp.validate", "yaml"),
+        ("mskgrasp plan", "numpy"),
+    ],
+)
+def test_ctrl_c_while_a_program_imports_is_not_lost(program: str, library: str):
+    process = subprocess.Popen(
+        [sys.executable, "-m", *program.split()], stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
-    loaded = Path(f"/proc/{program.pid}/maps")
+    loaded = Path(f"/proc/{process.pid}/maps")
     while f"/{library}/" not in loaded.read_text():
-        assert program.poll() is None
-    program.send_signal(signal.SIGINT)
-    assert (program.communicate()[1], program.returncode) == (STOPPED, 130)
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    assert (process.communicate()[1], process.returncode) == (STOPPED, 130)
 
 
 def test_importing_the_packages_has_no_side_effect():

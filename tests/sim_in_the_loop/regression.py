@@ -26,7 +26,7 @@ from mskgrasp.palletize.placement_records import Placement
 from mskgrasp.palletize.run import palletize
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.options import parse
-from mskgrasp.runtime.run_folder import TRIALS, file_digest, read
+from mskgrasp.runtime.run_folder import TRIALS, file_digest, read_trials
 from tests.sim_in_the_loop.record import PARTS
 
 HERE = Path(__file__).parent
@@ -152,7 +152,7 @@ def run_set(config: RegressionConfig) -> list[Row]:
         workers=config.workers,
     )  # fmt: skip
     palletize(settings)
-    placements = read(config.out / TRIALS, Placement.from_json)
+    placements = read_trials(config.out / TRIALS, Placement.from_json)
     return rows_of([one for one in placements if one.number < config.trials])
 
 
@@ -277,4 +277,4 @@ def print_differences(differences: Sequence[Difference], console: Console) -> No
 
 
 if __name__ == "__main__":
-    run(main)
+    run("tests.sim_in_the_loop.regression", main)

@@ -14,7 +14,7 @@ from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.evaluate.replay_trial import draw_trial, find_trial
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.planning.planner import GraspPlan, Planner, PlannerConfig
-from mskgrasp.runtime.run_folder import TRIALS, append, read
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, read_trials
 from mskgrasp.trials.trial import Prediction, Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file, write_trial
 from tests import synthetic
@@ -42,7 +42,7 @@ def stored(run: Path, one: Trial) -> tuple[RgbdFrame, GraspPlan]:
     plan = planner.plan(frame, np.random.default_rng(0))
     plan = dataclasses.replace(plan, view=dataclasses.replace(plan.view, table_offset=-0.002))
     write_trial(trial_file(run, one.key), frame, plan, None)
-    append(run / TRIALS, one.to_json())
+    append_trial(run / TRIALS, one.to_json())
     return frame, plan
 
 
@@ -81,17 +81,17 @@ def test_trials_are_read_back_equal_and_an_incomplete_last_line_is_removed(tmp_p
     first = trial(predicted_std=[np.nan] * 4, measured=[0.1, 0.2, np.nan, 0.3])
     lines = [json.dumps(one.to_json(), allow_nan=False) for one in (first, trial(number=1))]
     path.write_text(lines[0] + "\n" + lines[1][:40])
-    (found,) = read(path, Trial.from_json)
+    (found,) = read_trials(path, Trial.from_json)
     assert found.key == "a-000" and np.isnan(found.predicted_std).all()
     np.testing.assert_array_equal(found.measured, first.measured)
     assert path.read_text() == lines[0] + "\n"
     path.write_text("no json\n")
     with pytest.raises(BadDataset, match="line 1 is not a trial"):
-        read(path, Trial.from_json)
+        read_trials(path, Trial.from_json)
 
 
 def test_a_part_name_with_a_path_is_refused(tmp_path: Path):
-    append(tmp_path / TRIALS, trial().to_json() | {"part": "../../etc/passwd"})
+    append_trial(tmp_path / TRIALS, trial().to_json() | {"part": "../../etc/passwd"})
     with pytest.raises(BadDataset, match="not a trial"):
         find_trial(tmp_path, "../../etc/passwd-000")
 
@@ -113,6 +113,6 @@ def test_a_damaged_file_is_an_error_of_one_line(tmp_path: Path, content: bytes):
 def test_an_unknown_run_or_trial_is_refused_with_the_known_ones(tmp_path: Path):
     with pytest.raises(UsageError, match="no run of mskgrasp.evaluate"):
         find_trial(tmp_path, "a-000")
-    append(tmp_path / TRIALS, trial().to_json())
+    append_trial(tmp_path / TRIALS, trial().to_json())
     with pytest.raises(UsageError, match="no trial 'a-001' .* for example a-000"):
         find_trial(tmp_path, "a-001")

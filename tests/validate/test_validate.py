@@ -20,7 +20,7 @@ from mskgrasp.validate.closed_form import Check, run_checks
 from mskgrasp.validate.compare import cheapest, compare, complaints
 from mskgrasp.validate.config import CELL_FLOOR, FLOOR, REFERENCE, Setting, ValidateConfig
 from mskgrasp.validate.convergence import Outcomes, draw_grasps, run_settings
-from mskgrasp.validate.report import impossible
+from mskgrasp.validate.report import summarise_discards
 from tests.programs import run_here
 
 REPOSITORY = Path(__file__).parents[2]
@@ -89,7 +89,7 @@ def test_what_a_setting_adds_to_the_floor_is_listed():
 def test_what_cannot_be_is_counted_by_reason():
     sick = outcomes()
     sick.penetration[3], sick.fastest[5], sick.displacement[8, 0] = 0.002, 4.0, 0.06
-    found = impossible(sick)
+    found = summarise_discards(sick)
     assert found.dropped == {"penetrated": 1, "too_fast": 1, "moved_too_far": 1, "not_finite": 0}
     assert found.penetration == 0 and found.fastest == pytest.approx(0.3) and found.displaced < 0.05
 

@@ -18,6 +18,7 @@ from mskgrasp.dataset.export import export_npz
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table
+from mskgrasp.runtime.options import parse_command
 from mskgrasp.runtime.progress import progress
 
 PROG = "python -m mskgrasp.dataset"
@@ -69,20 +70,16 @@ class Export:
     """The file to write, ending in .npz or .h5; with .h5 comes a .json file of the same name."""
 
 
-Verb = (
-    Annotated[Check, tyro.conf.subcommand("check")]
-    | Annotated[Info, tyro.conf.subcommand("info")]
-    | Annotated[Export, tyro.conf.subcommand("export")]
-)
+VERBS = {"check": Check, "info": Info, "export": Export}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb and return the exit code."""
-    verb = tyro.cli(
-        Verb,  # pyright: ignore[reportArgumentType]
+    verb = parse_command(
+        VERBS,
         prog=PROG,
         description="Check, summarise and export datasets of mskgrasp.collect.",
-        args=None if argv is None else list(argv),
+        argv=argv,
     )
     match verb:
         case Check():

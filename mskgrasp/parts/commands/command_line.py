@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, assert_never
-
-import tyro
+from typing import assert_never
 
 from mskgrasp.parts.builtin import builtin_names
 from mskgrasp.parts.commands.build import Build, run_build
@@ -13,26 +11,20 @@ from mskgrasp.parts.commands.import_ import Import, run_import
 from mskgrasp.parts.commands.list_ import List, run_list
 from mskgrasp.parts.commands.rate import Rate, run_rate
 from mskgrasp.parts.commands.show import Sheet, Show, run_sheet, run_show
+from mskgrasp.runtime.options import parse_command
 
 PROG = "python -m mskgrasp.parts"
 
-Command = (
-    Annotated[Build, tyro.conf.subcommand("build")]
-    | Annotated[Import, tyro.conf.subcommand("import")]
-    | Annotated[List, tyro.conf.subcommand("list")]
-    | Annotated[Show, tyro.conf.subcommand("show")]
-    | Annotated[Sheet, tyro.conf.subcommand("sheet")]
-    | Annotated[Rate, tyro.conf.subcommand("rate")]
-)
+COMMANDS = {"build": Build, "import": Import, "list": List, "show": Show, "sheet": Sheet, "rate": Rate}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit code."""
-    command = tyro.cli(
-        Command,  # pyright: ignore[reportArgumentType]
+    command = parse_command(
+        COMMANDS,
         prog=PROG,
         description=f"Parts for simulation: a catalogue of {len(builtin_names())}, and your own CAD files.",
-        args=None if argv is None else list(argv),
+        argv=argv,
     )
     match command:
         case Build():

@@ -45,7 +45,7 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     (tmp_path / "empty.yaml").touch()
     done = run_here(program.main, *arguments)
     assert done.returncode == 2 and message in done.stderr
-    assert done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("program: ") and done.stderr.count("\n") == 1
 
 
 def test_the_printed_board_is_the_board_at_its_true_size(tmp_path: Path):

@@ -133,7 +133,7 @@ def test_a_reflex_between_motions_is_not_recovered_silently(
         nudge(arm)
 
 
-def test_the_user_stop_is_told_and_recover_waits_for_its_release(
+def test_the_user_stop_is_reported_and_recover_waits_for_its_release(
     driver: DriverName, robot: FakeRobot, tmp_path: Path
 ):
     with arm_at(tmp_path, driver, robot.host) as arm:
@@ -160,7 +160,7 @@ def test_a_state_is_measured_after_it_was_asked_for(driver: DriverName, robot: F
                 assert arm._measure().mode == mode
 
 
-def test_a_cable_pulled_in_mid_motion_is_told_within_seconds(
+def test_a_cable_pulled_in_mid_motion_is_reported_within_seconds(
     driver: DriverName, robot: FakeRobot, tmp_path: Path
 ):
     with arm_at(tmp_path, driver, robot.host) as arm:
@@ -179,7 +179,7 @@ def test_a_cable_pulled_in_mid_motion_is_told_within_seconds(
         nudge(arm)
 
 
-def test_a_robot_that_is_switched_off_in_mid_motion_is_told(driver: DriverName, tmp_path: Path):
+def test_a_robot_that_is_switched_off_in_mid_motion_is_reported(driver: DriverName, tmp_path: Path):
     with robot_for(driver) as robot, arm_at(tmp_path, driver, robot.host) as arm:
         with (
             once_moving(robot, robot.process.kill),
@@ -192,7 +192,9 @@ def test_a_robot_that_is_switched_off_in_mid_motion_is_told(driver: DriverName, 
         arm.state()
 
 
-def test_a_second_program_is_told_and_the_first_goes_on(driver: DriverName, robot: FakeRobot, tmp_path: Path):
+def test_a_second_program_is_reported_and_the_first_goes_on(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path
+):
     with arm_at(tmp_path, driver, robot.host) as arm:
         second = arm_at(tmp_path, driver, robot.host, connect_timeout_s=4.0)
         begin = time.monotonic()
@@ -207,7 +209,7 @@ def test_a_second_program_is_told_and_the_first_goes_on(driver: DriverName, robo
             third.state()
 
 
-def test_a_driver_process_that_dies_is_told_and_the_arm_stops(
+def test_a_driver_process_that_dies_is_reported_and_the_arm_stops(
     driver: DriverName, robot: FakeRobot, tmp_path: Path
 ):
     with arm_at(tmp_path, driver, robot.host) as arm:
@@ -256,6 +258,40 @@ def test_a_program_that_is_ended_in_mid_motion_leaves_an_arm_at_rest(
         arm.move_gripper(0.05)
 
 
+@pytest.mark.parametrize("op", ["state", "stop"])
+def test_a_driver_that_hangs_ends_after_its_program(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path, op: str
+):
+    """A robot that answers nothing any more, and a program that is killed before its request is overdue."""
+    code = (
+        "import sys, threading, time\n"
+        "from hal import cell_from_yaml\n"
+        "with cell_from_yaml(__import__('pathlib').Path(sys.argv[1])).arm as arm:\n"
+        "    print(arm._link.pid, flush=True)\n"
+        "    sys.stdin.readline()\n"
+        "    threading.Thread(target=lambda: arm._link.ask(sys.argv[2], timeout_s=5), daemon=True).start()\n"
+        "    time.sleep(0.5)\n"
+        "    print('asked', flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    path = write_cell(tmp_path, driver, robot.host)
+    with subprocess.Popen(
+        [sys.executable, "-c", code, path, op], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as program:
+        assert program.stdin is not None and program.stdout is not None
+        driver_state = Path(f"/proc/{program.stdout.readline().strip()}/stat")
+        robot.freeze()
+        program.stdin.write("\n")
+        program.stdin.flush()
+        assert program.stdout.readline().strip() == "asked"
+        program.kill()
+    deadline = time.monotonic() + TIMEOUT_S
+    while driver_state.exists() and driver_state.read_text().rpartition(")")[2].split()[0] != "Z":
+        assert time.monotonic() < deadline, "the driver outlives its program"
+        time.sleep(0.1)
+    robot.process.send_signal(signal.SIGCONT)
+
+
 def test_a_grasp_that_misses_is_the_same_outcome_however_it_is_reported(
     driver: DriverName, robot: FakeRobot, tmp_path: Path
 ):
@@ -290,19 +326,21 @@ def test_a_hand_that_was_never_homed_is_homed_by_the_first_command_and_not_by_co
 
 
 @pytest.mark.parametrize(("driver", "version"), [("franky", 5), ("panda_py", 6)])
-def test_a_robot_of_another_version_is_told_with_the_remedy(driver: DriverName, version: int, tmp_path: Path):
+def test_a_robot_of_another_version_is_reported_with_the_remedy(
+    driver: DriverName, version: int, tmp_path: Path
+):
     with fci5(version=version) as robot:
         with pytest.raises(IncompatibleDriver, match="which wheel fits") as caught:
             arm_at(tmp_path, driver, robot.host).connect()
         assert "\n" not in str(caught.value)
 
 
-def test_no_robot_at_the_address_is_told(driver: DriverName, tmp_path: Path):
+def test_no_robot_at_the_address_is_reported(driver: DriverName, tmp_path: Path):
     with pytest.raises(NotConnected, match="no robot at 127.0.0.250"):
         arm_at(tmp_path, driver, "127.0.0.250").connect()
 
 
-def test_a_missing_package_is_told_with_its_extra(driver: DriverName, tmp_path: Path, monkeypatch):
+def test_a_missing_package_is_reported_with_its_extra(driver: DriverName, tmp_path: Path, monkeypatch):
     name = {"franky": "franky", "panda_py": "panda_py"}[driver]
     (tmp_path / f"{name}.py").write_text(f"raise ModuleNotFoundError('No module named {name}')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -310,7 +348,7 @@ def test_a_missing_package_is_told_with_its_extra(driver: DriverName, tmp_path: 
         arm_at(tmp_path, driver, "127.0.0.250").connect()
 
 
-def test_another_end_effector_in_desk_is_told(tmp_path: Path):
+def test_another_end_effector_in_desk_is_reported(tmp_path: Path):
     """Our server alone: franky-sim's hand cannot be taken off."""
     with fci5() as robot:
         robot.order("flange")
@@ -351,7 +389,7 @@ def test_a_driver_whose_program_was_killed_while_it_connected_ends_by_itself(dri
         assert worker.wait(TIMEOUT_S) in (0, -signal.SIGALRM)
 
 
-def test_pads_that_meet_something_on_their_way_are_told(tmp_path: Path):
+def test_pads_that_meet_something_on_their_way_are_reported(tmp_path: Path):
     """Our server alone: the fingers of franky-sim never come to rest when pressed against a stop."""
     with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
         robot.order("part 0.03")

@@ -114,10 +114,10 @@ def test_a_fault_ends_in_its_error_in_time_and_the_camera_opens_again(
     camera = bench.camera()
     with camera:
         bench.set(fault=fault)
-        begun = time.monotonic()
+        started = time.monotonic()
         with pytest.raises(error, match=message) as caught:
             camera.capture(1.6)  # a late frame is more than a second under way
-        assert time.monotonic() - begun < 1.6 + 1.0 + BUSY_S  # timeout, grace
+        assert time.monotonic() - started < 1.6 + 1.0 + BUSY_S  # timeout, grace
         assert "\n" not in str(caught.value)
         if error is CommunicationLost:
             with pytest.raises(CommunicationLost, match="open the cell again"):
@@ -185,10 +185,10 @@ def test_a_driver_that_does_not_stop_is_ended(bench: Bench):
     camera = bench.camera()
     camera.connect()
     bench.set(fault="refused")
-    begun = time.monotonic()
+    started = time.monotonic()
     camera.close()
     camera.close()
-    assert time.monotonic() - begun < 3 + BUSY_S
+    assert time.monotonic() - started < 3 + BUSY_S
 
 
 def test_a_killed_driver_is_reported_and_the_program_lives(bench: Bench):

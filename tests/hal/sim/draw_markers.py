@@ -18,10 +18,10 @@ from tests.hal.sim.marked_parts import (
     Motion,
     errors,
     find,
-    lay,
     littered,
     marked_cell,
     noisy,
+    place_part,
     present,
     random_motion,
     small_motion,
@@ -110,7 +110,7 @@ def draw_pictures(cell: Cell, panels: Sequence[Axes]) -> None:
     for axes, (title, x, y, turn) in zip(
         panels, (("before", 0.5, 0.0, 0.35), ("after", 0.506, -0.005, 0.6)), strict=True
     ):
-        lay(cell, resting, x, y, turn)
+        place_part(cell, resting, x, y, turn)
         frame = cell.camera.capture()
         assert frame.fine_colour is not None
         seen.append(find(cell, frame))

@@ -1,4 +1,4 @@
-"""Parts with tape squares in the simulated cell, laid where they are told to lie: the truth is known."""
+"""Parts with tape squares in the simulated cell, placed at known poses."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ def present(cell: Cell, part: str) -> Pose:
     raise TapeDoesNotFit(part)
 
 
-def lay(cell: Cell, resting: Pose, x: float, y: float, turn: float) -> Pose:
-    """Lays the part as it rests, turned, at a place."""
+def place_part(cell: Cell, resting: Pose, x: float, y: float, turn: float) -> Pose:
+    """Places the part in its resting pose, turned, at a point."""
     pose = Pose(
         position=np.array([x, y, resting.position[2]]),
         quat_wxyz=quat_multiply(quat_about_z(np.array(turn)), resting.quat_wxyz),
@@ -91,7 +91,7 @@ def random_motion(cell: Cell, resting: Pose, rng: np.random.Generator) -> Motion
     end = start + rng.uniform(-1, 1, 3) * [0.02, 0.02, np.radians(30)]
     poses, frames = [], []
     for place in (start, end):
-        poses.append(lay(cell, resting, *place))
+        poses.append(place_part(cell, resting, *place))
         frames.append(cell.camera.capture())
     grasp = np.array([*(start[:2] + rng.normal(0, 0.01, 2)), 0.0115, rng.uniform(-np.pi / 2, np.pi / 2)])
     return Motion(poses=(poses[0], poses[1]), frames=(frames[0], frames[1]), grasp=grasp)
@@ -101,7 +101,7 @@ def small_motion(cell: Cell, resting: Pose) -> Motion:
     """Half a centimetre and six degrees in the middle of the region."""
     poses, frames = [], []
     for place in ((0.5, 0.0, 0.3), (0.505, 0.004, 0.4)):
-        poses.append(lay(cell, resting, *place))
+        poses.append(place_part(cell, resting, *place))
         frames.append(cell.camera.capture())
     grasp = np.array([0.5, 0.0, 0.0115, 0.2])
     return Motion(poses=(poses[0], poses[1]), frames=(frames[0], frames[1]), grasp=grasp)
