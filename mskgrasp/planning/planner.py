@@ -11,8 +11,8 @@ from pydantic import Field
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.config import Config
+from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.errors import BadModel, NoGraspFound
-from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
@@ -316,29 +316,3 @@ def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> 
             f"{config.min_quality:g}; move the part, or lower min_quality"
         )
     return int(good[0] if config.policy == "quality" else good[np.argmin(scores[good])])
-
-
-def object_displacement_covariance(
-    grasp_displacement: np.ndarray, variance: np.ndarray, centre_grasp: np.ndarray
-) -> np.ndarray:
-    """Compute the object displacement's covariance, to first order in the grasp displacement's deviations.
-
-    Args:
-        grasp_displacement: (..., 4) mean.
-        variance: (..., 4) of independent components.
-        centre_grasp: (..., 3) object centre in the grasp frame before the grasp, metres.
-
-    Returns:
-        (..., 4, 4) J diag(variance) J', J the derivative of `grasp.to_object_displacement`.
-    """
-    turn = -wrap_angle(grasp_displacement[..., 3])
-    cos, sin = np.cos(turn), np.sin(turn)
-    arm = centre_grasp - grasp_displacement[..., :3]
-    jacobian = np.zeros(grasp_displacement.shape[:-1] + (4, 4))
-    jacobian[..., 0, 0], jacobian[..., 0, 1] = -cos, sin
-    jacobian[..., 1, 0], jacobian[..., 1, 1] = -sin, -cos
-    jacobian[..., 2, 2] = -1.0
-    jacobian[..., 0, 3] = sin * arm[..., 0] + cos * arm[..., 1]
-    jacobian[..., 1, 3] = -cos * arm[..., 0] + sin * arm[..., 1]
-    jacobian[..., 3, 3] = -1.0
-    return jacobian * variance[..., None, :] @ np.swapaxes(jacobian, -1, -2)

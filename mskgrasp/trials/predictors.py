@@ -10,12 +10,12 @@ from typing import Protocol
 import numpy as np
 
 from hal.camera import RgbdFrame
+from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.errors import NoGraspFound
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import PartView, centre_in_grasp_frame, to_grasp_displacement, to_object_displacement
 from mskgrasp.dataset import list_shards, read_columns
 from mskgrasp.learning.grasp_models import Models
-from mskgrasp.planning.planner import object_displacement_covariance
 from mskgrasp.planning.scoring import Scene, displacements
 from mskgrasp.trials.lowess import Lowess
 from mskgrasp.trials.trial import Prediction

@@ -4,15 +4,12 @@ import json
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
 
 from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound
-from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
+from mskgrasp.core.grasp import centre_in_grasp_frame
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.planner import (
     PlannerConfig,
-    object_displacement_covariance,
     select,
     shortlist,
     variance_score,
@@ -21,7 +18,6 @@ from mskgrasp.planning.refine import fingers_free
 from mskgrasp.planning.scoring import Scene
 from mskgrasp.reports.grasp_figures import draw_plan
 from tests import synthetic
-from tests.core.test_grasp import centres, shifts
 from tests.planning.hand_made import BOX, FRAME, hand_made_models, planner
 from tests.synthetic import REGION, Box
 
@@ -108,21 +104,6 @@ def test_the_score_is_the_mean_squared_error_of_the_parts_points():
     moved_y = sin * points[:, 0] + cos * points[:, 1] + errors[:, 1, None]
     squared = (moved_x - points[:, 0]) ** 2 + (moved_y - points[:, 1]) ** 2 + errors[:, 2, None] ** 2
     assert variance_score(variance, radius) == pytest.approx(squared.mean(), rel=0.06)
-
-
-@given(shifts, centres)
-def test_the_covariance_is_that_of_the_derivative(displacement, centre):
-    variance = np.array([1e-6, 4e-6, 9e-6, 1e-4])
-    covariance = object_displacement_covariance(displacement, variance, centre)
-    jacobian = np.zeros((4, 4))
-    for k in range(4):
-        step = np.zeros(4)
-        step[k] = 1e-6
-        ahead, behind = (to_object_displacement(displacement + s * step, centre) for s in (1, -1))
-        change = ahead - behind
-        change[3] = wrap_angle(change[3])
-        jacobian[:, k] = change / 2e-6
-    assert np.allclose(covariance, jacobian @ np.diag(variance) @ jacobian.T, atol=1e-10)
 
 
 def test_a_grasp_beside_which_something_stands_is_left_out():
