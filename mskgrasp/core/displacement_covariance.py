@@ -10,12 +10,12 @@ from mskgrasp.core.geometry import wrap_angle
 def object_displacement_covariance(
     grasp_displacement: np.ndarray, variance: np.ndarray, centre_grasp: np.ndarray
 ) -> np.ndarray:
-    """Compute the object displacement's covariance, to first order in the grasp displacement's deviations.
+    """Compute the covariance of a point's displacement, to first order in the grasp displacement's.
 
     Args:
         grasp_displacement: (..., 4) mean.
         variance: (..., 4) of independent components.
-        centre_grasp: (..., 3) object centre in the grasp frame before the grasp, metres.
+        centre_grasp: (..., 3) the point in the grasp frame before the grasp, metres.
 
     Returns:
         (..., 4, 4) J diag(variance) J', J the derivative of `grasp.to_object_displacement`.
