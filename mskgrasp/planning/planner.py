@@ -13,7 +13,7 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.config import Config
 from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.errors import BadModel, NoGraspFound
-from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
+from mskgrasp.core.grasp import Grasp, PartView, sample_grasps, to_object_displacement
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.refine import fingers_free, grasps_near
@@ -68,9 +68,8 @@ class GraspPlan:
     Attributes:
         grasp: The chosen one, base frame.
         quality: Predicted probability of success.
-        displacement: (4,) expected object displacement, axes of the grasp frame, metres and radians.
-        displacement_cov: (4, 4) its covariance, to first order.
-        grasp_displacement: (4,) expected grasp displacement, predicted by the network.
+        grasp_displacement: (4,) expected grasp displacement, predicted by the network: the rigid motion, from
+            which `displacement_of` gives that of a point.
         grasp_displacement_var: (4,) its variances; NaN if the network predicts none.
         score: Variance score of the grasp, square metres; NaN if the network predicts no variance.
         view: The detected part.
@@ -83,8 +82,6 @@ class GraspPlan:
 
     grasp: Grasp
     quality: float
-    displacement: np.ndarray
-    displacement_cov: np.ndarray
     grasp_displacement: np.ndarray
     grasp_displacement_var: np.ndarray
     score: float
@@ -104,19 +101,15 @@ class GraspPlan:
         best: Shortlist,
         chosen: int,
         *,
-        centre: np.ndarray,
         seconds: dict[str, float],
     ) -> GraspPlan:
-        """Make the plan of the shortlist's grasp ``chosen``, for a part centre (3,), base frame."""
-        row, mean, variance = best.rows[chosen], best.mean[chosen], best.variance[chosen]
-        centre_grasp = centre_in_grasp_frame(centre, candidates[row])
+        """Make the plan of the shortlist's grasp ``chosen``."""
+        row = best.rows[chosen]
         return cls(
             grasp=Grasp.from_vector(candidates[row]),
             quality=float(qualities[row]),
-            displacement=to_object_displacement(mean, centre_grasp),
-            displacement_cov=object_displacement_covariance(mean, variance, centre_grasp),
-            grasp_displacement=mean,
-            grasp_displacement_var=variance,
+            grasp_displacement=best.mean[chosen],
+            grasp_displacement_var=best.variance[chosen],
             score=float(best.scores[chosen]),
             view=view,
             candidates=candidates,
@@ -133,9 +126,36 @@ class GraspPlan:
         place = f"x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees"
         return f"grasp at {place}, quality {self.quality:.2f}"
 
+    def displacement_of(self, point_base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the expected displacement of a point of the part.
+
+        Args:
+            point_base: (3,) the point before the grasp, base frame, metres.
+
+        Returns:
+            Its displacement (4,), axes of the grasp frame, metres and radians, and the covariance (4, 4), to
+            first order.
+        """
+        point_grasp = self.grasp.T_base_grasp.inverse().apply(np.asarray(point_base, dtype=np.float64))
+        mean, variance = self.grasp_displacement, self.grasp_displacement_var
+        return (
+            to_object_displacement(mean, point_grasp),
+            object_displacement_covariance(mean, variance, point_grasp),
+        )
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """(4,) expected displacement of the seen centre, axes of the grasp frame, metres and radians."""
+        return self.displacement_of(self.view.centre_base)[0]
+
+    @property
+    def displacement_cov(self) -> np.ndarray:
+        """(4, 4) its covariance."""
+        return self.displacement_of(self.view.centre_base)[1]
+
     @property
     def displacement_std(self) -> np.ndarray:
-        """(4,) standard deviations of the object displacement, metres and radians."""
+        """(4,) its standard deviations."""
         return np.sqrt(np.diag(self.displacement_cov))
 
     def to_json(self) -> dict[str, Any]:
@@ -219,7 +239,7 @@ class Planner:
             "select": selected - scored,
             "total": selected - started,
         }
-        return GraspPlan.of(view, candidates, found, best, chosen, centre=view.centre_base, seconds=seconds)
+        return GraspPlan.of(view, candidates, found, best, chosen, seconds=seconds)
 
     def _shortlist(self, scene: Scene, candidates: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Find the best candidates; with ``check_fingers`` the best whose fingers are free.

@@ -53,12 +53,12 @@ class Predictor(Protocol):
         """Whether grasps of this part were among those it was made from."""
         ...
 
-    def predict(self, seen: Seen, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def predict(self, seen: Seen, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of grasps (n, 4), base frame.
 
         Returns:
-            Mean (n, 4) of the grasp displacement, its variances (n, 4), NaN where it tells none, both metres
-            and radians along the axes of the grasp frame; the part's centre (3,) that it speaks of, base.
+            Mean (n, 4) of the grasp displacement and its variances (n, 4), NaN where it tells none, both
+            metres and radians along the axes of the grasp frame.
         """
         ...
 
@@ -79,11 +79,10 @@ class NetworkPredictor:
         """Whether the part was among those of training."""
         return part in self.models.meta.training.get("training_parts", ())
 
-    def predict(self, seen: Seen, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def predict(self, seen: Seen, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """From the depth image alone."""
         scene = Scene.of(seen.frame, seen.view, seen.view.table_z, self.models.device)
-        mean, variance = displacements(self.models, scene, grasps, self.chunk_size)
-        return mean, variance, seen.view.centre_base
+        return displacements(self.models, scene, grasps, self.chunk_size)
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ class LowessPredictor:
         """Whether there are recorded grasps of it."""
         return part in self.fits
 
-    def predict(self, seen: Seen, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def predict(self, seen: Seen, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """From the part's pose.
 
         Raises:
@@ -111,17 +110,17 @@ class LowessPredictor:
             position=np.tile(np.asarray(pose.position, dtype=np.float64), (n, 1)),
             quat_wxyz=np.tile(np.asarray(pose.quat_wxyz, dtype=np.float64), (n, 1)),
         )
-        mean, variance = self.fits[seen.part].predict(poses, grasps)
-        return mean, variance, np.asarray(pose.position, dtype=np.float64)
+        return self.fits[seen.part].predict(poses, grasps)
 
 
-def predict_one(predictor: Predictor, seen: Seen, grasp: np.ndarray) -> Prediction:
-    """What a model expects of one grasp (4,), as an object displacement."""
-    mean, variance, centre = predictor.predict(seen, np.asarray(grasp, dtype=np.float64)[None])
-    centre_grasp = centre_in_grasp_frame(centre, np.asarray(grasp, dtype=np.float64))
-    covariance = object_displacement_covariance(mean[0], variance[0], centre_grasp)
+def predict_one(predictor: Predictor, seen: Seen, grasp: np.ndarray, point_base: np.ndarray) -> Prediction:
+    """The displacement of a part's point (3,), base frame, that a model expects of one grasp (4,)."""
+    grasp = np.asarray(grasp, dtype=np.float64)
+    mean, variance = predictor.predict(seen, grasp[None])
+    point_grasp = centre_in_grasp_frame(np.asarray(point_base, dtype=np.float64), grasp)
+    covariance = object_displacement_covariance(mean[0], variance[0], point_grasp)
     return Prediction(
-        mean=to_object_displacement(mean[0], centre_grasp).tolist(),
+        mean=to_object_displacement(mean[0], point_grasp).tolist(),
         std=np.sqrt(np.diag(covariance)).tolist(),
     )
 

@@ -14,7 +14,7 @@ _LEGAL_KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """A model's expectation of a grasp: object displacement, axes of the grasp frame, metres and radians.
+    """A model's expectation of a grasp: displacement of the trial's point, metres and radians.
 
     Attributes:
         mean: (4,).
@@ -29,6 +29,8 @@ class Prediction:
 class Trial:
     """A planned grasp and its outcome; poses in the base frame, displacements in the grasp frame.
 
+    All displacements of a trial are of one point of the part, ``point_base``.
+
     Attributes:
         part: Name of the part.
         number: Index of the trial among those of the part.
@@ -38,18 +40,19 @@ class Trial:
         reason: Why not; empty where it was.
         grasp: (4,) the executed grasp; None, as all that follows, where no grasp was found.
         quality: Predicted.
-        predicted: (4,) expected object displacement, metres and radians.
+        point_base: (3,) that point before the grasp, metres: the part's origin by the tracker, or its seen
+            centre where markers measure or nothing tracks the part; None where no grasp was found.
+        predicted: (4,) expected displacement, metres and radians.
         predicted_std: (4,) its standard deviations; NaN where the model predicts none.
-        measured: (4,) object displacement; None where not successful or not measured. Of markers, dz is NaN:
-            they measure the motion in the plane.
+        measured: (4,) displacement; None where not successful or not measured. Of markers, dz is NaN: they
+            measure the motion in the plane.
         tilt: Measured tilt, radians, or None.
         planning_s: Seconds that planning took.
         family: Kind of part.
         policy: How the grasp was chosen.
         chosen_by: Label of the model whose variances chose it; empty where there is but one.
         unmeasured: Why a success was not measured; empty where it was.
-        true: (4,) where markers measure, the tracker's displacement of the very point whose motion they
-            measure, the part's seen centre; None without a tracker.
+        true: (4,) where markers measure, the displacement by the tracker; None without one.
         pose_base_obj: (7,) x y z qw qx qy qz of the part before the grasp, where a tracker reports it.
         predictions: Expectations of other models for this grasp, by label.
     """
@@ -61,6 +64,7 @@ class Trial:
     reason: str
     grasp: list[float] | None = None
     quality: float | None = None
+    point_base: list[float] | None = None
     predicted: list[float] | None = None
     predicted_std: list[float] | None = None
     measured: list[float] | None = None
@@ -88,9 +92,11 @@ class Trial:
         """The trial that `to_json` wrote.
 
         Raises:
-            TypeError, ValueError, KeyError: The values are no trial.
+            TypeError, ValueError, KeyError: The values are no trial, or do not say of which point they are.
         """
         values = dict(values)
+        if "point_base" not in values:  # predicted of one point and measured of another
+            raise KeyError("point_base")
         for name in ("predicted_std", "measured"):
             values[name] = _none_to_nan(values[name])
         values["predictions"] = {

@@ -73,7 +73,7 @@ def test_a_plan_is_plain_json_and_a_picture(tmp_path):
     values = json.loads(json.dumps(plan.to_json(), allow_nan=False))
     assert np.allclose(values["grasp"], plan.grasp.as_vector()) and len(values["displacement_std"]) == 4
     for number, drawn in enumerate(
-        (plan, dataclasses.replace(plan, displacement_cov=np.full((4, 4), np.nan)))
+        (plan, dataclasses.replace(plan, grasp_displacement_var=np.full(4, np.nan)))
     ):
         draw_plan(FRAME, drawn, tmp_path / f"{number}.png")
         assert (tmp_path / f"{number}.png").read_bytes().startswith(b"\x89PNG")

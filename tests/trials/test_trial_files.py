@@ -84,9 +84,11 @@ def test_lines_survive_the_file_and_a_line_cut_short(tmp_path: Path):
     assert found.key == "a-000" and np.isnan(found.predicted_std).all()
     np.testing.assert_array_equal(found.measured, first.measured)
     assert path.read_text() == lines[0] + "\n"
-    path.write_text("no json\n")
-    with pytest.raises(BadDataset, match="line 1 is not a trial"):
-        read(path, Trial.from_json)
+    old = {name: value for name, value in first.to_json().items() if name != "point_base"}
+    for text in ("no json", json.dumps(old)):  # it predicted one point and measured another
+        path.write_text(text + "\n")
+        with pytest.raises(BadDataset, match="line 1 is not a trial"):
+            read(path, Trial.from_json)
 
 
 def test_a_name_that_leads_out_of_the_folder_is_no_trial(tmp_path: Path):
