@@ -13,7 +13,7 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.config import Config
 from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.errors import BadModel, NoGraspFound
-from mskgrasp.core.grasp import Grasp, PartView, sample_grasps, to_object_displacement
+from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.refine import fingers_free, grasps_near
@@ -263,8 +263,9 @@ class Planner:
         return free[:n]
 
     def _scored(self, scene: Scene, candidates: np.ndarray, rows: np.ndarray) -> Shortlist:
-        mean, variance = displacements(self.models, scene, candidates[rows], self.config.chunk_size)
-        return Shortlist(rows, mean, variance, variance_score(variance, scene.view.gyration_radius))
+        grasps = candidates[rows]
+        mean, variance = displacements(self.models, scene, grasps, self.config.chunk_size)
+        return Shortlist(rows, mean, variance, variance_score(mean, variance, grasps, scene.view))
 
     def _refined(
         self,
@@ -314,13 +315,22 @@ def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:
     return np.argsort(-qualities, kind="stable")[:n]
 
 
-def variance_score(variance: np.ndarray, gyration_radius: float) -> np.ndarray:
-    """Compute var_x + var_y + var_z + r^2 var_theta of variances (..., 4), square metres.
+def variance_score(mean: np.ndarray, variance: np.ndarray, grasps: np.ndarray, view: PartView) -> np.ndarray:
+    """Compute var_x + var_y + var_z + r^2 var_theta of the displacement of the seen centre, square metres.
 
-    With r the part's radius of gyration it is the mean squared distance by which the part's points miss
-    their predicted places.
+    With r the part's radius of gyration it is, to first order, the mean squared distance by which the part's
+    points miss their predicted places.
+
+    Args:
+        mean: (..., 4) of the grasp displacement.
+        variance: (..., 4) the same.
+        grasps: (..., 4) base frame.
+        view: The detected part.
     """
-    return variance[..., :3].sum(axis=-1) + gyration_radius**2 * variance[..., 3]
+    centre_grasp = centre_in_grasp_frame(view.centre_base, grasps)
+    covariance = object_displacement_covariance(mean, variance, centre_grasp)
+    of_centre = np.diagonal(covariance, axis1=-2, axis2=-1)
+    return of_centre[..., :3].sum(axis=-1) + view.gyration_radius**2 * of_centre[..., 3]
 
 
 def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> int:

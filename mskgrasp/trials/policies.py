@@ -101,7 +101,7 @@ class Chooser:
         pose = None if self.tracker is None else self.tracker.part_pose()
         seen = Seen(part=self.part, frame=frame, view=view, pose_base_obj=pose)
         mean, variance = self.predictor.predict(seen, candidates[rows])
-        best = Shortlist(rows, mean, variance, variance_score(variance, view.gyration_radius))
+        best = Shortlist(rows, mean, variance, variance_score(mean, variance, candidates[rows], view))
         chosen = select(found[rows], best.scores, config)
         selecting_s = time.perf_counter() - scored
         seconds = {"score": scoring_s, "select": selecting_s, "total": scoring_s + selecting_s}

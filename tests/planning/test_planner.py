@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound
-from mskgrasp.core.grasp import centre_in_grasp_frame
+from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.planner import (
     PlannerConfig,
@@ -95,15 +95,22 @@ def test_selection_minimises_the_score_among_those_good_enough():
 
 def test_the_score_is_the_mean_squared_error_of_the_parts_points():
     rng = np.random.default_rng(0)
-    variance = np.array([0.001, 0.002, 0.0005, 0.05]) ** 2
-    points = rng.normal(size=(500, 2)) * 0.01
-    radius = np.sqrt((points**2).sum(axis=1).mean())
-    errors = rng.normal(size=(2000, 4)) * np.sqrt(variance)
-    cos, sin = np.cos(errors[:, 3, None]), np.sin(errors[:, 3, None])
-    moved_x = cos * points[:, 0] - sin * points[:, 1] + errors[:, 0, None]
-    moved_y = sin * points[:, 0] + cos * points[:, 1] + errors[:, 1, None]
-    squared = (moved_x - points[:, 0]) ** 2 + (moved_y - points[:, 1]) ** 2 + errors[:, 2, None] ** 2
-    assert variance_score(variance, radius) == pytest.approx(squared.mean(), rel=0.06)
+    mean, std = np.array([0.004, -0.003, 0.001, 0.3]), np.array([0.001, 0.002, 0.0005, 0.05])
+    grasp = np.array([0.5, 0.1, 0.02, 0.7])
+    points = np.array([0.52, 0.09, 0.03]) + rng.normal(size=(500, 3)) * [0.01, 0.01, 0.0]
+    centre = points.mean(axis=0)
+    view = dataclasses.replace(
+        planner().plan(FRAME, rng).view,
+        centre_base=centre,
+        gyration_radius=float(np.sqrt(((points - centre) ** 2).sum(axis=1).mean())),
+    )
+    drawn = np.repeat(mean + std * rng.normal(size=(2000, 1, 4)), 500, axis=1)
+    points_grasp = centre_in_grasp_frame(points, grasp)
+    expected = to_object_displacement(np.tile(mean, (500, 1)), points_grasp)
+    missed = to_object_displacement(drawn, points_grasp) - expected
+    squared = (missed[..., :3] ** 2).sum(axis=-1)
+    score = variance_score(mean[None], std[None] ** 2, grasp[None], view)
+    assert score[0] == pytest.approx(squared.mean(), rel=0.06)
 
 
 def test_a_grasp_beside_which_something_stands_is_left_out():
