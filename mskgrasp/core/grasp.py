@@ -161,13 +161,14 @@ def centre_in_grasp_frame(centre_base: Array, grasp: Array) -> Array:
 
 
 def to_grasp_displacement(displacement: Array, centre_grasp: Array) -> Array:
-    """Object displacement to grasp displacement: how the hand moved in the part's frame.
+    """Displacement of a part's point to grasp displacement: how the hand moved in the part's frame.
 
-    ``Delta-g = (c - Rz(-dtheta) (c + d), -dtheta)``, the inverse of `to_object_displacement`.
+    ``Delta-g = (c - Rz(-dtheta) (c + d), -dtheta)``, the inverse of `to_object_displacement`. It describes
+    the rigid motion: every point of the part gives the same, up to the tilt.
 
     Args:
-        displacement: (..., 4) dx, dy, dz, dtheta of the part in the hand.
-        centre_grasp: (..., 3) c, the object centre in the grasp frame before the grasp, metres.
+        displacement: (..., 4) dx, dy, dz, dtheta of that point in the hand.
+        centre_grasp: (..., 3) c, the point in the grasp frame before the grasp, metres.
 
     Returns:
         (..., 4) metres and radians, along the axes of the planned grasp frame.
@@ -179,14 +180,14 @@ def to_grasp_displacement(displacement: Array, centre_grasp: Array) -> Array:
 
 
 def to_object_displacement(grasp_displacement: Array, centre_grasp: Array) -> Array:
-    """Grasp displacement to object displacement; the inverse of `to_grasp_displacement`.
+    """Grasp displacement to the displacement of a part's point; the inverse of `to_grasp_displacement`.
 
     Args:
         grasp_displacement: (..., 4), metres and radians.
-        centre_grasp: (..., 3) c, the object centre in the grasp frame before the grasp, metres.
+        centre_grasp: (..., 3) c, the point in the grasp frame before the grasp, metres.
 
     Returns:
-        (..., 4) dx, dy, dz, dtheta of the part in the hand, along the axes of the grasp frame.
+        (..., 4) dx, dy, dz, dtheta of that point in the hand, along the axes of the grasp frame.
     """
     xp = array_namespace(grasp_displacement)
     dtheta = -grasp_displacement[..., 3]

@@ -50,7 +50,9 @@ def draw_trial(run: Path, trial: Trial, path: Path) -> None:
         return
     plan = dataclasses.replace(plan, seconds={"total": trial.planning_s or 0.0})
     measured = None if trial.measured is None else np.array(trial.measured)
-    draw_plan(frame, plan, path, measured=measured, note=f"{trial.key}: {outcome_text(trial)}")
+    point = None if trial.point_base is None else np.array(trial.point_base)
+    note = f"{trial.key}: {outcome_text(trial)}"
+    draw_plan(frame, plan, path, point_base=point, measured=measured, note=note)
 
 
 def outcome_text(trial: Trial) -> str:

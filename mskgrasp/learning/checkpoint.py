@@ -22,6 +22,7 @@ class Checkpoint:
 
     Attributes:
         fingerprint: Of the data; training does not resume with other data.
+        samples_version: Version of the samples made from the data; 1 in files that do not name it.
         stage: Network that is being trained.
         epoch: Epochs of that stage that are finished.
         history: One row an epoch of all stages so far.
@@ -31,6 +32,7 @@ class Checkpoint:
     """
 
     fingerprint: str
+    samples_version: int
     stage: str
     epoch: int
     history: list[dict[str, Any]]
@@ -49,7 +51,8 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         for group in _GROUPS
         for name, value in getattr(checkpoint, group).items()
     }
-    progress = {name: getattr(checkpoint, name) for name in ("fingerprint", "stage", "epoch", "history")}
+    names = ("fingerprint", "samples_version", "stage", "epoch", "history")
+    progress = {name: getattr(checkpoint, name) for name in names}
     temporary = path.with_name(path.name + ".tmp")
     save_file(tensors, temporary, metadata={"progress": json.dumps(progress)})
     temporary.chmod(0o644)  # safetensors creates it readable by its owner only
@@ -64,7 +67,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
     """
     try:
         with safe_open(path, framework="pt") as file:
-            progress: dict[str, Any] = json.loads(file.metadata()["progress"])
+            progress: dict[str, Any] = {"samples_version": 1} | json.loads(file.metadata()["progress"])
             groups: dict[str, dict[str, Tensor]] = {group: {} for group in _GROUPS}
             for key in file.keys():  # noqa: SIM118 - not a dict
                 group, name = key.split("/", 1)

@@ -11,6 +11,7 @@ from scipy.special import logit
 from scipy.stats import norm
 
 from mskgrasp.core import metrics
+from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import to_object_displacement
 from mskgrasp.learning.grasp_models import Calibration, Models
@@ -54,6 +55,25 @@ def predict_grasp_displacement(
         means.append(mean)
         variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
     return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
+
+
+def centroid_displacement(
+    samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Convert grasp displacements of some rows to displacements of the parts' true centroids.
+
+    Args:
+        samples: The dataset.
+        rows: n rows.
+        mean: (n, 4) of the grasp displacement.
+        variance: (n, 4) the same.
+
+    Returns:
+        Mean and variance (n, 4), the variance to first order.
+    """
+    origin_grasp = samples.origin_grasp[rows].double().numpy()
+    covariance = object_displacement_covariance(mean, variance, origin_grasp)
+    return to_object_displacement(mean, origin_grasp), np.diagonal(covariance, axis1=-2, axis2=-1)
 
 
 def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> Calibration:
@@ -133,7 +153,7 @@ def displacement_metrics(
 ) -> dict[str, Any]:
     """Compute errors of the GDN on successful grasps, and of predicting zero and the training mean.
 
-    RMSE is over the object displacement, likelihood and coverage over the grasp displacement.
+    RMSE is over the displacement of the true centroid, likelihood and coverage over the grasp displacement.
     """
     training_rows = training_rows[samples.success[training_rows]]
     rows = rows[samples.success[rows]]
@@ -158,9 +178,8 @@ def _uncertainty_metrics(
     samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
 ) -> dict[str, Any]:
     """Compute the errors' intervals over parts, and metrics of the predicted variances."""
-    centre_grasp = samples.centre_grasp[rows].double().numpy()
     displacement = samples.displacement[rows].double().numpy()
-    predicted = to_object_displacement(mean, centre_grasp)
+    predicted, expected = centroid_displacement(samples, rows, mean, variance)
     shift = np.linalg.norm(predicted[:, :3] - displacement[:, :3], axis=1)
     turn = np.abs(wrap_angle(predicted[:, 3] - displacement[:, 3]))
     report: dict[str, Any] = {
@@ -183,10 +202,10 @@ def _uncertainty_metrics(
     }
     return report | {
         "axes": {name: dict(zip(AXES, map(float, values), strict=True)) for name, values in axes.items()},
-        "ause_translation": metrics.ause(shift, variance[:, :3].sum(axis=1)),
-        "ause_rotation": metrics.ause(turn, variance[:, 3]),
+        "ause_translation": metrics.ause(shift, expected[:, :3].sum(axis=1)),
+        "ause_rotation": metrics.ause(turn, expected[:, 3]),
         "least_uncertain": {
-            f"{share:.0%}": _errors_of_least(shift, turn, variance, share) for share in (0.03, 0.1, 0.3)
+            f"{share:.0%}": _errors_of_least(shift, turn, expected, share) for share in (0.03, 0.1, 0.3)
         },
     }
 
@@ -211,9 +230,8 @@ def _by_part(samples: Samples, rows: torch.Tensor, values: np.ndarray) -> list[n
 def displacement_errors(
     samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
 ) -> dict[str, Any]:
-    """Compute RMSE over the object displacement, likelihood and coverage over the grasp displacement."""
-    centre_grasp = samples.centre_grasp[rows].double().numpy()
-    predicted = to_object_displacement(mean, centre_grasp)
+    """Compute RMSE over the displacement of the true centroid, likelihood and coverage over the grasp's."""
+    predicted, _ = centroid_displacement(samples, rows, mean, variance)
     displacement = samples.displacement[rows].double().numpy()
     target = samples.grasp_displacement[rows].double().numpy()
     covered = metrics.coverage(mean, variance, target)

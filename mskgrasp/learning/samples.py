@@ -24,6 +24,8 @@ from mskgrasp.perception.height_patches import crop_patches, height_image
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.runtime.worker_pool import Work, results
 
+SAMPLES_VERSION = 2
+"""Raised by every change after which a dataset gives other samples: training does not resume with them."""
 HEIGHT_STEP = 1e-4
 """Resolution of stored patches, metres: that of a stored depth."""
 SHARDS_A_WORKER = 100
@@ -39,11 +41,13 @@ class Samples:
         object_patches: (n, 1, r, c) int16, centred on the part and not rotated; None unless the
             network sees them.
         theta: (n,) float32 angle of the grasp.
-        centre_grasp: (n, 3) float32 object centre, estimated from the image, in the grasp frame, metres.
+        centre_grasp: (n, 3) float32 object centre, estimated from the image, in the grasp frame, metres:
+            what a network sees of the part's place.
+        origin_grasp: (n, 3) float32 the part's true centroid, the origin of obj, in the grasp frame, metres.
         height: (n,) float32 of the grasp above the table, metres.
         success: (n,) bool.
-        displacement: (n, 4) float32 true object displacement, NaN where the grasp failed.
-        grasp_displacement: (n, 4) float32, the same as grasp displacement: the training target.
+        displacement: (n, 4) float32 true displacement of the centroid, NaN where the grasp failed.
+        grasp_displacement: (n, 4) float32, the same motion as grasp displacement: the training target.
         part: (n,) int64, index into ``parts``.
         parts: Names of the parts.
         skipped: Number of unusable attempts by reason: the planner would find no part in them either.
@@ -54,6 +58,7 @@ class Samples:
     object_patches: Tensor | None
     theta: Tensor
     centre_grasp: Tensor
+    origin_grasp: Tensor
     height: Tensor
     success: Tensor
     displacement: Tensor
@@ -103,6 +108,7 @@ class Samples:
             object_patches=None if self.object_patches is None else self.object_patches[rows],
             theta=self.theta[rows],
             centre_grasp=self.centre_grasp[rows],
+            origin_grasp=self.origin_grasp[rows],
             height=self.height[rows],
             success=self.success[rows],
             displacement=self.displacement[rows],
@@ -241,7 +247,7 @@ def _shard_samples(
         return {}, skipped
     grasp = attempts.grasp[rows].astype(np.float64)
     displacement = attempts.displacement[rows].astype(np.float64)
-    centre_grasp = centre_in_grasp_frame(np.array(centres), grasp)
+    origin_grasp = centre_in_grasp_frame(attempts.pose_base_obj[rows, :3].astype(np.float64), grasp)
     table_z = info.table_z + np.array(offsets)
     heights = height_image(torch.from_numpy(depth[rows]), info.intrinsics, info.T_base_camera, table_z)
 
@@ -262,11 +268,12 @@ def _shard_samples(
         "patches": crop(grasp),
         "object_patches": crop(around_part) if network.sees_object else np.zeros((len(rows), 0)),
         "theta": grasp[:, 3].astype(np.float32),
-        "centre_grasp": centre_grasp.astype(np.float32),
+        "centre_grasp": centre_in_grasp_frame(np.array(centres), grasp).astype(np.float32),
+        "origin_grasp": origin_grasp.astype(np.float32),
         "height": (grasp[:, 2] - info.table_z).astype(np.float32),
         "success": attempts.success[rows],
         "displacement": displacement.astype(np.float32),
-        "grasp_displacement": to_grasp_displacement(displacement, centre_grasp).astype(np.float32),
+        "grasp_displacement": to_grasp_displacement(displacement, origin_grasp).astype(np.float32),
     }, skipped
 
 

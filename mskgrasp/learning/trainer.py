@@ -27,7 +27,7 @@ from mskgrasp.learning.checkpoint import (
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models
 from mskgrasp.learning.network_config import NetworkConfig, Normalisation, PatchNetworkConfig
 from mskgrasp.learning.networks import displacement_loss, with_noise
-from mskgrasp.learning.samples import Samples, part_sides
+from mskgrasp.learning.samples import SAMPLES_VERSION, Samples, part_sides
 from mskgrasp.learning.symmetry import mirror_and_turn
 
 _LEAST_TARGET_STD = (1e-4, 1e-4, 1e-4, 1e-3)
@@ -168,6 +168,7 @@ def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) ->
             "test_parts": [name for name in samples.parts if sides[name] == "test"],
             "skipped": samples.skipped,
             "data_fingerprint": samples.fingerprint,
+            "samples_version": SAMPLES_VERSION,
             # Without the paths of data and model, which mean nothing elsewhere.
             "settings": config.model_dump(mode="json", include=set(LearningConfig.model_fields)),
         },
@@ -337,7 +338,7 @@ def train(
 
     Raises:
         BadDataset: The data cannot be split, or lack successes or failures.
-        UsageError: The checkpoint was made from other data.
+        UsageError: The checkpoint was made from other data, or with another version of the samples.
         TrainingDiverged: The loss is not finite.
     """
     reporter = reporter or Reporter()
@@ -352,6 +353,11 @@ def train(
     saved = read_checkpoint(checkpoint_path) if checkpoint_path.exists() else None
     if saved is not None and saved.fingerprint != samples.fingerprint:
         raise UsageError(f"{checkpoint_path} was made from other data; choose another --out or delete it")
+    if saved is not None and saved.samples_version != SAMPLES_VERSION:
+        raise UsageError(
+            f"{checkpoint_path} was made with version {saved.samples_version} of the samples, this is "
+            f"version {SAMPLES_VERSION}; choose another --out or delete it"
+        )
 
     history: list[dict[str, Any]] = list(saved.history) if saved else []
     for name, network in networks.items():
@@ -376,6 +382,7 @@ def train(
                 checkpoint_path,
                 Checkpoint(
                     fingerprint=samples.fingerprint,
+                    samples_version=SAMPLES_VERSION,
                     stage=name,
                     epoch=number + 1,
                     history=history,

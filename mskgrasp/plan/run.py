@@ -28,7 +28,7 @@ def describe(plan: GraspPlan) -> str:
         [
             f"grasp         x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, theta {np.degrees(theta):.1f} deg (base)",
             f"quality       {plan.quality:.3f} (best of {len(plan.candidates)}: {plan.qualities.max():.3f})",
-            f"displacement  {shifts}, {turn} (grasp frame)",
+            f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
             f"planned in    {plan.seconds['total']:.2f} s ({stages})",
         ]
     )

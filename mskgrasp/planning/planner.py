@@ -11,8 +11,8 @@ from pydantic import Field
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.config import Config
+from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.errors import BadModel, NoGraspFound
-from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
@@ -68,9 +68,8 @@ class GraspPlan:
     Attributes:
         grasp: The chosen one, base frame.
         quality: Predicted probability of success.
-        displacement: (4,) expected object displacement, axes of the grasp frame, metres and radians.
-        displacement_cov: (4, 4) its covariance, to first order.
-        grasp_displacement: (4,) expected grasp displacement, predicted by the network.
+        grasp_displacement: (4,) expected grasp displacement, predicted by the network: the rigid motion, from
+            which `displacement_of` gives that of a point.
         grasp_displacement_var: (4,) its variances; NaN if the network predicts none.
         score: Variance score of the grasp, square metres; NaN if the network predicts no variance.
         view: The detected part.
@@ -83,8 +82,6 @@ class GraspPlan:
 
     grasp: Grasp
     quality: float
-    displacement: np.ndarray
-    displacement_cov: np.ndarray
     grasp_displacement: np.ndarray
     grasp_displacement_var: np.ndarray
     score: float
@@ -104,19 +101,15 @@ class GraspPlan:
         best: Shortlist,
         chosen: int,
         *,
-        centre: np.ndarray,
         seconds: dict[str, float],
     ) -> GraspPlan:
-        """Make the plan of the shortlist's grasp ``chosen``, of candidates (n, 4), for a part centre (3,)."""
-        row, mean, variance = best.rows[chosen], best.mean[chosen], best.variance[chosen]
-        centre_grasp = centre_in_grasp_frame(centre, candidates[row])
+        """Make the plan of the shortlist's grasp ``chosen``, of candidates (n, 4)."""
+        row = best.rows[chosen]
         return cls(
             grasp=Grasp.from_vector(candidates[row]),
             quality=float(qualities[row]),
-            displacement=to_object_displacement(mean, centre_grasp),
-            displacement_cov=object_displacement_covariance(mean, variance, centre_grasp),
-            grasp_displacement=mean,
-            grasp_displacement_var=variance,
+            grasp_displacement=best.mean[chosen],
+            grasp_displacement_var=best.variance[chosen],
             score=float(best.scores[chosen]),
             view=view,
             candidates=Grasp.from_vector(candidates),
@@ -133,9 +126,36 @@ class GraspPlan:
         place = f"x {x:.3f}, y {y:.3f}, z {z:.3f} m, {np.degrees(theta):.0f} degrees"
         return f"grasp at {place}, quality {self.quality:.2f}"
 
+    def displacement_of(self, point_base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the expected displacement of a point of the part.
+
+        Args:
+            point_base: (3,) the point before the grasp, base frame, metres.
+
+        Returns:
+            Its displacement (4,), axes of the grasp frame, metres and radians, and the covariance (4, 4), to
+            first order.
+        """
+        point_grasp = self.grasp.T_base_grasp.inverse().apply(np.asarray(point_base, dtype=np.float64))
+        mean, variance = self.grasp_displacement, self.grasp_displacement_var
+        return (
+            to_object_displacement(mean, point_grasp),
+            object_displacement_covariance(mean, variance, point_grasp),
+        )
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """(4,) expected displacement of the seen centre, axes of the grasp frame, metres and radians."""
+        return self.displacement_of(self.view.centre_base)[0]
+
+    @property
+    def displacement_cov(self) -> np.ndarray:
+        """(4, 4) its covariance."""
+        return self.displacement_of(self.view.centre_base)[1]
+
     @property
     def displacement_std(self) -> np.ndarray:
-        """(4,) standard deviations of the object displacement, metres and radians."""
+        """(4,) its standard deviations."""
         return np.sqrt(np.diag(self.displacement_cov))
 
     def to_json(self) -> dict[str, Any]:
@@ -219,7 +239,7 @@ class Planner:
             "select": selected - scored,
             "total": selected - started,
         }
-        return GraspPlan.of(view, candidates, found, best, chosen, centre=view.centre_base, seconds=seconds)
+        return GraspPlan.of(view, candidates, found, best, chosen, seconds=seconds)
 
     def _shortlist(self, scene: Scene, candidates: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Find the best candidates; with ``check_fingers`` the best whose fingers are free.
@@ -243,8 +263,9 @@ class Planner:
         return free[:n]
 
     def _scored(self, scene: Scene, candidates: np.ndarray, rows: np.ndarray) -> Shortlist:
-        mean, variance = displacements(self.models, scene, candidates[rows], self.config.chunk_size)
-        return Shortlist(rows, mean, variance, variance_score(variance, scene.view.gyration_radius))
+        grasps = candidates[rows]
+        mean, variance = displacements(self.models, scene, grasps, self.config.chunk_size)
+        return Shortlist(rows, mean, variance, variance_score(mean, variance, grasps, scene.view))
 
     def _refined(
         self,
@@ -294,13 +315,22 @@ def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:
     return np.argsort(-qualities, kind="stable")[:n]
 
 
-def variance_score(variance: np.ndarray, gyration_radius: float) -> np.ndarray:
-    """Compute var_x + var_y + var_z + r^2 var_theta of variances (..., 4), square metres.
+def variance_score(mean: np.ndarray, variance: np.ndarray, grasps: np.ndarray, view: PartView) -> np.ndarray:
+    """Compute var_x + var_y + var_z + r^2 var_theta of the displacement of the seen centre, square metres.
 
-    With r the part's radius of gyration it is the mean squared distance by which the part's points miss
-    their predicted places.
+    With r the part's radius of gyration it is, to first order, the mean squared distance by which the part's
+    points miss their predicted places.
+
+    Args:
+        mean: (..., 4) of the grasp displacement.
+        variance: (..., 4) the same.
+        grasps: (..., 4) base frame.
+        view: The detected part.
     """
-    return variance[..., :3].sum(axis=-1) + gyration_radius**2 * variance[..., 3]
+    centre_grasp = centre_in_grasp_frame(view.centre_base, grasps)
+    covariance = object_displacement_covariance(mean, variance, centre_grasp)
+    of_centre = np.diagonal(covariance, axis1=-2, axis2=-1)
+    return of_centre[..., :3].sum(axis=-1) + view.gyration_radius**2 * of_centre[..., 3]
 
 
 def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> int:
@@ -316,29 +346,3 @@ def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> 
             f"{config.min_quality:g}; move the part, or lower min_quality"
         )
     return int(good[0] if config.policy == "quality" else good[np.argmin(scores[good])])
-
-
-def object_displacement_covariance(
-    grasp_displacement: np.ndarray, variance: np.ndarray, centre_grasp: np.ndarray
-) -> np.ndarray:
-    """Compute the object displacement's covariance, to first order in the grasp displacement's deviations.
-
-    Args:
-        grasp_displacement: (..., 4) mean.
-        variance: (..., 4) of independent components.
-        centre_grasp: (..., 3) object centre in the grasp frame before the grasp, metres.
-
-    Returns:
-        (..., 4, 4) J diag(variance) J', J the derivative of `grasp.to_object_displacement`.
-    """
-    turn = -wrap_angle(grasp_displacement[..., 3])
-    cos, sin = np.cos(turn), np.sin(turn)
-    arm = centre_grasp - grasp_displacement[..., :3]
-    jacobian = np.zeros(grasp_displacement.shape[:-1] + (4, 4))
-    jacobian[..., 0, 0], jacobian[..., 0, 1] = -cos, sin
-    jacobian[..., 1, 0], jacobian[..., 1, 1] = -sin, -cos
-    jacobian[..., 2, 2] = -1.0
-    jacobian[..., 0, 3] = sin * arm[..., 0] + cos * arm[..., 1]
-    jacobian[..., 1, 3] = -cos * arm[..., 0] + sin * arm[..., 1]
-    jacobian[..., 3, 3] = -1.0
-    return jacobian * variance[..., None, :] @ np.swapaxes(jacobian, -1, -2)

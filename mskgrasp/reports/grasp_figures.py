@@ -120,7 +120,13 @@ def _ellipse(axes: Axes, centre: np.ndarray, covariance: np.ndarray, n_sigma: fl
 
 
 def draw_plan(
-    frame: RgbdFrame, plan: GraspPlan, path: Path, *, measured: np.ndarray | None = None, note: str = ""
+    frame: RgbdFrame,
+    plan: GraspPlan,
+    path: Path,
+    *,
+    point_base: np.ndarray | None = None,
+    measured: np.ndarray | None = None,
+    note: str = "",
 ) -> None:
     """Draws a plan: the part, candidates by quality, the best few, the chosen grasp and the expected shift.
 
@@ -130,27 +136,32 @@ def draw_plan(
         frame: The image planned in.
         plan: The plan.
         path: The picture, PNG.
-        measured: (4,) object displacement of its execution, drawn beside the expected one.
+        point_base: (3,) the point of the part whose displacement is drawn, base frame, metres; None: the seen
+            centre.
+        measured: (4,) displacement of that point in its execution, drawn beside the expected one.
         note: A line of text under the plan's.
     """
     with saved_figure(path, 11.5, 5.7 + 0.25 * bool(note)) as figure:
         left, right = figure.subplots(1, 2)
         _draw_candidates(figure, left, frame, plan)
-        _draw_chosen(right, frame, plan, measured)
-        text = _plan_text(plan) + (f"\n{note}" if note else "")
+        point = plan.view.centre_base if point_base is None else point_base
+        _draw_chosen(right, frame, plan, point, measured)
+        text = _plan_text(plan, point) + (f"\n{note}" if note else "")
         figure.suptitle(text, fontsize=11, x=0.01, ha="left")
 
 
-def _plan_text(plan: GraspPlan) -> str:
-    shift, std = plan.displacement * _MM, plan.displacement_std * _MM
+def _plan_text(plan: GraspPlan, point_base: np.ndarray) -> str:
+    mean, covariance = plan.displacement_of(point_base)
+    deviation = np.sqrt(np.diag(covariance))
+    shift, std = mean * _MM, deviation * _MM
     names = "xyz"
     known = np.isfinite(std).all()
     parts = [
         f"{name} {shift[i]:+.1f}" + (f" ± {std[i]:.1f}" if known else "") + " mm"
         for i, name in enumerate(names)
     ]
-    turn = np.degrees(plan.displacement[3])
-    spread = f" ± {np.degrees(plan.displacement_std[3]):.1f}" if known else ""
+    turn = np.degrees(mean[3])
+    spread = f" ± {np.degrees(deviation[3]):.1f}" if known else ""
     return (
         f"quality {plan.quality:.2f}     expected shift in the hand: {',  '.join(parts)},  "
         f"turn {turn:+.1f}{spread}°     planned in {plan.seconds['total']:.1f} s"
@@ -205,7 +216,9 @@ def _closing_line(axes: Axes, origin: np.ndarray, theta: float) -> None:
         axes.plot(*np.stack([origin + start, origin + end]).T, color=BLUE, lw=1.0, alpha=0.6, zorder=5)
 
 
-def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.ndarray | None) -> None:
+def _draw_chosen(
+    axes: Axes, frame: RgbdFrame, plan: GraspPlan, point_base: np.ndarray, measured: np.ndarray | None
+) -> None:
     side = 0.128
     heights = _from_above(
         frame.depth, frame.intrinsics, frame.T_base_camera, plan.view.table_z, plan.grasp.as_vector(), side
@@ -213,8 +226,9 @@ def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.nda
     top = float(plan.view.size[2]) * _MM
     show_heights(axes, heights, (0.0, 0.0), side, top)
     draw_jaw(axes, np.zeros(2), 0.0)
-    centre = plan.grasp.T_base_grasp.inverse().apply(plan.view.centre_base)[:2] * _MM
-    shift, turn = plan.displacement[:2] * _MM, float(plan.displacement[3])
+    centre = plan.grasp.T_base_grasp.inverse().apply(point_base)[:2] * _MM
+    mean, covariance = plan.displacement_of(point_base)
+    shift, turn = mean[:2] * _MM, float(mean[3])
     _outlines(axes, heights, np.zeros(2), side, centre, shift, turn)
     axes.plot([], [], color=INK, lw=0.9, label="part before")
     axes.plot([], [], color=ORANGE, lw=1.3, ls="--", label="part expected in the hand")
@@ -223,8 +237,7 @@ def _draw_chosen(axes: Axes, frame: RgbdFrame, plan: GraspPlan, measured: np.nda
         axes.plot([], [], color=GREEN, lw=1.3, ls="--", label="part measured in the hand")
     axes.legend(loc="upper left", fontsize=8)
     axes.plot(*centre, "+", color=ORANGE, ms=8, mew=1.5, zorder=9)
-    known = bool(np.isfinite(plan.displacement_cov).all())
-    covariance = plan.displacement_cov[:2, :2] if known else np.zeros((2, 2))
+    covariance = covariance[:2, :2] if np.isfinite(covariance).all() else np.zeros((2, 2))
     axes.set(
         xlabel="grasp x, mm",
         ylabel="grasp y (closing direction), mm",

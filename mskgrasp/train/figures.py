@@ -12,10 +12,14 @@ from matplotlib.ticker import MaxNLocator
 
 from mskgrasp.core import metrics
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.grasp import to_object_displacement
 from mskgrasp.core.palette import BLUE, FAINT, GREEN, ORANGE
 from mskgrasp.learning.grasp_models import Models
-from mskgrasp.learning.held_out import AXES, predict_grasp_displacement, predict_quality
+from mskgrasp.learning.held_out import (
+    AXES,
+    centroid_displacement,
+    predict_grasp_displacement,
+    predict_quality,
+)
 from mskgrasp.learning.samples import Samples
 from mskgrasp.reports.style import saved_figure
 
@@ -40,11 +44,11 @@ def draw_uncertainty(models: Models, samples: Samples, rows: torch.Tensor, path:
         panels = figure.subplots(2, 2)
         _reliability(panels[0, 0], predict_quality(models, samples, rows), samples.success[rows].numpy())
         _coverage(panels[0, 1], mean, variance, target)
-        predicted = to_object_displacement(mean, samples.centre_grasp[held].double().numpy())
+        predicted, expected = centroid_displacement(samples, held, mean, variance)
         error = samples.displacement[held].double().numpy() - predicted
         shift, turn = np.linalg.norm(error[:, :3], axis=1), np.abs(wrap_angle(error[:, 3]))
-        _sparsification(panels[1, 0], shift, variance[:, :3].sum(axis=1))
-        _error_over_deviation(panels[1, 1], shift, np.sqrt(variance[:, :3].sum(axis=1)), turn, variance)
+        _sparsification(panels[1, 0], shift, expected[:, :3].sum(axis=1))
+        _error_over_deviation(panels[1, 1], shift, turn, expected)
 
 
 def _reliability(axes: Axes, probability: np.ndarray, success: np.ndarray) -> None:
@@ -77,11 +81,9 @@ def _sparsification(axes: Axes, error: np.ndarray, uncertainty: np.ndarray) -> N
     axes.legend(fontsize=8)
 
 
-def _error_over_deviation(
-    axes: Axes, shift: np.ndarray, shift_std: np.ndarray, turn: np.ndarray, variance: np.ndarray
-) -> None:
+def _error_over_deviation(axes: Axes, shift: np.ndarray, turn: np.ndarray, variance: np.ndarray) -> None:
     """RMSE in bins of equal number over the RMS predicted deviation: a line through the origin is perfect."""
-    turn_std = np.sqrt(variance[:, 3])
+    shift_std, turn_std = np.sqrt(variance[:, :3].sum(axis=1)), np.sqrt(variance[:, 3])
     for error, std, factor, colour, label in (
         (shift, shift_std, 1e3, _COLOURS[0], "translation, mm"),
         (turn, turn_std, 180 / np.pi, _COLOURS[1], "rotation, degrees"),

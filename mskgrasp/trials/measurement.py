@@ -59,14 +59,19 @@ def run_trial(
     if plan is None:
         return TrialRecord(trial=trial, frame=frame, plan=None)
     done = engine.grasp(plan)
+    point = plan.view.centre_base
+    if engine.tape is None and done.before is not None:
+        point = np.asarray(done.before.position, dtype=np.float64)
+    mean, covariance = plan.displacement_of(point)
     trial = replace(
         trial,
         success=not done.reason,
         reason=done.reason,
         grasp=plan.grasp.as_vector().tolist(),
         quality=plan.quality,
-        predicted=plan.displacement.tolist(),
-        predicted_std=plan.displacement_std.tolist(),
+        point_base=point.tolist(),
+        predicted=mean.tolist(),
+        predicted_std=np.sqrt(np.diag(covariance)).tolist(),
         planning_s=plan.seconds["total"],
         pose_base_obj=None if done.before is None else np.asarray(done.before.as_vector()).tolist(),
         tilt=done.tilt,

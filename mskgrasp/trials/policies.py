@@ -99,9 +99,9 @@ class Chooser:
         rows = shortlist(found, config.top_fraction)
         pose = None if self.tracker is None else self.tracker.part_pose()
         observation = PartObservation(part=self.part, frame=frame, view=view, pose_base_obj=pose)
-        mean, variance, centre = self.predictor.predict(observation, candidates[rows])
-        best = Shortlist(rows, mean, variance, variance_score(variance, view.gyration_radius))
+        mean, variance = self.predictor.predict(observation, candidates[rows])
+        best = Shortlist(rows, mean, variance, variance_score(mean, variance, candidates[rows], view))
         chosen = select(found[rows], best.scores, config)
         selecting_s = time.perf_counter() - scored
         seconds = {"score": scoring_s, "select": selecting_s, "total": scoring_s + selecting_s}
-        return GraspPlan.of(view, candidates, found, best, chosen, centre=centre, seconds=seconds)
+        return GraspPlan.of(view, candidates, found, best, chosen, seconds=seconds)

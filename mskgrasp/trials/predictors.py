@@ -10,12 +10,12 @@ from typing import Protocol
 import numpy as np
 
 from hal.camera import RgbdFrame
+from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.errors import NoGraspFound
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import PartView, centre_in_grasp_frame, to_grasp_displacement, to_object_displacement
 from mskgrasp.dataset import list_shards, read_columns
 from mskgrasp.learning.grasp_models import Models
-from mskgrasp.planning.planner import object_displacement_covariance
 from mskgrasp.planning.scoring import Scene, displacements
 from mskgrasp.trials.lowess import Lowess
 from mskgrasp.trials.trial import Prediction
@@ -53,14 +53,12 @@ class Predictor(Protocol):
         """Whether the model was trained on grasps of this part."""
         ...
 
-    def predict(
-        self, observation: PartObservation, grasps: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def predict(self, observation: PartObservation, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Predict the grasp displacement of grasps (n, 4), base frame.
 
         Returns:
-            Mean (n, 4) and variances (n, 4), NaN where it predicts none, metres and radians along the axes of
-            the grasp frame; the point (3,) of the part that the displacement is of, base frame.
+            Mean (n, 4) of the grasp displacement and its variances (n, 4), NaN where it predicts none, both
+            metres and radians along the axes of the grasp frame.
         """
         ...
 
@@ -81,13 +79,10 @@ class NetworkPredictor:
         """Whether the part is a training part."""
         return part in self.models.meta.training.get("training_parts", ())
 
-    def predict(
-        self, observation: PartObservation, grasps: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def predict(self, observation: PartObservation, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Predict from the depth image."""
         scene = Scene.of(observation.frame, observation.view, observation.view.table_z, self.models.device)
-        mean, variance = displacements(self.models, scene, grasps, self.chunk_size)
-        return mean, variance, observation.view.centre_base
+        return displacements(self.models, scene, grasps, self.chunk_size)
 
 
 @dataclass(frozen=True)
@@ -101,9 +96,7 @@ class LowessPredictor:
         """Whether there is a fit of the part."""
         return part in self.fits
 
-    def predict(
-        self, observation: PartObservation, grasps: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def predict(self, observation: PartObservation, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Predict from the part's pose.
 
         Raises:
@@ -117,17 +110,19 @@ class LowessPredictor:
             position=np.tile(np.asarray(pose.position, dtype=np.float64), (n, 1)),
             quat_wxyz=np.tile(np.asarray(pose.quat_wxyz, dtype=np.float64), (n, 1)),
         )
-        mean, variance = self.fits[observation.part].predict(poses, grasps)
-        return mean, variance, np.asarray(pose.position, dtype=np.float64)
+        return self.fits[observation.part].predict(poses, grasps)
 
 
-def predict_one(predictor: Predictor, observation: PartObservation, grasp: np.ndarray) -> Prediction:
-    """Predict the object displacement of one grasp (4,)."""
-    mean, variance, centre = predictor.predict(observation, np.asarray(grasp, dtype=np.float64)[None])
-    centre_grasp = centre_in_grasp_frame(centre, np.asarray(grasp, dtype=np.float64))
-    covariance = object_displacement_covariance(mean[0], variance[0], centre_grasp)
+def predict_one(
+    predictor: Predictor, observation: PartObservation, grasp: np.ndarray, point_base: np.ndarray
+) -> Prediction:
+    """Predict the displacement of a part's point (3,), base frame, for one grasp (4,)."""
+    grasp = np.asarray(grasp, dtype=np.float64)
+    mean, variance = predictor.predict(observation, grasp[None])
+    point_grasp = centre_in_grasp_frame(np.asarray(point_base, dtype=np.float64), grasp)
+    covariance = object_displacement_covariance(mean[0], variance[0], point_grasp)
     return Prediction(
-        mean=to_object_displacement(mean[0], centre_grasp).tolist(),
+        mean=to_object_displacement(mean[0], point_grasp).tolist(),
         std=np.sqrt(np.diag(covariance)).tolist(),
     )
 

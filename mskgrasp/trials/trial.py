@@ -14,7 +14,7 @@ _LEGAL_KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """Predicted object displacement, axes of the grasp frame, metres and radians.
+    """Predicted displacement of the trial's point, axes of the grasp frame, metres and radians.
 
     Attributes:
         mean: (4,).
@@ -29,6 +29,8 @@ class Prediction:
 class Trial:
     """A planned grasp and its outcome; poses in the base frame, displacements in the grasp frame.
 
+    All displacements of a trial are of one point of the part, ``point_base``.
+
     Attributes:
         part: Name of the part.
         number: Index of the trial among those of the part.
@@ -38,9 +40,12 @@ class Trial:
         reason: Why not; empty where it was.
         grasp: (4,) the executed grasp; None, as the plan's other values, where no grasp was found.
         quality: Predicted probability of success.
-        predicted: (4,) expected object displacement, metres and radians.
+        point_base: (3,) the point of the part before the grasp whose displacement is predicted and measured,
+            metres: its origin by the tracker, or its seen centre where markers measure or nothing tracks the
+            part; None where no grasp was found.
+        predicted: (4,) expected displacement, metres and radians.
         predicted_std: (4,) its standard deviations; NaN where the model predicts none.
-        measured: (4,) object displacement; None where not successful or not measured. dz is NaN where
+        measured: (4,) displacement; None where not successful or not measured. dz is NaN where
             markers measured, which give the motion in the plane.
         tilt: Measured tilt, radians; None as before.
         planning_s: Planning time, seconds.
@@ -48,8 +53,7 @@ class Trial:
         policy: Policy of the planner.
         chosen_by: Label of the model whose variances chose the grasp; empty for the run's own model.
         unmeasured: Why a success was not measured; empty where it was.
-        true: (4,) where markers measure, the tracker's displacement of the same point, the part's detected
-            centre; None without a tracker.
+        true: (4,) where markers measure, the displacement by the tracker; None without one.
         pose_base_obj: (7,) x y z qw qx qy qz of the part before the grasp; None without a tracker.
         predictions: Predictions of the compared models for this grasp, by label.
     """
@@ -61,6 +65,7 @@ class Trial:
     reason: str
     grasp: list[float] | None = None
     quality: float | None = None
+    point_base: list[float] | None = None
     predicted: list[float] | None = None
     predicted_std: list[float] | None = None
     measured: list[float] | None = None
@@ -88,9 +93,11 @@ class Trial:
         """Convert the values of `to_json` to a trial.
 
         Raises:
-            TypeError, ValueError, KeyError: The values are not a trial.
+            TypeError, ValueError, KeyError: The values are not a trial, or of no stated point.
         """
         values = dict(values)
+        if "point_base" not in values:  # predicted of one point and measured of another
+            raise KeyError("point_base")
         for name in ("predicted_std", "measured"):
             values[name] = _none_to_nan(values[name])
         values["predictions"] = {

@@ -21,8 +21,7 @@ from mskgrasp.planning.planner import GraspPlan
 SCHEMA_VERSION = 1
 FOLDER = "trials"
 _ARRAYS = (
-    "displacement", "displacement_cov", "grasp_displacement", "grasp_displacement_var", "qualities",
-    "shortlist", "shortlist_scores",
+    "grasp_displacement", "grasp_displacement_var", "qualities", "shortlist", "shortlist_scores",
 )  # fmt: skip
 _NUMBERS = ("quality", "score")
 

@@ -96,6 +96,7 @@ def random_samples(config: LearningConfig, n: int) -> Samples:
         object_patches=None,
         theta=torch.zeros(n),
         centre_grasp=0.02 * torch.randn((n, 3), generator=generator),
+        origin_grasp=0.02 * torch.randn((n, 3), generator=generator),
         height=0.02 + 0.02 * torch.rand(n, generator=generator),
         success=success,
         displacement=shift,

@@ -72,6 +72,22 @@ def test_grasp_displacement_is_the_motion_of_the_hand_seen_from_the_part(displac
     assert same(to_grasp_displacement(displacement, centre), expected)
 
 
+@given(shifts, st.floats(0.0, 0.5), st.floats(-np.pi, np.pi), centres, centres)
+def test_every_point_of_a_rigid_part_gives_the_same_grasp_displacement_up_to_the_tilt(
+    motion, tilt, direction, first, second
+):
+    axis = np.array([np.cos(direction), np.sin(direction), 0.0])
+    swing = np.concatenate([[np.cos(tilt / 2)], np.sin(tilt / 2) * axis])
+    moved = Pose(position=motion[:3], quat_wxyz=quat_multiply(swing, quat_about_z(motion[3])))
+    one, other = (
+        to_grasp_displacement(np.append(moved.apply(point) - point, motion[3]), point)
+        for point in (first, second)
+    )
+    assert one[3] == other[3]
+    apart = 2 * np.sin(tilt / 2) * np.linalg.norm(first - second)
+    assert np.linalg.norm(one[:3] - other[:3]) <= apart + 1e-12
+
+
 @given(poses(), shifts)
 def test_a_displacement_put_into_the_hand_is_measured(T_tcp_obj, displacement):
     measured, tilt = object_displacement(T_tcp_obj, displaced(T_tcp_obj, displacement))

@@ -143,6 +143,7 @@ def test_models_are_compared_and_one_added_later_repeats_no_grasp(collected: Pat
     frames = [read_trial(trial_file(out, key))[0].depth for key in found]
     assert all(np.array_equal(frames[0], frame) for frame in frames)  # one scene for every policy
     best = found[f"{part}-000"]
+    assert best.point_base == best.pose_base_obj[:3]  # what the tracker follows
     if best.measured is not None:
         assert set(best.predictions) == {"gcip_mv", "lowess"}
         assert best.predictions["gcip_mv"].mean == pytest.approx(best.predicted, abs=1e-6)
@@ -182,7 +183,10 @@ def test_tape_agrees_with_the_tracker_or_measures_nothing(tmp_path: Path):
     if pin.success:
         assert report.summary.overall.unmeasured == {"no room for tape": 1}
     assert report.summary.overall.measured == 1
-    assert read_trial(trial_file(tmp_path / "out", washer.key))[2] is not None
+    _, plan, after = read_trial(trial_file(tmp_path / "out", washer.key))
+    assert after is not None and plan is not None
+    np.testing.assert_allclose(washer.point_base, plan.view.centre_base)
+    np.testing.assert_allclose(washer.predicted, plan.displacement, atol=1e-9)
 
 
 def test_a_run_without_a_success_reports_and_its_trial_is_replayed(tmp_path: Path):

@@ -19,6 +19,7 @@ from mskgrasp.trials.trial import Prediction, Trial
 def trial(**changes: object) -> Trial:
     values = dict(
         part="a", number=0, seed=1, success=True, reason="", grasp=[0.5, 0.0, 0.02, 0.0], quality=0.9,
+        point_base=[0.5, 0.01, 0.015],
         predicted=[0.003, 0.0, 0.0, 0.1], predicted_std=[0.001] * 4, measured=[0.0, 0.004, 0.0, -0.1],
         tilt=0.0, planning_s=1.0, family="nut", policy="quality",
     )  # fmt: skip

@@ -32,6 +32,7 @@ def step(network, optimiser) -> None:
 def checkpoint_of(network, optimiser, epoch: int = 3) -> Checkpoint:
     return Checkpoint(
         fingerprint="abc",
+        samples_version=7,
         stage="gqn",
         epoch=epoch,
         history=[{"stage": "gqn", "epoch": epoch, "train_loss": 0.5}],
@@ -46,7 +47,7 @@ def test_a_restored_optimiser_takes_the_same_next_step(tmp_path):
     path = tmp_path / "checkpoint.safetensors"
     write_checkpoint(path, checkpoint_of(network, optimiser))
     saved = read_checkpoint(path)
-    assert (saved.fingerprint, saved.stage, saved.epoch) == ("abc", "gqn", 3)
+    assert (saved.fingerprint, saved.samples_version, saved.stage, saved.epoch) == ("abc", 7, "gqn", 3)
     assert saved.history == [{"stage": "gqn", "epoch": 3, "train_loss": 0.5}]
     other, fresh = stepped(seed=1, steps=0)
     restore(saved, {"gqn": other}, fresh)

@@ -97,6 +97,17 @@ def test_errors_of_a_constant_prediction_are_those_of_the_constant(samples, halv
     )
 
 
+def test_a_known_motion_has_no_error_and_deviations_of_the_centroid(samples, halves):
+    rows = halves[1][samples.success[halves[1]]]
+    known = samples.grasp_displacement[rows].double().numpy()
+    errors = held_out.displacement_errors(samples, rows, known, np.full_like(known, 1e-6))
+    assert errors["translation_rmse"] < 1e-6 and errors["rotation_rmse"] < 1e-6
+    turns = np.tile([0.0, 0.0, 0.0, 1e-4], (len(rows), 1))
+    _, variance = held_out.centroid_displacement(samples, rows, np.zeros_like(turns), turns)
+    x, y, _ = samples.origin_grasp[rows].double().numpy().T
+    np.testing.assert_allclose(variance, 1e-4 * np.stack([y**2, x**2, 0 * x, 0 * x + 1], axis=1), atol=1e-12)
+
+
 def test_a_constant_quality_ranks_nothing_and_has_the_brier_score_worked_out_by_hand(samples, halves):
     rows = halves[1]
     report = held_out.quality_metrics(constant_models(samples), samples, rows)

@@ -5,6 +5,8 @@ import pytest
 import torch
 
 from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.geometry import Pose
+from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.learning.samples import part_sides, read_samples
 from tests import synthetic
 from tests.learning.small import HAND, PATCH
@@ -19,6 +21,21 @@ def test_samples_hold_every_attempt_with_its_displacement_seen_from_the_estimate
     # Closing the jaw centres a box: along y the displacement undoes the centre's offset, to a pixel.
     sideways = samples.displacement[held][:, 1] + samples.centre_grasp[held][:, 1]
     assert float(sideways.abs().max()) < 0.0025
+
+
+def test_the_target_is_the_hands_motion_seen_from_the_part_whatever_centre_was_seen(dataset, samples):
+    flip = Pose(position=np.zeros(3), quat_wxyz=np.array([0.0, 1.0, 0.0, 0.0]))  # of the TCP's frame, z down
+    attempts = [read_shard(path)[0] for path in list_shards(dataset)]
+    before, after = (
+        flip @ Pose.from_vector(np.concatenate([getattr(one, name) for one in attempts]).astype(np.float64))
+        for name in ("pose_tcp_obj_before", "pose_tcp_obj_after")
+    )
+    held = samples.success.numpy()
+    motion, turn = (before @ after.inverse()).position[held], samples.displacement[held, 3].numpy()
+    np.testing.assert_allclose(samples.grasp_displacement[held, :3], motion, atol=2e-6)
+    np.testing.assert_allclose(samples.grasp_displacement[held, 3], -turn, atol=1e-6)
+    np.testing.assert_allclose(samples.origin_grasp, before.position, atol=1e-6)
+    assert float((samples.origin_grasp - samples.centre_grasp)[:, :2].norm(dim=1).max()) > 3e-4
 
 
 def held_out_of(names: tuple[str, ...], fraction: float) -> set[str]:

@@ -1,10 +1,13 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
 import torch
+from safetensors import safe_open
+from safetensors.torch import save_file
 
 from mskgrasp.core import metrics
 from mskgrasp.core.errors import BadDataset, UsageError
@@ -89,6 +92,19 @@ def test_a_checkpoint_of_other_data_is_refused(samples, tmp_path):
     other = dataclasses.replace(samples, fingerprint="0")
     with pytest.raises(UsageError, match="other data"):
         learn(other, SHORT, checkpoint_path=path)
+
+
+def test_a_checkpoint_of_samples_made_otherwise_is_refused(samples, tmp_path):
+    path = tmp_path / "checkpoint.safetensors"
+    with pytest.raises(KeyboardInterrupt):
+        learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(1))
+    with safe_open(path, framework="pt") as file:
+        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - not a dict
+        progress = json.loads(file.metadata()["progress"])
+    del progress["samples_version"]  # as files were before samples had a version
+    save_file(tensors, path, metadata={"progress": json.dumps(progress)})
+    with pytest.raises(UsageError, match="made with version 1 of the samples, this is version 2"):
+        learn(samples, SHORT, checkpoint_path=path)
 
 
 def test_a_mean_only_network_and_the_papers_optimiser_can_be_trained(samples, tmp_path):

@@ -85,9 +85,11 @@ def test_trials_are_read_back_equal_and_an_incomplete_last_line_is_removed(tmp_p
     assert found.key == "a-000" and np.isnan(found.predicted_std).all()
     np.testing.assert_array_equal(found.measured, first.measured)
     assert path.read_text() == lines[0] + "\n"
-    path.write_text("no json\n")
-    with pytest.raises(BadDataset, match="line 1 is not a trial"):
-        read_trials(path, Trial.from_json)
+    old = {name: value for name, value in first.to_json().items() if name != "point_base"}
+    for text in ("no json", json.dumps(old)):  # it predicted one point and measured another
+        path.write_text(text + "\n")
+        with pytest.raises(BadDataset, match="line 1 is not a trial"):
+            read_trials(path, Trial.from_json)
 
 
 def test_a_part_name_with_a_path_is_refused(tmp_path: Path):

@@ -1,0 +1,33 @@
+"""Covariance of a point's displacement, from the variances of the grasp displacement."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mskgrasp.core.geometry import wrap_angle
+
+
+def object_displacement_covariance(
+    grasp_displacement: np.ndarray, variance: np.ndarray, centre_grasp: np.ndarray
+) -> np.ndarray:
+    """Compute the covariance of a point's displacement, to first order in the grasp displacement's.
+
+    Args:
+        grasp_displacement: (..., 4) mean.
+        variance: (..., 4) of independent components.
+        centre_grasp: (..., 3) the point in the grasp frame before the grasp, metres.
+
+    Returns:
+        (..., 4, 4) J diag(variance) J', J the derivative of `grasp.to_object_displacement`.
+    """
+    turn = -wrap_angle(grasp_displacement[..., 3])
+    cos, sin = np.cos(turn), np.sin(turn)
+    arm = centre_grasp - grasp_displacement[..., :3]
+    jacobian = np.zeros(grasp_displacement.shape[:-1] + (4, 4))
+    jacobian[..., 0, 0], jacobian[..., 0, 1] = -cos, sin
+    jacobian[..., 1, 0], jacobian[..., 1, 1] = -sin, -cos
+    jacobian[..., 2, 2] = -1.0
+    jacobian[..., 0, 3] = sin * arm[..., 0] + cos * arm[..., 1]
+    jacobian[..., 1, 3] = -cos * arm[..., 0] + sin * arm[..., 1]
+    jacobian[..., 3, 3] = -1.0
+    return jacobian * variance[..., None, :] @ np.swapaxes(jacobian, -1, -2)
