@@ -25,6 +25,7 @@ from mskgrasp.core.panda_kinematics import (
     within_limits,
 )
 from tasks.robot.motion import PEAK_ACCELERATION
+from tasks.robot.reflex import Reflex
 
 JOINT_SPEED = 2.0
 """Greatest joint speed, rad/s (Panda datasheet: 2.175 rad/s for joints 1 to 4)."""
@@ -34,8 +35,6 @@ TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
 SETTLE_S = 0.15
 """Settling time of the drives at the end of a motion, s."""
-CHECK_S = 0.004
-"""Time between two checks of the force on a moving hand, s."""
 _WAYPOINT_M = 0.01
 
 
@@ -107,25 +106,18 @@ class SapienArm(Arm):
 
     def _follow(self, path: Tensor) -> None:
         motion, contacts = self._world.env.motion, self._world.env.contacts
-        limit = self._world.physics.reflex_force
-
-        def load() -> float:
-            # The grip on a held part is internal to the hand and does not load the arm.
-            return float((contacts.outer_force() if self._force else contacts.hand_force())[0])
-
+        limit, holding = self._world.physics.reflex_force, self._force > 0
+        reflex = Reflex(contacts, motion, holding=holding)
         # Pads that close on a groove press the part on the table; that eases as the hand rises.
-        pressed = last = load() if self._force else 0.0
+        pressed = float(np.linalg.norm(contacts.load(holding=True))) if holding else 0.0
 
         def check(_: int) -> bool:
-            nonlocal pressed, last
-            # Mean of two checks: a part that is set down meets the table within a step, with a force that is
-            # the higher the shorter the step.
-            force = load()
-            mean, last = (last + force) / 2, force
-            pressed = min(pressed, force)
-            return self._stop.is_set() or mean - pressed > limit
+            nonlocal pressed
+            force = float(reflex.force()[0])
+            pressed = min(pressed, force) if reflex.full else pressed
+            return self._stop.is_set() or force - pressed > limit
 
-        if not motion.follow(path[:, None], check=check, check_every=motion.n_steps(CHECK_S)):
+        if not motion.follow(path[:, None], check=check, check_every=1):
             raise MotionAborted(
                 f"contact force over {limit:.0f} N: the arm stopped; call recover() when it is safe"
             )
