@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -211,7 +212,12 @@ class TrialEngine:
         )
 
     def put_back(self, plan: GraspPlan) -> None:
-        """Puts a lifted part down where it was grasped; a contact on the way ends that, and no trial."""
+        """Puts a lifted part down where it was grasped; a contact on the way ends that, and no trial.
+
+        Nothing is to be done where a simulated feeder places the next part on a table that is cleared.
+        """
+        if self.cell.arm.simulated and self.cell.feeder is not None:
+            return
         try:
             put_down(self.cell, plan.grasp)
         except MotionAborted as error:
@@ -250,6 +256,9 @@ def connected_engine(path: Path, *, yes: bool, picture: Path, tape: Tape | None)
     operator = Operator(cell, yes=yes)
     n_threads = torch.get_num_threads()
     if cell.arm.simulated:
+        # A simulator collects garbage at every new scene; the modules loaded by now need no scan.
+        gc.collect()
+        gc.freeze()
         # Networks round by the number of threads, and near-equal grasps would change places.
         torch.set_num_threads(1)
     try:
