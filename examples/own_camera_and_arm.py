@@ -53,7 +53,7 @@ class Gantry(Arm):
 
 side = dict(joint_lower=np.full(7, -2.0), joint_upper=np.full(7, 2.0))
 arm = Gantry(ArmLimits(**side, box_lower=-np.ones(3), box_upper=np.ones(3), table_z=0.0, max_force=70.0))
-table = Workspace(table_z=0, region=REGION, home=arm.pose, min_height=0.002, lift_height=0.1, grasp_force=20)
+table = Workspace(table_z=0, region=REGION, home=arm.pose, min_height=0.002, lift_height=0.1, grasp_force=30)
 planner = Planner(load_models(), PlannerConfig(), table_z=0.0, region=REGION)
 with Cell(camera=BlockCamera(), arm=arm, workspace=table).connected() as cell:
     plan = planner.plan(cell.camera.capture(), np.random.default_rng(0))

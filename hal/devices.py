@@ -43,7 +43,7 @@ class WorkspaceConfig(Config):
     """Points lower than this over the table count as table, m: real tables are not level, cameras drift."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
     """Height by which a grasped part is lifted, m."""
-    grasp_force: float = Field(default=20.0, gt=0, le=70)
+    grasp_force: float = Field(default=30.0, gt=0, le=70)
     """Gripper force, N."""
 
     @model_validator(mode="after")

@@ -33,6 +33,7 @@ from tasks.scene.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_
 from tasks.scene.part_actor import build_part, hull_corners
 from tasks.scene.physics import MOST_HULLS, sim_config
 from tasks.scene.resting_pose import random_resting_pose
+from tasks.scene.standing import StandingPoses, standing_poses
 
 _EXACT = ExecutionNoise()
 
@@ -48,7 +49,7 @@ class GraspDisplacementEnv(BaseEnv):
 
     **Randomizations:**
     - the part: one for each sub-scene, given by ``parts`` or drawn from the starter set
-    - its resting pose, by the poses' probabilities
+    - its resting pose, by the poses' probabilities; poses that the engine does not hold are left out
     - its place, uniform in a 24 x 24 cm region, and its turn about the vertical
     - where ``noise`` asks for it: errors of arm, gripper force, friction and camera (`core.settings`)
 
@@ -59,7 +60,8 @@ class GraspDisplacementEnv(BaseEnv):
 
     **Fail Conditions:**
     In mode ``grasp``: every attempt that is no success, with its reason (``missed``, ``slipped``,
-    ``ejected``, ``collided``, ``unsettled``) in ``info["failure"]``.
+    ``ejected``, ``collided``) in ``info["failure"]``. An attempt whose part was not at rest before anything
+    touched it (``unsettled``) says nothing about the grasp.
 
     **Goal Specification:**
     None. ``info["displacement"]`` holds dx, dy, dz, dtheta of the part in the hand.
@@ -118,6 +120,7 @@ class GraspDisplacementEnv(BaseEnv):
         names = self._part_names or []
         self._most_hulls = max((find_part(name).n_hulls for name in names), default=MOST_HULLS)
         self.parts: list[Part] = []
+        self._standing: dict[str, StandingPoses] = {}
         self._outcome: dict[str, Tensor] | None = None
         super().__init__(*args, robot_uids=panda_for(self.physics, self.region), num_envs=num_envs, **kwargs)
 
@@ -195,6 +198,10 @@ class GraspDisplacementEnv(BaseEnv):
         self._errors: list[ExecutionError | None] = [None] * self.num_envs
         if self.scene.can_render():
             without_reflection_table(self._overhead_sensor)
+        for part in self.parts:
+            if part.content_hash not in self._standing:
+                self._standing[part.content_hash] = standing_poses(part, self.physics)
+        self.standing = [self._standing[part.content_hash] for part in self.parts]
         coarse_hz = self.physics.coarse_hz(min(part.mass for part in self.parts))
         self.motion = PandaMotion(self.scene, self.agent, self.physics, coarse_hz)
         self.contacts = HandContacts(self.scene, self.agent, self.part)
@@ -206,7 +213,7 @@ class GraspDisplacementEnv(BaseEnv):
         if given is None:
             rows = [
                 random_resting_pose(
-                    self.parts[i],
+                    self.standing[i],
                     self._corners[i],
                     self.region,
                     self._batched_episode_rng[i],

@@ -167,6 +167,7 @@ def random_attempts(n: int, size: tuple[float, float, float], rng: np.random.Gen
         displacement=np.where(success[:, None], measured, np.nan).astype(np.float32),
         tilt=np.where(success, tilt, np.nan).astype(np.float32),
         width_after=np.where(success, min(size[:2]), 0.0).astype(np.float32),
+        relative_speed=np.where(success, 1e-3, np.nan).astype(np.float32),
         pose_base_obj=T_base_obj.as_vector().astype(np.float32),
         pose_tcp_obj_before=before.as_vector().astype(np.float32),
         pose_tcp_obj_after=after.as_vector().astype(np.float32),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import nullcontext
+from itertools import pairwise
 
 import numpy as np
 import torch
@@ -14,7 +16,7 @@ from hal.errors import MotionAborted, OutOfWorkspace
 from hal.limits import ArmLimits
 from hal.sim.world import SapienWorld
 from mskgrasp.core.geometry import Pose, pose_distance, straight_line
-from mskgrasp.core.grasp import MAX_OPENING, MIN_GAP
+from mskgrasp.core.grasp import MAX_OPENING, MIN_GAP, PAD_REACH
 from mskgrasp.core.minimum_jerk import minimum_jerk_duration, minimum_jerk_steps
 from mskgrasp.core.panda_kinematics import (
     POSE_TOLERANCE,
@@ -25,6 +27,7 @@ from mskgrasp.core.panda_kinematics import (
     within_limits,
 )
 from tasks.robot.motion import PEAK_ACCELERATION
+from tasks.robot.reflex import Reflex
 
 JOINT_SPEED = 2.0
 """Greatest joint speed, rad/s (Panda datasheet: 2.175 rad/s for joints 1 to 4)."""
@@ -34,8 +37,15 @@ TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
 SETTLE_S = 0.15
 """Settling time of the drives at the end of a motion, s."""
-CHECK_S = 0.004
-"""Time between two checks of the force on a moving hand, s."""
+AIR_HZ = 125
+"""Simulation steps a second while an empty hand is in free air."""
+AIR_GAP = 0.02
+"""Least distance of hand or held part from all else in free air, m: in it a hand at 0.4 m/s takes 50 ms."""
+PAD_GAP = 0.004
+"""Distance of the pads from a part at which closing fingers leave free air, m: more than their run-up."""
+LAST_S = 0.02
+"""The last part of a wait with a held part, s, which is simulated finely: a part trembles between the pads,
+and more in coarse steps."""
 _WAYPOINT_M = 0.01
 
 
@@ -85,8 +95,7 @@ class SapienArm(Arm):
         seconds = minimum_jerk_duration(
             float((goal - start).abs().max()), speed * JOINT_SPEED, JOINT_ACCELERATION
         )
-        share = torch.from_numpy(minimum_jerk_steps(self._world.env.motion.n_steps(seconds)))[:, None]
-        self._follow(start + share * (goal - start))
+        self._follow(torch.stack([start, goal]), seconds)
 
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
         start = self._target()
@@ -102,34 +111,73 @@ class SapienArm(Arm):
         if float(error.max()) > POSE_TOLERANCE or not self._within_limits(joints.numpy()):
             target = ", ".join(f"{value:.3f}" for value in T_base_tcp.position)
             raise OutOfWorkspace(f"no straight line from here to TCP ({target}) m within the joint limits")
-        share = torch.from_numpy(minimum_jerk_steps(self._world.env.motion.n_steps(seconds)))
-        self._follow(_interpolate(torch.cat([start[None], joints]), share))
+        self._follow(torch.cat([start[None], joints]), seconds)
 
-    def _follow(self, path: Tensor) -> None:
-        motion, contacts = self._world.env.motion, self._world.env.contacts
-        limit = self._world.physics.reflex_force
+    def _follow(self, waypoints: Tensor, seconds: float) -> None:
+        """Moves along joint waypoints (k, 7), evenly spaced, with a minimum-jerk profile."""
+        motion = self._world.env.motion
+        path = _interpolate(waypoints, torch.from_numpy(minimum_jerk_steps(motion.n_steps(seconds))))
+        # In free air long steps do: what the arm does there nothing feels.
+        in_air = self._in_air(path)
+        ends = [*(np.flatnonzero(np.diff(in_air)) + 1).tolist(), len(path)]
+        pressed = self._pressed()
+        for begin, end in pairwise([0, *ends]):
+            if in_air[begin]:
+                with motion.coarsely(self._air_hz):
+                    every = self._world.physics.rate_hz // motion.rate_hz
+                    picked = [*range(begin + every - 1, end - 1, every), end - 1]
+                    pressed = self._follow_piece(path[picked], pressed)
+            else:
+                pressed = self._follow_piece(path[begin:end], pressed)
+        self._pause(SETTLE_S, bool(in_air[-1]))
 
-        def load() -> float:
-            # The grip on a held part is internal to the hand and does not load the arm.
-            return float((contacts.outer_force() if self._force else contacts.hand_force())[0])
+    @property
+    def _air_hz(self) -> int | None:
+        """Rate in free air; None for that of the part in the hand."""
+        return None if self._force else AIR_HZ
 
+    def _in_air(self, path: Tensor) -> np.ndarray:
+        """(n,) whether hand and part are far from all else at joints (n, 7)."""
+        heights = forward(path)[0][:, 2, 3].numpy()
+        if not self._force:
+            return heights - PAD_REACH > self._world.top() + AIR_GAP
+        # A held part moves as the hand does; it may turn with the hand, so that its lowest point counts.
+        below = float(self._state().T_base_tcp.position[2]) - self._world.bottom()
+        return heights - below > self._world.top(beside=True) + AIR_GAP
+
+    def _pressed(self) -> float:
+        """Force on hand and part, N, before a motion with a held part."""
         # Pads that close on a groove press the part on the table; that eases as the hand rises.
-        pressed = last = load() if self._force else 0.0
+        return float(np.linalg.norm(self._world.env.contacts.load(holding=True))) if self._force else 0.0
+
+    def _follow_piece(self, path: Tensor, pressed: float) -> float:
+        """Follows joints (n, 7), one a step; returns the force that the hand still presses with."""
+        motion, contacts = self._world.env.motion, self._world.env.contacts
+        limit, holding = self._world.physics.reflex_force, self._force > 0
+        reflex = Reflex(contacts, motion, holding=holding)
 
         def check(_: int) -> bool:
-            nonlocal pressed, last
-            # Mean of two checks: a part that is set down meets the table within a step, with a force that is
-            # the higher the shorter the step.
-            force = load()
-            mean, last = (last + force) / 2, force
-            pressed = min(pressed, force)
-            return self._stop.is_set() or mean - pressed > limit
+            nonlocal pressed
+            force = float(reflex.force()[0])
+            pressed = min(pressed, force) if reflex.full else pressed
+            return self._stop.is_set() or force - pressed > limit
 
-        if not motion.follow(path[:, None], check=check, check_every=motion.n_steps(CHECK_S)):
+        if not motion.follow(path[:, None], check=check, check_every=1):
             raise MotionAborted(
                 f"contact force over {limit:.0f} N: the arm stopped; call recover() when it is safe"
             )
-        motion.step(motion.n_steps(SETTLE_S))
+        return pressed
+
+    def _pause(self, seconds: float, in_air: bool) -> None:
+        """Lets time pass; coarsely in free air, but for the end where a part is held."""
+        motion = self._world.env.motion
+        last = LAST_S if in_air and self._force else 0.0
+        if in_air:
+            with motion.coarsely(self._air_hz):
+                motion.step(motion.n_steps(seconds - last))
+            seconds = last
+        if seconds:
+            motion.step(motion.n_steps(seconds))
 
     def _target(self) -> Tensor:
         """(7,) drive targets, radians: a motion starts there, so that they do not jump."""
@@ -139,23 +187,30 @@ class SapienArm(Arm):
         )
 
     def _move_gripper(self, width: float) -> None:
+        motion = self._world.env.motion
+        free = not self._force and bool(self._in_air(self._target()[None])[0])
         self._force = 0.0
-        self._world.env.motion.move_fingers(width / 2, check=self._stop.is_set)
+        with motion.coarsely(AIR_HZ) if free else nullcontext():
+            motion.move_fingers(width / 2, check=self._stop.is_set)
 
     def _grasp(self, force: float) -> GraspOutcome:
         env = self._world.env
         env.agent.set_finger_force(force)
+        reach = self._world.reach(self._state().T_base_tcp)
+        if reach is not None and reach + PAD_GAP < MAX_OPENING / 2:
+            with env.motion.coarsely(AIR_HZ):
+                env.motion.move_fingers(reach + PAD_GAP, check=self._stop.is_set)
         self._force = force
         env.motion.move_fingers(-MAX_OPENING / 2, force=force, check=self._stop.is_set)
         width = self._state().gripper_width
         return GraspOutcome(width=width, holding=width > MIN_GAP)
 
     def _wait(self, seconds: float) -> None:
-        motion = self._world.env.motion
-        for _ in range(motion.n_steps(seconds)):
+        in_air = bool(self._in_air(self._target()[None])[0])
+        for k in range(max(1, round(seconds / LAST_S))):
             if self._stop.is_set():
                 return
-            motion.step()
+            self._pause(LAST_S, in_air and (k + 1) * LAST_S < seconds)
 
     def _forward(self, joints: np.ndarray) -> Pose:
         return forward_pose(joints)

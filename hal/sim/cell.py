@@ -38,7 +38,7 @@ class SapienCellConfig(Config):
     """Points lower than this over the table count as table, m; null: 2 mm, or 3 mm with camera noise."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
     """Height by which a grasped part is lifted, m."""
-    grasp_force: float = Field(default=20.0, gt=0, le=70)
+    grasp_force: float = Field(default=30.0, gt=0, le=70)
     """Gripper force, N."""
     physics: Physics = Physics()
     """Settings of the physics."""

@@ -16,9 +16,12 @@ from hal.sim.pallet import Lying, outside, restore
 from hal.sim.tape import stick_tape
 from mskgrasp.core.errors import TapeDoesNotFit
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.settings import Overhead, Physics, Region, Tape
+from mskgrasp.core.settings import TABLE_Z, Overhead, Physics, Region, Tape
 from mskgrasp.parts import find_part
 from tasks import GraspDisplacementEnv
+from tasks.attempt.clearance import hand_clearance
+from tasks.scene.frames import base_pose
+from tasks.scene.part_actor import hull_corners
 from tasks.scene.renderer import render_backend
 
 
@@ -57,6 +60,7 @@ class SapienWorld:
         self._colour_scale = colour_scale
         self._fine_colour: FineColour | None = None
         self._beside: list[Lying] = []
+        self._hull_corners: dict[str, list[np.ndarray]] = {}
         self._users = 0
         self._gym: gymnasium.Env | None = None
         self.presented = 0
@@ -166,10 +170,53 @@ class SapienWorld:
         assert hand is not None
         show_board(hand._objs[0].entity, image, size, T_tcp_board)
 
+    def top(self, *, beside: bool = False) -> float:
+        """Height of the highest point on the table, m: of all parts, or of those beside the present one."""
+        bodies = self._beside if beside else [*self._beside, self._present]
+        return max([TABLE_Z, *(float(self._corners(one)[:, 2].max()) for one in bodies)])
+
+    def bottom(self) -> float:
+        """Height of the lowest point of the present part, m."""
+        return float(self._corners(self._present)[:, 2].min())
+
+    def reach(self, T_base_tcp: Pose) -> float | None:
+        """Greatest distance from the middle of what stands between the open pads, m.
+
+        Returns:
+            None where anything is in the way of the open hand, or nothing between the pads.
+        """
+        grasp = T_base_tcp @ Pose(position=np.zeros(3), quat_wxyz=np.array([0.0, 1.0, 0.0, 0.0]))
+        found = hand_clearance(
+            [
+                (grasp.inverse() @ _pose(one)).apply(corners)
+                for one in [*self._beside, self._present]
+                for corners in self._hulls(one)
+            ]
+        )
+        return found.reach if found.free and found.reach > 0 else None
+
+    @property
+    def _present(self) -> Lying:
+        return Lying(self.env.parts[0], self.env.part)
+
+    def _hulls(self, lying: Lying) -> list[np.ndarray]:
+        """Corners (k, 3) of each of a part's hulls, obj frame, metres."""
+        if lying.part.content_hash not in self._hull_corners:
+            self._hull_corners[lying.part.content_hash] = hull_corners(lying.part)
+        return self._hull_corners[lying.part.content_hash]
+
+    def _corners(self, lying: Lying) -> np.ndarray:
+        """Corners (k, 3) of a part's hulls, base frame, metres."""
+        return _pose(lying).apply(np.concatenate(self._hulls(lying)))
+
     def part_pose(self) -> Pose:
         """``T_base_obj`` of the part, the simulator's ground truth."""
-        pose = self.env.part_pose()
-        return Pose(
-            position=pose.position[0].cpu().numpy().astype(np.float64),
-            quat_wxyz=pose.quat_wxyz[0].cpu().numpy().astype(np.float64),
-        )
+        return _pose(self._present)
+
+
+def _pose(lying: Lying) -> Pose:
+    pose = base_pose(lying.body)
+    return Pose(
+        position=pose.position[0].cpu().numpy().astype(np.float64),
+        quat_wxyz=pose.quat_wxyz[0].cpu().numpy().astype(np.float64),
+    )

@@ -42,6 +42,14 @@ FINGER_THICKNESS = 0.026
 """Distance from a pad's face to the back of the finger, metres."""
 PALM_HEIGHT = 0.0374
 """Height of the lower face of the hand's collision hull over the TCP, metres."""
+HAND_GEOMETRY = {
+    "pad_reach": PAD_REACH,
+    "max_opening": MAX_OPENING,
+    "finger_half_width": FINGER_HALF_WIDTH,
+    "finger_thickness": FINGER_THICKNESS,
+    "palm_height": PALM_HEIGHT,
+}
+"""The hand's measures above, as datasets state them, metres."""
 MIN_GAP = 0.5e-3
 """Pads with a smaller gap hold nothing, metres."""
 MIN_RISE = 0.8
@@ -53,7 +61,8 @@ MAX_DISPLACEMENT = 0.05
 EJECTED_DISTANCE = 0.05
 """A part that ends this far from its initial position, and not in the hand, was ejected, metres."""
 FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled")
-"""Why an attempt failed, by code: a shard stores the index into this tuple."""
+"""Why an attempt failed, by code: a shard stores the index into this tuple. ``unsettled`` is no failure of a
+grasp: the part was not at rest before. Only datasets of simulation version 1 hold such attempts."""
 
 
 @dataclass(frozen=True, kw_only=True)

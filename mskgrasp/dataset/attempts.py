@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,7 +25,8 @@ class Column:
     shape: tuple[int, ...] | None  # after the leading n; None: an image of any size
     unit: str
     frame: str
-    finite: str  # which rows must hold finite numbers
+    finite: Literal["all", "successful", "none"]  # which rows must hold finite numbers
+    since: int = 1  # version of the schema; in older shards the column is NaN
 
 
 COLUMNS = {
@@ -36,6 +37,7 @@ COLUMNS = {
     "displacement": Column("float32", (4,), "m m m rad (dx dy dz dtheta)", "grasp", "successful"),
     "tilt": Column("float32", (), "rad", "grasp", "successful"),
     "width_after": Column("float32", (), "m", "-", "successful"),
+    "relative_speed": Column("float32", (), "m/s", "tcp, measured", "none", since=2),
     "pose_base_obj": Column("float32", (7,), _POSE, "base", "all"),
     "pose_tcp_obj_before": Column("float32", (7,), _POSE, "tcp, commanded", "all"),
     "pose_tcp_obj_after": Column("float32", (7,), _POSE, "tcp, measured", "successful"),
@@ -54,6 +56,8 @@ class Attempts:
         displacement: (n, 4) float32 object displacement, NaN where not successful.
         tilt: (n,) float32, radians.
         width_after: (n,) float32 distance between the pads at the end, metres.
+        relative_speed: (n,) float32 speed of the part in the hand when it was judged, m/s; NaN where
+            nothing was lifted, or unknown.
         pose_base_obj: (n, 7) float32, x y z qw qx qy qz, at rest before the grasp.
         pose_tcp_obj_before: (n, 7) float32, in the commanded TCP.
         pose_tcp_obj_after: (n, 7) float32, in the measured TCP once lifted.
@@ -66,6 +70,7 @@ class Attempts:
     displacement: np.ndarray
     tilt: np.ndarray
     width_after: np.ndarray
+    relative_speed: np.ndarray
     pose_base_obj: np.ndarray
     pose_tcp_obj_before: np.ndarray
     pose_tcp_obj_after: np.ndarray
@@ -107,6 +112,9 @@ class ShardInfo:
         physics: Settings of the simulation.
         versions: Software versions.
         discarded: Number of discarded attempts by reason.
+        redrawn: Number of scenes drawn again because the part was not at rest.
+        toppled: Probability of the resting poses that the engine does not hold, which are left out.
+        hand: Measures of the hand, metres; empty: not recorded.
         noise: Simulated errors of the cell; empty: none.
     """
 
@@ -122,6 +130,9 @@ class ShardInfo:
     physics: dict[str, Any]
     versions: dict[str, str]
     discarded: dict[str, int]
+    redrawn: int = 0
+    toppled: float = 0.0
+    hand: dict[str, float] = field(default_factory=dict)
     noise: dict[str, Any] = field(default_factory=dict)
 
 
@@ -168,6 +179,8 @@ def problems(attempts: Attempts) -> Iterator[str]:
         return  # values of arrays with wrong shapes cannot be compared
     for name, column in COLUMNS.items():
         array = getattr(attempts, name)
+        if column.finite == "none":
+            continue
         rows = np.ones(n, bool) if column.finite == "all" else attempts.success
         bad = np.flatnonzero(rows & ~np.isfinite(array.reshape(n, -1)).all(axis=1)) if n else []
         if len(bad):

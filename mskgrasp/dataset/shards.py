@@ -17,7 +17,8 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.dataset.attempts import COLUMNS, Attempts, ShardInfo, problems, shape_problems
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+"""Version 1 had no relative speeds, and stored attempts at parts that were not at rest as failures."""
 _FORMAT = "mskgrasp-shard"
 _MOST_BYTES = 2**32
 """Largest plausible array: more than 10,000 images of the largest camera."""
@@ -87,7 +88,7 @@ def _file_image(attempts: Attempts, info: ShardInfo) -> bytes:
         file["failure"].attrs["failure_names"] = list(FAILURES)
         file.attrs["format"] = _FORMAT
         file.attrs["schema_version"] = SCHEMA_VERSION
-        for name in ("part", "part_hash", "family", "index", "seed", "table_z"):
+        for name in ("part", "part_hash", "family", "index", "seed", "table_z", "redrawn", "toppled"):
             file.attrs[name] = getattr(info, name)
         file.attrs["intrinsics"] = np.asarray(info.intrinsics, dtype=np.float64)
         pose = np.asarray(info.T_base_camera.as_vector(), dtype=np.float64)
@@ -95,7 +96,7 @@ def _file_image(attempts: Attempts, info: ShardInfo) -> bytes:
         file.attrs["T_base_camera_layout"] = "x y z qw qx qy qz, metres"
         file.attrs["region"] = np.asarray(info.region, dtype=np.float64)
         file.attrs["region_layout"] = "x_min x_max y_min y_max, base, metres"
-        for name in ("physics", "noise", "versions", "discarded"):
+        for name in ("physics", "noise", "versions", "discarded", "hand"):
             file.attrs[name] = json.dumps(getattr(info, name), sort_keys=True)
         file.flush()
         return file.id.get_file_image()
@@ -172,7 +173,9 @@ def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], Sh
 
 
 def _array(file: h5py.File, name: str) -> np.ndarray:
-    stored = file[name]
+    stored = file.get(name)
+    if stored is None:  # younger than the file, or _check_header would have refused it
+        return np.full(len(_array(file, "success")), np.nan, COLUMNS[name].dtype)
     assert isinstance(stored, h5py.Dataset)  # checked by _check_header
     # The data must be in the shard itself: a foreign file must not make us read other files.
     link = file.get(name, getlink=True)
@@ -188,10 +191,12 @@ def _check_header(file: h5py.File, path: Path) -> None:
     kind = file.attrs.get("format")
     if kind != _FORMAT:
         raise BadDataset(f"{path} is HDF5 but no grasp shard (format {kind!r}); remove it")
-    version = file.attrs.get("schema_version")
-    if version != SCHEMA_VERSION:
-        raise BadDataset(f"{path} has schema version {version}, legal: {SCHEMA_VERSION}; collect it again")
-    missing = [name for name in COLUMNS if not isinstance(file.get(name), h5py.Dataset)]
+    version: Any = file.attrs.get("schema_version")
+    if version not in range(1, SCHEMA_VERSION + 1):
+        legal = f"1 to {SCHEMA_VERSION}"
+        raise BadDataset(f"{path} has schema version {version}, legal: {legal}; collect it again")
+    due = [name for name, column in COLUMNS.items() if column.since <= version]
+    missing = [name for name in due if not isinstance(file.get(name), h5py.Dataset)]
     if missing:
         raise BadDataset(f"{path} lacks the array {', '.join(missing)}; delete it and collect again")
     names = tuple(np.asarray(file["failure"].attrs["failure_names"]).tolist())
@@ -219,6 +224,9 @@ def _read_info(file: h5py.File) -> ShardInfo:
         physics=_mapping(attrs, "physics"),
         versions=_mapping(attrs, "versions"),
         discarded=_mapping(attrs, "discarded"),
+        redrawn=int(attrs.get("redrawn", 0)),
+        toppled=float(attrs.get("toppled", 0.0)),
+        hand=_mapping(attrs, "hand") if "hand" in attrs else {},
         noise=_mapping(attrs, "noise") if "noise" in attrs else {},
     )
 

@@ -16,7 +16,7 @@ import torch
 from torch import Tensor
 
 from mskgrasp.core.errors import BadDataset, NoPartFound
-from mskgrasp.core.grasp import centre_in_grasp_frame, to_grasp_displacement
+from mskgrasp.core.grasp import FAILURES, centre_in_grasp_frame, to_grasp_displacement
 from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard, u16_to_depth
 from mskgrasp.learning.network_config import NetworkConfig
 from mskgrasp.parts.catalogue import Split, read_index
@@ -50,7 +50,8 @@ class Samples:
         grasp_displacement: (n, 4) float32, the same motion as grasp displacement: the training target.
         part: (n,) int64, index into ``parts``.
         parts: Names of the parts.
-        skipped: Number of unusable attempts by reason: the planner would find no part in them either.
+        skipped: Number of unusable attempts by reason: the planner would find no part in them either, or the
+            part was not at rest.
         fingerprint: Hex digest of grasps and outcomes; equal digests mean equal data.
     """
 
@@ -232,6 +233,9 @@ def _shard_samples(
     depth = u16_to_depth(attempts.depth)
     rows, centres, offsets = [], [], []
     for row, image in enumerate(depth):
+        if FAILURES[attempts.failure[row]] == "unsettled":
+            skipped["the part was not at rest"] += 1
+            continue
         try:
             view = view_part(
                 image, info.intrinsics, info.T_base_camera, table_z=info.table_z, region=info.region

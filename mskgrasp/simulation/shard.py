@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from mskgrasp.core.errors import NoPartFound
-from mskgrasp.core.grasp import MAX_DISPLACEMENT, sample_grasps
+from mskgrasp.core.grasp import HAND_GEOMETRY, MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
 from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, u16_to_depth, write_shard
@@ -25,9 +25,11 @@ from tasks.attempt.outcome import MAX_PENETRATION, MAX_SPEED
 from tasks.scene.renderer import render_backend
 
 FIELDS = (
-    "success", "failure", "displacement", "tilt", "width_after",
+    "success", "failure", "displacement", "tilt", "width_after", "relative_speed",
     "pose_base_obj", "pose_tcp_obj_before", "pose_tcp_obj_after",
 )  # fmt: skip
+MOST_REDRAWS = 4
+"""An attempt whose part was not at rest is drawn again so often at most."""
 
 
 class Simulator:
@@ -75,20 +77,19 @@ class Simulator:
         part = env.parts[0]
         rows: list[dict[str, np.ndarray]] = []
         discarded: Counter[str] = Counter()
+        redrawn = 0
         for attempt in range(task.first, task.first + task.n):
-            depth, grasp = draw_attempt(env, task.part, task.seed, attempt)
-            if grasp is None:
-                discarded["part_not_seen"] += 1
-                yield -1
-                continue
-            outcome = env.try_grasp(torch.as_tensor(grasp, device=env.device))
-            row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
-            reason = discard_reason(outcome, row)
+            draw = 0
+            row, reason = _try(env, task, attempt, draw)
+            while reason == "unsettled" and draw < MOST_REDRAWS:
+                draw += 1
+                row, reason = _try(env, task, attempt, draw)
+            redrawn += draw
             if reason:
                 discarded[reason] += 1
                 yield -1
                 continue
-            rows.append(dict(row, depth=depth, grasp=grasp[0]))
+            rows.append(row)
             yield int(row["success"])
         attempts = _stack(rows, (self._camera.n_pixels, self._camera.n_pixels))
         info = ShardInfo(
@@ -105,6 +106,9 @@ class Simulator:
             noise=self._noise.model_dump(mode="json"),
             versions=versions(),
             discarded=dict(discarded),
+            redrawn=redrawn,
+            toppled=env.standing[0].toppled,
+            hand=HAND_GEOMETRY,
         )
         return attempts, info
 
@@ -114,16 +118,35 @@ class Simulator:
             self._env.close()
 
 
+def _try(
+    env: GraspDisplacementEnv, task: ShardTask, attempt: int, draw: int
+) -> tuple[dict[str, np.ndarray], str]:
+    """One attempt as a row of the shard, and why it cannot be one; empty where it can."""
+    depth, grasp = draw_attempt(env, task.part, task.seed, attempt, draw)
+    if grasp is None:
+        return {}, "part_not_seen"
+    outcome = env.try_grasp(torch.as_tensor(grasp, device=env.device))
+    row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
+    return dict(row, depth=depth, grasp=grasp[0]), discard_reason(outcome, row)
+
+
 def draw_attempt(
-    env: GraspDisplacementEnv, part: str, seed: int, attempt: int
+    env: GraspDisplacementEnv, part: str, seed: int, attempt: int, draw: int = 0
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """Places the part as determined by seed and attempt number, takes a depth image and draws a grasp.
+
+    Args:
+        env: Holds the part.
+        part: Its name.
+        seed: Of the run.
+        attempt: Number of the attempt among those of the part.
+        draw: How often the attempt was drawn before, with a part that was not at rest.
 
     Returns:
         The depth image (h, w), uint16 in 0.1 mm, and the grasp (1, 4), float32, base frame; None where the
         camera does not see the part.
     """
-    episode_seed, grasp_seed = scene_seeds(seed, part, attempt)
+    episode_seed, grasp_seed = scene_seeds(seed, part, attempt, draw)
     env.begin_episode(episode_seed)
     depth = depth_to_u16(env.capture_depth()[0].cpu().numpy())
     try:
@@ -140,7 +163,9 @@ def draw_attempt(
 
 
 def discard_reason(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> str:
-    """Why an attempt cannot have happened; empty where it can."""
+    """Why an attempt is no label; empty where it is one."""
+    if not bool(outcome["settled"][0]):
+        return "unsettled"
     if not all(np.isfinite(row[name]).all() for name in FIELDS if name.startswith("pose")):
         return "not_finite"
     if float(outcome["penetration"][0]) > MAX_PENETRATION:
@@ -161,6 +186,7 @@ def _stack(rows: list[dict[str, np.ndarray]], shape: tuple[int, int]) -> Attempt
         displacement=np.zeros((0, 4), np.float32),
         tilt=np.zeros(0, np.float32),
         width_after=np.zeros(0, np.float32),
+        relative_speed=np.zeros(0, np.float32),
         pose_base_obj=np.zeros((0, 7), np.float32),
         pose_tcp_obj_before=np.zeros((0, 7), np.float32),
         pose_tcp_obj_after=np.zeros((0, 7), np.float32),

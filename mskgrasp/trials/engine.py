@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -211,7 +212,12 @@ class TrialEngine:
         )
 
     def put_back(self, plan: GraspPlan) -> None:
-        """Put a lifted part down where it was grasped; a contact ends this motion, not the trial."""
+        """Put a lifted part down where it was grasped; a contact ends this motion, not the trial.
+
+        Not where a simulated feeder clears the hand as it places the next part.
+        """
+        if self.cell.arm.simulated and self.cell.feeder is not None:
+            return
         try:
             put_down(self.cell, plan.grasp)
         except MotionAborted as error:
@@ -250,6 +256,9 @@ def connected_engine(path: Path, *, yes: bool, picture: Path, tape: Tape | None)
     operator = Operator(cell, yes=yes)
     n_threads = torch.get_num_threads()
     if cell.arm.simulated:
+        # A simulator collects garbage at every new scene; the modules loaded by now need no scan.
+        gc.collect()
+        gc.freeze()
         # Rounding depends on the number of threads, and would reorder near-equal grasps.
         torch.set_num_threads(1)
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -30,6 +31,7 @@ from tasks.attempt.speed_watch import SpeedWatch
 from tasks.robot.contacts import HandContacts
 from tasks.robot.motion import PEAK_ACCELERATION, PandaMotion, finger_lag, run_up
 from tasks.robot.panda import GraspPanda
+from tasks.robot.reflex import Reflex
 from tasks.scene.frames import own_pose
 
 SPEED_WINDOW_S = 0.02
@@ -38,14 +40,14 @@ REST_TIMEOUT_S = 0.3
 """Time a part that was not lifted has to fall, roll and come to rest before it is judged, s."""
 REST_WINDOW_S = 0.06
 """A part that has not moved for this time is at rest, s."""
-AHEAD = 0.003
+AHEAD = 0.001
 """Least distance from the part, m, at which fingers in free air begin to close: more than a settling part
 may move and still count as at rest."""
 TAKE_OFF = 0.012
 """First part of the lift, m, simulated as finely as the closing: a part turns in the hand while it leaves the
 table, within the first centimetre."""
-REFLEX_S = 0.008
-"""Time between two checks of the force on a descending hand, s."""
+LOOK_S = 0.05
+"""Time between two checks of a rising part: is it still in the hand, how deep do the pads overlap it, s."""
 ARRIVAL_S = 0.024
 """Time a hand has to come to rest after its descent, s."""
 LOST_MARGIN = 0.02
@@ -93,10 +95,11 @@ class Attempt:
             executed: (n, 4) true target of the hand; as commanded by default.
 
         Returns:
-            success (n) bool; failure (n) uint8; displacement (n, 4) and tilt (n), NaN where not
-            successful; width_after (n) m; pose_base_obj, pose_tcp_obj_before, pose_tcp_obj_after (n, 7);
-            penetration (n) m, NaN where unknown; fastest (n), greatest speed of the part, m/s; seconds (n) of
-            simulated time.
+            success (n) bool; failure (n) uint8; settled (n) bool, whether the part was at rest before
+            anything touched it: if not, the other values mean nothing; displacement (n, 4) and tilt (n), NaN
+            where not successful; width_after (n) m; relative_speed (n), of the part in the hand when it is
+            judged, m/s; pose_base_obj, pose_tcp_obj_before, pose_tcp_obj_after (n, 7); penetration (n) m, NaN
+            where unknown; fastest (n), greatest speed of the part, m/s; seconds (n) of simulated time.
 
         Raises:
             ValueError: A grasp is too low or out of the arm's reach.
@@ -124,22 +127,23 @@ class Attempt:
         motion.step(motion.n_steps(physics.settle_s))
         rest = self._part_pose()
         settled = at_rest(placed, rest)
-        collided, touched = xp.zeros_like(settled), xp.zeros_like(settled)
+        collided, touched, touching = (xp.zeros_like(settled) for _ in range(3))
+        reflex = Reflex(self._contacts, motion)
 
-        def reflex(_: int) -> bool:
-            force = self._contacts.hand_force()
+        def met(_: int) -> bool:
+            force = reflex.force()
             collided[:] = collided | (force > physics.reflex_force)
-            touched[:] = touched | (force > 0)
+            touching[:] = force > 0
+            touched[:] = touched | touching
             return bool((collided | ~settled | free).all())
 
         if down is not None:
-            every = motion.n_steps(REFLEX_S)
-            if motion.follow(down, check=reflex, check_every=every, frozen=collided):
-                for _ in range(round(ARRIVAL_S / REFLEX_S)):
-                    motion.step(every)
-                    reflex(0)
+            if motion.follow(down, check=met, check_every=1, frozen=collided):
+                for step in range(motion.n_steps(ARRIVAL_S)):
+                    motion.step()
+                    met(step)
             # A hand in contact yields: it must not be moved to its target.
-            motion.arrive(frozen=collided | ~settled | (self._contacts.hand_force() > 0))
+            motion.arrive(frozen=collided | ~settled | touching)
         # A part that moved although nothing touched it was still toppling.
         settled = settled & (touched | at_rest(rest, self._part_pose()))
         held, penetration = xp.zeros_like(settled), xp.zeros_like(reach)
@@ -153,14 +157,17 @@ class Attempt:
             motion.run_fingers(running & ~apart)
             motion.move_fingers(-MAX_OPENING / 2, frozen=apart, check=all_closed)
             held, penetration = self.grip()
-        carried = bool((alive & held).any())
-        if carried:
-            carried, deepest = self._lift(grasp, lifted, alive & held, collided | ~settled)
-            penetration = xp.maximum(penetration, deepest)
-        if not carried and bool(alive.any()):
-            with motion.coarsely():
-                self._wait_for_rest()
-        return self._outcome(commanded, rest, settled, collided, held, penetration, began)
+        # Parts that nothing holds come to rest before the others are lifted: when they are judged must not
+        # depend on other sub-scenes.
+        self._wait_for_rest(alive & ~held)
+        missed = self._part_pose()
+        lifting = alive & held
+        if bool(lifting.any()):
+            penetration = xp.maximum(penetration, self._lift(grasp, lifted, lifting))
+        seen = self._observe(lifting, penetration)
+        self._wait_for_rest(lifting & ~seen.pads_touch)
+        now = _where(lifting & seen.pads_touch, seen.part, _where(lifting, self._part_pose(), missed))
+        return self._outcome(commanded, rest, now, settled, collided, held, seen, began)
 
     def _part_pose(self) -> Pose:
         return own_pose(self._part, self._arrays)
@@ -204,28 +211,30 @@ class Attempt:
         first = MAX_OPENING / 2 + finger_lag(self._physics)
         return first - self._arrays.xp.floor((first - reach - AHEAD) / step) * step
 
-    def _wait_for_rest(self) -> None:
-        """Waits until parts that were not lifted are at rest: the pose of a falling part is arbitrary."""
+    def _wait_for_rest(self, parts: Array) -> None:
+        """Waits until parts (n,) that nothing holds are at rest: the pose of a falling part is arbitrary."""
+        if not bool(parts.any()):
+            return
         motion = self._motion
-        before = self._part_pose()
-        for _ in range(round(REST_TIMEOUT_S / REST_WINDOW_S)):
-            motion.step(motion.n_steps(REST_WINDOW_S))
-            now = self._part_pose()
-            if bool(at_rest(before, now).all()):
-                return
-            before = now
+        with motion.coarsely():
+            before = self._part_pose()
+            for _ in range(round(REST_TIMEOUT_S / REST_WINDOW_S)):
+                motion.step(motion.n_steps(REST_WINDOW_S))
+                now = self._part_pose()
+                if bool((at_rest(before, now) | ~parts).all()):
+                    return
+                before = now
 
-    def _lift(self, grasp: Array, lifted: Array, alive: Array, stopped: Array) -> tuple[bool, Array]:
-        """Lifts and holds.
+    def _lift(self, grasp: Array, lifted: Array, lifting: Array) -> Array:
+        """Lifts and holds; ends early where no part is left in its hand.
 
         Args:
             grasp: (n, 4) where the fingers closed.
             lifted: (n, 4) the same, at the end of the lift.
-            alive: (n,) bool, hands that hold a part.
-            stopped: (n,) bool, arms that do not move: a reflex may have ended their descent.
+            lifting: (n,) bool, hands that hold a part; the others stay where they are.
 
         Returns:
-            Whether any part is still held, and (n,) the deepest overlap seen, m.
+            (n,) the deepest overlap seen, m.
         """
         motion, physics, xp = self._motion, self._physics, self._arrays.xp
 
@@ -238,70 +247,86 @@ class Attempt:
         def all_lost(_: int) -> bool:
             nonlocal deepest
             deepest = xp.maximum(deepest, self._contacts.penetration())
-            lost = ~alive | (motion.gap() <= MIN_GAP) | (behind() > most_behind)
+            lost = ~lifting | (motion.gap() <= MIN_GAP) | (behind() > most_behind)
             return bool(lost.all())
 
         def rise(times: np.ndarray) -> bool:
             up = self._line_at(grasp, lifted, times)
-            return motion.follow(up, check=all_lost, check_every=motion.n_steps(0.05), frozen=stopped)
+            return motion.follow(up, check=all_lost, check_every=motion.n_steps(LOOK_S), frozen=~lifting)
 
         seconds = minimum_jerk_duration(physics.lift_height, physics.lift_speed, PEAK_ACCELERATION)
         times = _moments(motion.n_steps(seconds))
         times = times[: 1 + int(np.searchsorted(physics.lift_height * minimum_jerk(times), TAKE_OFF))]
         if not rise(times):
-            return False, deepest
+            return deepest
         # Off the table coarse steps suffice, but not for the last measurement: with them a part trembles more
         # between the pads.
         with motion.coarsely():
             rest = 1 - times[-1]
             if rest > 0 and not rise(times[-1] + rest * _moments(motion.n_steps(rest * seconds))):
-                return False, deepest
+                return deepest
             motion.step(motion.n_steps(physics.hold_s - SPEED_WINDOW_S))
-        return True, deepest
+        return deepest
+
+    def _observe(self, lifting: Array, penetration: Array) -> _InHand:
+        """Measures what hangs in the hands, in the last part of the hold."""
+        xp = self._arrays.xp
+        if bool(lifting.any()):
+            speed = self.relative_speed()
+        else:
+            speed = xp.full_like(penetration, math.nan)
+        touch, deepest = self.grip()
+        return _InHand(
+            speed=speed,
+            part=self._part_pose(),
+            tcp=self._hand_pose(),
+            gap=self._motion.gap(),
+            pads_touch=touch,
+            penetration=xp.maximum(penetration, deepest),
+        )
 
     def _outcome(
         self,
         commanded: Array,
         rest: Pose,
+        now: Pose,
         settled: Array,
         collided: Array,
         held: Array,
-        penetration: Array,
+        seen: _InHand,
         began: float,
     ) -> dict[str, Array]:
         xp = self._arrays.xp
-        speed = self.relative_speed()
-        now, tcp = self._part_pose(), self._hand_pose()
-        touch, deepest = self.grip()
-        deepest, gap = xp.maximum(penetration, deepest), self._motion.gap()
         moved = now.position - rest.position
         success, failure = judge(
             Observed(
                 settled=settled,
                 collided=collided,
                 held_closed=held,
-                pads_touch=touch,
-                gap=gap,
+                pads_touch=seen.pads_touch,
+                gap=seen.gap,
                 rise=moved[:, 2] / self._physics.lift_height,
-                relative_speed=speed,
-                penetration=deepest,
+                relative_speed=seen.speed,
+                penetration=seen.penetration,
                 wandered=_length(moved[:, :2]),
             )
         )
-        before, after = pose_base_tcp(commanded).inverse() @ rest, tcp.inverse() @ now
+        before, after = pose_base_tcp(commanded).inverse() @ rest, seen.tcp.inverse() @ now
         displacement, tilt = object_displacement(before, after)
         return dict(
             success=success,
             failure=failure,
+            settled=settled,
             displacement=xp.where(success[:, None], displacement, xp.full_like(displacement, math.nan)),
             tilt=xp.where(success, tilt, xp.full_like(tilt, math.nan)),
-            width_after=gap,
+            width_after=seen.gap,
+            relative_speed=seen.speed,
             pose_base_obj=rest.as_vector(),
             pose_tcp_obj_before=before.as_vector(),
             pose_tcp_obj_after=after.as_vector(),
-            penetration=deepest,
+            penetration=seen.penetration,
             fastest=self._speed.fastest(),
-            seconds=xp.full_like(deepest, self._motion.seconds - began),
+            seconds=xp.full_like(seen.penetration, self._motion.seconds - began),
         )
 
     def grip(self) -> tuple[Array, Array]:
@@ -335,6 +360,37 @@ class Attempt:
         share = self._arrays.of(minimum_jerk(times))[:, None, None]
         start, goal = _double(start), _double(goal)
         return top_down(start + share * (goal - start))[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _InHand:
+    """Measurements of n hands at the end of the hold.
+
+    Attributes:
+        speed: (n,) of the part against the hand, m/s; NaN where nothing was lifted in any sub-scene.
+        part: ``T_base_obj``.
+        tcp: ``T_base_tcp``.
+        gap: (n,) distance of the pads, m.
+        pads_touch: (n,) whether both pads hold the part.
+        penetration: (n,) deepest overlap of finger and part in the attempt, m.
+    """
+
+    speed: Array
+    part: Pose
+    tcp: Pose
+    gap: Array
+    pads_touch: Array
+    penetration: Array
+
+
+def _where(rows: Array, first: Pose, second: Pose) -> Pose:
+    """The first poses in some rows (n,), the second ones in the others."""
+    xp = array_namespace(rows)
+    chosen = [
+        xp.where(rows[:, None], a, b)
+        for a, b in ((first.position, second.position), (first.quat_wxyz, second.quat_wxyz))
+    ]
+    return Pose(position=chosen[0], quat_wxyz=chosen[1])
 
 
 def at_rest(before: Pose, after: Pose) -> Array:

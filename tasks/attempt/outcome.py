@@ -17,9 +17,9 @@ MIN_PAD_FORCE = 0.05
 """Least force of a contact, N."""
 MAX_SPEED = 3.0
 """No grasp makes a part faster than this, m/s: a faster one was flung out of an overlap by the solver."""
-MAX_DRIFT = 1e-3
-"""A part that moves more than this on the table before it is grasped was not at rest, m."""
-MAX_TURN = 0.02
+MAX_DRIFT = 2e-4
+"""A part that moves more than this on the table although nothing touches it is not at rest, m."""
+MAX_TURN = 5e-3
 """The same for a turn, rad."""
 
 CODE = {name: i for i, name in enumerate(FAILURES)}
@@ -30,13 +30,13 @@ class Observed:
     """Measurements of n attempts; every field has shape (n,).
 
     Attributes:
-        settled: The part was at rest before the grasp.
+        settled: The part was at rest before anything touched it; if not, no other value means anything.
         collided: The descent met more force than the reflex allows.
         held_closed: Both pads touched the part, and there was a gap, when the fingers had closed.
         pads_touch: Both pads touch the part after the hold.
         gap: Distance of the pads after the hold, m.
         rise: Rise of the part, as a fraction of the lift.
-        relative_speed: Speed of the part against the hand after the hold, m/s.
+        relative_speed: Speed of the part against the hand after the hold, m/s; NaN where nothing was lifted.
         penetration: Deepest overlap of finger and part seen, m; NaN where it is not known.
         wandered: Horizontal distance of the part from its resting place, m.
     """
@@ -66,8 +66,8 @@ def judge(seen: Observed) -> tuple[Array, Array]:
     steady = (seen.relative_speed < MAX_RELATIVE_SPEED) & ~overlap
     success = seen.settled & ~seen.collided & seen.held_closed & holds & steady
     xp = array_namespace(seen.gap)
-    failure = xp.full_like(seen.gap, CODE["unsettled"], dtype=xp.uint8)
-    failure[~holds] = CODE["slipped"]
+    # A part that still moves in the hand is slipping out of it.
+    failure = xp.full_like(seen.gap, CODE["slipped"], dtype=xp.uint8)
     failure[~seen.held_closed] = CODE["missed"]
     failure[~holds & (seen.wandered > EJECTED_DISTANCE)] = CODE["ejected"]
     failure[seen.collided] = CODE["collided"]

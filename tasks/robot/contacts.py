@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 import torch
 from mani_skill.envs.scene import ManiSkillScene
 from mani_skill.utils.structs.actor import Actor
-from sapien.physx import PhysxBaseComponent, PhysxRigidDynamicComponent
+from sapien import Component
+from sapien.physx import PhysxContact, PhysxRigidDynamicComponent
 
 from mskgrasp.core.geometry import Array
 from tasks.robot.panda import FINGER_LINKS, HAND_LINKS, GraspPanda
@@ -31,53 +32,51 @@ class HandContacts:
         self._arrays = arrays_for(scene)
         if not self._gpu:
             links = agent.robot.links_map
-            self._hand = {links[name]._objs[0]: i for i, name in enumerate(HAND_LINKS)}
+            self._hand = {links[name]._objs[0] for name in HAND_LINKS}
             self._fingers = {links[name]._objs[0]: i for i, name in enumerate(FINGER_LINKS)}
             self._body = part._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
 
-    def hand_force(self) -> Array:
-        """(n,) largest net contact force on the hand or a finger, N."""
-        if self._gpu:
-            return self._agent.robot.get_net_contact_forces(HAND_LINKS).norm(dim=-1).amax(dim=-1)
-        largest = max((float(np.linalg.norm(v)) for v in self._impulses(self._hand).values()), default=0.0)
-        return self._arrays.full(1, largest / self._scene.px.timestep)
+    def load(self, *, holding: bool = False) -> Array:
+        """(n, 3) net contact force on the hand with its fingers, base axes, N.
 
-    def outer_force(self) -> Array:
-        """(n,) net contact force of all else on the hand and, while it touches it, the part together, N.
+        On the CPU PhysX reports normal forces alone.
 
-        The forces of the grip cancel in this sum. They would not on the hand alone: on the CPU PhysX reports
-        no friction.
+        Args:
+            holding: A part that the hand touches counts as one with it, so that the grip cancels.
         """
         if self._gpu:
             hand = self._agent.robot.get_net_contact_forces(HAND_LINKS).sum(dim=-2)
-            part = self._part.get_net_contact_forces()
+            if not holding:
+                return hand
             touched = self.pads_on_part()[0].amax(dim=-1, keepdim=True) > 0
-            return torch.where(touched, hand + part, hand).norm(dim=-1)
-        bodies = dict(self._hand)
-        if self._touches_part():
-            bodies[self._body] = len(bodies)
-        impulses = self._impulses(bodies)
-        total = sum(impulses.values(), np.zeros(3))
-        return self._arrays.full(1, float(np.linalg.norm(total)) / self._scene.px.timestep)
+            return torch.where(touched, hand + self._part.get_net_contact_forces(), hand)
+        contacts = self._scene.px.get_contacts()
+        members = self._members(contacts, holding)
+        total = np.zeros(3)
+        for contact in contacts:
+            first, second = (body in members for body in contact.bodies)
+            if first is not second:
+                total += (1.0 if first else -1.0) * _sum([point.impulse for point in contact.points])
+        return self._arrays.of((total / self._scene.px.timestep)[None])
 
-    def _touches_part(self) -> bool:
-        for contact in self._scene.px.get_contacts():
-            first, second = contact.bodies
-            other = second if first is self._body else first if second is self._body else None
-            if other in self._hand and any(np.any(point.impulse) for point in contact.points):
-                return True
-        return False
+    def near(self, *, holding: bool = False) -> bool:
+        """Whether anything is within the contact offset of a hand, so that a load may follow."""
+        if self._gpu:
+            return True
+        contacts = self._scene.px.get_contacts()
+        members = self._members(contacts, holding)
+        return any((one.bodies[0] in members) is not (one.bodies[1] in members) for one in contacts)
 
-    def _impulses(self, bodies: dict[PhysxBaseComponent, int]) -> dict[int, np.ndarray]:
-        """Sum of the impulses on each of these bodies that is touched, N s, by its number."""
-        total: dict[int, np.ndarray] = {}
-        for contact in self._scene.px.get_contacts():
-            for sign, body in zip((1.0, -1.0), contact.bodies, strict=True):
-                i = bodies.get(body)
-                if i is not None:
-                    # Contact by contact: so the forces of equal grips cancel to the bit.
-                    total[i] = total.get(i, 0.0) + sign * _sum([point.impulse for point in contact.points])
-        return total
+    def _members(self, contacts: list[PhysxContact], holding: bool) -> Collection[Component]:
+        """The bodies of the hand, and the part where it counts as one with it."""
+        if holding and any(
+            self._body in contact.bodies
+            and any(body in self._hand for body in contact.bodies)
+            and any(np.any(point.impulse) for point in contact.points)
+            for contact in contacts
+        ):
+            return {*self._hand, self._body}
+        return self._hand
 
     def pads_on_part(self) -> tuple[Array, Array]:
         """Grip on the part.

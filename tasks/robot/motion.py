@@ -94,10 +94,10 @@ class PandaMotion:
         return max(1, round(seconds * self.rate_hz))
 
     @contextmanager
-    def coarsely(self) -> Iterator[None]:
-        """Simulates with the coarse rate while the context lasts."""
+    def coarsely(self, rate_hz: int | None = None) -> Iterator[None]:
+        """Simulates with a coarse rate while the context lasts, by default that of the part."""
         fine = self.rate_hz
-        self._set_rate(self._coarse_hz)
+        self._set_rate(min(fine, rate_hz or self._coarse_hz))
         try:
             yield
         finally:

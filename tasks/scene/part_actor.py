@@ -22,29 +22,35 @@ STEEL_GREY = (0.55, 0.57, 0.6, 1.0)
 def build_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: float) -> Actor:
     """Loads a part into one sub-scene.
 
-    The hulls are stored in millimetres and scaled, because PhysX drops hull vertices that lie closer
-    than 0.7 of its length unit's thousandth; mass and inertia come from the mesh, because PhysX would
-    add up overlapping hulls and clamp small inertias.
-
     Raises:
         BadPart: PhysX could not cook every hull of the part.
     """
     builder = scene.create_actor_builder()
-    material = PhysxMaterial(friction, friction, 0.0)
-    builder.add_multiple_convex_collisions_from_file(
-        str(part.hulls_path), scale=[1e-3] * 3, material=material
-    )
+    add_hulls(builder, part, friction)
     if scene.can_render():
         builder._procedural_shapes.append(_visual(part))
-    builder.set_mass_and_inertia(
-        part.mass, sapien.Pose(q=part.quat_obj_principal), part.principal_inertia.astype(np.float32)
-    )
     builder.initial_pose = sapien.Pose(p=[0, 0, 0.5 + 0.5 * part.longest_axis])
     builder.set_scene_idxs([scene_index])
     actor = builder.build(name=f"{part.name}-{scene_index}")
     body = actor._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
     _check_cooked(part, body)
     return actor
+
+
+def add_hulls(builder: sapien.ActorBuilder, part: Part, friction: float) -> None:
+    """Gives a body the part's hulls, mass and inertia.
+
+    The hulls are stored in millimetres and scaled, because PhysX drops hull vertices that lie closer
+    than 0.7 of its length unit's thousandth; mass and inertia come from the mesh, because PhysX would
+    add up overlapping hulls and clamp small inertias.
+    """
+    material = PhysxMaterial(friction, friction, 0.0)
+    builder.add_multiple_convex_collisions_from_file(
+        str(part.hulls_path), scale=[1e-3] * 3, material=material
+    )
+    builder.set_mass_and_inertia(
+        part.mass, sapien.Pose(q=part.quat_obj_principal), part.principal_inertia.astype(np.float32)
+    )
 
 
 def _check_cooked(part: Part, body: PhysxRigidDynamicComponent | None) -> None:

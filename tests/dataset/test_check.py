@@ -274,9 +274,9 @@ def test_a_shard_of_other_settings_is_named(data, name, value):
 
 def test_settings_that_changed_after_the_shards_were_made_are_named(data):
     settings = yaml.safe_load((data / "config.yaml").read_text())
-    settings["physics"]["finger_force"] = 30.0
+    settings["physics"]["finger_force"] = 40.0
     (data / "config.yaml").write_text(yaml.safe_dump(settings))
-    assert "physics.finger_force is 30.0, the shards were made with 20.0" in only(data, "config.yaml")
+    assert "physics.finger_force is 40.0, the shards were made with 30.0" in only(data, "config.yaml")
     (data / "config.yaml").unlink()
     assert "cannot read configuration" in only(data, "config.yaml")
 

@@ -24,7 +24,7 @@ def boxes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Part]:
     return dict(made, wide=make_box(cache, "wide", (0.05, 0.09, 0.03), 0.1))
 
 
-MASSES = {"feather": 0.0025, "light": 0.024, "lead": 0.05, "kilo": 1.0, "heavy": 1.55, "too-heavy": 2.15}
+MASSES = {"feather": 0.0025, "light": 0.024, "lead": 0.05, "kilo": 1.0, "heavy": 2.3, "too-heavy": 3.2}
 
 
 @pytest.fixture(scope="session")

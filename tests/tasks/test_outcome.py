@@ -44,8 +44,8 @@ def test_unknown_penetration_is_no_evidence_against_a_grasp():
         (dict(pads_touch=False), "slipped"),
         (dict(gap=0.0004), "slipped"),
         (dict(rise=0.79), "slipped"),
-        (dict(relative_speed=0.06), "unsettled"),
-        (dict(penetration=0.0011), "unsettled"),
+        (dict(relative_speed=0.06), "slipped"),
+        (dict(penetration=0.0011), "slipped"),
         (dict(rise=0.0, wandered=0.06), "ejected"),
         # Height alone is no success: a part that flies up without touching the pads.
         (dict(rise=1.2, pads_touch=False, wandered=0.08), "ejected"),

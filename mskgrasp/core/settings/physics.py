@@ -41,17 +41,20 @@ class Physics(Config):
     """Effective Coulomb coefficient between table and part."""
     pad_patch_radius: float = Field(default=0.005, ge=0)
     """Radius of the pad's contact patch, m, which resists turning about a single contact point."""
-    finger_speed: float = Field(default=0.1, gt=0)
-    """Closing speed of each finger, m/s (Franka Hand: 0.1 m/s at most)."""
-    finger_force: float = Field(default=20.0, gt=0, le=70)
-    """Force of each pad on the part, N."""
-    finger_stiffness: float = Field(default=8000.0, gt=0)
+    finger_speed: float = Field(default=0.05, gt=0)
+    """Closing speed of each finger, m/s (Franka Hand, product data sheet: at most 50 mm/s a finger; the speed
+    that libfranka takes is that of the width, twice as much)."""
+    finger_force: float = Field(default=30.0, gt=0, le=70)
+    """Force of each pad on the part, N. The Franka Hand presses with at most 70 N continuously (data sheet)
+    and, by its maker, with no less than 30 N (libfranka issue 111)."""
+    finger_stiffness: float = Field(default=16000.0, gt=0)
     """Drive stiffness of a finger, N/m; with the force limit and the speed it decides how soon a stopped pad
-    reaches its full force: 12 ms."""
-    finger_damping: float = Field(default=100.0, ge=0)
+    reaches its full force: 29 ms. What the hand takes is not published."""
+    finger_damping: float = Field(default=142.0, ge=0)
     """Drive damping of a finger, N s/m: critical, with the armature."""
     finger_armature: float = Field(default=0.3, ge=0)
-    """Inertia of motor and spindle that a finger joint carries, kg."""
+    """Inertia of motor and drive that a finger joint carries, kg. It is not published; `validate` shows what
+    other values change."""
     descend_speed: float = Field(default=0.25, gt=0)
     """Peak speed of the straight descent, m/s."""
     lift_speed: float = Field(default=0.25, gt=0)
@@ -60,14 +63,15 @@ class Physics(Config):
     """How far a part is lifted, m."""
     hold_s: float = Field(default=HOLD_S, ge=HOLD_S)
     """How long the lifted part is held before it is judged, s."""
-    settle_s: float = Field(default=0.06, ge=0)
-    """How long a part may settle on the table before it is grasped, s."""
+    settle_s: float = Field(default=0.02, ge=0)
+    """How long a part may settle on the table before it is grasped, s; it starts in a pose in which the
+    engine has held it at rest."""
     approach_clearance: float = Field(default=0.01, gt=0, le=0.1)
     """Height of the pads over the part's top at which the straight descent begins, m."""
     skip_air: bool = True
     """Whether motions of the hand through free space are skipped: it is placed at their end."""
     reflex_force: float = Field(default=20.0, gt=0)
-    """Contact force on the hand that ends a descent, N, as the robot's reflex would."""
+    """Mean contact force on the hand over 24 ms that ends a motion, N, as the robot's reflex would."""
 
     @model_validator(mode="before")
     @classmethod

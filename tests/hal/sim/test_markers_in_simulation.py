@@ -71,7 +71,7 @@ def test_a_grasp_that_shifts_and_turns_a_part_is_measured_on_the_table_as_it_was
         result = execute_grasp(cell, Grasp.from_vector(grasp))
         assert result.holding and result.aborted is None
         T_tcp_obj = result.T_base_tcp.inverse() @ world(cell).part_pose()
-        put_down(cell, Grasp.from_vector(grasp))
+        put_down(cell, Grasp.from_vector(grasp), height=0.0)
         go_home(cell)
         after = find(cell, cell.camera.capture())
     true, _ = object_displacement(pose_base_tcp(grasp).inverse() @ resting, T_tcp_obj)

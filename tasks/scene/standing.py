@@ -1,0 +1,130 @@
+"""Resting poses of a part as the engine holds them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import sapien
+from sapien.physx import PhysxCpuSystem, PhysxMaterial, PhysxRigidDynamicComponent
+
+from mskgrasp.core.errors import BadPart
+from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing
+from mskgrasp.core.settings import TABLE_Z, Physics
+from mskgrasp.parts import Part
+from tasks.scene.part_actor import add_hulls
+
+STILL_S = 0.1
+"""A part that stays within `STILL_DISTANCE` and `STILL_ANGLE` for this time stands, s."""
+STILL_DISTANCE = 2e-5
+"""m; a fifth of what a Panda repeats."""
+STILL_ANGLE = 5e-4
+"""rad."""
+SETTLE_TIMEOUT_S = 1.5
+"""A part that still moves after this time does not stand, s: a slow topple takes 0.5 s."""
+MAX_LEAN = 0.1
+"""Greatest swing between a resting pose of the mesh and the pose in which the engine holds the hulls, rad. A
+part that swings farther has toppled into another of its resting poses."""
+TABLE_HALF_SIZE = (0.5, 0.5, 0.02)
+"""m; as thick as the task's table."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StandingPoses:
+    """Resting poses that the engine holds.
+
+    Attributes:
+        poses: k of them, (k, 3) and (k, 4); their heights over the table count, metres.
+        probability: (k,) sums to 1.
+        toppled: Probability of the resting poses that the engine does not hold, which are left out.
+    """
+
+    poses: Pose
+    probability: np.ndarray
+    toppled: float
+
+
+def standing_poses(part: Part, physics: Physics) -> StandingPoses:
+    """Settle every resting pose of a part, in a scene of its own.
+
+    The mesh decides a part's resting poses, the engine simulates its hulls. These may lean by a degree, or
+    lack the edge on which the mesh stands.
+
+    Args:
+        part: Its resting poses are tried one by one.
+        physics: Rate and friction; the engine's other settings are those in force.
+
+    Raises:
+        BadPart: The engine holds none of the resting poses.
+    """
+    scene, body = _scene_with(part, physics)
+    poses, probability = [], []
+    for which, share in enumerate(part.resting_probability):
+        start = Pose(
+            position=np.array([0.0, 0.0, part.resting.position[which, 2]]),
+            quat_wxyz=part.resting.quat_wxyz[which],
+        )
+        settled = _settle(scene, body, start, physics.rate_hz)
+        if settled is not None and _lean(start, settled) <= MAX_LEAN:
+            poses.append(settled.as_vector())
+            probability.append(share)
+    if not poses:
+        raise BadPart(
+            f"part '{part.name}': none of its {len(part.resting_probability)} resting poses stands in the "
+            "engine; check its scale and its hulls: python -m mskgrasp.parts show"
+        )
+    kept = float(np.sum(probability))
+    return StandingPoses(
+        poses=Pose.from_vector(np.stack(poses)),
+        probability=np.array(probability) / kept,
+        toppled=float(max(0.0, 1 - kept)),
+    )
+
+
+def _scene_with(part: Part, physics: Physics) -> tuple[sapien.Scene, PhysxRigidDynamicComponent]:
+    scene = sapien.Scene([PhysxCpuSystem()])
+    scene.set_timestep(1 / physics.rate_hz)
+    table = scene.create_actor_builder()
+    mu = physics.friction_table
+    table.add_box_collision(
+        sapien.Pose(p=[0, 0, TABLE_Z - TABLE_HALF_SIZE[2]]),
+        np.array(TABLE_HALF_SIZE),
+        material=PhysxMaterial(mu, mu, 0.0),
+    )
+    table.build_static(name="table")
+    builder = scene.create_actor_builder()
+    add_hulls(builder, part, physics.friction_pad_part)
+    body = builder.build(name=part.name).find_component_by_type(PhysxRigidDynamicComponent)
+    assert isinstance(body, PhysxRigidDynamicComponent)
+    return scene, body
+
+
+def _settle(scene: sapien.Scene, body: PhysxRigidDynamicComponent, start: Pose, rate_hz: int) -> Pose | None:
+    """The pose in which a part comes to rest; None where it does not."""
+    body.entity.set_pose(sapien.Pose(start.position, start.quat_wxyz))
+    body.set_linear_velocity(np.zeros(3))
+    body.set_angular_velocity(np.zeros(3))
+    before = start
+    n_steps = max(1, round(STILL_S * rate_hz))
+    for _ in range(round(SETTLE_TIMEOUT_S / STILL_S)):
+        for _ in range(n_steps):
+            scene.step()
+        now = Pose(
+            position=np.asarray(body.entity.pose.p, dtype=np.float64),
+            quat_wxyz=np.asarray(body.entity.pose.q, dtype=np.float64),
+        )
+        if _still(before, now):
+            return now
+        before = now
+    return None
+
+
+def _still(before: Pose, after: Pose) -> bool:
+    moved = float(np.linalg.norm(after.position - before.position))
+    turned = quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz))
+    return moved < STILL_DISTANCE and 2 * float(np.linalg.norm(turned[1:])) < STILL_ANGLE
+
+
+def _lean(start: Pose, settled: Pose) -> float:
+    """Swing between two poses, rad: their turn about the vertical does not count."""
+    return float(twist_and_swing(quat_multiply(settled.quat_wxyz, quat_conjugate(start.quat_wxyz)))[1])
