@@ -69,7 +69,7 @@ def write_report(
         figures=[Figure(path=out / "errors.png", caption="Distribution of the errors, and medians by part")],
     )
     sections = [
-        _result(summary),
+        result_section(summary),
         errors,
         _pallets(out, placements, slots),
         _examples(out, placements),
@@ -84,7 +84,7 @@ def write_report(
 
 def print_report(summary: PlacementSummary, console: Console | None = None) -> None:
     """Print the counts and errors of each correction, and what correcting gains."""
-    print_sections([_result(summary)], console)
+    print_sections([result_section(summary)], console)
 
 
 def _conclusion(summary: PlacementSummary) -> str:
@@ -99,7 +99,8 @@ def _conclusion(summary: PlacementSummary) -> str:
     return f"{placed}; median error by correction: {', '.join(medians)}."
 
 
-def _result(summary: PlacementSummary) -> Section:
+def result_section(summary: PlacementSummary) -> Section:
+    """Make the section of counts and errors by correction, and of what correcting gains."""
     rows = [
         (
             name,

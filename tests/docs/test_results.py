@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from mskgrasp.core.config import read_yaml
+from tests.docs.make_results import REPORTS, RUNS, rendered
 from tests.docs.pages import ROOT
 
 RESULTS = sorted(set((ROOT / "docs/results").glob("*.md")) - {ROOT / "docs/results/README.md"})
@@ -20,6 +22,18 @@ def test_a_results_page_says_how_each_table_was_made(page: Path):
     counts = {key: len(re.findall(rf"^\| {key} \|[^|]+\|$", text, flags=re.M)) for key in KEYS}
     assert counts["command"] >= 1
     assert len(set(counts.values())) == 1, counts
+
+
+@pytest.mark.parametrize("page", RESULTS, ids=lambda page: page.stem)
+def test_a_page_shows_what_its_stored_reports_say(page: Path):
+    text = page.read_text(encoding="utf-8")
+    assert rendered(text) == text, "run: python -m tests.docs.make_results"
+
+
+def test_every_stored_report_is_on_a_page_and_of_a_named_run():
+    stored = {path.stem for path in REPORTS.glob("*.json")}
+    shown = {name for page in RESULTS for name in re.findall(r"<!-- run: (\w+) -->", page.read_text())}
+    assert stored == shown == set(read_yaml(RUNS))
 
 
 def test_the_index_links_every_results_page():
