@@ -10,13 +10,12 @@ from typing import Any, Literal
 import yaml
 
 from hal.open_cell import cell_from_values
+from hal.sensor_noise import NoiseModel
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.settings import Tape
 
-# As in hal.sim.noise, which brings the simulator along.
-Noise = Literal["off", "iid", "kinect2"]
 SIMULATED = "sapien"
 FINE = 3
 """Pixels of colour along one of depth, as a Kinect v2 has them, where tape is measured."""
@@ -67,7 +66,11 @@ class CellFile:
 
 
 def read_cell(
-    path: Path, *, noise: Noise | None, measure: Literal["truth", "markers"], tape: tuple[float, float] | None
+    path: Path,
+    *,
+    noise: NoiseModel | None,
+    measure: Literal["truth", "markers"],
+    tape: tuple[float, float] | None,
 ) -> CellFile:
     """Reads a cell's file and what is to be other.
 

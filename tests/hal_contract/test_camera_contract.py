@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hal import Camera, Cell, Workspace, cell_from_yaml
+from hal import Camera, Cell, SensorNoise, Workspace, cell_from_yaml
 from hal.errors import NotConnected
 from hal.replay import RecordingWriter, ReplayCamera, ReplayCameraConfig
 from hal.replay.recorder import RecordingCamera
-from hal.sim import SapienCamera, SensorNoise
+from hal.sim import SapienCamera
 from tests.hal.kinect2.bench import Bench
 from tests.hal_contract.conftest import CELLS
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, quat_rotate
 from mskgrasp.core.settings import Region
-from mskgrasp.parts import Part
+from mskgrasp.parts.part import Part
 
 
 def random_resting_pose(
