@@ -9,14 +9,15 @@ from typing import Any, Literal
 
 import yaml
 
-from hal.open_cell import cell_from_values
+from hal.open_cell import SIMULATED, cell_from_values
 from hal.sensor_noise import NoiseModel
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.settings import Tape
 
-SIMULATED = "sapien"
+TAPED = "sapien"
+"""Type of the simulated cell that draws tape and fine colour."""
 FINE = 3
 """Pixels of colour along one of depth, as a Kinect v2 has them, where tape is measured."""
 
@@ -38,7 +39,7 @@ class CellFile:
     @property
     def simulated(self) -> bool:
         """Whether the cell is simulated, so that several may run at once."""
-        return self.values.get("type") == SIMULATED
+        return self.values.get("type") in SIMULATED
 
     @property
     def noise(self) -> str:
@@ -82,10 +83,10 @@ def read_cell(
 
     Raises:
         BadConfig: The file or a value is not valid.
-        UsageError: Something is asked for that is not for this cell.
+        UsageError: An option does not apply to this cell.
     """
     values = read_yaml(path)
-    simulated = values.get("type") == SIMULATED
+    simulated = values.get("type") in SIMULATED
     if tape is not None and measure != "markers":
         raise UsageError("--tape is how large the squares are that --measure markers looks for; add that")
     if noise is not None:
@@ -98,6 +99,11 @@ def read_cell(
     squares = None
     if measure == "markers":
         squares = dict(zip(("large", "small"), tape, strict=True)) if tape else {}
+        if simulated and values["type"] != TAPED:
+            raise UsageError(
+                f"--measure markers: {path} is of type {values['type']!r}, which draws no "
+                "tape on parts; measure by its tracker (--measure truth), or use a cell of type sapien"
+            )
         if simulated:
             squares = squares or values.get("tape") or {}
             values |= {"tape": squares, "colour_scale": max(FINE, values.get("colour_scale", 1))}
