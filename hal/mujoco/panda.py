@@ -190,15 +190,17 @@ def _add_finger(hand: mujoco.MjsBody, name: str, number: int, side: float, physi
             rgba=_GREY,
             **_robot_shape(physics),
         )
-    (x, y, z), size = _PAD
-    finger.add_geom(
-        name=f"pad{number}",
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        pos=[x, side * y, z],
-        size=np.array(size) / 2,
-        rgba=_BLACK,
-        **_robot_shape(physics),
-    )
+    (x, y, z), (width, depth, height) = _PAD
+    n = physics.pad_pieces
+    for i in range(n):
+        for j in range(n):
+            finger.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[x + ((i + 0.5) / n - 0.5) * width, side * y, z + ((j + 0.5) / n - 0.5) * height],
+                size=[width / n / 2, depth / 2, height / n / 2],
+                rgba=_BLACK,
+                **_robot_shape(physics),
+            )
 
 
 def _add_finger_drive(spec: mujoco.MjSpec, physics: MujocoPhysics) -> None:

@@ -213,10 +213,6 @@ class Simulation:
             return float(np.linalg.norm(mean.sum(axis=0)))
         return float(np.sqrt((mean[:-1] ** 2).sum(axis=-1).max()))
 
-    def touches_part(self) -> bool:
-        """Whether the hand or a finger touches the part."""
-        return bool(self.data.sensordata[-4] > 0)
-
     def _measure_forces(self) -> None:
         sensed = self.data.sensordata.reshape(-1, 4)
         row = self._forces[self._row]
