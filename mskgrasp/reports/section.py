@@ -13,7 +13,7 @@ from typing import Literal
 import mskgrasp
 
 Kind = Literal["number", "word", "prose"]
-_PACKAGES = ("torch", "sapien", "mani_skill", "numpy", "opencv-python-headless")
+_PACKAGES = ("torch", "sapien", "mani_skill", "mujoco", "numpy", "opencv-python-headless")
 _NUMBER = re.compile(r"[+\-−]?\d.*|[-–]?")
 _LONG = 40
 """Characters; a column with a longer cell is wrapped."""
