@@ -205,7 +205,8 @@ class GraspDisplacementEnv(BaseEnv):
         if given is None:
             rows = [
                 random_resting_pose(
-                    self.parts[i],
+                    self.parts[i].resting,
+                    self.parts[i].resting_probability,
                     self._corners[i],
                     self.region,
                     self._batched_episode_rng[i],

@@ -42,7 +42,7 @@ class MujocoPhysics(Config):
     finger_armature: float = Field(default=_COMMON.finger_armature, ge=0)
     """Inertia of motor and spindle that a finger carries, kg."""
     reflex_force: float = Field(default=_COMMON.reflex_force, gt=0)
-    """Mean contact force on the hand that ends a motion, N, as the robot's reflex would."""
+    """Mean contact force on the hand over 24 ms that ends a motion, N, as the robot's reflex would."""
 
     @model_validator(mode="after")
     def _check(self) -> MujocoPhysics:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from hal.limits import lowest_point
-from hal.mujoco.panda import FINGER_STIFFNESS, HAND_BODIES
+from hal.mujoco.panda import FINGER_STIFFNESS
 from hal.mujoco.scene import build_model
 from hal.mujoco.settings import MujocoPhysics
 from mskgrasp.core.geometry import Pose
@@ -24,8 +24,8 @@ NATURAL_RATE = 100.0
 and follows a path to 0.1 mm."""
 SETTLE_S = 0.05
 """Time in which the arm comes to rest at the end of a motion, s: five times that of the controller."""
-REFLEX_S = 0.008
-"""The force on the hand that a reflex sees is the mean over this time, s."""
+REFLEX_S = 0.024
+"""The force on the hand that a reflex sees is the mean over this time, s, as in the SAPIEN cell."""
 MOVE_FORCE = 20.0
 """Of the fingers while they hold nothing, N."""
 STILL_FINGER = 2e-3
@@ -89,9 +89,10 @@ class Simulation:
         self._limit_fingers(MOVE_FORCE)
         self.target = np.array(home, dtype=float)
         """(7,) where the arm was sent, radians: a motion starts there."""
-        self._forces = np.zeros((max(1, round(REFLEX_S / self.step_s)), len(HAND_BODIES) + 1, 3))
-        self._sum = np.zeros_like(self._forces[0])
+        self._forces = np.zeros((self.n_steps(REFLEX_S), 3))
+        self._sum = np.zeros(3)
         self._row = 0
+        self._measured = 0
         self._wanted = np.zeros(self.model.nv)
         self._torque = np.zeros(self.model.nv)
         self._settle()
@@ -131,7 +132,7 @@ class Simulation:
         """
         path = _Path.through(joints, self.step_s)
         free = self._in_air(path.joints)
-        pressed = self.load()
+        pressed = self._pressed()
         last = len(path.joints) - 1
         simulated = True
         for start in range(0, last, _BLOCK):
@@ -147,8 +148,8 @@ class Simulation:
                 self._step(path.joints[k], path.speeds[k], path.accelerations[k])
                 self.target = path.joints[k + 1]
                 load = self.load()
-                # Pads that close on a groove press the part on the table; that eases as the hand rises.
-                pressed = min(pressed, load)
+                if self._measured >= len(self._forces):
+                    pressed = min(pressed, load)
                 if load - pressed > self.physics.reflex_force:
                     return False
         if simulated:
@@ -203,26 +204,27 @@ class Simulation:
     # ------------------------------------------------------------------ contacts
 
     def load(self) -> float:
-        """Mean contact force of the last `REFLEX_S`, N.
+        """Mean contact force on the hand with its fingers over the last `REFLEX_S`, N.
 
-        Without a grip the largest on the hand or a finger. With one it is that of all else on hand and part
-        together, of which the grip is no part.
+        Once the hand grips, a part that it touches counts as one with it, so that the grip cancels.
         """
-        mean = self._sum / len(self._forces)
-        if self.force is not None:
-            return float(np.linalg.norm(mean.sum(axis=0)))
-        return float(np.sqrt((mean[:-1] ** 2).sum(axis=-1).max()))
+        return float(np.linalg.norm(self._sum)) / len(self._forces)
 
-    def _measure_forces(self) -> None:
+    def _measure_force(self) -> None:
         sensed = self.data.sensordata.reshape(-1, 4)
         row = self._forces[self._row]
         self._sum -= row
-        # The bodies of the hand, and the part while it is touched.
-        row[:] = sensed[:-1, 1:]
-        if not sensed[-1, 0]:
-            row[-1] = 0
+        gripped = self.force is not None and sensed[-1, 0] > 0
+        row[:] = sensed[: -1 if gripped else -2, 1:].sum(axis=0)
         self._sum += row
         self._row = (self._row + 1) % len(self._forces)
+        self._measured += 1
+
+    def _forget_forces(self) -> None:
+        """Begins a new mean, which takes steps that were not yet measured as free of force."""
+        self._forces[:] = 0
+        self._sum[:] = 0
+        self._measured = 0
 
     # ------------------------------------------------------------------ steps
 
@@ -239,7 +241,7 @@ class Simulation:
         data.ctrl[:7] = self._torque[:7] + data.qfrc_bias[:7]
         data.ctrl[7] = self._opening
         mujoco.mj_step2(model, data)
-        self._measure_forces()
+        self._measure_force()
 
     def _place(self, path: _Path, k: int) -> None:
         """Puts the arm at a step of a path."""
@@ -248,8 +250,16 @@ class Simulation:
         data.qvel[7:9] = 0
         data.qacc_warmstart[:] = 0
         self.target = path.joints[k]
-        self._forces[:] = 0
-        self._sum[:] = 0
+        self._forget_forces()
+
+    def _pressed(self) -> float:
+        """Force that the grip itself puts on hand and part, N; begins a new mean.
+
+        Pads that close on a groove press the part on the table; that eases as the hand rises.
+        """
+        pressed = self.load() if self.force is not None else 0.0
+        self._forget_forces()
+        return pressed
 
     def _in_air(self, joints: np.ndarray) -> np.ndarray:
         """(k,) whether the hand, at the steps of a path where a block begins or ends, is over all parts."""

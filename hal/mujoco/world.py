@@ -89,7 +89,7 @@ class MujocoWorld:
 
         Args:
             part: Name or folder.
-            seed: Determines its position and turn, the same as in the SAPIEN cell.
+            seed: Determines its position and turn, as in the SAPIEN cell.
             keep: Parts outside the region, such as on a pallet, stay; else the table is cleared.
 
         Raises:
@@ -98,7 +98,9 @@ class MujocoWorld:
         """
         new = find_part(part)
         corners = np.concatenate(hull_corners(new))
-        drawn = random_resting_pose(new, corners, self.region, np.random.RandomState(seed))
+        drawn = random_resting_pose(
+            new.resting, new.resting_probability, corners, self.region, np.random.RandomState(seed)
+        )
         staying = self._outside() if keep else []
         self._simulation = _simulation()(
             self.physics,

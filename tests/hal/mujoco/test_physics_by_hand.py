@@ -118,25 +118,29 @@ def test_the_grip_is_no_load_but_what_pulls_at_the_part_is(box: MakeBox):
     """Each pad feels 40 N; the weight of a part is no contact, and the table is one as soon as it is met."""
     simulation = held(box((0.03, 0.02, 0.04), 0.05), force=40.0)
     assert simulation.load() < 0.01
-    joints = np.array([simulation.target, *_down(0.104)])
+    joints = np.array([simulation.target, *_down(0.104, 1000)])
     assert not simulation.follow(joints, stop=never)  # 4 mm into the table
     assert simulation.physics.reflex_force < simulation.load() < 2 * simulation.physics.reflex_force
 
 
-def _down(way: float) -> np.ndarray:
-    """Joints (1000, 7) on the way down from 12 cm."""
-    shares = np.arange(1, 1001) / 1000
-    return np.array([top_down(np.array([0.5, 0.0, 0.12 - way * share, 0.0]))[0] for share in shares])
+def _down(way: float, n: int) -> np.ndarray:
+    """Joints (n, 7) on the way down from 12 cm."""
+    return np.array(
+        [top_down(np.array([0.5, 0.0, 0.12 - way * share, 0.0]))[0] for share in np.arange(1, n + 1) / n]
+    )
 
 
 @pytest.mark.parametrize("step_s", [0.0005, 0.001])
 def test_the_reflex_depends_on_the_mean_force_and_not_on_the_step(box: MakeBox, step_s: float):
-    """A part is set down at 10 cm/s: the hand stops at the same height whatever the step."""
-    physics = MujocoPhysics(step_s=step_s)
-    simulation = held(box((0.03, 0.02, 0.04), 0.05), physics, force=40.0)
-    simulation.follow(np.array([simulation.target, *_down(0.104)]), stop=never)
+    """A part is set down at 10 cm/s and slides through the pads with 2 mu F, 40 N.
+
+    The mean over 24 ms passes 20 N after half that time, in which the hand sinks by 1.2 mm.
+    """
+    simulation = held(box((0.03, 0.02, 0.04), 0.05), MujocoPhysics(step_s=step_s), force=40.0)
+    path = _down(0.104, simulation.n_steps(1.04))
+    assert not simulation.follow(np.array([simulation.target, *path]), stop=never)
     height = forward_pose(simulation.joints).position[2]
-    assert height == pytest.approx(0.0195, abs=0.4 * MM)
+    assert height == pytest.approx(0.02 - 1.2 * MM, abs=0.25 * MM)
 
 
 @pytest.mark.slow
