@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from hal.limits import lowest_point
-from hal.mujoco.panda import FINGER_STIFFNESS
+from hal.mujoco.panda import FINGER_STIFFNESS, FINGERS
 from hal.mujoco.scene import build_model
 from hal.mujoco.settings import MujocoPhysics
 from mskgrasp.core.geometry import Pose
@@ -154,6 +154,8 @@ class Simulation:
                     return False
         if simulated:
             self.stand(SETTLE_S, stop=lambda: False)
+        else:
+            self.data.qvel[:7] = 0  # also where it was stopped on its way
         return True
 
     def stand(self, seconds: float, *, stop: Callable[[], bool]) -> None:
@@ -209,6 +211,24 @@ class Simulation:
         Once the hand grips, a part that it touches counts as one with it, so that the grip cancels.
         """
         return float(np.linalg.norm(self._sum)) / len(self._forces)
+
+    def grip(self) -> tuple[np.ndarray, float]:
+        """Forces (2,) of both fingers on the part, N, and how deep a finger and the part overlap, metres."""
+        model, data = self.model, self.data
+        part = model.body("part0").id
+        fingers = [model.body(name).id for name in FINGERS]
+        total, deepest, one = np.zeros((2, 3)), 0.0, np.zeros(6)
+        for i in range(data.ncon):
+            contact = data.contact[i]
+            bodies = model.geom_bodyid[list(contact.geom)].tolist()
+            touching = [number for number, finger in enumerate(fingers) if finger in bodies]
+            if part not in bodies or not touching:
+                continue
+            mujoco.mj_contactForce(model, data, i, one)
+            sign = 1.0 if bodies[1] == part else -1.0
+            total[touching[0]] += sign * contact.frame.reshape(3, 3).T @ one[:3]
+            deepest = max(deepest, -contact.dist)
+        return np.linalg.norm(total, axis=1), deepest
 
     def _measure_force(self) -> None:
         sensed = self.data.sensordata.reshape(-1, 4)
