@@ -95,7 +95,7 @@ def try_grasp(part: Part, pose: np.ndarray, grasp: np.ndarray, physics: Physics)
 def try_grasps(
     folder: Path, poses: np.ndarray, grasps: np.ndarray, physics: Physics
 ) -> dict[str, np.ndarray]:
-    """Attempts (n) from starts (n, 7) with grasps (n, 4), as `try_grasp`, and the processor time of each, s."""
+    """Attempts (n) from starts (n, 7) with grasps (n, 4), as `try_grasp`, and processor times."""
     part = read_part(folder)
     rows = []
     for pose, grasp in zip(poses, grasps, strict=True):
