@@ -7,9 +7,10 @@ from hal.errors import HalError
 from hal.execute import GraspResult, execute_grasp, go_home, let_go, lower, put_down
 from hal.limits import ArmLimits
 from hal.open_cell import cell_from_yaml, open_cell
+from hal.sensor_noise import SensorNoise
 
 __all__ = [
     "Arm", "ArmLimits", "ArmState", "Camera", "Cell", "GraspOutcome", "GraspResult", "HalError",
-    "PartFeeder", "PartTracker", "RgbdFrame", "Workspace", "cell_from_yaml", "execute_grasp", "go_home",
-    "let_go", "lower", "open_cell", "put_down",
+    "PartFeeder", "PartTracker", "RgbdFrame", "SensorNoise", "Workspace", "cell_from_yaml",
+    "execute_grasp", "go_home", "let_go", "lower", "open_cell", "put_down",
 ]  # fmt: skip

@@ -11,7 +11,9 @@ from hal.cell import Cell
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import BadConfig
 
-CellType = Literal["sapien", "devices", "recorded", "replay"]
+CellType = Literal["sapien", "mujoco", "devices", "recorded", "replay"]
+SIMULATED: tuple[CellType, ...] = ("sapien", "mujoco")
+"""Types of which several may run at once."""
 
 
 @contextmanager
@@ -53,6 +55,10 @@ def cell_from_values(values: dict[str, Any], path: Path) -> Cell:
             from hal.sim import SapienCellConfig, sapien_cell
 
             return sapien_cell(check_config(SapienCellConfig, values, str(path)))
+        case "mujoco":
+            from hal.mujoco import MujocoCellConfig, mujoco_cell
+
+            return mujoco_cell(check_config(MujocoCellConfig, values, str(path)))
         case "devices":
             from hal.devices import devices_cell
 

@@ -24,15 +24,16 @@ from mskgrasp.core.grasp import MIN_RISE, lowest_grasp_z
 from mskgrasp.core.panda_kinematics import HOME
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionError, ExecutionNoise, Overhead, Physics, Region
 from mskgrasp.parts import Part, find_part, starter_names
+from mskgrasp.parts.hulls import hull_corners
+from mskgrasp.parts.resting_pose import random_resting_pose
 from tasks.attempt.attempt import Attempt
 from tasks.robot.contacts import HandContacts
 from tasks.robot.motion import PandaMotion
 from tasks.robot.panda import GraspPanda, panda_for
 from tasks.scene.camera import camera_config, without_reflection_table
 from tasks.scene.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_world
-from tasks.scene.part_actor import build_part, hull_corners
+from tasks.scene.part_actor import build_part
 from tasks.scene.physics import MOST_HULLS, sim_config
-from tasks.scene.resting_pose import random_resting_pose
 from tasks.scene.standing import StandingPoses, standing_poses
 
 _EXACT = ExecutionNoise()
@@ -213,7 +214,8 @@ class GraspDisplacementEnv(BaseEnv):
         if given is None:
             rows = [
                 random_resting_pose(
-                    self.standing[i],
+                    self.standing[i].poses,
+                    self.standing[i].probability,
                     self._corners[i],
                     self.region,
                     self._batched_episode_rng[i],

@@ -30,6 +30,8 @@ SIMULATION = (
     "mskgrasp/core/panda_kinematics.py",
     "mskgrasp/core/minimum_jerk.py",
     "mskgrasp/core/seeds.py",
+    "mskgrasp/parts/hulls.py",
+    "mskgrasp/parts/resting_pose.py",
     "mskgrasp/perception/part_detection.py",
     "mskgrasp/simulation/shard.py",
 )

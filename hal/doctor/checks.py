@@ -19,6 +19,7 @@ from hal.cell import Workspace
 from hal.charuco import project
 from hal.errors import HalError, OutOfWorkspace
 from hal.execute import APPROACH
+from hal.open_cell import SIMULATED
 from hal.table import fit_table
 from mskgrasp.core.errors import BadConfig, MskgraspError
 from mskgrasp.core.geometry import Pose
@@ -47,6 +48,7 @@ _PACKAGES = {
     "panda_py": ("panda-python", "mskgrasp[franka]"),
     "kinect2": ("pylibfreenect2", "mskgrasp[kinect2]"),
     "sapien": ("sapien", "mskgrasp"),
+    "mujoco": ("mujoco", "mskgrasp[mujoco]"),
 }
 _LOW_DISK = 2e9
 _MAX_AGE_S = 0.5
@@ -67,7 +69,8 @@ _STEP = 0.03
 
 def check_drivers(values: dict[str, Any]) -> Iterator[Finding]:
     """Whether the packages that the cell file names are installed, and which versions."""
-    drivers: dict[str, dict[str, Any]] = {"sapien": {}} if values.get("type") == "sapien" else {}
+    kind = str(values.get("type"))
+    drivers: dict[str, dict[str, Any]] = {kind: {}} if kind in SIMULATED else {}
     for section in ("arm", "camera"):
         part = values.get(section)
         if values.get("type") == "devices" and isinstance(part, dict):

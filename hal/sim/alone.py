@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from hal.sensor_noise import SensorNoise
 from hal.sim.camera import SapienCamera
-from hal.sim.noise import SensorNoise
 from hal.sim.world import SapienWorld
 from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Overhead, Physics, Region

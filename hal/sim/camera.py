@@ -8,7 +8,7 @@ import numpy as np
 
 from hal.camera import Camera, RgbdFrame
 from hal.errors import NotConnected
-from hal.sim.noise import SensorNoise, add_noise
+from hal.sensor_noise import SensorNoise, add_noise
 from hal.sim.world import SapienWorld
 from tasks.scene.camera import FAR
 

@@ -10,9 +10,9 @@ from pydantic import Field, model_validator
 
 from hal.cell import Cell, Workspace
 from hal.limits import ArmLimits
+from hal.sensor_noise import SensorNoise
 from hal.sim.arm import SapienArm
 from hal.sim.camera import SapienCamera
-from hal.sim.noise import SensorNoise
 from hal.sim.world import SapienWorld
 from mskgrasp.core.config import Config
 from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER, top_down

@@ -18,10 +18,10 @@ from mskgrasp.core.errors import TapeDoesNotFit
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.settings import TABLE_Z, Overhead, Physics, Region, Tape
 from mskgrasp.parts import find_part
+from mskgrasp.parts.hulls import hull_corners
 from tasks import GraspDisplacementEnv
 from tasks.attempt.clearance import hand_clearance
 from tasks.scene.frames import base_pose
-from tasks.scene.part_actor import hull_corners
 from tasks.scene.renderer import render_backend
 
 

@@ -23,10 +23,14 @@ TCP_OFFSET = 0.1034
 POSE_TOLERANCE = 1e-4
 """A pose that `track` misses by more, metres and radians mixed, is out of reach."""
 
-_A = (0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088)
-_D = (0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.0)
-_ALPHA = (0.0, -math.pi / 2, math.pi / 2, math.pi / 2, -math.pi / 2, math.pi / 2, math.pi / 2)
-_FLANGE = 0.107
+DH_A = (0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088)
+"""Link lengths of the seven joints, metres."""
+DH_D = (0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.0)
+"""Link offsets, metres."""
+DH_ALPHA = (0.0, -math.pi / 2, math.pi / 2, math.pi / 2, -math.pi / 2, math.pi / 2, math.pi / 2)
+"""Link twists, radians."""
+FLANGE_OFFSET = 0.107
+"""From the last joint's frame to the flange, metres."""
 _UPPER_ARM = math.hypot(0.316, 0.0825)
 _FOREARM = math.hypot(0.384, 0.0825)
 
@@ -43,7 +47,9 @@ def forward(q: Array) -> tuple[Array, Array]:
     """
     xp = array_namespace(q)
     angles = [*components(q), xp.full(q.shape[:-1], -math.pi / 4, dtype=q.dtype, device=device(q))]
-    links = _links(xp.stack(angles, axis=-1), (*_A, 0.0), (*_D, _FLANGE + TCP_OFFSET), (*_ALPHA, 0.0))
+    links = _links(
+        xp.stack(angles, axis=-1), (*DH_A, 0.0), (*DH_D, FLANGE_OFFSET + TCP_OFFSET), (*DH_ALPHA, 0.0)
+    )
     frame = links[..., 0, :, :]
     frames = [frame]
     for joint in range(1, 8):
@@ -99,8 +105,8 @@ def top_down(grasps: Array) -> tuple[Array, Array]:
     xp = array_namespace(grasps)
     x, y, z, theta = components(grasps)
     q1 = xp.atan2(y, x)
-    radius = xp.sqrt(x * x + y * y) - _A[6]
-    height = z + _FLANGE + TCP_OFFSET - _D[0]
+    radius = xp.sqrt(x * x + y * y) - DH_A[6]
+    height = z + FLANGE_OFFSET + TCP_OFFSET - DH_D[0]
     distance2 = radius * radius + height * height
     cosine = (distance2 - _UPPER_ARM**2 - _FOREARM**2) / (2 * _UPPER_ARM * _FOREARM)
     within = abs(cosine) <= 1

@@ -7,11 +7,11 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
+from hal.sensor_noise import NoiseModel
 from mskgrasp.core.config import Config
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.planning.planner import PlannerConfig
-from mskgrasp.trials.cell_file import Noise
 
 Experiment = Literal["success", "displacement"]
 
@@ -25,7 +25,7 @@ class EvaluateConfig(Config):
     """success: the policy of --planner.policy. displacement: both policies, known and novel parts apart."""
     cell: Path = SIMULATED_CELL
     """YAML file of the cell; by default the simulated one."""
-    noise: Noise | None = None
+    noise: NoiseModel | None = None
     """Noise of a simulated camera (iid: 3 mm per pixel); overrides the cell's file."""
     measure: Literal["truth", "markers"] = "truth"
     """truth: the cell's tracker measures the displacement; markers: two squares of tape (docs/markers.md)."""

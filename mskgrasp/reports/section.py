@@ -11,7 +11,7 @@ from pathlib import Path
 import mskgrasp
 from mskgrasp.runtime.console_table import Table
 
-_PACKAGES = ("torch", "sapien", "mani_skill", "numpy", "opencv-python-headless")
+_PACKAGES = ("torch", "sapien", "mani_skill", "mujoco", "numpy", "opencv-python-headless")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,15 +9,15 @@ from typing import Any, Literal
 
 import yaml
 
-from hal.open_cell import cell_from_values
+from hal.open_cell import SIMULATED, cell_from_values
+from hal.sensor_noise import NoiseModel
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.settings import Tape
 
-# As in hal.sim.noise, which imports the simulator.
-Noise = Literal["off", "iid", "kinect2"]
-SIMULATED = "sapien"
+TAPED = "sapien"
+"""Type of the simulated cell that draws tape and fine colour."""
 FINE = 3
 """Colour pixels per depth pixel along one axis where tape is measured, about as a Kinect v2 has."""
 
@@ -39,7 +39,7 @@ class CellFile:
     @property
     def simulated(self) -> bool:
         """Whether the cell is simulated, so that several can run in parallel."""
-        return self.values.get("type") == SIMULATED
+        return self.values.get("type") in SIMULATED
 
     @property
     def noise(self) -> str:
@@ -67,7 +67,11 @@ class CellFile:
 
 
 def read_cell(
-    path: Path, *, noise: Noise | None, measure: Literal["truth", "markers"], tape: tuple[float, float] | None
+    path: Path,
+    *,
+    noise: NoiseModel | None,
+    measure: Literal["truth", "markers"],
+    tape: tuple[float, float] | None,
 ) -> CellFile:
     """Read a cell file and apply overrides.
 
@@ -82,7 +86,7 @@ def read_cell(
         UsageError: An override does not apply to this cell.
     """
     values = read_yaml(path)
-    simulated = values.get("type") == SIMULATED
+    simulated = values.get("type") in SIMULATED
     if tape is not None and measure != "markers":
         raise UsageError("--tape needs --measure markers; add it")
     if noise is not None:
@@ -95,6 +99,11 @@ def read_cell(
     squares = None
     if measure == "markers":
         squares = dict(zip(("large", "small"), tape, strict=True)) if tape else {}
+        if simulated and values["type"] != TAPED:
+            raise UsageError(
+                f"--measure markers: {path} is of type {values['type']!r}, which draws no "
+                "tape on parts; measure by its tracker (--measure truth), or use a cell of type sapien"
+            )
         if simulated:
             squares = squares or values.get("tape") or {}
             values |= {"tape": squares, "colour_scale": max(FINE, values.get("colour_scale", 1))}

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 from pydantic import Field, model_validator
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Physics
+
+Engine = Literal["sapien", "mujoco"]
 
 SHIFT = 1e-5
 """By how much the starts of the floor are moved, m: less than any camera or arm could resolve."""
@@ -26,11 +28,13 @@ class Setting:
         name: For tables and files.
         physics: Its values.
         shift: By how much the parts' starts are moved on the table, m: 0 but for the floors.
+        engine: Simulator of the attempts.
     """
 
     name: str
     physics: Physics
     shift: float = 0.0
+    engine: Engine = "sapien"
 
 
 class ValidateConfig(Config):
@@ -53,6 +57,8 @@ class ValidateConfig(Config):
     variants: Annotated[dict[str, dict[str, float | bool]], tyro.conf.Suppress] = {}
     """Other values of some physics settings, by a name for the tables: each is tried at the rate and with the
     iterations under test, and compared with the same finest setting. It shows the effect of these values."""
+    engine: Engine = "sapien"
+    """mujoco: compare the settings under test with a second engine, and nothing else; needs ``[mujoco]``."""
     convergence: bool = True
     """Whether grasps are compared under all rates and iterations; without, the checks take a minute."""
     physics: Physics = Physics()
@@ -111,7 +117,19 @@ class ValidateConfig(Config):
             *(Setting(name=name, physics=self.varied(name)) for name in self.variants),
         ]
 
+    def engines(self) -> list[Setting]:
+        """The settings under test in both engines, and in each with the starts moved by 0.1 mm."""
+        engines: tuple[Engine, ...] = ("sapien", "mujoco")
+        return [
+            *(Setting(name=name, physics=self.physics, engine=name) for name in engines),
+            *(
+                Setting(name=f"{name}{MOVED}", physics=self.physics, shift=CELL_SHIFT, engine=name)
+                for name in engines
+            ),
+        ]
 
+
+MOVED = ", starts moved by 0.1 mm"
 REFERENCE = "the finest, nothing skipped"
 FLOOR = "the same, starts moved by 10 um"
 CELL_FLOOR = "the same, starts moved by 0.1 mm"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import json
 import logging
 import os
@@ -174,6 +175,11 @@ def _try_grasps(setting: Setting, drawn: Drawn, file: Path) -> int:
     angle = np.random.default_rng([len(grasps), 1]).uniform(0, 2 * np.pi, len(grasps))
     poses[:, 0] += setting.shift * np.cos(angle)
     poses[:, 1] += setting.shift * np.sin(angle)
+    if setting.engine == "mujoco":
+        from mskgrasp.validate.mujoco_attempts import try_grasps
+
+        _write(file, **try_grasps(drawn.folder, poses, grasps, setting.physics))
+        return len(grasps)
     made, env = _make_env(str(drawn.folder), setting.physics, "none")
     rows: dict[str, list[np.ndarray]] = {name: [] for name in (*KEPT, "cpu_seconds")}
     for pose, grasp in zip(poses, grasps, strict=True):
@@ -199,7 +205,10 @@ def _outcome_file(out: Path, setting: Setting, drawn: Drawn) -> Path:
     grasps = hashlib.sha256(drawn.file.read_bytes()).hexdigest()
     part = read_part(drawn.folder)
     # The versions, so that outcomes of another simulation are not read as this one's.
-    text = json.dumps([setting.physics.model_dump(), setting.shift, part.content_hash, grasps, versions()])
+    identity = [setting.physics.model_dump(), setting.shift, part.content_hash, grasps, versions()]
+    if setting.engine == "mujoco":
+        identity.append({"engine": setting.engine, "version": importlib.metadata.version("mujoco")})
+    text = json.dumps(identity)
     return out / "outcomes" / f"{part.name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
 
 

@@ -14,6 +14,7 @@ from mskgrasp.validate.closed_form import Check, run_checks
 from mskgrasp.validate.compare import Comparison, cheapest, compare, complaints
 from mskgrasp.validate.config import CELL_FLOOR, FLOOR, NOTHING_SKIPPED, REFERENCE, ValidateConfig
 from mskgrasp.validate.convergence import draw_grasps, run_settings
+from mskgrasp.validate.engines import compare_engines
 from mskgrasp.validate.fidelity import check_parts
 from mskgrasp.validate.report import (
     draw,
@@ -27,10 +28,16 @@ from mskgrasp.validate.report import (
 
 
 def validate(config: ValidateConfig) -> int:
-    """Runs a validation; 0 if all checks pass, 1 otherwise."""
+    """Runs a validation; 0 if all checks pass, 1 otherwise.
+
+    Raises:
+        DriverMissing: A second engine is to be compared and is not installed.
+    """
     names = chosen_names(config.parts or ("starter",))
     parts = [find_part(name) for name in progress(names, title="parts", unit="part")]
     make_folder(config.out)
+    if config.engine == "mujoco":
+        return compare_engines(config, parts)
     checks = _closed_form(config)
     print_checks(checks)
     fidelity = _fidelity(config, parts)

@@ -86,10 +86,3 @@ def _visual(part: Part) -> sapien.render.RenderShapeTriangleMesh:
         uvs=np.zeros((len(vertices), 2), dtype=np.float32),
         material=sapien.render.RenderMaterial(base_color=STEEL_GREY, metallic=0.3, roughness=0.5),
     )
-
-
-def hull_corners(part: Part) -> list[np.ndarray]:
-    """Vertices (k, 3) of each collision hull, obj frame, metres."""
-    loaded = trimesh.load(part.hulls_path)
-    meshes = loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]
-    return [np.asarray(mesh.vertices) * 1e-3 for mesh in meshes]

@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hal.sim.noise import NoiseModel, SensorNoise, add_noise
+from hal.sensor_noise import NoiseModel, SensorNoise, add_noise
 from mskgrasp.core.errors import NoPartFound
 from mskgrasp.core.grasp import PartView
 from mskgrasp.dataset import ShardInfo, list_shards, u16_to_depth

@@ -10,7 +10,7 @@ from hal import Cell, cell_from_yaml
 CELLS = Path(__file__).parents[2] / "configs" / "cells"
 
 
-@pytest.fixture(params=["sapien.yaml"], scope="module")
+@pytest.fixture(params=["sapien.yaml", "mujoco.yaml"], scope="module")
 def closed_cell(request: pytest.FixtureRequest) -> Cell:
     """A cell of every backend that can run without hardware, not connected."""
     return cell_from_yaml(CELLS / request.param)

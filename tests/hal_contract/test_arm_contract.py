@@ -1,4 +1,4 @@
-"""What every arm promises: the simulated one, both drivers of a Franka arm over the wire, and a replay.
+"""What every arm promises: the simulated ones, both drivers of a Franka arm over the wire, and a replay.
 
 The arm of a recording knows what happened and nothing else. Each test is therefore first run on the simulated
 arm while it is recorded, which holds that one to the contract, too, and then on what was recorded.
@@ -20,6 +20,7 @@ import pytest
 from hal import Arm, Cell, cell_from_yaml, execute_grasp
 from hal.arm import JOINT_TOLERANCE, POSITION_TOLERANCE, ROTATION_TOLERANCE
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
+from hal.open_cell import SIMULATED
 from hal.replay import ReplayArm, ReplayArmConfig, recorded_cell
 from hal.replay.recorder import RecordingArm
 from mskgrasp.core.geometry import Pose, pose_distance, quat_multiply
@@ -37,8 +38,8 @@ def backend(name: str, folder: Path) -> AbstractContextManager[Path]:
 
     @contextmanager
     def serve() -> Iterator[Path]:
-        if name == "sapien":
-            yield CELLS / "sapien.yaml"
+        if name in SIMULATED:
+            yield CELLS / f"{name}.yaml"
         elif name == "replay":
             with recorded_cell(toy_cell(), folder / "toy.h5").connected() as cell:
                 cell.arm.move_gripper(0.05)
@@ -58,7 +59,7 @@ def backend(name: str, folder: Path) -> AbstractContextManager[Path]:
 PANDA_PY = pytest.param("panda_py", marks=pytest.mark.slow)
 
 
-@pytest.fixture(params=["sapien", "franky", PANDA_PY, "replay"], scope="module")
+@pytest.fixture(params=[*SIMULATED, "franky", PANDA_PY, "replay"], scope="module")
 def name(request: pytest.FixtureRequest) -> str:
     return request.param
 
@@ -267,7 +268,7 @@ def test_a_grasp_out_of_reach_is_refused_before_anything_moves(cell: Cell):
 
 def test_stop_from_another_thread_ends_a_motion_and_nothing_moves_before_recover(cell: Cell, name: str):
     far = cell.workspace.home + np.array([0.5, 0, 0, 0, 0, 0, 0])
-    with stopped_after(0.05 if name == "sapien" else 0.6, cell, name):
+    with stopped_after(0.05 if name in SIMULATED else 0.6, cell, name):
         with pytest.raises((Stopped, NeedsRecovery), match="stop"):
             for k in range(200):  # a simulated motion may be quicker than the timer
                 cell.arm.move_to_joints(far if k % 2 == 0 else cell.workspace.home)
@@ -293,7 +294,7 @@ def test_stop_from_another_thread_ends_a_motion_and_nothing_moves_before_recover
     ids=["gripper", "grasp", "wait", "line"],
 )
 def test_stop_ends_every_kind_of_motion(cell: Cell, name: str, command):
-    with stopped_after(0.005 if name == "sapien" else 0.2, cell, name):
+    with stopped_after(0.005 if name in SIMULATED else 0.2, cell, name):
         with pytest.raises((Stopped, NeedsRecovery), match="stop"):
             for k in range(200):  # a simulated motion may be quicker than the timer
                 command(cell.arm, k)

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hal import Camera, Cell, Workspace, cell_from_yaml
+from hal import Camera, Cell, SensorNoise, Workspace, cell_from_yaml
 from hal.errors import NotConnected
+from hal.mujoco import MujocoCellConfig, mujoco_cell
 from hal.replay import RecordingWriter, ReplayCamera, ReplayCameraConfig
 from hal.replay.recorder import RecordingCamera
-from hal.sim import SapienCamera, SensorNoise
+from hal.sim import SapienCamera
 from tests.hal.kinect2.bench import Bench
 from tests.hal_contract.conftest import CELLS
 
@@ -36,7 +37,9 @@ def sapien() -> Iterator[Cell]:
         yield cell
 
 
-@pytest.fixture(scope="module", params=["sapien", "sapien with noise", "replay", "kinect2"])
+@pytest.fixture(
+    scope="module", params=["sapien", "sapien with noise", "mujoco", "mujoco with noise", "replay", "kinect2"]
+)
 def station(
     request: pytest.FixtureRequest, sapien: Cell, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Station]:
@@ -49,6 +52,13 @@ def station(
             world, noise = sapien.camera._world, SensorNoise(model="kinect2", offset=0.0)
             with SapienCamera(world, noise) as camera:
                 yield Station(camera, table, lambda: SapienCamera(world, noise))
+        case "mujoco":
+            with cell_from_yaml(CELLS / "mujoco.yaml").camera as camera:
+                yield Station(camera, table, lambda: cell_from_yaml(CELLS / "mujoco.yaml").camera)
+        case "mujoco with noise":
+            config = MujocoCellConfig(type="mujoco", noise=SensorNoise(model="kinect2", offset=0.0))
+            with mujoco_cell(config).camera as camera:
+                yield Station(camera, table, lambda: mujoco_cell(config).camera)
         case "replay":
             with RecordingCamera(sapien.camera, RecordingWriter(folder / "a.h5", table, sapien.arm)) as taken:
                 for _ in range(3):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from hal.sim.noise import SensorNoise, add_noise
+from hal.sensor_noise import SensorNoise, add_noise
 from mskgrasp.core.errors import NoPartFound
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.scoring import Scene

@@ -46,3 +46,11 @@ def test_a_real_cells_file_is_used_in_place(tmp_path: Path):
     assert found.tape is not None and not found.simulated and found.noise == ""
     with pytest.raises(UsageError, match="for a simulated cell"):
         read_cell(real, noise="iid", measure="truth", tape=None)
+
+
+def test_the_mujoco_cell_takes_noise_and_draws_no_tape(tmp_path: Path):
+    path = CELLS / "mujoco.yaml"
+    found = read_cell(path, noise="kinect2", measure="truth", tape=None)
+    assert found.simulated and found.noise == "kinect2" and found.write(tmp_path) == tmp_path / "cell.yaml"
+    with pytest.raises(UsageError, match="draws no tape.*type sapien"):
+        read_cell(path, noise=None, measure="markers", tape=None)

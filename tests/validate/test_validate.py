@@ -18,8 +18,10 @@ from mskgrasp.parts import find_part
 from mskgrasp.validate.__main__ import main
 from mskgrasp.validate.closed_form import Check, run_checks
 from mskgrasp.validate.compare import cheapest, compare, complaints
-from mskgrasp.validate.config import CELL_FLOOR, FLOOR, REFERENCE, Setting, ValidateConfig
+from mskgrasp.validate.config import CELL_FLOOR, FLOOR, MOVED, REFERENCE, Setting, ValidateConfig
 from mskgrasp.validate.convergence import Outcomes, draw_grasps, run_settings
+from mskgrasp.validate.engines import complaints as complaints_of_engines
+from mskgrasp.validate.engines import disagreements
 from mskgrasp.validate.report import summarise_discards
 from tests.programs import run_here
 
@@ -210,3 +212,28 @@ def test_distributions_that_differ_by_less_than_can_be_noticed_are_the_same():
         moved = still.displacement + np.array([0, 0, shift, 0])
         found = compare(dataclasses.replace(still, displacement=moved), still)
         assert (found.p_beyond > 0.05) == same and found.p_value < 0.05
+
+
+def test_engines_that_differ_are_reported_with_the_kinds_of_disagreement():
+    one = outcomes()
+    one = dataclasses.replace(one, failure=np.where(one.success, 0, 1))
+    assert complaints_of_engines(compare(one, one)) == []
+    success = one.success.copy()
+    success[:20] = ~success[:20]
+    moved = np.where(success[:, None], np.nan_to_num(one.displacement) + 0.001, np.nan)
+    other = dataclasses.replace(one, success=success, displacement=moved, failure=np.where(success, 0, 2))
+    assert [said.split()[0] for said in complaints_of_engines(compare(other, one))] == ["S", "displacements"]
+    assert sorted(disagreements(other, one)) == [(("held", "missed"), 10), (("slipped", "held"), 10)]
+
+
+def test_both_engines_try_the_same_grasps(tmp_path: Path):
+    done = run_here(
+        main, "--engine", "mujoco", "--parts", "hex_nut_m30", "--grasps-per-part", "6", "--workers", "1",
+        "--out", str(tmp_path),
+    )  # fmt: skip
+    assert done.returncode in (0, 1), done.stderr
+    record = json.loads((tmp_path / "engines.json").read_text())
+    found = record["engines"]
+    assert found["hex_nut_m30"] == found["all"] and found["all"]["n"] == 6
+    assert found["all"]["agreement"] >= 0.6 and found[f"mujoco{MOVED}"]["shift_median"] < 1e-3
+    assert "mujoco" in record["versions"]

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from hal import open_cell
-from hal.sim import SensorNoise
-from hal.sim.noise import NoiseModel, add_noise
+from hal import SensorNoise, open_cell
+from hal.sensor_noise import NoiseModel, add_noise
 
 PART = "hex_nut_m30"
 SIDE = 34

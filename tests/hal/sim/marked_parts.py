@@ -11,9 +11,9 @@ import numpy as np
 import torch
 from mani_skill.utils.structs.pose import Pose as ManiSkillPose
 
-from hal import Cell, RgbdFrame
-from hal.sim import SapienCellConfig, SensorNoise, sapien_cell
-from hal.sim.noise import add_noise
+from hal import Cell, RgbdFrame, SensorNoise
+from hal.sensor_noise import add_noise
+from hal.sim import SapienCellConfig, sapien_cell
 from hal.sim.world import SapienWorld
 from mskgrasp.core.errors import TapeDoesNotFit
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, wrap_angle

@@ -1,4 +1,4 @@
-"""What the simulated arm does beyond the contract: it meets parts, and the simulator knows the truth."""
+"""What simulated arms do beyond the contract: they meet parts, and the simulator knows the truth."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import pytest
 import hal.sim.arm
 from hal import Cell, execute_grasp, go_home, let_go, put_down
 from hal.errors import MotionAborted, NeedsRecovery, Stopped
+from hal.mujoco.world import MujocoWorld
+from hal.sim.world import SapienWorld
 from mskgrasp.core.geometry import pose_distance
 from mskgrasp.core.grasp import Grasp, pose_base_tcp
 from mskgrasp.planning.place_pose import place
@@ -28,13 +30,17 @@ def test_a_straight_motion_arrives_to_a_millimetre(cell: Cell, theta: float):
 def test_a_straight_motion_is_straight(cell: Cell, monkeypatch):
     begin, target = cell.arm.state().T_base_tcp.position, pose_base_tcp(np.array([0.5, 0.1, 0.15, 0.0]))
     seen: list[np.ndarray] = []
-    step = cell.feeder.env.motion.step  # type: ignore[union-attr]  # the feeder is the simulated world
+    world = cell.feeder
+    assert isinstance(world, SapienWorld | MujocoWorld)
+    moves = (world.env.motion, "step") if isinstance(world, SapienWorld) else (world.simulation, "_step")
+    step = getattr(*moves)
 
     def watched(*args: object) -> None:
         step(*args)
         seen.append(cell.arm.state().T_base_tcp.position)
 
-    monkeypatch.setattr(cell.feeder.env.motion, "step", watched)  # type: ignore[union-attr]
+    monkeypatch.setattr(*moves, watched)
+    cell.arm.grasp(5.0)  # closed fingers might hold something, so that no air is skipped
     cell.arm.move_to_pose(target, speed=0.3)
     way = (target.position - begin) / np.linalg.norm(target.position - begin)
     offsets = [p - begin - way * np.dot(p - begin, way) for p in seen]
@@ -133,10 +139,16 @@ def test_a_part_that_falls_from_the_hand_does_not_stop_the_arm(cell: Cell):
     cell.feeder.present("hex_nut_m30", 0)
     before = cell.tracker.part_pose().position
     assert execute_grasp(cell, Grasp.from_vector(np.array([before[0], before[1], 0.0115, 0.3]))).holding
-    agent = cell.feeder.env.agent  # type: ignore[union-attr]  # the feeder is the simulated world
-    agent.set_finger_force(0.01)
+    world = cell.feeder
+    assert isinstance(world, SapienWorld | MujocoWorld)
+    weaken = (
+        world.env.agent.set_finger_force
+        if isinstance(world, SapienWorld)
+        else world.simulation._limit_fingers
+    )
+    weaken(0.01)
     cell.arm.move_to_pose(pose_base_tcp(np.array([before[0], before[1], 0.17, 0.3])))
-    agent.set_finger_force(agent.physics.finger_force)
+    weaken(20.0)
     assert cell.tracker.part_pose().position[2] < before[2] + 0.01
     go_home(cell)
 
@@ -178,9 +190,7 @@ def test_a_finger_in_a_bore_leaves_the_part_where_it_is_if_it_opens_no_farther_t
     assert moved > 0.004 if pushed else moved < 0.0003
 
 
-@pytest.mark.parametrize(
-    ("part", "offset"), [("hex_nut_m30", (0.004, 0.003)), ("hinge_60x30", (0.0, 0.004))]
-)
+@pytest.mark.parametrize(("part", "offset"), [("hex_nut_m30", (0.004, 0.003)), ("hinge_60x30", (0.0, 0.004))])
 def test_long_steps_in_free_air_leave_a_part_in_the_hand_as_short_ones_do(
     cell: Cell, monkeypatch, part: str, offset: tuple[float, float]
 ):

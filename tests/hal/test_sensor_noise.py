@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hal.sim.noise import SensorNoise, add_noise, axial_sigma, incidence_angles
+from hal.sensor_noise import SensorNoise, add_noise, axial_sigma, incidence_angles
 from mskgrasp.core.config import Config, check_config
 from mskgrasp.core.errors import BadConfig
 

@@ -1,0 +1,11 @@
+"""A second simulated cell, in MuJoCo, as a backend of ``hal``: an engine independent of SAPIEN's.
+
+Needs the extra ``[mujoco]``, which is loaded when a cell is connected.
+"""
+
+from hal.mujoco.arm import MujocoArm
+from hal.mujoco.camera import MujocoCamera
+from hal.mujoco.cell import MujocoCellConfig, mujoco_cell
+from hal.mujoco.settings import MujocoPhysics
+
+__all__ = ["MujocoArm", "MujocoCamera", "MujocoCellConfig", "MujocoPhysics", "mujoco_cell"]

@@ -1,0 +1,138 @@
+"""Simulated world shared by camera, arm, feeder and tracker of a cell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hal.errors import DriverMissing, NotConnected
+from hal.mujoco.settings import MujocoPhysics
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.settings import TABLE_Z, Overhead, Region
+from mskgrasp.parts import Part, find_part
+from mskgrasp.parts.hulls import hull_corners
+from mskgrasp.parts.resting_pose import random_resting_pose
+
+if TYPE_CHECKING:
+    from hal.mujoco.simulation import Simulation
+
+_FALLEN = 0.05
+"""A part this far below the table has fallen off it, m."""
+
+
+class MujocoWorld:
+    """Parts on a table under a Panda; built when first connected.
+
+    Args:
+        physics: Settings of the simulation.
+        overhead: Settings of the camera.
+        region: Where parts lie, base frame, metres.
+        home: (7,) joints of the arm while a part is placed.
+        part: Part on the table at first.
+        seed: Determines its position and turn.
+    """
+
+    def __init__(
+        self,
+        *,
+        physics: MujocoPhysics,
+        overhead: Overhead,
+        region: Region,
+        home: np.ndarray,
+        part: str,
+        seed: int,
+    ):
+        self.physics = physics
+        self.overhead = overhead
+        self.region = region
+        self._home = np.asarray(home, dtype=float)
+        self._first = (part, seed)
+        self._users = 0
+        self._simulation: Simulation | None = None
+        self.presented = 0
+        """Number of parts placed so far."""
+        self.presented_seed = seed
+        """Seed of the last placement."""
+
+    @property
+    def simulation(self) -> Simulation:
+        """The simulation.
+
+        Raises:
+            NotConnected: No device of this cell is connected.
+        """
+        if self._simulation is None:
+            raise NotConnected("the simulated cell is closed; use it inside open_cell(...)")
+        return self._simulation
+
+    def open(self) -> None:
+        """Builds the world for its first user.
+
+        Raises:
+            DriverMissing: MuJoCo is not installed.
+        """
+        if self._simulation is None:
+            self.present(*self._first)
+        self._users += 1
+
+    def close(self) -> None:
+        """Frees the world after its last user."""
+        self._users = max(0, self._users - 1)
+        if self._users == 0:
+            self._simulation = None
+
+    def present(self, part: str, seed: int, *, keep: bool = False) -> None:
+        """Places a part on the table, arm at home, everything at rest.
+
+        A new simulation each time, so that a trial does not depend on those before it.
+
+        Args:
+            part: Name or folder.
+            seed: Determines its position and turn, as in the SAPIEN cell.
+            keep: Parts outside the region, such as on a pallet, stay; else the table is cleared.
+
+        Raises:
+            BadPart: There is no such part.
+            DriverMissing: MuJoCo is not installed.
+        """
+        new = find_part(part)
+        corners = np.concatenate(hull_corners(new))
+        drawn = random_resting_pose(
+            new.resting, new.resting_probability, corners, self.region, np.random.RandomState(seed)
+        )
+        staying = self._outside() if keep else []
+        self._simulation = _simulation()(
+            self.physics,
+            [new, *(one for one, _ in staying)],
+            [Pose.from_vector(drawn), *(pose for _, pose in staying)],
+            self._home,
+        )
+        self.presented, self.presented_seed = self.presented + 1, seed
+
+    def part_pose(self) -> Pose:
+        """``T_base_obj`` of the part, the simulator's ground truth."""
+        return self.simulation.part_pose()
+
+    def _outside(self) -> list[tuple[Part, Pose]]:
+        """Parts on the table outside the region, with their poses."""
+        x_min, x_max, y_min, y_max = self.region
+        found = []
+        for i, part in enumerate(self.simulation.parts):
+            pose = self.simulation.part_pose(i)
+            x, y, z = pose.position
+            if z > TABLE_Z - _FALLEN and not (x_min <= x <= x_max and y_min <= y <= y_max):
+                found.append((part, pose))
+        return found
+
+
+def _simulation() -> type[Simulation]:
+    try:
+        from hal.mujoco.simulation import Simulation
+    except ModuleNotFoundError as error:
+        if error.name != "mujoco":
+            raise
+        raise DriverMissing(
+            "this cell needs the package mujoco; run: pip install 'mskgrasp[mujoco]'"
+        ) from error
+    return Simulation

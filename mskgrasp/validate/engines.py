@@ -1,0 +1,129 @@
+"""The same grasps in SAPIEN and in MuJoCo."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import json
+import math
+import os
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hal.errors import DriverMissing
+from mskgrasp.core.grasp import FAILURES
+from mskgrasp.parts import Part
+from mskgrasp.reports.console import print_sections
+from mskgrasp.reports.section import Section, Table
+from mskgrasp.runtime.progress import Bar, progress
+from mskgrasp.simulation.versions import versions
+from mskgrasp.validate.compare import Comparison, compare
+from mskgrasp.validate.config import MOVED, ValidateConfig
+from mskgrasp.validate.convergence import Outcomes, draw_grasps, run_settings
+
+LEAST_AGREEMENT = 0.95
+"""Share of random grasps in which S must agree."""
+MOST_SHIFT = (0.5e-3, 3e-3)
+"""Greatest difference of displacements, median and 90 %, m."""
+
+
+def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
+    """Compares outcomes of both engines part by part; 0 if they agree as they should, 1 otherwise.
+
+    Raises:
+        DriverMissing: MuJoCo is not installed.
+    """
+    if importlib.util.find_spec("mujoco") is None:
+        raise DriverMissing("--engine mujoco needs the package mujoco; run: pip install 'mskgrasp[mujoco]'")
+    workers = config.workers or os.cpu_count() or 1
+    n = len(parts) * config.grasps_per_part
+    folders = [part.folder for part in parts]
+    with progress(total=n, title="drawing grasps", unit="grasp") as bar:
+        drawn = draw_grasps(folders, config.grasps_per_part, config.seed, config.out, workers, _advance(bar))
+    settings = config.engines()
+    with progress(total=n * len(settings), title="grasps", unit="grasp", keep=True) as bar:
+        found = run_settings(settings, drawn, config.out, workers, _advance(bar))
+    sapien, mujoco = found["sapien"], found["mujoco"]
+    rows = {"all": compare(mujoco, sapien)}
+    rows |= {f"{name}{MOVED}": compare(found[f"{name}{MOVED}"], found[name]) for name in ("sapien", "mujoco")}
+    by_part = {part.name: compare(_of(mujoco, part.name), _of(sapien, part.name)) for part in parts}
+    differing = disagreements(mujoco, sapien)
+    told = [f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN" for (ours, theirs), count in differing]
+    worst = sorted(by_part.items(), key=lambda item: item[1].agreement)
+    print_sections(
+        [
+            Section(
+                title="MuJoCo against SAPIEN",
+                text=told,
+                tables=[_table([*rows.items(), *worst])],
+            )
+        ]
+    )
+    failed = complaints(rows["all"])
+    record = {
+        "settings": config.model_dump(mode="json"),
+        "versions": versions() | {"mujoco": importlib.metadata.version("mujoco")},
+        "engines": {name: one.as_dict() for name, one in (rows | by_part).items()},
+        "disagreements": [[ours, theirs, count] for (ours, theirs), count in differing],
+        "failed": failed,
+    }
+    path = config.out / "engines.json"
+    path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    print(f"wrote {path}")
+    print(f"the engines differ: {'; '.join(failed)}" if failed else "the engines agree")
+    return 1 if failed else 0
+
+
+def complaints(found: Comparison) -> list[str]:
+    """Where two engines differ by more than they may."""
+    said = []
+    if found.agreement < LEAST_AGREEMENT:
+        said.append(f"S agrees in {found.agreement:.1%}, at least {LEAST_AGREEMENT:.0%} is needed")
+    for name, value, most in (
+        ("median", found.shift_median, MOST_SHIFT[0]),
+        ("90 %", found.shift_p90, MOST_SHIFT[1]),
+    ):
+        if not value <= most:  # NaN: nothing succeeded in both
+            said.append(f"displacements differ by {1e3 * value:.2f} mm ({name}), at most {1e3 * most:g} mm")
+    return said
+
+
+def disagreements(ours: Outcomes, theirs: Outcomes) -> list[tuple[tuple[str, str], int]]:
+    """How often S differs, by outcome here and there; most frequent first."""
+    differ = np.flatnonzero(ours.success != theirs.success)
+    names = [(FAILURES[int(ours.failure[i])], FAILURES[int(theirs.failure[i])]) for i in differ]
+    said = [(a.replace("none", "held"), b.replace("none", "held")) for a, b in names]
+    return Counter(said).most_common()
+
+
+def _advance(bar: Bar) -> Callable[[int], None]:
+    def advance(by: int) -> None:
+        bar.update(by)
+
+    return advance
+
+
+def _of(outcomes: Outcomes, part: str) -> Outcomes:
+    rows = outcomes.part == part
+    return replace(outcomes, **{name: values[rows] for name, values in vars(outcomes).items()})
+
+
+def _table(rows: Sequence[tuple[str, Comparison]]) -> Table:
+    header = (
+        "grasps", "n", "success", "same success", "shift median, mm", "90 %", "turn median, deg", "90 %",
+        "CPU ms per grasp",
+    )  # fmt: skip
+    return Table(
+        header=header,
+        rows=[
+            (
+                name, c.n, f"{c.success_rate:.1%}", f"{c.agreement:.1%}", f"{1e3 * c.shift_median:.2f}",
+                f"{1e3 * c.shift_p90:.2f}", f"{math.degrees(c.turn_median):.2f}",
+                f"{math.degrees(c.turn_p90):.2f}", f"{c.cpu_ms:.0f}",
+            )
+            for name, c in rows
+        ],
+    )  # fmt: skip
