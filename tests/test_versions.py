@@ -1,4 +1,4 @@
-from mskgrasp.simulation.versions import other_versions, versions
+from mskgrasp.simulation.versions import SIMULATION_VERSION, other_versions, versions
 from tests.versions import changed, code_digest
 
 
@@ -17,6 +17,7 @@ def test_comments_docstrings_and_imports_are_no_change_but_numbers_are():
 
 
 def test_data_made_before_versions_were_numbered_are_of_version_1():
-    first = versions() | {"simulation": "38dc7f58aea7bdfa"}
-    assert other_versions(first) == ""
-    assert "simulation 38dc" in other_versions(first | {"simulation": "38dc7f58aea7bdff"})
+    unnumbered = versions() | {"simulation": "38dc7f58aea7bdfa"}
+    assert other_versions(unnumbered) == f"simulation 1 (here {SIMULATION_VERSION})"
+    assert "simulation 38dc" in other_versions(unnumbered | {"simulation": "38dc7f58aea7bdff"})
+    assert other_versions(versions()) == ""

@@ -89,7 +89,7 @@ def test_a_build_of_the_catalogue_that_is_stopped_keeps_the_rest_of_the_index(mo
 def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
     code = (
         "from mskgrasp.parts.commands.command_line import main; "
-        "from mskgrasp.runtime.cli import run; run(main)"
+        "from mskgrasp.runtime.cli import run; run('mskgrasp.parts', main)"
     )
     build = subprocess.Popen(
         [sys.executable, "-c", code, "build", "--workers", "2"],
@@ -115,7 +115,7 @@ def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
 def test_workers_of_a_killed_build_end_too(own_cache):
     code = (
         "from mskgrasp.parts.commands.command_line import main; "
-        "from mskgrasp.runtime.cli import run; run(main)"
+        "from mskgrasp.runtime.cli import run; run('mskgrasp.parts', main)"
     )
     build = subprocess.Popen(
         [sys.executable, "-c", code, "build", "--workers", "2"],
