@@ -70,7 +70,7 @@ def draw_success(summary: SuccessSummary, path: Path) -> None:
         right.barh(
             list(reasons) or ["none"], list(reasons.values()) or [0], color=_OURS["low_variance"], height=0.5
         )
-        right.set_title(f"Not lifted: {sum(reasons.values())} of {overall.trials}")
+        right.set_title(f"{sum(reasons.values())} not lifted")
         right.xaxis.get_major_locator().set_params(integer=True)
         right.set_xlabel("grasps")
         right.set_ylim(-0.7, max(len(reasons), 5) - 0.3)
