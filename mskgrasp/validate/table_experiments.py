@@ -128,7 +128,12 @@ def _pushed(scene: BodyScene, workshop: Workshop) -> Iterator[Check]:
     rolled = way - speed * seconds / 2
     expected = math.sqrt(2 * _kept_work(force * rolled, rolled) / (1.5 * cylinder.mass))
     yield near(
-        "its speed", "3/4 m v^2 = F s, less the impacts of its facets (McGeer 1990)", "m/s", expected, speed, 0.05
+        "its speed",
+        "3/4 m v^2 = F s, less the impacts of its facets (McGeer 1990)",
+        "m/s",
+        expected,
+        speed,
+        0.05,
     )
 
 
