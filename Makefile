@@ -6,7 +6,7 @@ TESTABLE := $(VENV)/.testable
 RUN := $(VENV)/bin/python -m
 
 .PHONY: help setup collect train plan evaluate palletize test test-all regression bench-parts bench-collect bench-train \
-	bench-plan check format reference clean
+	bench-plan check format reference results clean
 .DEFAULT_GOAL := help
 
 help: ## Explain the targets
@@ -75,6 +75,9 @@ format: $(READY) ## Format the code
 
 reference: $(READY) ## Write docs/reference.md from docstrings
 	$(RUN) tests.docs.make_reference
+
+results: $(READY) ## Write docs/results/validation.md from its stored report (ARGS="--store FILE" replaces that)
+	$(RUN) tests.docs.make_results $(ARGS)
 
 clean: ## Remove the virtual environment and caches (data, models and out stay)
 	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis .import_linter_cache *.egg-info

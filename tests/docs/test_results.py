@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.docs import make_results
 from tests.docs.pages import ROOT
 
 RESULTS = sorted(set((ROOT / "docs/results").glob("*.md")) - {ROOT / "docs/results/README.md"})
@@ -32,3 +33,18 @@ def test_every_figure_of_the_readme_is_on_a_results_page():
     rows = readme[readme.index("| result |") : readme.index("[All results]")]
     known = {number for page in RESULTS for number in re.findall(NUMBER, page.read_text(encoding="utf-8"))}
     assert not [number for number in re.findall(NUMBER, rows) if number not in known]
+
+
+def test_the_page_on_validation_is_that_of_the_stored_report():
+    """Run `make results` after storing a report or changing a table."""
+    record = make_results.report()
+    assert make_results.PAGE.read_text(encoding="utf-8") == make_results.page(record)
+    readme = make_results.README.read_text(encoding="utf-8")
+    assert readme.count("| `mskgrasp.validate` |") == 1
+    assert readme == make_results.with_row(readme, record)
+
+
+def test_a_stored_report_names_neither_folders_nor_a_machine_s_processes():
+    record = make_results.report()
+    assert "/tmp" not in make_results.REPORT.read_text(encoding="utf-8")
+    assert not {"out", "workers"} & record["settings"].keys()

@@ -22,7 +22,7 @@ def distances(rng: np.random.Generator) -> np.ndarray:
 
 
 def gained(rng: np.random.Generator, rate: float, spread: float) -> np.ndarray:
-    """Differences of success, of mean ``rate``; 4 % of the grasps differ, in some parts more than in others."""
+    """Differences of success of mean ``rate``; 4 % of the grasps differ, more in some parts than others."""
     up = np.clip((0.04 + rate) / 2 + spread * rng.uniform(-1, 1, PARTS)[PART], 0, 1)
     down = np.clip((0.04 - rate) / 2 + spread * rng.uniform(-1, 1, PARTS)[PART], 0, 1)
     drawn = rng.uniform(size=len(PART))
