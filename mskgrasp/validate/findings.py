@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -137,13 +137,11 @@ def errors(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> list[Jud
 def grid(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> list[Judged]:
     """Every setting of the grid against the first reference, cheapest first."""
     first = config.references[0]
-    named = {name: NOMINAL if name == config.production else name for name in config.candidates()}
-    found = [
-        Judged(
-            **{**vars(judge(outcomes, key, first.name, config.n_of(first), config.margins)), "setting": name}
-        )
-        for name, key in named.items()
-    ]
+    found = []
+    for name in config.candidates():
+        key = NOMINAL if name == config.production else name
+        own = judge(outcomes, key, first.name, config.n_of(first), config.margins)
+        found.append(replace(own, setting=name))
     return sorted(found, key=lambda one: one.found.cpu_ms)
 
 

@@ -76,8 +76,8 @@ def _row(record: dict[str, Any]) -> str:
     floor = record["errors"][0]
     said = (
         f"labels against {record['yardstick']}: success agrees in {own['agreement']:.1%}, displacement "
-        f"differs by {1e3 * own['shift_median']:.3f} mm (median); floor of the comparison: {floor['agreement']:.1%}, "
-        f"{1e3 * floor['shift_median']:.3f} mm"
+        f"differs by {1e3 * own['shift_median']:.3f} mm (median); floor of the comparison: "
+        f"{floor['agreement']:.1%}, {1e3 * floor['shift_median']:.3f} mm"
     )
     n = f"{own['n']} grasps of {len(record['parts'])} parts, no model"
     return f"| {said} | {n} | none | `mskgrasp.validate` |"

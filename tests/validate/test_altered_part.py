@@ -15,7 +15,7 @@ def test_another_density_scales_mass_and_inertia_alone(tmp_path):
     part = find_part("hex_nut_m20")
     heavy = altered_part(part, tmp_path, density=2.0)
     assert heavy.mass == pytest.approx(2 * part.mass)
-    np.testing.assert_allclose(heavy.inertia, 2 * part.inertia, rtol=1e-6)
+    np.testing.assert_allclose(heavy.inertia, 2 * part.inertia, rtol=1e-6, atol=1e-15)
     for own, other in zip(hull_corners(part), hull_corners(heavy), strict=True):
         np.testing.assert_allclose(own, other, atol=1e-8)
     assert heavy.content_hash != part.content_hash and find_part("hex_nut_m20").mass == part.mass
