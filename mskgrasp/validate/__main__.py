@@ -8,9 +8,9 @@ from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 DESCRIPTION = """Shows whether simulated labels are right: run it after changing a setting or a part.
 
 Three kinds of evidence: experiments whose outcome follows from closed-form physics; parts as the engine
-cooked them, against their meshes; and the same grasps under coarser and finer settings, against the finest,
-beside the floor: the finest setting against itself with the starts moved by 10 um. Writes validate.json and
-validate.png; ends with 1 if a check fails or the settings under test add something to the floor."""
+cooked them, against their meshes; and the same grasps under finer references, coarser settings and other
+values of what is not known exactly. Production must be equivalent to the reference by two one-sided tests.
+Writes validate.json and validate.png; ends with 1 if a check fails or the equivalence is not shown."""
 
 
 def main() -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from pathlib import Path
 
 import gymnasium
@@ -11,12 +12,12 @@ import sapien
 import torch
 from sapien.physx import PhysxRigidDynamicComponent
 
-from mskgrasp.core.geometry import Pose
+from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.panda_kinematics import top_down
 from mskgrasp.core.settings import Physics
 from mskgrasp.parts import Part, store
-from mskgrasp.parts.solids.solid import Solid
+from mskgrasp.parts.solids import shape as h
 from mskgrasp.parts.write_solid import write_solid
 from tasks import GraspDisplacementEnv
 from tasks.scene.frames import base_pose
@@ -25,20 +26,57 @@ ALOFT = 0.25
 """Height at which the hand holds bodies that must not meet the table, m."""
 
 
-def make_body(folder: Path, name: str, solid: Solid, mass: float) -> Part:
-    """A part folder under ``folder`` for a plain body (millimetres) of some mass, kg."""
-    volume = float(solid.mesh.volume) * 1e-9
-    with store.kept_in(folder):
-        return write_solid(
-            solid,
-            name=name,
-            family="plain",
-            source="closed-form check",
-            licence="Apache-2.0",
-            density=mass / volume,
-            dimensions={},
-            recipe_hash="closed-form check",
-        )
+GRAVITY = 9.81
+BLOCK = (0.04, 0.02, 0.03)
+"""Edges of the block of most experiments, m."""
+
+
+class Workshop:
+    """Makes part folders of plain bodies.
+
+    Args:
+        folder: Where they are kept.
+    """
+
+    def __init__(self, folder: Path):
+        self._folder = folder
+        self._made: dict[str, Part] = {}
+
+    def block(self) -> Part:
+        """A block of 100 g."""
+        return self.box("block", BLOCK, 0.1)
+
+    def box(self, name: str, size: tuple[float, float, float], mass: float) -> Part:
+        """A box with edges in metres and a mass in kg."""
+        x, y, z = (500 * edge for edge in size)
+        return self.part(name, h.block(-x, x, -y, y, -z, z), mass)
+
+    def part(self, name: str, shape: h.Shape, mass: float) -> Part:
+        """A body of some mass, kg; one that was made under that name before is returned."""
+        if name not in self._made:
+            solid = shape.solid()
+            with store.kept_in(self._folder):
+                self._made[name] = write_solid(
+                    solid,
+                    name=name,
+                    family="plain",
+                    source="closed-form check",
+                    licence="Apache-2.0",
+                    density=mass / (float(solid.mesh.volume) * 1e-9),
+                    dimensions={},
+                    recipe_hash="closed-form check",
+                )
+        return self._made[name]
+
+    def centroid(self, part: Part) -> np.ndarray:
+        """Centroid (3,) of a body in the axes and the unit, mm, in which its shape was given."""
+        return 1e3 * np.asarray(store.read_record(part.folder)["centroid_in_source"])
+
+
+def turn_about(before: Pose, after: Pose, axis: int) -> float:
+    """Signed angle of the turn from before to after about a coordinate axis, radians."""
+    q = quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz))
+    return float(2 * math.atan2(q[1 + axis], q[0]))
 
 
 class BodyScene:
@@ -113,6 +151,12 @@ class BodyScene:
             body.add_force_at_point(force, body.entity.pose.p)
             self.env.motion.step(1)
         return n / self.env.motion.rate_hz
+
+    def twist(self, torque: list[float], seconds: float) -> None:
+        """Advances the simulation with a constant torque (x, y, z) on the part, N m."""
+        for _ in range(self.env.motion.n_steps(seconds)):
+            self.body.add_force_torque([0.0, 0.0, 0.0], torque)
+            self.env.motion.step(1)
 
     def pinch(self, part: Part, along: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
         """Closes the hand aloft on a weightless part, then gives the part its weight.

@@ -1,23 +1,41 @@
-"""Configuration of a validation: settings under test, parts, and finer settings for comparison."""
+"""Configuration of a validation: settings under test, parts, references and what is varied."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 import tyro
 from pydantic import Field, model_validator
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Physics
+from mskgrasp.core.settings.physics import LEAST_RATE_HZ
+from mskgrasp.validate.altered_part import HULLS
 
 Engine = Literal["sapien", "mujoco"]
 
 SHIFT = 1e-5
-"""By how much the starts of the floor are moved, m: less than any camera or arm could resolve."""
+"""By how much the starts of a floor are moved, m: less than any camera or arm could resolve."""
 CELL_SHIFT = 1e-4
-"""The same for the cell's floor: what a Panda repeats (ISO 9283, by its data sheet), m."""
+"""The same for engines that are compared, m: what a Panda repeats (ISO 9283, by its data sheet)."""
+ROUNDING = 1e-7
+"""The same for the floor of rounding, m: ten float32 numbers at 0.1 m are that far apart."""
+FINGER_MASS = 0.015
+"""Of a finger of the Panda without its motor, kg."""
+
+NOMINAL, MOVED, NOTHING_SKIPPED = (
+    "production",
+    "production, starts moved by 10 um",
+    "production, nothing skipped",
+)
+DRAWN = "all drawn together"
+
+Value = float | bool | str
+RESTS = ("hulls", "mesh")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,14 +45,52 @@ class Setting:
     Attributes:
         name: For tables and files.
         physics: Its values.
+        n: Grasps of each part that are tried.
         shift: By how much the parts' starts are moved on the table, m: 0 but for the floors.
+        density: Of the parts, by their own.
+        hulls: Of the parts, one of `mskgrasp.validate.altered_part.HULLS`; empty: their own.
+        rest: The parts start in the resting poses of their "hulls" or of their "mesh".
+        ranges: Physics settings drawn for each grasp, uniformly between two bounds.
         engine: Simulator of the attempts.
     """
 
     name: str
     physics: Physics
+    n: int
     shift: float = 0.0
     engine: Engine = "sapien"
+    density: float = 1.0
+    hulls: str = ""
+    rest: str = "hulls"
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+
+class Reference(Config):
+    """Simulation finer than production, nothing skipped and nothing coarse."""
+
+    rate_hz: int
+    """Steps a second."""
+    position_iterations: int
+    """Solver iterations a step."""
+    grasps_per_part: int = Field(ge=1)
+    """Grasps of each part; at most as many are compared with it."""
+    floor_grasps_per_part: int = Field(ge=1)
+    """Grasps of each part that are tried again with their starts moved. Success rates are compared without
+    a floor."""
+
+    @property
+    def name(self) -> str:
+        """For tables."""
+        return setting_name(self.rate_hz, self.position_iterations)
+
+
+class Margins(Config):
+    """Differences that count as none, stated before anything is measured."""
+
+    displacement: float = Field(default=2.5e-4, gt=0)
+    """Of the median distance between displacements, beyond that of the reference's floor, m."""
+    success: float = Field(default=0.02, gt=0)
+    """Of the success rate."""
 
 
 class ValidateConfig(Config):
@@ -44,40 +100,72 @@ class ValidateConfig(Config):
     """Folder of the report and of the outcomes, from which a stopped run resumes."""
     parts: tuple[str, ...] = ()
     """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
-    grasps_per_part: int = Field(default=40, ge=1)
-    """Grasps of each part that are tried under every setting."""
+    grasps_per_part: int = Field(default=20, ge=1)
+    """Grasps of each part that are drawn, and tried under production's setting; no setting gets more."""
+    variant_grasps_per_part: int = Field(default=8, ge=1)
+    """Grasps of each part that are tried under each variant."""
     seed: int = Field(default=0, ge=0)
     """The starts and grasps follow from it."""
     workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
     """Processes; 0: one for each core."""
-    rates_hz: tuple[int, ...] = (125, 250, 500, 1000)
-    """Simulation rates; the finest setting has the highest of them, that under test included, throughout."""
-    iterations: tuple[int, ...] = (8, 15, 25, 50)
-    """Solver iterations; the most, those under test included, belong to the finest setting."""
-    variants: Annotated[dict[str, dict[str, float | bool]], tyro.conf.Suppress] = {}
-    """Other values of some physics settings, by a name for the tables: each is tried at the rate and with the
-    iterations under test, and compared with the same finest setting. It shows the effect of these values."""
+    references: Annotated[tuple[Reference, ...], tyro.conf.Suppress] = (
+        Reference(rate_hz=2000, position_iterations=100, grasps_per_part=20, floor_grasps_per_part=8),
+        Reference(rate_hz=4000, position_iterations=100, grasps_per_part=4, floor_grasps_per_part=4),
+    )
+    """What production is compared with, each with floors of its own. The first is the yardstick of the grid,
+    the others tell how far it has converged itself."""
+    margins: Annotated[Margins, tyro.conf.Suppress] = Margins()
+    """Of the tests of equivalence."""
+    rates_hz: tuple[int, ...] = (250, 500, 1000)
+    """Simulation rates of the grid from which production's setting is chosen."""
+    iterations: tuple[int, ...] = (15, 25, 50)
+    """Solver iterations of the grid."""
+    variants: Annotated[dict[str, dict[str, dict[str, Value]]], tyro.conf.Suppress] = {}
+    """What is varied, by a group and a label for the table: values of physics settings, ``density`` (a
+    factor), ``hulls`` or ``rest`` (mesh). Each is compared with production on the same grasps."""
+    ranges: Annotated[dict[str, tuple[float, float]], tyro.conf.Suppress] = {}
+    """Physics settings of the hand and the table that are not known better: drawn together, uniformly, for
+    each grasp, they give the error of a label. The fingers' damping stays critical."""
     engine: Engine = "sapien"
     """mujoco: compare the settings under test with a second engine, and nothing else; needs ``[mujoco]``."""
     convergence: bool = True
-    """Whether grasps are compared under all rates and iterations; without, the checks take a minute."""
+    """Whether grasps are compared under other settings; without, the checks take two minutes."""
     physics: Physics = Physics()
-    """The settings under test; rate and iterations mark the production setting in the grid."""
+    """The settings under test: production's."""
 
     @model_validator(mode="after")
     def _check(self) -> ValidateConfig:
-        if not self.rates_hz or not self.iterations:
-            raise ValueError("rates_hz and iterations need at least one value each")
+        if not self.rates_hz or not self.iterations or not self.references:
+            raise ValueError("rates_hz, iterations and references need at least one value each")
         for rate in self.rates_hz:
             self.at(rate, self.iterations[0])
-        for name, values in self.variants.items():
-            unknown = values.keys() - Physics.model_fields.keys()
-            if unknown:
+        finest = (max(*self.rates_hz, self.physics.rate_hz), self._most_iterations)
+        for reference in self.references:
+            if reference.rate_hz <= finest[0] or reference.position_iterations <= finest[1]:
                 raise ValueError(
-                    f"variants: {name!r} sets {', '.join(sorted(unknown))}, no setting of physics"
+                    f"references must be finer than all that is compared with them, {setting_name(*finest)}, "
+                    f"in rate and iterations; got {reference.name}"
                 )
-            self.varied(name)
+        for group, labels in self.variants.items():
+            for label, values in labels.items():
+                self._check_variant(f"{group}: {label}", values)
+        for name, (low, high) in self.ranges.items():
+            if name not in Physics.model_fields or not low <= high:
+                raise ValueError(f"ranges: {name} must be a setting of physics, from low to high")
         return self
+
+    @property
+    def _most_iterations(self) -> int:
+        return max(*self.iterations, self.physics.position_iterations)
+
+    def _check_variant(self, name: str, values: dict[str, Value]) -> None:
+        unknown = values.keys() - Physics.model_fields.keys() - {"density", "hulls", "rest"}
+        if unknown:
+            raise ValueError(f"variants: {name!r} sets {', '.join(sorted(unknown))}, no setting of physics")
+        for key, legal in (("hulls", HULLS), ("rest", RESTS)):
+            if key in values and values[key] not in legal:
+                raise ValueError(f"variants: {name!r}: {key} must be one of {', '.join(legal)}")
+        self._variant(name, values)
 
     def at(self, rate_hz: int, iterations: int) -> Physics:
         """The settings under test at another rate and other iterations."""
@@ -85,57 +173,106 @@ class ValidateConfig(Config):
         values = {"rate_hz": rate_hz, "coarse_rate_hz": coarse, "position_iterations": iterations}
         return Physics.model_validate(self.physics.model_dump() | values)
 
-    def varied(self, name: str) -> Physics:
-        """The settings under test with a variant's values."""
-        return Physics.model_validate(self.physics.model_dump() | self.variants[name])
-
     @property
     def production(self) -> str:
-        """Name of the setting under test."""
+        """Name of the setting under test in the grid."""
         return setting_name(self.physics.rate_hz, self.physics.position_iterations)
 
-    def settings(self) -> list[Setting]:
-        """The grid with the setting under test; reference and floor; the former in full; the variants."""
+    def n_of(self, reference: Reference) -> int:
+        """Grasps of each part that are compared with a reference."""
+        return min(self.grasps_per_part, reference.grasps_per_part)
+
+    @property
+    def n_variants(self) -> int:
+        """Grasps of each part that are tried under a variant."""
+        return min(self.grasps_per_part, self.variant_grasps_per_part)
+
+    def candidates(self) -> list[str]:
+        """Settings of the grid from which data may be collected, production's included."""
         pairs = {(rate, count) for rate in self.rates_hz for count in self.iterations}
         pairs.add((self.physics.rate_hz, self.physics.position_iterations))
-        grid = [
-            Setting(name=setting_name(rate, count), physics=self.at(rate, count))
-            for rate, count in sorted(pairs)
+        return [setting_name(*pair) for pair in sorted(pairs) if pair[0] >= LEAST_RATE_HZ]
+
+    def settings(self) -> list[Setting]:
+        """All that is simulated: production and its floor, references and floors, the grid, variants."""
+        n = self.grasps_per_part
+        whole = self.physics.model_copy(update={"skip_air": False})
+        found = [
+            Setting(name=NOMINAL, physics=self.physics, n=n),
+            Setting(name=MOVED, physics=self.physics, n=self.n_variants, shift=SHIFT),
+            Setting(name=NOTHING_SKIPPED, physics=whole, n=self.n_variants),
         ]
-        whole = {"skip_air": False}
-        # The setting under test is never compared with a coarser one.
-        finest_hz = max(*self.rates_hz, self.physics.rate_hz)
-        finest = self.at(finest_hz, max(*self.iterations, self.physics.position_iterations)).model_copy(
-            update=whole | {"coarse_rate_hz": finest_hz}
-        )
-        return [
-            *grid,
-            Setting(name=REFERENCE, physics=finest),
-            Setting(name=FLOOR, physics=finest, shift=SHIFT),
-            Setting(name=CELL_FLOOR, physics=finest, shift=CELL_SHIFT),
-            Setting(name=NOTHING_SKIPPED, physics=self.physics.model_copy(update=whole)),
-            *(Setting(name=name, physics=self.varied(name)) for name in self.variants),
-        ]
+        for k, reference in enumerate(self.references):
+            physics = self.at(reference.rate_hz, reference.position_iterations).model_copy(
+                update={"skip_air": False, "coarse_rate_hz": reference.rate_hz}
+            )
+            name, n = reference.name, self.n_of(reference)
+            again = min(n, reference.floor_grasps_per_part)
+            found += [
+                Setting(name=name, physics=physics, n=n),
+                Setting(name=floor_name(name), physics=physics, n=again, shift=SHIFT),
+            ]
+            if k == 0:
+                again = min(again, self.n_variants)
+                found.append(Setting(name=rounding_name(name), physics=physics, n=again, shift=ROUNDING))
+        pairs = {(rate, count) for rate in self.rates_hz for count in self.iterations}
+        pairs -= {(self.physics.rate_hz, self.physics.position_iterations)}
+        n = self.n_of(self.references[0])
+        found += [Setting(name=setting_name(*pair), physics=self.at(*pair), n=n) for pair in sorted(pairs)]
+        for group, labels in self.variants.items():
+            found += [self._variant(variant_name(group, label), labels[label]) for label in labels]
+        if self.ranges:
+            found.append(Setting(name=DRAWN, physics=self.physics, n=self.n_variants, ranges=self.ranges))
+        return found
+
+    def _variant(self, name: str, values: dict[str, Value]) -> Setting:
+        own: dict[str, Any] = {key: values[key] for key in ("density", "hulls", "rest") if key in values}
+        physics = self.physics.model_dump() | {key: values[key] for key in values.keys() - own.keys()}
+        return Setting(name=name, physics=Physics.model_validate(physics), n=self.n_variants, **own)
 
     def engines(self) -> list[Setting]:
         """The settings under test in both engines, and in each with the starts moved by 0.1 mm."""
         engines: tuple[Engine, ...] = ("sapien", "mujoco")
+        n = self.grasps_per_part
         return [
-            *(Setting(name=name, physics=self.physics, engine=name) for name in engines),
+            *(Setting(name=name, physics=self.physics, n=n, engine=name) for name in engines),
             *(
-                Setting(name=f"{name}{MOVED}", physics=self.physics, shift=CELL_SHIFT, engine=name)
+                Setting(name=name + SHIFTED, physics=self.physics, n=n, shift=CELL_SHIFT, engine=name)
                 for name in engines
             ),
         ]
 
 
-MOVED = ", starts moved by 0.1 mm"
-REFERENCE = "the finest, nothing skipped"
-FLOOR = "the same, starts moved by 10 um"
-CELL_FLOOR = "the same, starts moved by 0.1 mm"
-NOTHING_SKIPPED = "under test, nothing skipped"
+SHIFTED = ", starts moved by 0.1 mm"
+
+
+def drawn_physics(
+    physics: Physics, ranges: dict[str, tuple[float, float]], rng: np.random.Generator
+) -> Physics:
+    """Settings with some values drawn uniformly; what no table can have (its friction < 0) is drawn again."""
+    while True:
+        values = physics.model_dump() | {name: float(rng.uniform(*bounds)) for name, bounds in ranges.items()}
+        mass = values["finger_armature"] + FINGER_MASS
+        values["finger_damping"] = 2 * math.sqrt(values["finger_stiffness"] * mass)
+        if 2 * values["friction_table_part"] >= values["friction_pad_part"]:
+            return Physics.model_validate(values)
 
 
 def setting_name(rate_hz: int, iterations: int) -> str:
-    """Name of a setting in tables."""
+    """Name of a rate and iterations in tables."""
     return f"{rate_hz} Hz, {iterations} it"
+
+
+def floor_name(reference: str) -> str:
+    """Name of a reference whose starts are moved by `SHIFT`."""
+    return f"{reference}, starts moved by 10 um"
+
+
+def rounding_name(reference: str) -> str:
+    """Name of a reference whose starts are moved by `ROUNDING`."""
+    return f"{reference}, starts moved by 0.1 um"
+
+
+def variant_name(group: str, label: str) -> str:
+    """Name of a variant among the settings."""
+    return f"{group}: {label}"

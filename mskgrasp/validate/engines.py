@@ -21,8 +21,8 @@ from mskgrasp.reports.section import Section, Table
 from mskgrasp.runtime.progress import Bar, progress
 from mskgrasp.simulation.versions import versions
 from mskgrasp.validate.compare import Comparison, compare
-from mskgrasp.validate.config import MOVED, ValidateConfig
-from mskgrasp.validate.convergence import Outcomes, draw_grasps, run_settings
+from mskgrasp.validate.config import SHIFTED, ValidateConfig
+from mskgrasp.validate.outcomes import Outcomes, draw_grasps, run_settings
 
 LEAST_AGREEMENT = 0.95
 """Share of random grasps in which S must agree."""
@@ -45,10 +45,12 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
         drawn = draw_grasps(folders, config.grasps_per_part, config.seed, config.out, workers, _advance(bar))
     settings = config.engines()
     with progress(total=n * len(settings), title="grasps", unit="grasp", keep=True) as bar:
-        found = run_settings(settings, drawn, config.out, workers, _advance(bar))
+        found = run_settings(settings, drawn, {}, config.out, workers, _advance(bar))
     sapien, mujoco = found["sapien"], found["mujoco"]
     rows = {"all": compare(mujoco, sapien)}
-    rows |= {f"{name}{MOVED}": compare(found[f"{name}{MOVED}"], found[name]) for name in ("sapien", "mujoco")}
+    rows |= {
+        f"{name}{SHIFTED}": compare(found[f"{name}{SHIFTED}"], found[name]) for name in ("sapien", "mujoco")
+    }
     by_part = {part.name: compare(_of(mujoco, part.name), _of(sapien, part.name)) for part in parts}
     differing = disagreements(mujoco, sapien)
     told = [f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN" for (ours, theirs), count in differing]

@@ -40,7 +40,7 @@ def try_grasp(part: Part, pose: np.ndarray, grasp: np.ndarray, physics: Physics)
         physics: Speeds, times and forces; both engines share them.
 
     Returns:
-        success, failure, displacement (4,) and tilt (NaN where not successful), penetration, fastest (NaN: it
+        success, failure, settled, displacement (4,) and tilt (NaN where not successful), penetration, fastest (NaN: it
         is not watched), seconds of simulated time.
     """
     start = Pose.from_vector(pose)
@@ -84,6 +84,7 @@ def try_grasp(part: Part, pose: np.ndarray, grasp: np.ndarray, physics: Physics)
     return dict(
         success=success[0],
         failure=failure[0],
+        settled=np.asarray(settled),
         displacement=np.full(4, np.nan) if nothing else displacement,
         tilt=np.asarray(np.nan if nothing else tilt),
         penetration=np.asarray(max(deepest, now)),

@@ -1,30 +1,41 @@
-"""The steps of a validation: closed-form checks, fidelity of parts, convergence, report."""
+"""The steps of a validation: closed-form checks, fidelity of parts, comparisons, report."""
 
 from __future__ import annotations
 
+import json
 import os
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
-from mskgrasp.core.settings.physics import LEAST_RATE_HZ
+import numpy as np
+
+from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import Part, chosen_names, find_part
+from mskgrasp.parts.hulls import hull_corners
+from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.cli import make_folder
-from mskgrasp.runtime.progress import Bar, progress
+from mskgrasp.runtime.progress import Bar, note, progress
+from mskgrasp.simulation.versions import versions
+from mskgrasp.validate.altered_part import altered_part
 from mskgrasp.validate.body_scene import BodyScene
-from mskgrasp.validate.closed_form import Check, run_checks
-from mskgrasp.validate.compare import Comparison, cheapest, compare, complaints
-from mskgrasp.validate.config import CELL_FLOOR, FLOOR, NOTHING_SKIPPED, REFERENCE, ValidateConfig
-from mskgrasp.validate.convergence import draw_grasps, run_settings
+from mskgrasp.validate.check import Check
+from mskgrasp.validate.closed_form import run_checks
+from mskgrasp.validate.config import NOMINAL, Setting, ValidateConfig
 from mskgrasp.validate.engines import compare_engines
-from mskgrasp.validate.fidelity import check_parts
-from mskgrasp.validate.report import (
-    draw,
-    print_checks,
-    print_convergence,
-    print_discards,
-    print_fidelity,
+from mskgrasp.validate.fidelity import Fidelity, check_parts
+from mskgrasp.validate.figure import draw
+from mskgrasp.validate.findings import (
+    choose,
+    errors,
+    grid,
+    label_error,
+    sensitivity,
+    size,
     summarise_discards,
-    write_json,
 )
+from mskgrasp.validate.outcomes import Outcomes, draw_grasps, run_settings
+from mskgrasp.validate.tables import sections
 
 
 def validate(config: ValidateConfig) -> int:
@@ -39,29 +50,48 @@ def validate(config: ValidateConfig) -> int:
     if config.engine == "mujoco":
         return compare_engines(config, parts)
     checks = _closed_form(config)
-    print_checks(checks)
     fidelity = _fidelity(config, parts)
-    print_fidelity(fidelity)
     failed = [check.name for check in checks if not check.passed]
     failed += [f"part {one.part}" for one in fidelity if not one.passed]
-    results: dict[str, Any] = {
+    record: dict[str, Any] = {
+        "settings": config.model_dump(mode="json"),
+        "versions": versions(),
         "closed_form": [check.as_dict() for check in checks],
         "parts": [one.as_dict() for one in fidelity],
     }
-    found = None
+    print_sections(sections(record))
     if config.convergence:
-        found = _convergence(config, parts, results)
-        reference = found[REFERENCE].success_rate
+        compared = findings(config, _simulate(config, parts))
+        record |= compared
+        print_sections(sections(record)[2:])
         failed += [
-            f"{config.production}: {said}"
-            for said in complaints(found[config.production], found[FLOOR], reference)
+            f"production, {config.production}: {said}" for said in compared["choice"]["production_fails"]
         ]
-    results["failed"] = failed
-    write_json(config.out / "validate.json", config, results)
-    picture = draw(config.out / "validate.png", checks, config, found)
-    print(f"wrote {config.out / 'validate.json'} and {picture}")
+    record["failed"] = failed
+    stored = config.out / "validate.json"
+    stored.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    picture = draw(config.out / "validate.png", record)
+    print(f"wrote {stored} and {picture}")
     print(f"{len(failed)} of the checks failed: {'; '.join(failed)}" if failed else "all checks passed")
     return 1 if failed else 0
+
+
+def findings(config: ValidateConfig, outcomes: dict[str, Outcomes]) -> dict[str, Any]:
+    """What is stored of the outcomes under all settings."""
+    judged = grid(config, outcomes)
+    setting, shown = choose(judged)
+    own = next(one for one in judged if one.setting == config.production)
+    return {
+        "production": config.production,
+        "yardstick": config.references[0].name,
+        "size": size(outcomes[NOMINAL]),
+        "errors": [one.as_dict() for one in errors(config, outcomes)],
+        "grid": [one.as_dict() for one in judged],
+        "choice": {"setting": setting, "shown": shown, "production_fails": own.complaints()},
+        "sensitivity": [one.as_dict() for one in sensitivity(config, outcomes)],
+        "label_error": label_error(config, outcomes),
+        "impossible": summarise_discards(outcomes[NOMINAL]).as_dict(),
+    }
 
 
 def _closed_form(config: ValidateConfig) -> list[Check]:
@@ -69,7 +99,7 @@ def _closed_form(config: ValidateConfig) -> list[Check]:
         return run_checks(config.physics, lambda _: _advance(bar))
 
 
-def _fidelity(config: ValidateConfig, parts: list[Part]) -> list:
+def _fidelity(config: ValidateConfig, parts: list[Part]) -> list[Fidelity]:
     scene = BodyScene(config.physics, parts[0])
     try:
         with progress(total=len(parts), title="parts", unit="part") as bar:
@@ -78,40 +108,45 @@ def _fidelity(config: ValidateConfig, parts: list[Part]) -> list:
         scene.close()
 
 
-def _convergence(config: ValidateConfig, parts: list[Part], results: dict[str, Any]) -> dict[str, Comparison]:
+def _simulate(config: ValidateConfig, parts: list[Part]) -> dict[str, Outcomes]:
     workers = config.workers or os.cpu_count() or 1
     folders = [part.folder for part in parts]
     settings = config.settings()
     n = len(parts) * config.grasps_per_part
     with progress(total=n, title="drawing grasps", unit="grasp") as bar:
         drawn = draw_grasps(
-            folders,
-            config.grasps_per_part,
-            config.seed,
-            config.out,
-            workers,
-            lambda k: _advance(bar, k),
+            folders, config.grasps_per_part, config.seed, config.out, workers, lambda k: _advance(bar, k)
         )
-    with progress(total=n * len(settings), title="grasps", unit="grasp", keep=True) as bar:
-        outcomes = run_settings(settings, drawn, config.out, workers, lambda k: _advance(bar, k))
-    found = {name: compare(one, outcomes[REFERENCE]) for name, one in outcomes.items()}
-    apart = (FLOOR, CELL_FLOOR, REFERENCE, NOTHING_SKIPPED, *config.variants)
-    candidates = [
-        setting.name
-        for setting in settings
-        if setting.physics.rate_hz >= LEAST_RATE_HZ and setting.name not in apart
-    ]
-    chosen = {
-        floor: cheapest(found, found[floor], found[REFERENCE].success_rate, candidates)
-        for floor in (FLOOR, CELL_FLOOR)
-    }
-    print_convergence(config, found, chosen)
-    seen = summarise_discards(outcomes[config.production])
-    print_discards(seen)
-    results["convergence"] = {name: one.as_dict() for name, one in found.items()}
-    results["cheapest_that_adds_nothing"] = chosen
-    results["impossible"] = vars(seen)
+    altered = _altered(config.out / "parts", settings, parts)
+    n = sum(setting.n * len(altered.get(setting.name, parts)) for setting in settings)
+    with progress(total=n, title="grasps", unit="grasp", keep=True) as bar:
+        return run_settings(settings, drawn, altered, config.out, workers, lambda k: _advance(bar, k))
+
+
+def _altered(folder: Path, settings: Sequence[Setting], parts: Sequence[Part]) -> dict[str, dict[str, Path]]:
+    """Folders of altered parts by setting and part; parts that a setting leaves as they are are left out."""
+    found: dict[str, dict[str, Path]] = {}
+    for setting in settings:
+        if not setting.hulls and setting.density == 1:
+            continue
+        own = found.setdefault(setting.name, {})
+        place = folder / f"{setting.hulls or 'own'}-{setting.density:g}".replace(" ", "_")
+        for part in parts:
+            try:
+                altered = altered_part(part, place, density=setting.density, hulls=setting.hulls)
+            except BadPart as error:
+                note(f"left out of {setting.name!r}: {error}")
+                continue
+            if setting.density != 1 or not _same_hulls(part, altered):
+                own[part.folder.name] = altered.folder
     return found
+
+
+def _same_hulls(part: Part, other: Part) -> bool:
+    return part.n_hulls == other.n_hulls and all(
+        a.shape == b.shape and np.allclose(a, b, atol=1e-7)
+        for a, b in zip(hull_corners(part), hull_corners(other), strict=True)
+    )
 
 
 def _advance(bar: Bar, by: int = 1) -> None:

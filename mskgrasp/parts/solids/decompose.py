@@ -83,14 +83,25 @@ def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
     )
 
 
-def fewest_hulls(mesh_mm: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
-    """Exact pieces joined where that changes little: within ``CLOSE_P95_MM`` and ``CLOSE_VOLUME_RATIO``."""
+def fewest_hulls(
+    mesh_mm: trimesh.Trimesh, hulls: Sequence[np.ndarray], most_p95: float = CLOSE_P95_MM
+) -> tuple[np.ndarray, ...]:
+    """Exact pieces joined where that changes little.
+
+    Args:
+        mesh_mm: What the pieces represent.
+        hulls: Corners (n, 3) of each.
+        most_p95: 95 % of the surface stay within this distance, mm; the bounds of the volume and of the
+            largest distance are in proportion.
+    """
     surface = MeshSurface(mesh_mm)
+    share = most_p95 / CLOSE_P95_MM
     most_largest = np.inf  # more than PhysX should handle have to be joined at any distance
     if len(hulls) <= MOST_HULLS:
         # Holes that are filled on purpose count as distance already.
-        most_largest = max(CLOSE_LARGEST_MM, surface.outward_largest(hulls) + 0.01)
-    return tuple(_join(surface, hulls, CLOSE_P95_MM, CLOSE_VOLUME_RATIO, most_largest))
+        most_largest = max(share * CLOSE_LARGEST_MM, surface.outward_largest(hulls) + 0.01)
+    most_ratio = min(MOST_VOLUME_RATIO, 1 + share * (CLOSE_VOLUME_RATIO - 1))
+    return tuple(_join(surface, hulls, most_p95, most_ratio, most_largest))
 
 
 def is_manifold(mesh_mm: trimesh.Trimesh) -> bool:

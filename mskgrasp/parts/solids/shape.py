@@ -6,7 +6,9 @@ so that a family does not have to describe its collision geometry.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +25,20 @@ HULL_DETAIL_MM = 0.15
 FILLED_BORE_MM = 2.6
 """Bores up to this radius are filled in the hulls: no finger enters, and each would cost eight pieces."""
 
+_FILLED_OVERRIDE: ContextVar[float] = ContextVar("filled_override", default=FILLED_BORE_MM)
+
 _SLIVER_MM = 0.05
 """Pieces thinner than this are left out: PhysX cannot cook them, and they do not affect contact."""
+
+
+@contextmanager
+def bores_filled_to(radius_mm: float) -> Iterator[None]:
+    """Fills bores of plates up to another radius than ``FILLED_BORE_MM`` within the context."""
+    token = _FILLED_OVERRIDE.set(radius_mm)
+    try:
+        yield
+    finally:
+        _FILLED_OVERRIDE.reset(token)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +119,7 @@ def plate(
     body = s.extrude(outline, z0, z1, [s.circle(r, (x, y)) for x, y, r in holes])
     region = shapely.Polygon(outline).simplify(HULL_DETAIL_MM)
     for x, y, r in holes:
-        if r > FILLED_BORE_MM:
+        if r > _FILLED_OVERRIDE.get():
             region = region.difference(shapely.Polygon(s.bore_polygon(r, centre=(x, y))))
     return Shape(body=body, hulls=tuple(s.prism(piece, z0, z1) for piece in convex_polygons(region)))
 

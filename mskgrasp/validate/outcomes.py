@@ -1,4 +1,4 @@
-"""The same grasps simulated under coarser and finer settings."""
+"""The same grasps simulated under several settings."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import json
 import logging
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+import zlib
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import gymnasium
@@ -22,11 +23,12 @@ from mskgrasp.parts import read_part
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.simulation.shard import draw_attempt
 from mskgrasp.simulation.versions import versions
-from mskgrasp.validate.config import Setting
+from mskgrasp.validate.altered_part import mesh_rests, resting_start
+from mskgrasp.validate.config import Setting, drawn_physics
 from tasks import GraspDisplacementEnv
 from tasks.scene.renderer import render_backend
 
-KEPT = ("success", "failure", "displacement", "tilt", "penetration", "fastest", "seconds")
+KEPT = ("success", "failure", "settled", "displacement", "tilt", "penetration", "fastest", "seconds")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +38,8 @@ class Outcomes:
     Attributes:
         success: (n,) bool.
         failure: (n,) index into `mskgrasp.core.grasp.FAILURES`.
+        settled: (n,) bool, the part was at rest before anything touched it; the rest of the others means
+            nothing.
         displacement: (n, 4) object displacement, NaN where not successful.
         tilt: (n,) rad.
         penetration: (n,) deepest overlap of finger and part, m.
@@ -43,10 +47,12 @@ class Outcomes:
         seconds: (n,) simulated time.
         cpu_seconds: (n,) processor time.
         part: (n,) name of the part.
+        index: (n,) number of the grasp among those of its part.
     """
 
     success: np.ndarray
     failure: np.ndarray
+    settled: np.ndarray
     displacement: np.ndarray
     tilt: np.ndarray
     penetration: np.ndarray
@@ -54,6 +60,15 @@ class Outcomes:
     seconds: np.ndarray
     cpu_seconds: np.ndarray
     part: np.ndarray
+    index: np.ndarray
+
+    def rows(self, which: np.ndarray) -> Outcomes:
+        """Some of the grasps: (n,) bool or indices."""
+        return Outcomes(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
+
+    def of(self, parts: Collection[str], n: int) -> Outcomes:
+        """The first n grasps of each of some parts."""
+        return self.rows(np.isin(self.part, list(parts)) & (self.index < n))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,6 +105,7 @@ def draw_grasps(
 def run_settings(
     settings: Sequence[Setting],
     drawn: Sequence[Drawn],
+    altered: Mapping[str, Mapping[str, Path]],
     out: Path,
     workers: int,
     report: Callable[[int], None],
@@ -99,6 +115,7 @@ def run_settings(
     Args:
         settings: Tried in parallel with the parts.
         drawn: The grasps.
+        altered: For settings with altered parts the folder of each by the part's name; others are left out.
         out: Where outcomes are kept.
         workers: Processes.
         report: Called with the number of grasps that were tried.
@@ -106,19 +123,40 @@ def run_settings(
     Raises:
         WorkerFailed: Processes died again and again.
     """
+    trials = {setting.name: _trials(setting, drawn, altered.get(setting.name), out) for setting in settings}
     jobs = []
-    for setting in settings:
-        for one in drawn:
-            file = _outcome_file(out, setting, one)
-            if file.exists():
-                with np.load(file) as stored:
-                    report(len(stored["success"]))
-            else:
-                jobs.append((setting, one, file))
+    for trial in (trial for own in trials.values() for trial in own):
+        if trial.file.exists():
+            with np.load(trial.file) as stored:
+                report(len(stored["success"]))
+        else:
+            jobs.append((trial, trial.file))
     # The finest first: the longest job must not be the last to start.
-    jobs.sort(key=lambda job: -job[0].physics.rate_hz * job[0].physics.position_iterations)
+    jobs.sort(key=lambda job: -job[0].setting.physics.rate_hz * job[0].setting.physics.position_iterations)
     _in_parallel(_try_grasps, jobs, workers, report)
-    return {setting.name: _read(out, setting, drawn) for setting in settings}
+    return {name: _read(own) for name, own in trials.items()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Trial:
+    """The grasps of one part under one setting; `folder` is that of the part as it is simulated."""
+
+    setting: Setting
+    drawn: Drawn
+    folder: Path
+    file: Path
+
+
+def _trials(
+    setting: Setting, drawn: Sequence[Drawn], altered: Mapping[str, Path] | None, out: Path
+) -> list[_Trial]:
+    found = []
+    for one in drawn:
+        folder = one.folder if altered is None else altered.get(one.folder.name)
+        if folder is not None:
+            file = _outcome_file(out, setting, one, folder)
+            found.append(_Trial(setting=setting, drawn=one, folder=folder, file=file))
+    return found
 
 
 def _in_parallel(
@@ -167,22 +205,33 @@ def _draw(folder: str, n: int, seed: int, file: str) -> int:
     return len(grasps)
 
 
-def _try_grasps(setting: Setting, drawn: Drawn, file: Path) -> int:
+def _try_grasps(trial: _Trial, file: Path) -> int:
     torch.set_num_threads(1)
-    with np.load(drawn.file) as stored:
+    setting = trial.setting
+    with np.load(trial.drawn.file) as stored:
         poses, grasps = stored["pose"].astype(np.float64), stored["grasp"]
     # The direction of the shift is the same under every setting: it is part of the start.
     angle = np.random.default_rng([len(grasps), 1]).uniform(0, 2 * np.pi, len(grasps))
     poses[:, 0] += setting.shift * np.cos(angle)
     poses[:, 1] += setting.shift * np.sin(angle)
+    poses, grasps = poses[: setting.n], grasps[: setting.n]
     if setting.engine == "mujoco":
         from mskgrasp.validate.mujoco_attempts import try_grasps
 
-        _write(file, **try_grasps(drawn.folder, poses, grasps, setting.physics))
+        _write(file, **try_grasps(trial.folder, poses, grasps, setting.physics))
         return len(grasps)
-    made, env = _make_env(str(drawn.folder), setting.physics, "none")
     rows: dict[str, list[np.ndarray]] = {name: [] for name in (*KEPT, "cpu_seconds")}
-    for pose, grasp in zip(poses, grasps, strict=True):
+    made, env = _make_env(str(trial.folder), setting.physics, "none")
+    for k, (pose, grasp) in enumerate(zip(poses, grasps, strict=True)):
+        if setting.ranges:
+            made.close()
+            rng = np.random.default_rng([zlib.crc32(trial.drawn.folder.name.encode()), k])
+            physics = drawn_physics(setting.physics, setting.ranges, rng)
+            made, env = _make_env(str(trial.folder), physics, "none")
+        if setting.hulls:
+            pose = resting_start(pose, env.standing[0].poses)
+        elif setting.rest == "mesh":
+            pose = resting_start(pose, mesh_rests(env.parts[0]))
         began = time.process_time()
         env.reset(seed=0, options=dict(pose_base_obj=pose[None]))
         outcome = env.attempt.run(torch.as_tensor(grasp[None]))
@@ -201,24 +250,27 @@ def _write(file: Path, **arrays: np.ndarray) -> None:
     temporary.rename(file)
 
 
-def _outcome_file(out: Path, setting: Setting, drawn: Drawn) -> Path:
+def _outcome_file(out: Path, setting: Setting, drawn: Drawn, folder: Path) -> Path:
     grasps = hashlib.sha256(drawn.file.read_bytes()).hexdigest()
-    part = read_part(drawn.folder)
-    # The versions, so that outcomes of another simulation are not read as this one's.
-    identity = [setting.physics.model_dump(), setting.shift, part.content_hash, grasps, versions()]
+    part = read_part(folder)
+    # The name is for people. The versions, so that outcomes of another simulation are not read as this one's.
+    what = {field.name: getattr(setting, field.name) for field in fields(setting) if field.name != "name"}
+    what["physics"] = setting.physics.model_dump()
     if setting.engine == "mujoco":
-        identity.append({"engine": setting.engine, "version": importlib.metadata.version("mujoco")})
-    text = json.dumps(identity)
+        what["version"] = importlib.metadata.version("mujoco")
+    text = json.dumps([what, part.content_hash, grasps, versions()])
     return out / "outcomes" / f"{part.name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
 
 
-def _read(out: Path, setting: Setting, drawn: Sequence[Drawn]) -> Outcomes:
-    pieces: dict[str, list[np.ndarray]] = {name: [] for name in (*KEPT, "cpu_seconds")}
-    parts: list[str] = []
-    for one in drawn:
-        with np.load(_outcome_file(out, setting, one)) as stored:
-            for name, values in pieces.items():
-                values.append(stored[name])
-            parts += [one.folder.name] * len(stored["success"])
-    joined = {name: np.concatenate(values) for name, values in pieces.items()}
-    return Outcomes(**joined, part=np.array(parts))
+def _read(trials: Sequence[_Trial]) -> Outcomes:
+    pieces: dict[str, list[np.ndarray]] = {field.name: [] for field in fields(Outcomes)}
+    for trial in trials:
+        with np.load(trial.file) as stored:
+            for name in (*KEPT, "cpu_seconds"):
+                pieces[name].append(stored[name])
+            n = len(stored["success"])
+        pieces["part"].append(np.repeat(trial.drawn.folder.name, n))
+        pieces["index"].append(np.arange(n))
+    if not trials:
+        return Outcomes(**{name: np.zeros((0, 4) if name == "displacement" else 0, bool) for name in pieces})
+    return Outcomes(**{name: np.concatenate(values) for name, values in pieces.items()})

@@ -1,0 +1,138 @@
+"""What is simulated follows from the configuration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mskgrasp.core.config import check_config, read_config
+from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.settings import Physics
+from mskgrasp.parts import find_part
+from mskgrasp.validate.config import (
+    MOVED,
+    NOMINAL,
+    Reference,
+    ValidateConfig,
+    drawn_physics,
+    floor_name,
+    rounding_name,
+)
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+def settings_of(config: ValidateConfig):
+    return {setting.name: setting for setting in config.settings()}
+
+
+def test_every_reference_is_finer_than_production_whole_and_has_floors_of_its_own():
+    config = ValidateConfig(grasps_per_part=10)
+    settings = settings_of(config)
+    for reference in config.references:
+        own, floor = settings[reference.name], settings[floor_name(reference.name)]
+        assert own.physics.rate_hz >= 2 * config.physics.rate_hz
+        assert own.physics.position_iterations >= 2 * config.physics.position_iterations
+        assert own.physics.coarse_rate_hz == own.physics.rate_hz and not own.physics.skip_air
+        assert (floor.physics, floor.shift) == (own.physics, 1e-5) and floor.n <= own.n
+    assert settings[rounding_name(config.references[0].name)].shift == 1e-7
+    assert settings[MOVED].physics == settings[NOMINAL].physics == config.physics
+    assert settings[config.references[1].name].n == 4 and settings[config.references[0].name].n == 10
+
+
+def test_a_reference_that_is_not_finer_is_refused():
+    for rate, iterations in ((1000, 100), (2000, 50)):
+        with pytest.raises(ValueError, match="references must be finer"):
+            ValidateConfig(
+                references=(
+                    Reference(
+                        rate_hz=rate,
+                        position_iterations=iterations,
+                        grasps_per_part=1,
+                        floor_grasps_per_part=1,
+                    ),
+                )
+            )
+
+
+def test_the_grid_holds_the_setting_under_test_once():
+    config = ValidateConfig(
+        rates_hz=(125, 250, 1000), iterations=(8, 50), physics=Physics(rate_hz=500, position_iterations=25)
+    )
+    candidates = config.candidates()
+    assert {"250 Hz, 8 it", "1000 Hz, 50 it", "500 Hz, 25 it"} < set(candidates)
+    assert not [name for name in candidates if name.startswith("125")]
+    names = [setting.name for setting in config.settings()]
+    assert len(names) == len(set(names)) and config.production not in names
+
+
+def test_a_coarser_grid_is_coarse_throughout():
+    assert ValidateConfig(physics=Physics()).at(125, 8).coarse_rate_hz == 125
+    assert Physics(rate_hz=200).coarse_rate_hz == 200
+    with pytest.raises(BadConfig, match="coarse_rate_hz is at most rate_hz, 200, got 250: lower it, too"):
+        check_config(Physics, dict(rate_hz=200, coarse_rate_hz=250), "physics")
+
+
+def test_the_default_validation_is_of_the_settings_that_are_the_default():
+    config = read_config(ValidateConfig, REPOSITORY / "configs" / "validate" / "default.yaml")
+    assert config.physics == Physics()
+    assert min(find_part(name).mass for name in config.parts if name != "starter") < 0.003
+    for name, (low, high) in config.ranges.items():
+        assert low <= getattr(config.physics, name) <= high
+
+
+def test_fingers_of_variants_are_critically_damped():
+    config = read_config(ValidateConfig, REPOSITORY / "configs" / "validate" / "default.yaml")
+    for setting in config.settings():
+        physics = setting.physics
+        critical = 2 * np.sqrt(physics.finger_stiffness * (physics.finger_armature + 0.015))
+        assert physics.finger_damping == pytest.approx(critical, rel=0.01), setting.name
+
+
+def test_variants_are_tried_beside_the_grid():
+    config = ValidateConfig(
+        variants={"pads": {"soft": {"pad_patch_radius": 0.008}}, "part": {"heavy": {"density": 2.0}}}
+    )
+    settings = settings_of(config)
+    soft, heavy = settings["pads: soft"], settings["part: heavy"]
+    assert soft.physics.pad_patch_radius == 0.008 and soft.physics.rate_hz == config.physics.rate_hz
+    assert heavy.density == 2.0 and heavy.physics == config.physics
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"pad_radius": 0.008}, "no setting of physics"),
+        ({"hulls": "coarse"}, "hulls must be one of exact"),
+        ({"rest": "drawing"}, "rest must be one of hulls, mesh"),
+    ],
+)
+def test_variants_that_name_nothing_are_refused(values, message):
+    with pytest.raises(ValueError, match=message):
+        ValidateConfig(variants={"group": {"typo": values}})
+
+
+def test_empty_lists_are_refused():
+    for name in ("rates_hz", "iterations", "references"):
+        with pytest.raises(ValueError, match="at least one value"):
+            ValidateConfig(**{name: ()})
+
+
+def test_drawn_settings_lie_within_their_ranges_and_can_be_simulated():
+    ranges = {
+        "friction_pad_part": (0.3, 0.8),
+        "friction_table_part": (0.3, 0.8),
+        "finger_stiffness": (2e3, 64e3),
+    }
+    rng = np.random.default_rng(0)
+    drawn = [drawn_physics(Physics(), ranges, rng) for _ in range(200)]
+    for name, (low, high) in ranges.items():
+        values = np.array([getattr(one, name) for one in drawn])
+        assert low <= values.min() < values.max() <= high
+        assert values.min() < low + 0.1 * (high - low) and values.max() > high - 0.1 * (high - low)
+    for one in drawn:
+        mass = one.finger_armature + 0.015
+        assert one.finger_damping**2 == pytest.approx(4 * one.finger_stiffness * mass)
+        assert one.friction_table >= 0

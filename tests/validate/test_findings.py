@@ -1,0 +1,134 @@
+"""Findings name what was put into made-up outcomes."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from mskgrasp.validate.compare import compare
+from mskgrasp.validate.config import MOVED, NOMINAL, Margins, ValidateConfig, floor_name
+from mskgrasp.validate.findings import choose, judge, label_error, sensitivity, size, summarise_discards
+from mskgrasp.validate.outcomes import Outcomes
+from tests.validate.made_up import PARTS, moved, outcomes
+
+REFERENCE = "2000 Hz, 100 it"
+
+
+def found(per_part: int = 40, **settings: Outcomes) -> dict[str, Outcomes]:
+    reference = outcomes(per_part)
+    noise = np.random.default_rng(1).normal(0, 5e-5, reference.displacement.shape)
+    return {REFERENCE: reference, floor_name(REFERENCE): moved(reference, noise), **settings}
+
+
+def judged(one: Outcomes, name: str = "coarse", cpu_ms: float = 100.0):
+    told = judge(found(**{name: one}), name, REFERENCE, 40, Margins())
+    return dataclasses.replace(told, found=dataclasses.replace(told.found, cpu_ms=cpu_ms))
+
+
+def test_differences_are_those_that_were_put_in():
+    before = outcomes()
+    one = before.success.copy()
+    one[:10] = ~one[:10]
+    after = moved(before, np.array([0.003, 0.0, 0.004, 0.02]))
+    told = compare(
+        dataclasses.replace(
+            after, displacement=np.where(one[:, None], after.displacement, np.nan), success=one
+        ),
+        before,
+    )
+    assert told.agreement == pytest.approx(0.95)
+    assert told.n_both == 95
+    assert told.shift_median == pytest.approx(0.005) and told.shift_p90 == pytest.approx(0.005)
+    assert told.turn_median == pytest.approx(0.02) and told.bias == pytest.approx(0.004)
+
+
+def test_a_turn_over_half_a_circle_is_measured_the_short_way():
+    before, after = outcomes(), outcomes()
+    before.displacement[:, 3], after.displacement[:, 3] = np.pi - 0.01, -np.pi + 0.01
+    assert compare(after, before).turn_median == pytest.approx(0.02)
+
+
+def test_grasps_whose_part_was_not_at_rest_are_left_out():
+    before = outcomes()
+    unsettled = np.arange(len(before.success)) < 50
+    after = moved(before, np.where(unsettled[:, None], 0.1, 0.0))
+    told = compare(dataclasses.replace(after, settled=~unsettled), before)
+    assert told.n == len(before.success) - 50 and told.shift_p90 == pytest.approx(0, abs=1e-12)
+
+
+def test_the_cheapest_equivalent_setting_is_chosen():
+    same = outcomes(40)
+    near, far = moved(same, [1e-4, 0, 0, 0]), moved(same, [1e-3, 0, 0, 0])
+    settings = [judged(near, "dear", 90), judged(near, "cheap", 40), judged(far, "wrong", 10)]
+    assert choose(settings) == ("cheap", True)
+    [said] = settings[2].complaints()
+    assert said.startswith("median displacement beyond the floor: +0.9") and "the margin of 0.25" in said
+    assert settings[2].displacement.estimate == pytest.approx(1e-3 - 8e-5, abs=3e-5)
+
+
+def test_where_nothing_passes_the_choice_is_by_cost_among_the_likely():
+    same = outcomes(40)
+    lost = same.success.copy()
+    lost[:: len(lost) // 12] = ~lost[:: len(lost) // 12]  # 1.5 % differ: likely the same, but not shown
+    likely = dataclasses.replace(
+        same, success=lost, displacement=np.where(lost[:, None], same.displacement, np.nan)
+    )
+    far = moved(same, [1e-3, 0, 0, 0])
+    one = judge(found(likely=likely), "likely", REFERENCE, 8, Margins())
+    assert not one.passed and "success rate" in one.complaints()[0]
+    assert choose([judged(far, "wrong", 10), one]) == ("likely", False)
+    assert choose([judged(far, "wrong", 10)]) == ("wrong", False)
+
+
+def test_a_constant_bias_cannot_hide_behind_the_floor():
+    """A shift of every grasp raises the median distance, however much the grasps scatter one by one."""
+    same = outcomes(40)
+    for axis in range(3):
+        shift = np.zeros(4)
+        shift[axis] = 4e-4
+        assert not judged(moved(same, shift)).passed
+
+
+def test_variants_are_compared_with_production_on_the_same_grasps():
+    config = ValidateConfig(
+        grasps_per_part=10, variant_grasps_per_part=4, variants={"hulls": {"exact": {"hulls": "exact"}}},
+        ranges={"finger_force": (20.0, 40.0)},
+    )  # fmt: skip
+    nominal = outcomes(10)
+    changed = moved(nominal.of(["part-03", "part-07"], 4), [2e-3, 0, 0, 0])
+    drawn = moved(nominal.of(sorted(set(nominal.part)), 4), [0, 1e-3, 0, 0.1])
+    settings = {NOMINAL: nominal, MOVED: nominal, "hulls: exact": changed, "all drawn together": drawn}
+    start, exact = sensitivity(config, settings)
+    assert (start.group, start.found.n, start.found.shift_p90) == ("start", 4 * PARTS, 0)
+    assert (exact.parts, exact.found.n) == (2, 8)
+    assert exact.found.shift_median == pytest.approx(2e-3)
+    told = label_error(config, settings)
+    assert told is not None and told["shift_median"] == pytest.approx(1e-3)
+    assert told["turn_p90"] == pytest.approx(0.1) and told["ranges"] == {"finger_force": [20.0, 40.0]}
+    own = np.linalg.norm(nominal.displacement[nominal.success, :3], axis=1)
+    assert size(nominal)["shift_median"] == pytest.approx(np.median(own))
+
+
+def test_what_cannot_be_is_counted_by_reason():
+    sick = outcomes()
+    sick.penetration[3], sick.fastest[5], sick.displacement[8, 0] = 0.002, 4.0, 0.06
+    sick.settled[11] = False
+    told = summarise_discards(sick)
+    assert told.dropped == {
+        "unsettled": 1,
+        "penetrated": 1,
+        "too_fast": 1,
+        "moved_too_far": 1,
+        "not_finite": 0,
+    }
+    assert told.penetration == 0 and told.fastest == pytest.approx(0.3) and told.displaced < 0.05
+
+
+def test_without_successes_in_common_nothing_can_be_said():
+    n = len(outcomes(40).success)
+    nothing = outcomes(40, success=np.zeros(n, bool), displacement=np.full((n, 4), np.nan))
+    told = judged(nothing)
+    assert any("no grasps to compare" in said or "parts were compared" in said for said in told.complaints())
+    assert told.as_dict()["shift_median"] is None and not told.passed
