@@ -40,8 +40,8 @@ def try_grasp(part: Part, pose: np.ndarray, grasp: np.ndarray, physics: Physics)
         physics: Speeds, times and forces; both engines share them.
 
     Returns:
-        success, failure, settled, displacement (4,) and tilt (NaN where not successful), penetration, fastest (NaN: it
-        is not watched), seconds of simulated time.
+        success, failure, settled, displacement (4,) and tilt (NaN where not successful), penetration, fastest
+        (NaN: it is not watched), seconds of simulated time.
     """
     start = Pose.from_vector(pose)
     top = float(start.apply(np.concatenate(hull_corners(part)))[:, 2].max())
