@@ -40,8 +40,8 @@ class Physics(Config):
     friction_table_part: float = Field(default=0.4, ge=0, le=2)
     """Effective Coulomb coefficient between table and part."""
     pad_patch_radius: float = Field(default=0.005, ge=0)
-    """Lever with which friction at a single contact point of a pad resists turning, m: mu F r, as a disc of 1.5
-    times this radius under uniform pressure. Contacts of more points do not depend on it."""
+    """Lever with which friction at a single contact point of a pad resists turning, m: mu F r, as a disc of
+    1.5 times this radius under uniform pressure. Contacts of more points do not depend on it."""
     finger_speed: float = Field(default=0.05, gt=0)
     """Closing speed of each finger, m/s (Franka Hand, product data sheet: at most 50 mm/s a finger; the speed
     that libfranka takes is that of the width, twice as much)."""
