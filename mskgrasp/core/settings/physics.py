@@ -19,8 +19,8 @@ class Physics(Config):
     """Settings of the simulated cell; SI units."""
 
     rate_hz: int = Field(default=1000, ge=100)
-    """Simulation steps a second. At 500 Hz displacements differ twice as much from those of finer
-    simulation; below 250 Hz light parts creep out of the fingers, and no data is collected."""
+    """Simulation steps a second; `validate` compares rates. Below 250 Hz light parts creep out of the
+    fingers, and no data is collected."""
     coarse_rate_hz: int = Field(default=250, ge=100)
     """Steps a second, at most ``rate_hz``, for parts of ``coarse_mass`` and more during lift and hold, and
     while a part that is not held comes to rest. The first 12 mm of the lift, in which the part leaves the
@@ -29,7 +29,7 @@ class Physics(Config):
     coarse_mass: float = Field(default=0.04, gt=0)
     """Lighter parts are simulated at ``rate_hz`` throughout, kg: longer steps shake them in the grip."""
     position_iterations: int = Field(default=50, ge=4)
-    """Solver iterations a step. With 25 displacements differ twice as much from those of finer steps."""
+    """Solver iterations a step; `validate` compares them."""
     contact_offset: float = Field(default=0.003, gt=0, le=0.02)
     """Distance at which contacts are generated, m; ManiSkill's 20 mm costs two to four times the time."""
     persistent_manifold: bool = False
@@ -40,7 +40,8 @@ class Physics(Config):
     friction_table_part: float = Field(default=0.4, ge=0, le=2)
     """Effective Coulomb coefficient between table and part."""
     pad_patch_radius: float = Field(default=0.005, ge=0)
-    """Radius of the pad's contact patch, m, which resists turning about a single contact point."""
+    """Lever with which friction at a single contact point of a pad resists turning, m: mu F r, as a disc of
+    1.5 times this radius under uniform pressure. Contacts of more points do not depend on it."""
     finger_speed: float = Field(default=0.05, gt=0)
     """Closing speed of each finger, m/s (Franka Hand, product data sheet: at most 50 mm/s a finger; the speed
     that libfranka takes is that of the width, twice as much)."""
