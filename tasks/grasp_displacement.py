@@ -61,8 +61,8 @@ class GraspDisplacementEnv(BaseEnv):
     **Fail Conditions:**
     In mode ``grasp``: every attempt that is no success, with its reason (``missed``, ``slipped``,
     ``ejected``, ``collided``) in ``info["failure"]``. An attempt whose part was not at rest before anything
-    touched it (``unsettled``) says nothing about the grasp; nor does one whose grasp the arm cannot execute
-    (``unreachable``, ``info["executable"]``): it is not tried, in one sub-scene or in many, and raises nothing.
+    touched it (``unsettled``) says nothing about the grasp. A grasp that the arm cannot execute is not tried,
+    in one sub-scene or in many, and raises nothing (``unreachable``; ``info["executable"]`` is false).
 
     **Goal Specification:**
     None. ``info["displacement"]`` holds dx, dy, dz, dtheta of the part in the hand.

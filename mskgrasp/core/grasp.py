@@ -62,8 +62,8 @@ EJECTED_DISTANCE = 0.05
 """A part that ends this far from its initial position, and not in the hand, was ejected, metres."""
 FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled", "unreachable")
 """Why an attempt failed, by code: a shard stores the index into this tuple. The last two are no failures of a
-grasp. ``unsettled``: the part was not at rest before; only datasets of simulation version 1 hold such attempts.
-``unreachable``: the grasp was not tried, since the arm cannot execute it; no dataset holds such attempts."""
+grasp: ``unsettled``, the part was not at rest before (only datasets of simulation version 1 hold such), and
+``unreachable``, the arm cannot execute the grasp, so that it was not tried (no dataset holds any)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,9 +43,9 @@ REST_WINDOW_S = 0.06
 AHEAD = 0.001
 """Least distance from the part, m, at which fingers in free air begin to close: more than a settling part
 may move and still count as at rest."""
-TAKE_OFF = 0.012
+TAKE_OFF = 0.006
 """First part of the lift, m, simulated as finely as the closing: a part turns in the hand while it leaves the
-table, within the first centimetre."""
+table."""
 LOOK_S = 0.05
 """Time between two checks of a rising part: is it still in the hand, how deep do the pads overlap it, s."""
 ARRIVAL_S = 0.024

@@ -11,9 +11,9 @@ from tasks.robot.motion import PandaMotion
 WINDOW_S = 0.024
 """Time over which the force is averaged, s. A robot's estimate of the external force is filtered, too; and
 the force of an impact within one step would depend on the length of the step."""
-NEAR_S = 0.008
-"""Time between two checks of what is near the hand, s: it moves 3 mm, pairs are listed within 6 mm (twice the
-contact offset)."""
+NEAR_S = 0.004
+"""Time between two checks of what is near the hand, s: it moves at most 1.6 mm, pairs are listed within 2 mm
+(twice the contact offset)."""
 
 
 class Reflex:
