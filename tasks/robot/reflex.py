@@ -39,6 +39,11 @@ class Reflex:
         self._near = False
 
     @property
+    def near(self) -> bool:
+        """Whether anything was near the hand when `force` looked last; without, the force is zero."""
+        return self._near
+
+    @property
     def full(self) -> bool:
         """Whether the window holds as many samples as it is long; the mean takes the others as zero."""
         return len(self._loads) == self._n or not self._near
