@@ -62,7 +62,8 @@ class GraspDisplacementEnv(BaseEnv):
     **Fail Conditions:**
     In mode ``grasp``: every attempt that is no success, with its reason (``missed``, ``slipped``,
     ``ejected``, ``collided``) in ``info["failure"]``. An attempt whose part was not at rest before anything
-    touched it (``unsettled``) says nothing about the grasp.
+    touched it (``unsettled``) says nothing about the grasp. A grasp that the arm cannot execute is not tried,
+    in one sub-scene or in many, and raises nothing (``unreachable``; ``info["executable"]`` is false).
 
     **Goal Specification:**
     None. ``info["displacement"]`` holds dx, dy, dz, dtheta of the part in the hand.
@@ -156,6 +157,15 @@ class GraspDisplacementEnv(BaseEnv):
         return CameraConfig("render_camera", pose, 512, 512, 0.9, 0.01, 100)
 
     @property
+    def fidelity(self) -> str:
+        """Class of the labels made here, "cpu" or "gpu", which must not be mixed in a dataset.
+
+        On a GPU PhysX caches contact points whatever `Physics.persistent_manifold` says and reports no
+        separations, so that overlaps of hand and part are not seen; see docs/task.md.
+        """
+        return "gpu" if self.gpu_sim_enabled else "cpu"
+
+    @property
     def region_centre(self) -> tuple[float, float]:
         """Middle of the region, base frame, metres."""
         x_min, x_max, y_min, y_max = self.region
@@ -203,7 +213,9 @@ class GraspDisplacementEnv(BaseEnv):
             if part.content_hash not in self._standing:
                 self._standing[part.content_hash] = standing_poses(part, self.physics)
         self.standing = [self._standing[part.content_hash] for part in self.parts]
-        coarse_hz = self.physics.coarse_hz(min(part.mass for part in self.parts))
+        # The rate of a part must not depend on what lies in the other sub-scenes.
+        one = self.num_envs == 1
+        coarse_hz = self.physics.coarse_hz(self.parts[0].mass) if one else self.physics.rate_hz
         self.motion = PandaMotion(self.scene, self.agent, self.physics, coarse_hz)
         self.contacts = HandContacts(self.scene, self.agent, self.part)
         self.attempt = Attempt(self.agent, self.part, self._hulls, self.motion, self.contacts, self.physics)

@@ -224,6 +224,11 @@ def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
         raise BadDataset(
             f"{path}: part '{task.part}' has changed since; delete its shards or choose another --out"
         )
+    if info.fidelity != "cpu":
+        raise BadDataset(
+            f"{path} holds labels of fidelity '{info.fidelity}', the collector makes those of 'cpu'; choose "
+            "another --out"
+        )
     other = other_versions(info.versions)
     if other:
         raise BadDataset(f"{path} was made by other software: {other}; choose another --out")

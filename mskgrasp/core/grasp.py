@@ -60,9 +60,10 @@ MAX_DISPLACEMENT = 0.05
 """Largest displacement of a held part in the hand, metres; a row with a larger one is not used as a label."""
 EJECTED_DISTANCE = 0.05
 """A part that ends this far from its initial position, and not in the hand, was ejected, metres."""
-FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled")
-"""Why an attempt failed, by code: a shard stores the index into this tuple. ``unsettled`` is no failure of a
-grasp: the part was not at rest before. Only datasets of simulation version 1 hold such attempts."""
+FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled", "unreachable")
+"""Why an attempt failed, by code: a shard stores the index into this tuple. The last two are no failures of a
+grasp: ``unsettled``, the part was not at rest before (only datasets of simulation version 1 hold such), and
+``unreachable``, the arm cannot execute the grasp, so that it was not tried (no dataset holds any)."""
 
 
 @dataclass(frozen=True, kw_only=True)

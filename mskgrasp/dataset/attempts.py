@@ -114,6 +114,8 @@ class ShardInfo:
         discarded: Number of discarded attempts by reason.
         redrawn: Number of scenes drawn again because the part was not at rest.
         toppled: Probability of the resting poses that the engine does not hold, which are left out.
+        fidelity: Class of the labels, which must not be mixed: "cpu", or "gpu" for PhysX on a GPU, where
+            contact points are cached and overlaps of hand and part are not seen.
         hand: Measures of the hand, metres; empty: not recorded.
         noise: Simulated errors of the cell; empty: none.
     """
@@ -132,6 +134,7 @@ class ShardInfo:
     discarded: dict[str, int]
     redrawn: int = 0
     toppled: float = 0.0
+    fidelity: str = "cpu"
     hand: dict[str, float] = field(default_factory=dict)
     noise: dict[str, Any] = field(default_factory=dict)
 

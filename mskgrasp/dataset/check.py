@@ -19,7 +19,7 @@ from mskgrasp.dataset.ranges import range_problems
 from mskgrasp.dataset.shards import read_unchecked, shard_path
 from mskgrasp.parts import store
 
-SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise")
+SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise", "fidelity")
 """Properties that all shards of a dataset share."""
 
 

@@ -88,7 +88,9 @@ def _file_image(attempts: Attempts, info: ShardInfo) -> bytes:
         file["failure"].attrs["failure_names"] = list(FAILURES)
         file.attrs["format"] = _FORMAT
         file.attrs["schema_version"] = SCHEMA_VERSION
-        for name in ("part", "part_hash", "family", "index", "seed", "table_z", "redrawn", "toppled"):
+        for name in (
+            "part", "part_hash", "family", "index", "seed", "table_z", "redrawn", "toppled", "fidelity",
+        ):  # fmt: skip
             file.attrs[name] = getattr(info, name)
         file.attrs["intrinsics"] = np.asarray(info.intrinsics, dtype=np.float64)
         pose = np.asarray(info.T_base_camera.as_vector(), dtype=np.float64)
@@ -200,7 +202,7 @@ def _check_header(file: h5py.File, path: Path) -> None:
     if missing:
         raise BadDataset(f"{path} lacks the array {', '.join(missing)}; delete it and collect again")
     names = tuple(np.asarray(file["failure"].attrs["failure_names"]).tolist())
-    if names != FAILURES:
+    if names != FAILURES[: len(names)]:  # names were added at the end
         raise BadDataset(f"{path} names failures {names}, legal: {FAILURES}; collect it again")
 
 
@@ -226,6 +228,7 @@ def _read_info(file: h5py.File) -> ShardInfo:
         discarded=_mapping(attrs, "discarded"),
         redrawn=int(attrs.get("redrawn", 0)),
         toppled=float(attrs.get("toppled", 0.0)),
+        fidelity=str(attrs.get("fidelity", "cpu")),
         hand=_mapping(attrs, "hand") if "hand" in attrs else {},
         noise=_mapping(attrs, "noise") if "noise" in attrs else {},
     )

@@ -52,6 +52,7 @@ class Simulator:
                 camera=self._camera.model_dump(),
                 noise=self._noise.model_dump(),
                 render_backend=render_backend(),
+                sim_backend="physx_cpu",
             )
             # ManiSkill collects garbage at every new scene; the modules loaded by now need no scan.
             gc.collect()
@@ -108,6 +109,7 @@ class Simulator:
             discarded=dict(discarded),
             redrawn=redrawn,
             toppled=env.standing[0].toppled,
+            fidelity=env.fidelity,
             hand=HAND_GEOMETRY,
         )
         return attempts, info
@@ -164,11 +166,16 @@ def draw_attempt(
 
 def discard_reason(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> str:
     """Why an attempt is no label; empty where it is one."""
+    if not bool(outcome["executable"][0]):
+        return "unreachable"
     if not bool(outcome["settled"][0]):
         return "unsettled"
     if not all(np.isfinite(row[name]).all() for name in FIELDS if name.startswith("pose")):
         return "not_finite"
-    if float(outcome["penetration"][0]) > MAX_PENETRATION:
+    penetration = float(outcome["penetration"][0])
+    if np.isnan(penetration):
+        return "overlap_unknown"
+    if penetration > MAX_PENETRATION:
         return "penetrated"
     if float(outcome["fastest"][0]) > MAX_SPEED:
         return "too_fast"

@@ -23,8 +23,6 @@ from tasks.scene.arrays import arrays_for
 STILL_FINGER = 2e-3
 """A finger slower than this, m/s, has stopped. Speeds are differences of positions: PhysX's
 TGS solver reports the velocity of a pressed joint with the drive's impulse still in it."""
-STILL_S = 0.03
-"""Fingers that did not move for this long have closed, s."""
 PEAK_ACCELERATION = 1.5
 """Of the hand on straight lines, m/s^2: the drives then overshoot by less than 0.4 mm."""
 FINGER_TIMEOUT_S = 0.5
@@ -32,7 +30,8 @@ FINGER_TIMEOUT_S = 0.5
 FINGER_MASS = 0.015
 """Of a finger of the Panda without its motor, kg."""
 CHECK_S = 0.02
-"""Time between two checks of closing fingers, and of the part's speed, s."""
+"""Time between two checks of closing fingers, and of the part's speed, s. Fingers that press and did not move
+for this long have closed."""
 
 
 def run_up(physics: Physics) -> float:
@@ -318,11 +317,10 @@ class PandaMotion:
         steps = np.arange(1, n_ramp + 1, dtype=np.float32) - self._within
         done = arrays.of(steps)[:, None] * speed / self.rate_hz
         ramp = start + xp.sign(way) * xp.minimum(done, abs(way))
-        quiet = xp.zeros_like(way)
         # A held part stops the fingers before their targets; wait until the drives press in full.
         lag = (force or self._physics.finger_force) / self._physics.finger_stiffness
         last = self.fingers()
-        every, enough = self.n_steps(CHECK_S), self.n_steps(STILL_S)
+        every = self.n_steps(CHECK_S)
         far = STILL_FINGER * every / self.rate_hz
         targets = None if self.gpu else ramp[:, 0].tolist()
         for i in range(n_ramp + self.n_steps(FINGER_TIMEOUT_S)):
@@ -344,8 +342,7 @@ class PandaMotion:
             # Fingers that open press the other way until the target has passed them: they are not done.
             pressing = xp.where(way == 0, abs(ahead), ahead * xp.sign(way)) > lag
             arrived = abs(middle - goal) < 1e-3
-            quiet = xp.where(still & (pressing | arrived), quiet + every, xp.zeros_like(quiet))
-            if bool((quiet >= enough).all()):
+            if bool((still & (pressing | arrived)).all()):
                 break
         self.set_fingers(goal)
         return True

@@ -11,9 +11,9 @@ from tasks.robot.motion import PandaMotion
 WINDOW_S = 0.024
 """Time over which the force is averaged, s. A robot's estimate of the external force is filtered, too; and
 the force of an impact within one step would depend on the length of the step."""
-NEAR_S = 0.008
-"""Time between two checks of what is near the hand, s: it moves 3 mm, pairs are listed within 6 mm (twice the
-contact offset)."""
+NEAR_S = 0.004
+"""Time between two checks of what is near the hand, s: it moves at most 1.6 mm, pairs are listed within 2 mm
+(twice the contact offset)."""
 
 
 class Reflex:
@@ -37,6 +37,11 @@ class Reflex:
         self._loads: deque[Array] = deque(maxlen=self._n)
         self._steps = 0
         self._near = False
+
+    @property
+    def near(self) -> bool:
+        """Whether anything was near the hand when `force` looked last; without, the force is zero."""
+        return self._near
 
     @property
     def full(self) -> bool:

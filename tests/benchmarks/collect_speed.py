@@ -1,10 +1,10 @@
 """How fast grasps are simulated. Run: python -m tests.benchmarks.collect_speed --help.
 
-In one run, on one core, with the same parts, physics, starts and grasps, part by part in turn:
-(a) a plain ManiSkill loop, ``pd_ee_pose`` at 20 Hz and ``obs_mode="depth"``; (b) a raw SAPIEN script
-that runs every attempt to its end, at the fine rate throughout; (c) the collector, shards written to
-disk. Processor time of all of it, the loading of the part's scene included. Then the collector as users
-start it, with one worker and with two.
+In one run, on one core, with the same parts, starts and grasps, part by part in turn: (a) a ManiSkill loop,
+``pd_ee_pose`` at 20 Hz with one depth image an attempt, at ManiSkill's default physics and at ours; (b) a raw
+SAPIEN script with the collector's physics and shortcuts; (c) the collector, shards written to disk. Processor
+time of all of it, the loading of the part's scene included. Then the collector as users start it, with one
+worker and with two.
 """
 
 from __future__ import annotations
@@ -13,10 +13,13 @@ import argparse
 import json
 import logging
 import os
+import shlex
+import sys
 import tempfile
 import time
-from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,24 +28,26 @@ os.environ.setdefault("LP_NUM_THREADS", "0")  # the software renderer stays in t
 
 import gymnasium
 import numpy as np
+import sapien
 import torch
 import trimesh
-from mani_skill.envs.scene import ManiSkillScene
-from mani_skill.utils.structs.render_camera import RenderCamera
-from rich.console import Console
-from rich.table import Table
+from sapien.physx import PhysxCpuSystem
 
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.run import plan_shards
 from mskgrasp.collect.workers import make_shards
+from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import PAD_REACH
 from mskgrasp.core.settings import REGION, ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import Part, find_part, starter_names
+from mskgrasp.runtime.console_table import Table, print_table
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.worker_pool import JobResult
 from mskgrasp.simulation.shard import Simulator, draw_attempt
 from mskgrasp.simulation.shard_task import ShardTask
+from mskgrasp.simulation.versions import versions
+from tasks import GraspDisplacementEnv
 from tasks.scene.renderer import render_backend
 from tests.benchmarks.raw_sapien import RawSapien
 
@@ -50,14 +55,34 @@ Draw = tuple[np.ndarray, np.ndarray, np.ndarray]
 """The part's pose (7,), the grasp (4,), and where the hand comes from (4,)."""
 
 
+SEED = 0
+MANISKILL = dict(
+    rate_hz=100, coarse_rate_hz=100, position_iterations=15, contact_offset=0.02, persistent_manifold=True
+)
+"""What ManiSkill takes where a task says nothing."""
+
+
+@dataclass
+class Row:
+    """One program: its processor time, the share of it inside PhysX' steps and the renderer."""
+
+    program: str
+    grasps: int = 0
+    lifted: int = 0
+    seconds: float = 0.0
+    inside: float = 0.0
+
+
 def main() -> None:
-    """Prints a table and, last, one JSON object."""
+    """Prints tables and, last, one JSON object."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--parts", type=int, default=6, help="parts of the starter set (default 6)")
     parser.add_argument("--attempts", type=int, default=25, help="attempts a part (default 25)")
     parser.add_argument(
-        "--shards", type=int, default=2, help="shards of 25 attempts a part for the scaling (default 2)"
-    )
+        "--shards", type=int, default=2,
+        help="shards of 25 attempts a part for the scaling (default 2); 0: it is not measured",
+    )  # fmt: skip
+    parser.add_argument("--out", type=Path, help="folder for report.json")
     parser.add_argument(
         "--endurance", type=int, default=0,
         help="only let one worker make so many attempts, 10000 say, and compare each tenth of them",
@@ -71,46 +96,40 @@ def main() -> None:
     if options.endurance:
         endure(parts, options.endurance)
         return
-    found = side_by_side(parts, options.attempts)
-    rates = {workers: throughput(parts, options.shards, workers) for workers in (1, 2)}
-    report(found, rates)
+    rows = side_by_side(parts, options.attempts)
+    rates = [throughput(parts, options.shards, workers) for workers in (1, 2)] if options.shards else []
+    report(rows, rates, chosen, options)
 
 
-def side_by_side(parts: list[Part], n: int) -> dict[str, dict[str, float]]:
-    """Processor time of n attempts a part in the three programs, and their success."""
+def side_by_side(parts: list[Part], n: int) -> list[Row]:
+    """The programs, with n attempts a part."""
     ours = Ours()
-    programs = {"maniskill": PlainManiSkill(parts[0]), "raw": Raw()}
-    seconds: dict[str, float] = defaultdict(float)
-    lifted: dict[str, int] = defaultdict(int)
-    with progress(total=len(parts) * n * 3, unit="grasp") as bar:
+    programs = {
+        "(a) ManiSkill loop, its default physics": PlainManiSkill(parts[0], MANISKILL),
+        "(a) ManiSkill loop, our physics": PlainManiSkill(parts[0], {}),
+        "(b) raw SAPIEN script, same shortcuts": Raw(),
+    }
+    collector = "(c) the collector"
+    rows = {name: Row(program=name) for name in (*programs, collector)}
+    with progress(total=len(parts) * n * len(rows), unit="grasp") as bar:
         ours.shard(parts[0], 1)  # shaders are compiled, caches filled
-        inside = 0.0
         for number, part in enumerate(parts):
             drawn = ours.draw(part, n)
             for name, program in programs.items():
                 if number == 0:
                     program.load(part)
                     program.attempt(*drawn[0])
-                ours.clock.reset()  # it measures the steps of (a), too
-                began = time.process_time()
-                program.load(part)
-                for draw in drawn:
-                    lifted[name] += program.attempt(*draw)
-                    bar.update()
-                seconds[name] += time.process_time() - began - ours.clock.cost
-            ours.clock.reset()
-            began = time.process_time()
-            lifted["ours"] += ours.shard(part, n)
-            seconds["ours"] += time.process_time() - began - ours.clock.cost
-            inside += ours.clock.inside
+                with ours.measured(rows[name]):
+                    program.load(part)
+                    for draw in drawn:
+                        rows[name].lifted += program.attempt(*draw)
+                        bar.update()
+            with ours.measured(rows[collector]):
+                rows[collector].lifted += ours.shard(part, n)
             bar.update(n)
-    total = len(parts) * n
-    found = {
-        name: {"grasps_per_s": total / spent, "success": lifted[name] / total}
-        for name, spent in seconds.items()
-    }
-    found["ours"]["engine_share"] = inside / seconds["ours"]
-    return found
+    for row in rows.values():
+        row.grasps = len(parts) * n
+    return list(rows.values())
 
 
 def over_the_part(part: Part, pose: np.ndarray, grasp: np.ndarray) -> np.ndarray:
@@ -124,10 +143,10 @@ def over_the_part(part: Part, pose: np.ndarray, grasp: np.ndarray) -> np.ndarray
 class PlainManiSkill:
     """What a user of ManiSkill writes first."""
 
-    def __init__(self, part: Part):
+    def __init__(self, part: Part, physics: dict):
         self.env = gymnasium.make(
-            "GraspDisplacement-v1", parts=[str(part.folder)], control_mode="pd_ee_pose", obs_mode="depth",
-            render_backend=render_backend(),
+            "GraspDisplacement-v1", parts=[str(part.folder)], control_mode="pd_ee_pose", obs_mode="none",
+            physics=physics, render_backend=render_backend(),
         )  # fmt: skip
 
     def load(self, part: Part) -> None:
@@ -137,6 +156,9 @@ class PlainManiSkill:
     def attempt(self, pose: np.ndarray, grasp: np.ndarray, above: np.ndarray) -> bool:
         """Approach, descend, close, lift, hold: 2.45 s at 20 Hz."""
         self.env.reset(seed=0, options=dict(pose_base_obj=pose[None]))
+        env = self.env.unwrapped
+        assert isinstance(env, GraspDisplacementEnv)
+        env.capture_depth()
         top = grasp.copy()
         top[2] += 0.1
         waypoints = [
@@ -167,7 +189,7 @@ class Raw:
 
     def attempt(self, pose: np.ndarray, grasp: np.ndarray, above: np.ndarray) -> bool:
         """One attempt."""
-        return self.sim.attempt(pose, grasp, above)
+        return self.sim.attempt(pose, grasp)
 
 
 class Clock:
@@ -215,18 +237,27 @@ class Clock:
 
 
 class Ours:
-    """The collector's own loop, with a clock around PhysX and the renderer."""
+    """The collector's own loop, and a clock around PhysX and the renderer that measures the others, too."""
 
     def __init__(self) -> None:
         self.simulator = Simulator(Physics(), Overhead(), ExecutionNoise())
         self.clock = Clock()
         for owner, name in (
-            (ManiSkillScene, "step"),
-            (ManiSkillScene, "update_render"),
-            (RenderCamera, "take_picture"),
-            (RenderCamera, "get_picture"),
+            (PhysxCpuSystem, "step"),
+            (sapien.Scene, "update_render"),
+            (sapien.render.RenderCameraComponent, "take_picture"),
+            (sapien.render.RenderCameraComponent, "get_picture"),
         ):
             setattr(owner, name, self.clock.around(getattr(owner, name)))
+
+    @contextmanager
+    def measured(self, row: Row) -> Iterator[None]:
+        """Adds the processor time of the context to a row."""
+        self.clock.reset()
+        began = time.process_time()
+        yield
+        row.seconds += time.process_time() - began - self.clock.cost
+        row.inside += self.clock.inside
 
     def draw(self, part: Part, n: int) -> list[Draw]:
         """The first attempts at a part, as the collector draws them."""
@@ -234,7 +265,7 @@ class Ours:
         drawn: list[Draw] = []
         attempt = 0
         while len(drawn) < n:
-            _, grasp = draw_attempt(env, part.name, 0, attempt)
+            _, grasp = draw_attempt(env, part.name, SEED, attempt)
             attempt += 1
             if grasp is not None:
                 pose, grasp = env.part_pose().as_vector()[0].double().numpy(), grasp[0].astype(float)
@@ -243,7 +274,7 @@ class Ours:
 
     def shard(self, part: Part, n: int) -> int:
         """A shard of n attempts, written; how many of them lifted the part."""
-        task = ShardTask(part=part.name, folder=str(part.folder), index=0, first=0, n=n, seed=0)
+        task = ShardTask(part=part.name, folder=str(part.folder), index=0, first=0, n=n, seed=SEED)
         with tempfile.TemporaryDirectory() as folder:
             return sum(outcome == 1 for outcome in self.simulator.write(task, Path(folder)))
 
@@ -323,36 +354,46 @@ def largest_child(field: str = "VmHWM") -> float:
     return most
 
 
-def report(found: dict[str, dict[str, float]], rates: dict[int, dict[str, float]]) -> None:
-    """A table, and the numbers for programs."""
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for header in ("one core", "grasps/s", "against ours", "lifted"):
-        table.add_column(header, justify="left" if header == "one core" else "right")
-    labels = {
-        "maniskill": "(a) plain ManiSkill loop",
-        "raw": "(b) raw SAPIEN script",
-        "ours": "(c) the collector",
-    }
-    ours = found["ours"]["grasps_per_s"]
-    for name, label in labels.items():
-        rate = found[name]["grasps_per_s"]
-        table.add_row(label, f"{rate:.2f}", f"{ours / rate:.2f}", f"{found[name]['success']:.0%}")
-    Console(width=100).print(table)
-    share = found["ours"]["engine_share"]
-    print(f"share of (c) inside PhysX and the renderer: {share:.0%}")
-    one, two = rates[1], rates[2]
-    print(
-        f"collector, steady state: {one['grasps_per_s']:.2f} grasps/s with 1 worker, "
-        f"{two['grasps_per_s']:.2f} with 2; largest worker {max(one['gib'], two['gib']):.2f} GiB"
-    )
+def report(
+    rows: list[Row], rates: list[dict[str, float]], parts: list[str], options: argparse.Namespace
+) -> None:
+    """Prints tables and the numbers for programs, and writes ``report.json`` where a folder is given."""
+    ours = rows[-1]
+    rate = {row.program: row.grasps / row.seconds for row in rows}
+    table = Table(
+        header=("one core", "grasps/s", "ours by it", "lifted", "in PhysX and renderer"),
+        rows=[
+            (
+                row.program, f"{rate[row.program]:.2f}", f"{rate[ours.program] / rate[row.program]:.2f}",
+                f"{row.lifted / row.grasps:.1%}", f"{row.inside / row.seconds:.1%}",
+            )
+            for row in rows
+        ],
+    )  # fmt: skip
+    print_table(table)
+    default, same, raw = (round(rate[ours.program] / rate[row.program], 2) for row in rows[:-1])
     result = {
-        "ours_over_maniskill": round(ours / found["maniskill"]["grasps_per_s"], 2),
-        "ours_over_raw": round(ours / found["raw"]["grasps_per_s"], 2),
-        "engine_share": round(share, 3),
-        "scaling_2": round(two["grasps_per_s"] / one["grasps_per_s"], 2),
-        "worker_gib": round(max(one["gib"], two["gib"]), 2),
-        "grasps_per_s_core": round(ours, 2),
+        "ours_over_maniskill_default": default,
+        "ours_over_maniskill_same_physics": same,
+        "ours_over_raw": raw,
+        "engine_share": round(ours.inside / ours.seconds, 3),
+        "grasps_per_s_core": round(rate[ours.program], 2),
     }
+    if rates:
+        one, two = rates
+        steady = [(n + 1, f"{one['grasps_per_s']:.2f}", f"{one['gib']:.2f}") for n, one in enumerate(rates)]
+        print_table(Table(header=("workers", "grasps/s, wall time", "largest worker, GiB"), rows=steady))
+        result["scaling_2"] = round(two["grasps_per_s"] / one["grasps_per_s"], 2)
+        result["worker_gib"] = round(max(one["gib"], two["gib"]), 2)
+    if options.out is not None:
+        options.out.mkdir(parents=True, exist_ok=True)
+        stored = dict(
+            command="python -m tests.benchmarks.collect_speed " + shlex.join(sys.argv[1:]),
+            parts=parts, n=ours.grasps, seeds=[SEED], versions=versions(), physics=Physics().model_dump(),
+            maniskill_physics=MANISKILL, rows=[asdict(row) for row in rows], workers=rates, result=result,
+        )  # fmt: skip
+        write_whole(options.out / "report.json", (json.dumps(stored, indent=1) + "\n").encode())
+        print(f"wrote {options.out / 'report.json'}")
     print(json.dumps(result))
 
 

@@ -163,6 +163,10 @@ def test_shards_of_other_software_are_not_added_to(collected, tmp_path):
         file.attrs["versions"] = json.dumps(info.versions | {"simulation": "0123456789abcdef"})
     with pytest.raises(BadDataset, match="other software: simulation 0123456789abcdef"):
         is_done(out, task, info.part_hash)
+    with h5py.File(out / "shards" / path.name, "r+") as file:
+        file.attrs["fidelity"] = "gpu"
+    with pytest.raises(BadDataset, match="labels of fidelity 'gpu'"):
+        is_done(out, task, info.part_hash)
 
 
 def test_two_collections_do_not_write_into_one_folder(collected, tmp_path):

@@ -263,6 +263,7 @@ def test_a_shard_with_too_few_attempts_is_named(data):
         ("region", [0.38, 0.62, -0.12, 0.121]),
         ("intrinsics", [[366.0, 0, 79.5], [0, 366.0, 79.5], [0, 0, 1]]),
         ("physics", '{"rate_hz": 250}'),
+        ("fidelity", "gpu"),
         ("noise", '{"finger_force": [5.0, 70.0]}'),
         ("family", "spoon"),
     ],

@@ -5,6 +5,8 @@ import torch
 
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.settings import Physics
+from mskgrasp.simulation.shard import FIELDS, discard_reason
+from tasks.scene.frames import BASE_IN_WORLD
 from tests.tasks.toy_engine import ToyScene, toy_attempt
 
 # Each row a sub-scene: the block, half the width that it stops the pads at, how it is carried, the force.
@@ -58,6 +60,28 @@ def test_what_a_carried_block_did_is_told_for_its_own_sub_scene():
     closed = [0, 3, 4]
     assert found["width_after"][closed].tolist() == pytest.approx((2 * BETWEEN[closed]).tolist(), abs=1e-4)
     assert torch.isnan(found["penetration"]).all()  # a GPU reports no contact points
+
+
+@pytest.mark.parametrize("low_or_far", [(0.5, 0.0, 0.005, 0.0), (0.95, 0.0, 0.02, 0.0)])
+def test_a_grasp_that_cannot_be_executed_is_not_tried_and_leaves_the_others_alone(low_or_far):
+    rows = list(range(len(REASONS)))
+    alone = outcomes(rows, Physics())
+    scene = ToyScene(*(torch.cat([of, of[:1]]) for of in (BLOCKS, BETWEEN, CARRIED, STRUCK)))
+    found = toy_attempt(scene, Physics()).run(torch.cat([GRASPS, torch.tensor([low_or_far])]))
+    assert found["executable"].tolist() == [True] * len(rows) + [False]
+    assert FAILURES[int(found["failure"][-1])] == "unreachable"
+    assert not found["success"][-1] and bool(torch.isnan(found["displacement"][-1]).all())
+    torch.testing.assert_close(scene.part[-1], BLOCKS[0] + torch.tensor(BASE_IN_WORLD))
+    for name in LABELS:
+        torch.testing.assert_close(found[name][rows], alone[name], equal_nan=True, atol=0, rtol=0)
+
+
+def test_an_attempt_whose_overlap_is_unknown_is_no_label():
+    outcome = outcomes([0], Physics())
+    row = {name: outcome[name][0].numpy() for name in FIELDS}
+    assert outcome["success"][0] and discard_reason(outcome, row) == "overlap_unknown"
+    known = dict(outcome, penetration=torch.zeros(1), fastest=torch.zeros(1))
+    assert discard_reason(known, row) == ""
 
 
 def test_frozen_arms_stay_where_they_are_and_the_others_arrive():
