@@ -138,19 +138,17 @@ class Attempt:
         settled = at_rest(placed, rest)
         collided, touched, touching = (xp.zeros_like(settled) for _ in range(3))
         reflex = Reflex(self._contacts, motion)
+        ended = bool((~settled | free).all())
 
         def met(_: int) -> bool:
+            nonlocal ended
             force = reflex.force()
-            if not reflex.near:
-                touching[:] = False
-                return done()
-            collided[:] = collided | (force > physics.reflex_force)
             touching[:] = force > 0
-            touched[:] = touched | touching
-            return done()
-
-        def done() -> bool:
-            return bool((collided | ~settled | free).all())
+            if reflex.near:
+                collided[:] = collided | (force > physics.reflex_force)
+                touched[:] = touched | touching
+                ended = bool((collided | ~settled | free).all())
+            return ended
 
         if down is not None:
             if motion.follow(down, check=met, check_every=1, frozen=collided):

@@ -71,6 +71,7 @@ class PandaMotion:
         self.arrays = arrays_for(scene)
         """Kind of array that all methods compute with and return; they take either kind."""
         self.n = scene.num_envs
+        self._advance = scene.step if self.gpu else scene.px.step
         self._articulation = agent.robot._objs[0]
         self._arm_drives = [joint._objs[0] for joint in agent.arm_joints]
         self._finger_drives = [joint._objs[0] for joint in agent.finger_joints]
@@ -191,7 +192,7 @@ class PandaMotion:
             self._scene.px.gpu_apply_articulation_target_position()
             self._scene.px.gpu_apply_articulation_target_velocity()
         for _ in range(n_steps):
-            self._scene.step()
+            self._advance()
             self.seconds += 1 / self.rate_hz
             self._unwatched += 1
             if not self.gpu and self._unwatched >= self._watch_every:
