@@ -21,6 +21,7 @@ from mskgrasp.core.minimum_jerk import minimum_jerk, minimum_jerk_duration
 from mskgrasp.core.panda_kinematics import top_down
 from mskgrasp.core.settings import Overhead, Physics
 from mskgrasp.parts import Part
+from mskgrasp.parts.hulls import hull_corners
 from tasks.attempt.attempt import AHEAD, ARRIVAL_S, LOOK_S, LOST_MARGIN, SPEED_WINDOW_S, TAKE_OFF
 from tasks.attempt.clearance import hand_clearance
 from tasks.robot.motion import CHECK_S, PEAK_ACCELERATION, STILL_FINGER, finger_lag, run_up
@@ -28,7 +29,7 @@ from tasks.robot.panda import ARM_DAMPING, ARM_STIFFNESS, ARM_TORQUE_LIMIT, HAND
 from tasks.robot.reflex import NEAR_S, WINDOW_S
 from tasks.scene.camera import FAR, NEAR
 from tasks.scene.frames import sapien_camera_pose, to_world
-from tasks.scene.part_actor import _visual, hull_corners
+from tasks.scene.part_actor import _visual
 
 OPEN = MAX_OPENING / 2
 

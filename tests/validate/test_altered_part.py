@@ -7,8 +7,8 @@ import pytest
 
 from mskgrasp.core.geometry import Pose, quat_multiply
 from mskgrasp.parts import find_part
+from mskgrasp.parts.hulls import hull_corners
 from mskgrasp.validate.altered_part import altered_part, mesh_rests, resting_start
-from tasks.scene.part_actor import hull_corners
 
 
 def test_another_density_scales_mass_and_inertia_alone(tmp_path):
