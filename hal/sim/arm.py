@@ -40,12 +40,11 @@ SETTLE_S = 0.15
 AIR_HZ = 125
 """Simulation steps a second while an empty hand is in free air."""
 AIR_GAP = 0.02
-"""Least distance of hand or held part from all else in free air, m: in it a hand at 0.4 m/s takes 50 ms."""
+"""Least distance of the empty hand from all else in free air, m: at 0.4 m/s it takes 50 ms to cross it."""
 PAD_GAP = 0.004
 """Distance of the pads from a part at which closing fingers leave free air, m: more than their run-up."""
-LAST_S = 0.02
-"""The last part of a wait with a held part, s, which is simulated finely: a part trembles between the pads,
-and more in coarse steps."""
+STOP_CHECK_S = 0.02
+"""Time between two checks whether a wait was stopped, s."""
 _WAYPOINT_M = 0.01
 
 
@@ -123,7 +122,7 @@ class SapienArm(Arm):
         pressed = self._pressed()
         for begin, end in pairwise([0, *ends]):
             if in_air[begin]:
-                with motion.coarsely(self._air_hz):
+                with motion.coarsely(AIR_HZ):
                     every = self._world.physics.rate_hz // motion.rate_hz
                     picked = [*range(begin + every - 1, end - 1, every), end - 1]
                     pressed = self._follow_piece(path[picked], pressed)
@@ -131,19 +130,13 @@ class SapienArm(Arm):
                 pressed = self._follow_piece(path[begin:end], pressed)
         self._pause(SETTLE_S, bool(in_air[-1]))
 
-    @property
-    def _air_hz(self) -> int | None:
-        """Rate in free air; None for that of the part in the hand."""
-        return None if self._force else AIR_HZ
-
     def _in_air(self, path: Tensor) -> np.ndarray:
-        """(n,) whether hand and part are far from all else at joints (n, 7)."""
+        """(n,) whether the hand is empty and far from all else at joints (n, 7).
+
+        A part in the hand feels the steps: pads that press a thin sheet may oscillate in long ones.
+        """
         heights = forward(path)[0][:, 2, 3].numpy()
-        if not self._force:
-            return heights - PAD_REACH > self._world.top() + AIR_GAP
-        # A held part moves as the hand does; it may turn with the hand, so that its lowest point counts.
-        below = float(self._state().T_base_tcp.position[2]) - self._world.bottom()
-        return heights - below > self._world.top(beside=True) + AIR_GAP
+        return (heights - PAD_REACH > self._world.top() + AIR_GAP) & (self._force == 0)
 
     def _pressed(self) -> float:
         """Force on hand and part, N, before a motion with a held part."""
@@ -169,14 +162,9 @@ class SapienArm(Arm):
         return pressed
 
     def _pause(self, seconds: float, in_air: bool) -> None:
-        """Lets time pass; coarsely in free air, but for the end where a part is held."""
+        """Lets time pass; coarsely in free air."""
         motion = self._world.env.motion
-        last = LAST_S if in_air and self._force else 0.0
-        if in_air:
-            with motion.coarsely(self._air_hz):
-                motion.step(motion.n_steps(seconds - last))
-            seconds = last
-        if seconds:
+        with motion.coarsely(AIR_HZ) if in_air else nullcontext():
             motion.step(motion.n_steps(seconds))
 
     def _target(self) -> Tensor:
@@ -188,7 +176,7 @@ class SapienArm(Arm):
 
     def _move_gripper(self, width: float) -> None:
         motion = self._world.env.motion
-        free = not self._force and bool(self._in_air(self._target()[None])[0])
+        free = bool(self._in_air(self._target()[None])[0])
         self._force = 0.0
         with motion.coarsely(AIR_HZ) if free else nullcontext():
             motion.move_fingers(width / 2, check=self._stop.is_set)
@@ -207,10 +195,10 @@ class SapienArm(Arm):
 
     def _wait(self, seconds: float) -> None:
         in_air = bool(self._in_air(self._target()[None])[0])
-        for k in range(max(1, round(seconds / LAST_S))):
+        for _ in range(max(1, round(seconds / STOP_CHECK_S))):
             if self._stop.is_set():
                 return
-            self._pause(LAST_S, in_air and (k + 1) * LAST_S < seconds)
+            self._pause(STOP_CHECK_S, in_air)
 
     def _forward(self, joints: np.ndarray) -> Pose:
         return forward_pose(joints)

@@ -170,14 +170,10 @@ class SapienWorld:
         assert hand is not None
         show_board(hand._objs[0].entity, image, size, T_tcp_board)
 
-    def top(self, *, beside: bool = False) -> float:
-        """Height of the highest point on the table, m: of all parts, or of those beside the present one."""
-        bodies = self._beside if beside else [*self._beside, self._present]
+    def top(self) -> float:
+        """Height of the highest point of the parts on the table, m."""
+        bodies = [*self._beside, self._present]
         return max([TABLE_Z, *(float(self._corners(one)[:, 2].max()) for one in bodies)])
-
-    def bottom(self) -> float:
-        """Height of the lowest point of the present part, m."""
-        return float(self._corners(self._present)[:, 2].min())
 
     def reach(self, T_base_tcp: Pose) -> float | None:
         """Greatest distance from the middle of what stands between the open pads, m.

@@ -154,7 +154,7 @@ def test_in_an_attempt_fingers_begin_near_the_part_and_run_as_if_they_had_come_a
 @pytest.mark.parametrize(
     ("drive", "millimetres"),
     [
-        ({}, (1.3, 1.6)),
+        ({}, (1.95, 2.25)),
         (SOFT, (3.7, 4.5)),
         (SOFT | {"finger_armature": 1.0}, (12.0, 14.5)),
         (SOFT | {"finger_damping": 500.0}, (75.0, 90.0)),

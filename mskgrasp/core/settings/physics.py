@@ -49,10 +49,11 @@ class Physics(Config):
     finger_force: float = Field(default=30.0, gt=0, le=70)
     """Force of each pad on the part, N. The Franka Hand presses with at most 70 N continuously (data sheet)
     and, by its maker, with no less than 30 N (libfranka issue 111)."""
-    finger_stiffness: float = Field(default=16000.0, gt=0)
+    finger_stiffness: float = Field(default=8000.0, gt=0)
     """Drive stiffness of a finger, N/m; with the force limit and the speed it decides how soon a stopped pad
-    reaches its full force: 29 ms. What the hand takes is not published."""
-    finger_damping: float = Field(default=142.0, ge=0)
+    reaches its full force: 62 ms. What the hand takes is not published. With 16 kN/m pads on a thin sheet
+    begin to oscillate in steps of 4 ms, up to many times the force limit."""
+    finger_damping: float = Field(default=100.0, ge=0)
     """Drive damping of a finger, N s/m: critical, with the armature."""
     finger_armature: float = Field(default=0.3, ge=0)
     """Inertia of motor and drive that a finger joint carries, kg. It is not published; `validate` shows what
