@@ -1,7 +1,7 @@
 """How engines push a flat part: a wall's edge turns a bar on the table, against quasi-static mechanics.
 
-The bar (80 x 20 x 12 mm) lies turned by 23.7 degrees; the left edge of a pad 17.5 mm wide meets it 7 mm from its
-centre and pushes it by 9.1 mm. Both engines let the bar rest on its four corners. Inertia hardly counts:
+The bar (80 x 20 x 12 mm) lies turned by 23.7 degrees; the left edge of a pad 17.5 mm wide meets it 7 mm from
+its centre and pushes it by 9.1 mm. In both engines it rests on its four corners. Inertia hardly counts:
 v^2 / (2 mu g) is 1.3 mm at 0.1 m/s and 0.01 mm at 0.01 m/s.
 
 Each row also gives the bar turned upside down: the same body, whose corners an engine lists in another order.
@@ -72,7 +72,9 @@ def in_sapien(physics: Physics, speed: float, over: bool) -> np.ndarray:
     """The same in plain SAPIEN with the settings of the task; the pad is kinematic."""
     physx.set_scene_config(enable_tgs=True, enable_pcm=physics.persistent_manifold, cpu_workers=0)
     physx.set_body_config(
-        solver_position_iterations=physics.position_iterations, solver_velocity_iterations=1, sleep_threshold=0.0
+        solver_position_iterations=physics.position_iterations,
+        solver_velocity_iterations=1,
+        sleep_threshold=0.0,
     )
     physx.set_shape_config(contact_offset=physics.contact_offset, rest_offset=0.0)
     scene = sapien.Scene([physx.PhysxCpuSystem()])
@@ -124,9 +126,7 @@ def in_mujoco(physics: Physics, speed: float, over: bool) -> np.ndarray:
     spec.add_mesh(name="bar", uservert=np.asarray(points).ravel())
     bar.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="bar", friction=table, **stiff)
     pad = spec.worldbody.add_body(name="pad", pos=pad_centre(first_contact() + _CLEAR))
-    pad.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(PAD) / 2, friction=part, priority=2, **stiff
-    )
+    pad.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(PAD) / 2, friction=part, priority=2, **stiff)
     pad.explicitinertial, pad.mass, pad.inertia, pad.ipos = True, 10.0, [10.0] * 3, [0, 0, 0]
     pad.add_joint(name="slide", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 1, 0])
     pad.gravcomp = 1
@@ -156,7 +156,7 @@ def _moved(pose: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     """Prints the motion on paper and in both engines."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--rate-hz", type=int, default=Physics().rate_hz)
     parser.add_argument("--iterations", type=int, default=Physics().position_iterations)
     parser.add_argument("--pcm", action="store_true", help="keep PhysX' contact points from step to step")

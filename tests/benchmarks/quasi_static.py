@@ -1,9 +1,9 @@
 """Quasi-static motion of a flat part that a point pushes over a table.
 
-The part moves so slowly that its inertia does not count: the pusher's force balances the friction of the table,
-which at each point of the support is mu times the pressure there and opposes the point's motion (Goyal, Ruina and
-Papadopoulos, Planar sliding with dry friction, Wear 143, 1991; Lynch and Mason, Stable pushing, IJRR 15, 1996).
-The contact sticks if its force lies in the friction cone, and else slides along the cone's edge.
+The part moves so slowly that its inertia does not count: the pusher's force balances the friction of the
+table, which at each point of the support is mu times the pressure there and opposes the motion (Goyal, Ruina
+and Papadopoulos, Planar sliding with dry friction, Wear 143, 1991; Lynch and Mason, Stable pushing,
+IJRR 15, 1996). The contact sticks if its force lies in the friction cone, and else slides at the cone's edge.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares, minimize_scalar
+from scipy.optimize import fminbound, least_squares
 
 _STEPS = 100
 _REST = 1e-9
@@ -58,7 +58,7 @@ class Push:
             return np.array([velocity[0] + turn * contact[1], velocity[1] - turn * contact[0], turn])
 
         def wrench(slip: float, turn: float) -> tuple[np.ndarray, float]:
-            """What the pusher exerts: force over the friction of the part's weight, moment about the contact."""
+            """Force on the pusher over the friction of the whole weight, and its moment about the contact."""
             x, y, w = motion(slip, turn)
             velocity = np.stack([x - w * points[:, 1], y + w * points[:, 0]], axis=1)
             speed = np.sqrt((velocity**2).sum(axis=1) + _REST**2)
@@ -71,8 +71,7 @@ class Push:
             return float(self.weight @ np.hypot(x - w * points[:, 1], y + w * points[:, 0]))
 
         scale = float(np.sqrt((self.support**2).sum(axis=1).mean()))
-        turn = float(minimize_scalar(dissipated, bounds=(-2 / scale, 2 / scale), method="bounded",
-                                     options=dict(xatol=1e-10)).x)  # fmt: skip
+        turn = float(fminbound(dissipated, -2 / scale, 2 / scale, xtol=1e-10))
         force, _ = wrench(0.0, turn)
         pressing, sideways = -force @ normal, force @ along
         if abs(sideways) <= self.mu * pressing:
@@ -96,6 +95,6 @@ def rectangle(length: float, thickness: float, n: tuple[int, int] = (40, 10)) ->
 
 
 def corners(length: float, thickness: float) -> np.ndarray:
-    """The four corners (4, 2) of a rectangle, on which both engines let it rest; the last two opposite the first."""
+    """The four corners (4, 2) of a rectangle; the last two lie opposite the first."""
     x, y = length / 2, thickness / 2
     return np.array([[x, y], [-x, y], [-x, -y], [x, -y]])

@@ -30,8 +30,8 @@ def test_a_ring_pushed_a_little_off_its_centre_turns_as_the_expansion_says():
 
 
 def test_without_friction_at_the_contact_two_points_turn_about_the_one_that_rests():
-    # The push is normal to the bar between its two points; with equal loads they cannot both slide unless it is
-    # in the middle, so that the bar turns about the farther point.
+    # The push is normal to the bar between its two points. With equal loads both can slide only if it is in
+    # the middle; else the bar turns about the farther point.
     bar = _even(np.array([[0.04, 0.0], [-0.04, 0.0]]), mu=0.0)
     way = 1e-5
     x, y, turn = bar.run(np.zeros(3), 0.01, way)
