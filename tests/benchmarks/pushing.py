@@ -1,0 +1,188 @@
+"""How engines push a flat part: a wall's edge turns a bar on the table, against quasi-static mechanics.
+
+The bar (80 x 20 x 12 mm) lies turned by 23.7 degrees; the left edge of a pad 17.5 mm wide meets it 7 mm from
+its centre and pushes it by 9.1 mm. In both engines it rests on its four corners. Inertia hardly counts:
+v^2 / (2 mu g) is 1.3 mm at 0.1 m/s and 0.01 mm at 0.01 m/s.
+
+Each row also gives the bar turned upside down: the same body, whose corners an engine lists in another order.
+
+Run: python -m tests.benchmarks.pushing
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+import numpy as np
+import sapien
+import trimesh
+from sapien import physx
+
+from hal.mujoco.settings import MujocoPhysics
+from mskgrasp.core.settings import Physics
+from tests.benchmarks.quasi_static import Push, corners, rectangle
+
+SIZE = (0.08, 0.02, 0.012)
+MASS = 0.15072
+START = (-0.01934, 0.01945, np.radians(-23.68))
+"""x, y, angle of the bar; the pad closes towards y = 0."""
+PAD = (0.0175, 0.0152, 0.0185)
+WAY = 0.0091
+SPEEDS = (0.1, 0.05, 0.02, 0.01)
+_CLEAR = 0.0003
+"""Distance of pad and bar, and of pad and table, at the start, m."""
+
+
+def inertia() -> np.ndarray:
+    """Principal moments (3,) of the bar, kg m^2."""
+    square = np.array(SIZE) ** 2
+    return MASS / 12 * (square.sum() - square)
+
+
+def first_contact() -> float:
+    """y of the pad's face when its edge meets the bar, m."""
+    x, y, angle = START
+    return y + (SIZE[1] / 2 + (-PAD[0] / 2 - x) * np.sin(angle)) / np.cos(angle)
+
+
+def pad_centre(face: float) -> np.ndarray:
+    """Centre (3,) of the pad with its face at some y."""
+    return np.array([0.0, face + PAD[1] / 2, PAD[2] / 2 + _CLEAR])
+
+
+def steps(speed: float, rate_hz: float) -> Iterator[float]:
+    """y of the pad's face after each step."""
+    n = round((WAY + _CLEAR) / speed * rate_hz)
+    return (first_contact() + _CLEAR - speed * (k + 1) / rate_hz for k in range(n))
+
+
+def on_paper(physics: Physics, points: np.ndarray) -> np.ndarray:
+    """Motion (3,) of the bar: x and y in metres, angle in radians."""
+    push = Push(
+        support=points,
+        weight=np.full(len(points), 1 / len(points)),
+        mu=physics.friction_pad_part,
+        half_thickness=SIZE[1] / 2,
+    )
+    return push.run(np.array(START), -PAD[0] / 2, WAY) - START
+
+
+def in_sapien(physics: Physics, speed: float, over: bool) -> np.ndarray:
+    """The same in plain SAPIEN with the settings of the task; the pad is kinematic."""
+    physx.set_scene_config(enable_tgs=True, enable_pcm=physics.persistent_manifold, cpu_workers=0)
+    physx.set_body_config(
+        solver_position_iterations=physics.position_iterations,
+        solver_velocity_iterations=1,
+        sleep_threshold=0.0,
+    )
+    physx.set_shape_config(contact_offset=physics.contact_offset, rest_offset=0.0)
+    scene = sapien.Scene([physx.PhysxCpuSystem()])
+    scene.set_timestep(1 / physics.rate_hz)
+    part = physx.PhysxMaterial(physics.friction_pad_part, physics.friction_pad_part, 0.0)
+    table = physx.PhysxMaterial(physics.friction_table, physics.friction_table, 0.0)
+    builder = scene.create_actor_builder()
+    builder.add_box_collision(sapien.Pose([0, 0, -0.02]), np.array([0.5, 0.5, 0.02]), material=table)
+    builder.build_static()
+    builder = scene.create_actor_builder()
+    builder.add_box_collision(half_size=np.array(SIZE) / 2, material=part)
+    builder.set_mass_and_inertia(MASS, sapien.Pose(), inertia().astype(np.float32))
+    bar = builder.build()
+    bar.set_pose(sapien.Pose([*START[:2], SIZE[2] / 2], _turned(START[2], over)))
+    builder = scene.create_actor_builder()
+    builder.add_box_collision(half_size=np.array(PAD) / 2, material=part)
+    pad = builder.build_kinematic()
+    pad.set_pose(sapien.Pose(pad_centre(first_contact() + _CLEAR)))
+    body = pad.find_component_by_type(physx.PhysxRigidDynamicComponent)
+    assert isinstance(body, physx.PhysxRigidDynamicComponent)
+    for face in steps(speed, physics.rate_hz):
+        body.set_kinematic_target(sapien.Pose(pad_centre(face)))
+        scene.step()
+    return _moved(np.asarray(bar.pose.to_transformation_matrix(), dtype=np.float64))
+
+
+def in_mujoco(physics: Physics, speed: float, over: bool) -> np.ndarray:
+    """The same in plain MuJoCo with the settings of its cell; the pad is heavy and keeps its speed."""
+    import mujoco
+
+    own = MujocoPhysics()
+    spec = mujoco.MjSpec()
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    option = spec.option
+    option.timestep, option.noslip_iterations = own.step_s, own.noslip_iterations
+    option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.iterations, option.tolerance = own.solver_iterations, 1e-9
+    stiff = dict(solref=[own.contact_time_s, 1], solimp=[*own.contact_impedance, 0.5, 2], condim=3)
+    table, part = [physics.friction_table_part, 0, 0], [physics.friction_pad_part, 0, 0]
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1], friction=table, priority=1, **stiff
+    )
+    bar = spec.worldbody.add_body(name="bar", pos=[*START[:2], SIZE[2] / 2], quat=_turned(START[2], over))
+    bar.add_freejoint()
+    bar.explicitinertial, bar.mass, bar.inertia = True, MASS, inertia()
+    bar.ipos, bar.iquat = [0, 0, 0], [1, 0, 0, 0]  # by default those of the body
+    points = trimesh.creation.box(np.array(SIZE)).vertices
+    spec.add_mesh(name="bar", uservert=np.asarray(points).ravel())
+    bar.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="bar", friction=table, **stiff)
+    pad = spec.worldbody.add_body(name="pad", pos=pad_centre(first_contact() + _CLEAR))
+    pad.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(PAD) / 2, friction=part, priority=2, **stiff)
+    pad.explicitinertial, pad.mass, pad.inertia, pad.ipos = True, 10.0, [10.0] * 3, [0, 0, 0]
+    pad.add_joint(name="slide", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 1, 0])
+    pad.gravcomp = 1
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    slide = model.joint("slide")
+    for face in steps(speed, 1 / own.step_s):
+        data.qvel[slide.dofadr[0]] = -speed
+        data.qpos[slide.qposadr[0]] = face - first_contact() - _CLEAR + speed * own.step_s
+        mujoco.mj_step(model, data)
+    pose = np.eye(4)
+    mujoco.mj_kinematics(model, data)
+    pose[:3, :3], pose[:3, 3] = data.body("bar").xmat.reshape(3, 3), data.body("bar").xpos
+    return _moved(pose)
+
+
+def _turned(angle: float, over: bool) -> list[float]:
+    """Quaternion (w, x, y, z) of a turn about z, and before it of half a turn about x."""
+    c, s = np.cos(angle / 2), np.sin(angle / 2)
+    return [0.0, c, s, 0.0] if over else [c, 0.0, 0.0, s]
+
+
+def _moved(pose: np.ndarray) -> np.ndarray:
+    """How far (x, y, angle) a bar at a pose (4, 4) has come."""
+    return np.array([*pose[:2, 3], np.arctan2(pose[1, 0], pose[0, 0])]) - START
+
+
+def main() -> None:
+    """Prints the motion on paper and in both engines."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--rate-hz", type=int, default=Physics().rate_hz)
+    parser.add_argument("--iterations", type=int, default=Physics().position_iterations)
+    parser.add_argument("--pcm", action="store_true", help="keep PhysX' contact points from step to step")
+    given = parser.parse_args()
+    physics = Physics(
+        rate_hz=given.rate_hz, position_iterations=given.iterations, persistent_manifold=given.pcm
+    )
+    print("motion of the bar: x mm, y mm, turn deg")
+    four = corners(*SIZE[:2])
+    for name, points in (
+        ("even pressure", rectangle(*SIZE[:2])),
+        ("four corners", four),
+        ("one diagonal", four[[0, 2]]),
+        ("the other", four[[1, 3]]),
+    ):
+        print(f"{'on paper, ' + name:28s} {_show(on_paper(physics, points))}")
+    for name, run in (("SAPIEN", in_sapien), ("MuJoCo", in_mujoco)):
+        for speed in SPEEDS:
+            shown = "   upside down ".join(_show(run(physics, speed, over)) for over in (False, True))
+            print(f"{f'{name}, {speed:g} m/s':28s} {shown}", flush=True)
+
+
+def _show(moved: np.ndarray) -> str:
+    x, y, turn = moved * [1e3, 1e3, 180 / np.pi]
+    return f"{x:7.2f} {y:7.2f} {turn:7.2f}"
+
+
+if __name__ == "__main__":
+    main()
