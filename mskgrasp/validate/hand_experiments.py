@@ -167,7 +167,9 @@ def centring(scene: BodyScene, workshop: Workshop) -> Iterator[Check]:
 def mirroring(scene: BodyScene, workshop: Workshop) -> Iterator[Check]:
     """An L-shaped block, and its mirror image at the hand's planes: displacements are mirror images, too.
 
-    Of chaotic grasps some differ: the median is compared.
+    Of chaotic grasps some differ: the median is compared. It is not zero, as which corners PhysX takes for
+    the anchors of friction depends on the order of the corners; it may be as large as a difference of
+    settings that counts as none (`mskgrasp.validate.config.Margins`).
     """
     bracket = h.block(-20, 20, -6, 6, -10, 10) + h.block(8, 20, 6, 18, -10, 10)
     starts = np.random.default_rng(3).uniform((-0.006, -0.006, -0.5), (0.006, 0.006, 0.5), (MIRRORED, 3))
@@ -181,7 +183,7 @@ def mirroring(scene: BodyScene, workshop: Workshop) -> Iterator[Check]:
         way = float(np.median(np.linalg.norm(difference[both, :3], axis=1))) if both.any() else math.inf
         turn = float(np.median(np.abs(wrap_angle(difference[both, 3])))) if both.any() else math.inf
         for what, unit, value, most in (
-            ("displacement", "mm", 1e3 * way, 0.1),
+            ("displacement", "mm", 1e3 * way, 0.25),
             ("turn", "deg", math.degrees(turn), 0.1),
         ):
             yield Check(

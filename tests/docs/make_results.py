@@ -99,9 +99,10 @@ def record(name: str) -> None:
     out = ROOT / "out" / "results" / name
     command = [sys.executable, *shlex.split(facts["command"])[1:], "--out", str(out)]
     subprocess.run(command, cwd=ROOT, check=not facts.get("may_fail"))
-    report = json.loads((out / facts.get("report", "report.json")).read_text(encoding="utf-8"))
-    for name in ("out", "workers"):  # of the machine, not of the measurement
-        report.get("settings", {}).pop(name, None)
+    text = (out / facts.get("report", "report.json")).read_text(encoding="utf-8")
+    report = json.loads(text.replace(f"{ROOT}/", ""))
+    for setting in ("out", "workers"):  # of the machine, not of the measurement
+        report.get("settings", {}).pop(setting, None)
     physics = Physics()
     values = dict(
         record=dict(
@@ -119,13 +120,16 @@ def record(name: str) -> None:
 def _size(report: dict[str, Any]) -> str:
     if "closed_form" in report:
         settings = report["settings"]
+        most = settings["grasps_per_part"]
         references = "; ".join(
-            f"{one['grasps_per_part']} under {one['rate_hz']} Hz with {one['position_iterations']} iterations"
+            f"{min(most, one['grasps_per_part'])} under {one['rate_hz']} Hz "
+            f"with {one['position_iterations']} iterations"
             for one in settings["references"]
         )
         return (
             f"{len(report['parts'])} parts; grasps a part: {settings['grasps_per_part']} in production, "
-            f"{references}, {settings['variant_grasps_per_part']} a variant; seed {settings['seed']}"
+            f"{references}, {min(most, settings['variant_grasps_per_part'])} a variant; "
+            f"seed {settings['seed']}"
         )
     if "experiment" in report:
         settings = report["settings"]
