@@ -1,4 +1,4 @@
-"""What outcomes under several settings say: errors by origin, the choice of a setting, sensitivity."""
+"""Findings from outcomes under several settings: errors by origin, the chosen setting, sensitivity."""
 
 from __future__ import annotations
 
