@@ -22,14 +22,14 @@ settings.load_profile("mskgrasp")
 LONGEST = (
     "parts/recipes/test_families.py",
     "hal_contract/test_arm_contract.py",
-    "collect/test_collect.py",
+    "collect/test_run.py",
     "hal/franka/test_faults.py",
     "hal_contract/test_same_code.py",
-    "validate/test_validate.py",
+    "validate/test_run.py",
     "collect/test_crashes.py",
     "collect/test_cluster.py",
-    "evaluate/test_evaluate.py",
-    "palletize/test_palletize.py",
+    "evaluate/test_run.py",
+    "palletize/test_run.py",
     "sim_in_the_loop/test_precise_grasps.py",
 )
 """Files that take a minute or more: started first, so that no process is left alone with one at the end."""
