@@ -1,4 +1,3 @@
-from mskgrasp.simulation.versions import SIMULATION_VERSION, other_versions, versions
 from tests.versions import changed, code_digest
 
 
@@ -14,10 +13,3 @@ def test_comments_docstrings_and_imports_are_no_change_but_numbers_are():
     worded = "import math as m\nimport math\n\n\ndef area(r):\n    # exact\n    return math.pi * r**2\n"
     assert code_digest(before) == code_digest(worded)
     assert code_digest(before) != code_digest(before.replace("**2", "**3"))
-
-
-def test_data_made_before_versions_were_numbered_are_of_version_1():
-    unnumbered = versions() | {"simulation": "38dc7f58aea7bdfa"}
-    assert other_versions(unnumbered) == f"simulation 1 (here {SIMULATION_VERSION})"
-    assert "simulation 38dc" in other_versions(unnumbered | {"simulation": "38dc7f58aea7bdff"})
-    assert other_versions(versions()) == ""

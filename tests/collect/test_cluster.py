@@ -11,21 +11,16 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from mskgrasp.collect import cluster
-from mskgrasp.collect import node as cluster_node
-from mskgrasp.collect.config import CollectConfig
-from mskgrasp.core.config import read_config
 from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.dataset import list_shards
 from mskgrasp.parts import find_part
 from mskgrasp.parts.store import pack_part, receive_part
-from mskgrasp.simulation.shard_task import ShardTask
-from mskgrasp.simulation.versions import versions
 from tests.collecting import PARTS, REPOSITORY, assert_equal, command
 
 RAY = [sys.executable, "-m", "ray.scripts.scripts"]
@@ -287,16 +282,3 @@ def test_a_part_keeps_its_hash_on_the_way_and_takes_no_other_parts_place(tmp_pat
     for name, contents in (("../x", files), (part.name, {**files, "extra": b""})):
         with pytest.raises(BadPart, match="is not a part"):
             receive_part(name, part.content_hash, contents)
-
-
-def test_a_node_of_other_software_or_without_the_folder_is_refused(collected, monkeypatch):
-    monkeypatch.setattr(cluster_node, "_simulator", None)
-    config = read_config(CollectConfig, collected / "config.yaml")
-    settings = cluster_node.RunSettings(config=config, digest="other", versions=versions())
-    task = ShardTask(part=PARTS[1], folder="", index=0, first=0, n=1, seed=5)
-    part = cluster_node.PackedPart(name=PARTS[1], content_hash="0", files={})
-    reply = cluster_node.make_shard(part, settings, task)
-    assert "does not see the dataset" in reply.error and str(collected) in reply.error
-    old = replace(settings, versions=dict(settings.versions, sapien="1.0"))
-    assert "the node has sapien" in cluster_node.make_shard(part, old, task).error
-    assert reply.outcomes == ()

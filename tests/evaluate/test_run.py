@@ -4,16 +4,9 @@ from __future__ import annotations
 
 import io
 import json
-import multiprocessing
-import os
-import re
 import shutil
-import signal
 import subprocess
 import sys
-import threading
-import time
-from multiprocessing.process import BaseProcess as Process
 from pathlib import Path
 from typing import Any
 
@@ -22,17 +15,14 @@ import pytest
 
 from hal.operator import StoppedByOperator
 from hal.sim import SapienArm
-from mskgrasp.core.errors import BadConfig, UsageError
+from mskgrasp.core.errors import UsageError
 from mskgrasp.evaluate.config import EvaluateConfig
-from mskgrasp.evaluate.experiments import scenes
 from mskgrasp.evaluate.run import evaluate
 from mskgrasp.learning.grasp_models import PRETRAINED
-from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.planning.planner import PlannerConfig
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
-from mskgrasp.trials.trial_runner import Setup, run_trials
 from tests.browser import Page
 
 REPOSITORY = Path(__file__).parents[2]
@@ -90,36 +80,6 @@ def test_several_processes_resume_a_run_with_equal_trials(alone: Path, tmp_path:
         assert len(widths) == 5 and min(widths) > 500  # both figures, and the worst three
         assert page.evaluate("[...document.links].every(a => document.querySelector(a.hash) !== null)")
         assert page.complaints == []
-
-
-def hold_a_worker_at_its_first_trial(held: list[Process]) -> None:
-    """Stop a worker once it has loaded the renderer, which is within its first trial."""
-    while not held:
-        for worker in multiprocessing.active_children():
-            if "libvulkan_" in Path(f"/proc/{worker.pid}/maps").read_text():
-                os.kill(worker.pid or 0, signal.SIGSTOP)
-                held.append(worker)
-                return
-        time.sleep(0.01)
-
-
-def test_a_trial_whose_process_dies_is_repeated(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
-    planner = PlannerConfig(policy="quality", n_candidates=20)
-    (tmp_path / "trials").mkdir()
-    setup = Setup(cell=SIMULATED_CELL, models=PRETRAINED, planner=planner, out=tmp_path)
-    tasks = scenes({"hex_nut_m30": "hex_nut_m30"}, 3, 0, planner, None)
-    held: list[Process] = []
-    holding = threading.Thread(target=hold_a_worker_at_its_first_trial, args=(held,), daemon=True)
-    holding.start()
-    made = run_trials(setup, tasks, 2)
-    first = next(made)  # by the other process
-    holding.join(timeout=0)
-    held[0].kill()
-    others = list(made)
-    assert sorted(one.number for one in (first, *others)) == [0, 1, 2]
-    lost = re.findall(r"trial (hex_nut_m30-\d+) is made again", capfd.readouterr().err)
-    assert len(lost) == 1 and lost[0] in {one.key for one in others}
-    assert not multiprocessing.active_children()
 
 
 def test_a_run_with_other_settings_or_another_model_is_refused(alone: Path, tmp_path: Path):
@@ -266,10 +226,3 @@ def test_unusable_settings_are_refused_in_one_line_and_leave_no_folder(
         evaluate(config(tmp_path / "out", **changes))
     assert raised.value.exit_code == (1 if "lowess_data" in changes else 2)
     assert "\n" not in str(raised.value) and not (tmp_path / "out").exists()
-
-
-def test_models_to_compare_can_be_a_mapping_in_a_file():
-    named = EvaluateConfig.model_validate(dict(models="m", compare={"gcip_mv": "models/a"}))
-    assert named.compare == ("gcip_mv=models/a",)
-    with pytest.raises((BadConfig, ValueError)):
-        EvaluateConfig.model_validate(dict(models="m", compare=[1]))

@@ -2,53 +2,15 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.console import Console
 
-from mskgrasp.evaluate.comparison import PAPER, DisplacementSummary, compare, figure_names, paper_label
+from mskgrasp.evaluate.comparison import compare
 from mskgrasp.evaluate.figures import draw_comparison, draw_errors, draw_success
-from mskgrasp.evaluate.report import Report, print_report, sections
-from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise, worst_trials
-from mskgrasp.trials.trial import Prediction, Trial
-
-
-def trial(**changes: object) -> Trial:
-    values = dict(
-        part="a", number=0, seed=1, success=True, reason="", grasp=[0.5, 0.0, 0.02, 0.0], quality=0.9,
-        point_base=[0.5, 0.01, 0.015],
-        predicted=[0.003, 0.0, 0.0, 0.1], predicted_std=[0.001] * 4, measured=[0.0, 0.004, 0.0, -0.1],
-        tilt=0.0, planning_s=1.0, family="nut", policy="quality",
-    )  # fmt: skip
-    return Trial(**(values | changes))  # type: ignore[arg-type]
-
-
-NOTHING = dict(
-    success=False, reason="NoPartFound", grasp=None, quality=None, predicted=None, predicted_std=None,
-    measured=None, planning_s=None,
-)  # fmt: skip
-
-
-class Model:
-    """Trained on part a."""
-
-    has_variance = True
-
-    def knows(self, part: str) -> bool:
-        return part == "a"
-
-
-def report_of(summary: SuccessSummary | DisplacementSummary) -> Report:
-    return Report(summary=summary, trials={}, worst={}, settings={}, versions={})
-
-
-def printed(summary: SuccessSummary | DisplacementSummary) -> str:
-    stream = io.StringIO()
-    print_report(report_of(summary), Path("out"), Console(file=stream, width=200))
-    return stream.getvalue()
+from mskgrasp.evaluate.summary import largest_errors, summarise, worst_trials
+from tests.evaluate.made_trials import NOTHING, Model, printed, report_of, trial
 
 
 def test_success_and_errors_follow_their_definitions():
@@ -105,40 +67,6 @@ def test_tape_errors_of_tilted_parts_are_reported_apart():
     assert found is not None and found.flat.trials == found.tilted.trials == 1
     assert found.flat.translation_worst == 0.0
     assert found.tilted.translation_worst == pytest.approx(0.006)
-
-
-def test_models_are_compared_on_shared_grasps_and_on_their_own():
-    expected = {"one": Prediction(mean=[0.0, 0.001, 0.0, -0.1], std=[0.01] * 4)}
-    best = [trial(predictions=expected), trial(part="b", predictions=expected, measured=[0.0, 0.0, 0.0, 0.0])]
-    chosen = trial(policy="low_variance", chosen_by="one", predicted=[0.0, 0.0039, 0.0, -0.1])
-    summary = compare([*best, chosen], {"one": Model(), "other": Model()})
-    one = summary.models["one"]
-    assert one.quality.known.translation_rmse == pytest.approx(0.003)
-    assert one.quality.novel.translation_rmse == pytest.approx(0.001)
-    assert one.quality.novel.rotation_rmse == pytest.approx(0.1)
-    assert one.low_variance is not None
-    assert one.low_variance.known.translation_rmse == pytest.approx(0.0001)
-    assert one.quality.known.coverage_90 == [1.0, 1.0, 1.0, 1.0]
-    assert summary.models["other"].low_variance is None
-    assert summary.models["other"].quality.known.translation_rmse is None
-    section = next(
-        s for s in sections(report_of(summary), Path("out")) if s.title == "Displacement in the hand"
-    )
-    assert ("one", "high quality", "novel") in [row[:3] for row in section.tables[0].rows]
-
-
-def test_labels_are_matched_with_the_papers_models():
-    assert paper_label("gcip_mv") == paper_label("GCIP-M+V") == "GCIP-M+V"
-    assert paper_label("lowess") == "LOWESS" and paper_label("ours") is None
-    bar = PAPER["GCIP-M+V"]["low_variance"]
-    assert bar is not None and bar.translation_rmse == pytest.approx(0.0024)
-    assert np.degrees(bar.rotation_rmse) == pytest.approx(7.01)
-
-
-def test_two_models_of_the_same_name_in_the_paper_both_appear_in_the_figure():
-    assert figure_names(["gcip_mv", "GCIP.M.V", "ours"]) == {
-        "GCIP-M+V": "gcip_mv", "GCIP.M.V": "GCIP.M.V", "ours": "ours"
-    }  # fmt: skip
 
 
 def test_the_worst_are_confident_failures_then_the_largest_errors():

@@ -4,10 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from hal import cell_from_yaml
 from hal.errors import HalError
+from mskgrasp.core.errors import BadPart
 from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.parts import find_part
 from mskgrasp.planning.for_cell import SIMULATED_CELL, make_planner, part_name, present
 from mskgrasp.planning.planner import PlannerConfig
 
@@ -27,3 +30,29 @@ def test_a_part_cannot_be_presented_without_a_feeder():
 def test_a_name_and_a_folder_stand_for_themselves(tmp_path: Path):
     assert part_name("hex_nut_m30") == "hex_nut_m30"
     assert part_name(str(tmp_path)) == str(tmp_path)
+
+
+def test_a_cad_file_is_made_a_part(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    file = tmp_path / "My Bracket.stl"
+    trimesh.creation.box((4, 2, 1.5)).export(file)
+    name = part_name(str(file))
+    assert find_part(name).longest_axis == pytest.approx(0.004)
+    assert part_name(str(file), "in") == name and find_part(name).longest_axis == pytest.approx(0.004 * 25.4)
+
+
+def test_a_file_that_is_no_cad_file_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "part.stl").write_text("a letter")
+    with pytest.raises(BadPart, match="part.stl"):
+        part_name(str(tmp_path / "part.stl"))
+
+
+def test_an_example_is_taken_by_its_name_unless_such_a_file_is_here(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    assert find_part(part_name("bracket.stl")).longest_axis > 0.02
+    assert "using the shipped example" in capsys.readouterr().out
+    trimesh.creation.box((4, 2, 1.5)).export(tmp_path / "bracket.stl")
+    assert find_part(part_name("bracket.stl")).longest_axis == pytest.approx(0.004)
+    assert capsys.readouterr().out == ""

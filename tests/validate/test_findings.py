@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mskgrasp.validate.compare import compare
 from mskgrasp.validate.config import MOVED, NOMINAL, Margins, ValidateConfig, floor_name
 from mskgrasp.validate.findings import choose, judge, label_error, sensitivity, size, summarise_discards
 from mskgrasp.validate.outcomes import Outcomes
@@ -25,37 +24,6 @@ def found(per_part: int = 40, **settings: Outcomes) -> dict[str, Outcomes]:
 def judged(one: Outcomes, name: str = "coarse", cpu_ms: float = 100.0):
     told = judge(found(**{name: one}), name, REFERENCE, 40, Margins())
     return dataclasses.replace(told, found=dataclasses.replace(told.found, cpu_ms=cpu_ms))
-
-
-def test_differences_are_those_that_were_put_in():
-    before = outcomes()
-    one = before.success.copy()
-    one[:10] = ~one[:10]
-    after = moved(before, np.array([0.003, 0.0, 0.004, 0.02]))
-    told = compare(
-        dataclasses.replace(
-            after, displacement=np.where(one[:, None], after.displacement, np.nan), success=one
-        ),
-        before,
-    )
-    assert told.agreement == pytest.approx(0.95)
-    assert told.n_both == 95
-    assert told.shift_median == pytest.approx(0.005) and told.shift_p90 == pytest.approx(0.005)
-    assert told.turn_median == pytest.approx(0.02) and told.bias == pytest.approx(0.004)
-
-
-def test_a_turn_over_half_a_circle_is_measured_the_short_way():
-    before, after = outcomes(), outcomes()
-    before.displacement[:, 3], after.displacement[:, 3] = np.pi - 0.01, -np.pi + 0.01
-    assert compare(after, before).turn_median == pytest.approx(0.02)
-
-
-def test_grasps_whose_part_was_not_at_rest_are_left_out():
-    before = outcomes()
-    unsettled = np.arange(len(before.success)) < 50
-    after = moved(before, np.where(unsettled[:, None], 0.1, 0.0))
-    told = compare(dataclasses.replace(after, settled=~unsettled), before)
-    assert told.n == len(before.success) - 50 and told.shift_p90 == pytest.approx(0, abs=1e-12)
 
 
 def test_the_cheapest_equivalent_setting_is_chosen():

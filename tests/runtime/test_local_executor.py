@@ -1,0 +1,52 @@
+"""Jobs in spawned processes of this machine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+
+from mskgrasp.runtime.local_executor import LocalExecutor
+from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult, Work, results, run_jobs
+from tests.runtime.test_worker_pool import bench
+
+
+@contextmanager
+def counting(folder: Path) -> Iterator[Callable[[tuple[int, ...]], Iterator[int]]]:
+    """Dies after its first result, once."""
+
+    def work(job: tuple[int, ...]) -> Iterator[int]:
+        for number in job:
+            yield number
+            if not (folder / "died").exists():
+                (folder / "died").touch()
+                os._exit(9)
+
+    yield work
+
+
+def test_what_a_dead_process_has_not_delivered_is_done_again(tmp_path: Path):
+    jobs: list[tuple[int, ...]] = [(1, 2, 3)]
+    (job,), again = jobs, (2, 3)
+    events = list(run_jobs(jobs, LocalExecutor(counting, tmp_path, 1), rest=lambda job, n: job[n:]))
+    assert events[:2] == [JobResult(job, 1), JobLost(job, 1, again, "exit code 9")]
+    assert events[2:4] == [JobResult(again, 2), JobResult(again, 3)]
+    (last,) = events[4:]
+    assert isinstance(last, JobDone) and last.job == again
+
+
+def test_a_process_that_died_after_its_last_result_has_done_its_job(tmp_path: Path):
+    jobs: list[tuple[int, ...]] = [(1,)]
+    executor = LocalExecutor(counting, tmp_path, 1)
+    events = list(run_jobs(jobs, executor, rest=lambda job, n: job[n:] or None))
+    assert events[0] == JobResult((1,), 1) and isinstance(events[1], JobDone) and len(events) == 2
+
+
+def test_whoever_closes_the_iterator_ends_the_workers():
+    with closing(results(Work(bench, 3), list(range(1, 20)), 2)) as found:
+        pid = next(value for value in found if value > 3 * 19)
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
