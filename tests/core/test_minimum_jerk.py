@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from mskgrasp.core.minimum_jerk import minimum_jerk_duration, minimum_jerk_steps
+from mskgrasp.core.minimum_jerk import (
+    minimum_jerk,
+    minimum_jerk_duration,
+    minimum_jerk_rate,
+    minimum_jerk_steps,
+)
 from tasks.robot.motion import PEAK_ACCELERATION
 
 
@@ -21,3 +28,34 @@ def test_a_path_passes_neither_its_speed_nor_its_acceleration(distance, speed):
     assert np.abs(acceleration).max() <= PEAK_ACCELERATION * 1.01
     # One of the bounds is reached: the path is not slower than it must be.
     assert velocity.max() > speed * 0.99 or np.abs(acceleration).max() > PEAK_ACCELERATION * 0.99
+
+
+def test_a_motion_starts_and_ends_at_rest_without_acceleration():
+    """Finite differences at both ends and in the middle; by symmetry half of the way is covered by then."""
+    h = 1e-4
+    for end in (0.0, 1.0):
+        near = minimum_jerk(end + np.array([-h, 0.0, h]))
+        assert near[1] == end
+        assert (near[2] - near[0]) / (2 * h) == pytest.approx(0, abs=1e-6)
+        assert (near[2] - 2 * near[1] + near[0]) / h**2 == pytest.approx(0, abs=0.01)
+    assert minimum_jerk(np.array(0.5)) == 0.5 and minimum_jerk_rate(np.array(0.5)) == 15 / 8
+
+
+@given(st.floats(0, 1))
+def test_the_rate_is_the_derivative_and_the_second_half_mirrors_the_first(t: float):
+    h = 1e-6
+    slope = (minimum_jerk(np.array(t + h)) - minimum_jerk(np.array(t - h))) / (2 * h)
+    assert minimum_jerk_rate(np.array(t)) == pytest.approx(slope, abs=1e-8)
+    assert minimum_jerk(np.array(t)) + minimum_jerk(np.array(1 - t)) == pytest.approx(1)
+
+
+def test_steps_end_at_the_goal_and_none_is_the_start():
+    steps = minimum_jerk_steps(10)
+    assert len(steps) == 10 and steps[0] > 0 and steps[-1] == 1 and (np.diff(steps) > 0).all()
+    assert minimum_jerk_steps(1).tolist() == [1.0]
+
+
+def test_no_motion_is_shorter_than_the_shortest():
+    assert minimum_jerk_duration(0.0, 0.25, 1.5) == 0.02
+    assert minimum_jerk_duration(1e-6, 0.25, 1.5, shortest_s=0.5) == 0.5
+    assert minimum_jerk_duration(1.0, 0.25, 1.5) == pytest.approx(15 / 8 / 0.25)

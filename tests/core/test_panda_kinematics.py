@@ -12,8 +12,19 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import pose_base_tcp
-from mskgrasp.core.panda_kinematics import HOME, forward, top_down, track
+from mskgrasp.core.panda_kinematics import (
+    HOME,
+    JOINT_LOWER,
+    JOINT_UPPER,
+    forward,
+    forward_pose,
+    reachable,
+    top_down,
+    track,
+    within_limits,
+)
 
 coordinate = dict(allow_nan=False, allow_infinity=False)
 
@@ -69,3 +80,34 @@ def test_numpy_joints_need_no_torch():
         "assert 'torch' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_at_home_the_hand_is_where_the_links_lengths_put_it():
+    """Joints 3 and 5 are zero: a planar chain of the lengths in Franka's documentation, summed by hand."""
+    q2, q4, q6 = HOME[1], HOME[3], HOME[5]
+    shoulder = np.array([0.0, 0.333])
+    along, across = np.array([math.sin(q2), math.cos(q2)]), np.array([math.cos(q2), -math.sin(q2)])
+    elbow = shoulder + 0.316 * along + 0.0825 * across
+    bent = q2 - q4
+    along, across = np.array([math.sin(bent), math.cos(bent)]), np.array([math.cos(bent), -math.sin(bent)])
+    wrist = elbow - 0.0825 * across + 0.384 * along
+    assert bent - q6 == pytest.approx(0)  # so the hand points straight down
+    hand = wrist + np.array([0.088, -0.107 - 0.1034])
+    pose = forward_pose(np.array(HOME))
+    assert pose.position == pytest.approx([hand[0], 0.0, hand[1]])
+    assert pose.as_matrix()[:3, 2] == pytest.approx([0, 0, -1], abs=1e-12)
+
+
+def test_a_joint_beyond_its_limit_and_a_pose_beyond_the_arm_are_out_of_reach():
+    lower, upper = np.array(JOINT_LOWER), np.array(JOINT_UPPER)
+    home = forward_pose(np.array(HOME))
+    assert within_limits(np.array(HOME), lower, upper) and reachable(home, lower, upper)
+    beyond = np.array(HOME)
+    beyond[3] = 0.0
+    assert not within_limits(np.stack([HOME, beyond]), lower, upper)
+    far = Pose(position=np.array([1.0, 0.0, 0.5]), quat_wxyz=home.quat_wxyz)
+    assert not reachable(far, lower, upper)
+    # Within the arm's length, and not within joints that are held at home.
+    aside = Pose(position=home.position + [0.0, 0.1, 0.0], quat_wxyz=home.quat_wxyz)
+    assert reachable(aside, lower, upper)
+    assert not reachable(aside, np.array(HOME) - 1e-3, np.array(HOME) + 1e-3)

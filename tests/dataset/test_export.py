@@ -6,7 +6,6 @@ import h5py
 import numpy as np
 import pytest
 
-import tasks  # noqa: F401 (registers the task)
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.dataset import list_shards, read_shard

@@ -1,0 +1,25 @@
+"""Errors have one base class, and an exit code that says whether the command was wrong."""
+
+from __future__ import annotations
+
+import inspect
+
+import pytest
+
+from mskgrasp.core import errors
+from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, MskgraspError, UnknownPart, UsageError
+
+ALL = [one for _, one in inspect.getmembers(errors, inspect.isclass)]
+
+
+@pytest.mark.parametrize("error", ALL)
+def test_an_error_ends_a_program_with_2_where_the_command_is_wrong_and_with_1_otherwise(error):
+    assert issubclass(error, MskgraspError)
+    assert error("one line").exit_code == (2 if issubclass(error, UsageError) else 1)
+
+
+def test_a_part_that_nobody_knows_is_a_bad_part_and_a_wrong_command():
+    for kind in (BadPart, UsageError):
+        with pytest.raises(kind, match="no part 'x'"):
+            raise UnknownPart("no part 'x'")
+    assert issubclass(BadConfig, UsageError) and not issubclass(BadDataset, UsageError)
