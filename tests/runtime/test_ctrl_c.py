@@ -5,11 +5,22 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred, repeat_dropped_ctrl_c
 from tests.runtime.interrupted import STOPPED, interrupted
+
+
+@pytest.fixture
+def python_hears_ctrl_c() -> Iterator[None]:
+    """Python's own handler, where the tests' own is another or ignores the signal."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def test_ctrl_c_while_python_cleans_up_is_not_lost():
@@ -51,3 +62,43 @@ def test_ctrl_c_while_a_program_imports_is_not_lost(program: str, library: str):
         assert process.poll() is None
     process.send_signal(signal.SIGINT)
     assert (process.communicate()[1], process.returncode) == (STOPPED, 130)
+
+
+def test_ctrl_c_within_the_block_takes_effect_at_its_end(python_hears_ctrl_c):
+    done = []
+    with pytest.raises(KeyboardInterrupt), ctrl_c_deferred():
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        done.append("the block ends")
+    assert done == ["the block ends"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_error_in_the_block_does_not_lose_ctrl_c(python_hears_ctrl_c):
+    with pytest.raises(KeyboardInterrupt) as raised, ctrl_c_deferred():
+        signal.raise_signal(signal.SIGINT)
+        raise ImportError("half a library")
+    assert isinstance(raised.value.__context__, ImportError)
+
+
+def test_other_threads_leave_the_handler_alone(python_hears_ctrl_c):
+    seen = []
+
+    def work() -> None:
+        with ctrl_c_deferred():
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [signal.default_int_handler]
+
+
+def test_what_python_drops_and_is_no_ctrl_c_is_reported_as_before():
+    reported = []
+
+    class Dropped:
+        exc_type = ValueError
+
+    repeat_dropped_ctrl_c(Dropped, reported.append)
+    assert reported == [Dropped]

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import subprocess
+import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
 from mskgrasp.runtime.worker_pool import Work, results
+from mskgrasp.runtime.worker_process import one_thread_a_process
 from tests.runtime.interrupted import STOPPED, interrupted
 
 
@@ -52,3 +58,49 @@ for _ in range({threads}):
 run("program", lambda: list(worker_pool.results(worker_pool.Work(bench, 3), [1, 2], 2)))
 """
     assert interrupted(code) == (130, STOPPED)
+
+
+@pytest.mark.parametrize("before", [None, "4"])
+def test_processes_have_one_thread_each_and_this_one_its_own_setting_afterwards(
+    before: str | None, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    if before is not None:
+        monkeypatch.setenv("OMP_NUM_THREADS", before)
+    with pytest.raises(RuntimeError), one_thread_a_process():
+        assert os.environ["OMP_NUM_THREADS"] == "1"
+        raise RuntimeError
+    assert os.environ.get("OMP_NUM_THREADS") == before
+
+
+def test_a_process_ends_with_its_parent():
+    """The parent starts a child that would run for a minute, prints its number, and is killed."""
+    child = (
+        "from mskgrasp.runtime.worker_process import leave_with_parent as l; l(); import time; time.sleep(60)"
+    )
+    parent = (
+        "import subprocess, sys, time\n"
+        f"child = subprocess.Popen([sys.executable, '-c', {child!r}])\n"
+        "print(child.pid, flush=True)\n"
+        "time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", parent], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        pid = int(process.stdout.readline())
+        loaded = Path(f"/proc/{pid}/task")
+        while len(list(loaded.iterdir())) < 2:  # its watching thread
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.kill()
+    deadline = time.monotonic() + 20
+    while alive(pid):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs; one that has ended may wait for a parent to ask for its exit code."""
+    try:
+        return "Z (zombie)" not in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
