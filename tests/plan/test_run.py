@@ -1,0 +1,56 @@
+"""One grasp planned in the simulated cell with the shipped model."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mskgrasp.core.errors import BadConfig, UnknownPart
+from mskgrasp.parts import find_part
+from mskgrasp.plan.config import PlanConfig
+from mskgrasp.plan.run import describe, plan_grasp
+from mskgrasp.planning.planner import PlannerConfig
+from tests.figures import picture
+from tests.planning.hand_made import FRAME, planner
+
+PART = "hex_nut_m30"
+
+
+def test_a_plan_is_written_with_its_picture_and_a_seed_repeats_it(tmp_path: Path):
+    config = PlanConfig(part=PART, out=tmp_path / "plan", seed=4, planner=PlannerConfig(n_candidates=60))
+    plan = plan_grasp(config)
+    stored = json.loads((config.out / "plan.json").read_text())
+    assert stored["seed"] == 4 and stored["n_candidates"] == 60
+    np.testing.assert_allclose(stored["grasp"], plan.grasp.as_vector())
+    np.testing.assert_allclose(stored["displacement"], plan.displacement)
+    # The part that was asked for lies there: it is as high as one of its own edges is long.
+    assert np.abs(find_part(PART).extents - stored["part"]["size"][2]).min() < 1e-3
+    assert picture(config.out / "plan.png").shape[1] > 1000
+    again = plan_grasp(config)
+    np.testing.assert_array_equal(again.grasp.as_vector(), plan.grasp.as_vector())
+
+
+def test_a_plan_is_described_in_millimetres_and_degrees():
+    plan = planner().plan(FRAME, np.random.default_rng(0))
+    text = describe(plan)
+    lines = dict(line.split("  ", 1) for line in text.splitlines())
+    x, y, z, theta = (float(value) for value in re.findall(r"-?\d+\.\d+", lines["grasp"]))
+    np.testing.assert_allclose([x, y, z], plan.grasp.position, atol=5e-5)
+    assert theta == pytest.approx(np.degrees(plan.grasp.theta), abs=0.05)
+    # The hand-made network moves the hand by 1 and 2 mm and turns it by 0.1 rad: the part, the other way.
+    assert "dtheta -5.7 +- " in lines["displacement"]
+    assert f"dx {1e3 * plan.displacement[0]:+.1f} +- {1e3 * plan.displacement_std[0]:.1f} mm" in text
+    assert "best of 600" in lines["quality"] and "sample" in lines["planned in"] and "total" not in text
+
+
+def test_an_unknown_part_and_an_unknown_cell_are_refused_and_nothing_is_written(tmp_path: Path):
+    with pytest.raises(UnknownPart, match="hex_nut_m3o"):
+        plan_grasp(PlanConfig(part="hex_nut_m3o", out=tmp_path / "plan"))
+    (tmp_path / "cell.yaml").write_text("type: nowhere")
+    with pytest.raises(BadConfig, match="'type' is 'nowhere'; legal: sapien"):
+        plan_grasp(PlanConfig(cell=tmp_path / "cell.yaml", out=tmp_path / "plan"))
+    assert not (tmp_path / "plan" / "plan.json").exists()
