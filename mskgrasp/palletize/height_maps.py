@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+import zlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -80,13 +81,21 @@ def read_height_maps(path: Path) -> HeightMaps:
         BadDataset: The file is missing or damaged.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
             values = {name: file[name] for name in file.files}
         numbers = {name: float(values[name]) for name in ("side", "top", "turn", "theta")}
         return HeightMaps(
             before=values["before"], after=values["after"], grasp=values["grasp"].reshape(3), **numbers
         )
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        EOFError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
         raise BadDataset(f"{path} is missing or damaged; start again in another --out") from error
 
 
