@@ -1,0 +1,132 @@
+"""Steps of a trial in the simulated cell, on a box whose motion in the hand is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+
+import numpy as np
+import pytest
+
+from hal import Cell
+from hal.errors import CaptureFailed, MotionAborted, NeedsRecovery, Stopped
+from hal.operator import Operator
+from mskgrasp.core.errors import UsageError
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import Grasp
+from mskgrasp.core.shipped import config_file
+from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.trials.engine import ExecutedGrasp, TrialEngine, connected_engine
+from tests.hal.replay.toy import toy_cell
+from tests.planning.hand_made import FRAME, planner
+from tests.trials.box_grasps import BesideTheMiddle, BoxCell
+
+
+def test_a_box_beside_the_middle_of_the_hand_ends_in_its_middle(box_cell: BoxCell):
+    planned = box_cell.present(along=0.008, across=0.006)
+    assert planned.plan is not None and not planned.reason
+    done = box_cell.engine.grasp(planned.plan)
+    assert done.reason == "" and not done.aborted and done.result is not None
+    assert done.result.width == pytest.approx(0.02, abs=5e-4)
+    # The hand is 6 mm beside it: the fingers push it by as much, and leave it where it is along them.
+    assert done.displacement is not None and done.tilt is not None
+    np.testing.assert_allclose(done.displacement[:3], [0, 0.006, 0], atol=8e-4)
+    assert abs(done.displacement[3]) < np.radians(0.5) and done.tilt < np.radians(1)
+
+
+def test_a_seed_presents_the_same_scene_again(box_cell: BoxCell):
+    first, again = box_cell.present(), box_cell.present()
+    np.testing.assert_array_equal(first.frame.depth, again.frame.depth)
+    assert first.plan is not None and again.plan is not None
+    np.testing.assert_array_equal(first.plan.candidates.as_vector(), again.plan.candidates.as_vector())
+
+
+def test_depth_is_captured_in_the_resolution_of_a_file(box_cell: BoxCell):
+    steps = box_cell.engine.capture().depth.astype(np.float64) / 1e-4
+    assert np.abs(steps - np.rint(steps)).max() < 0.01
+    # Beyond 6.5535 m a file holds nothing. The toy camera's k-th frame is k metres away.
+    cell = toy_cell()
+    engine = TrialEngine(cell, Operator(cell, yes=True))
+    seen = [engine.capture().depth for _ in range(3)]
+    with pytest.raises(CaptureFailed):
+        engine.capture()
+    seen += [engine.capture().depth for _ in range(3)]
+    assert [float(np.nanmax(depth)) for depth in seen[:5]] == pytest.approx([1, 2, 3, 5, 6], abs=1e-6)
+    assert np.isnan(seen[5]).all() and np.isnan(seen[0][0, 0])
+
+
+def test_a_grasp_over_the_part_misses_and_one_on_its_top_collides(box_cell: BoxCell):
+    over = box_cell.present(up=0.06)
+    assert over.plan is not None
+    missed = box_cell.engine.grasp(over.plan)
+    assert missed.reason == "missed" and missed.displacement is None and missed.before is not None
+    # 45 mm aside, a finger of 26 mm comes down on the box.
+    beside = box_cell.present(across=0.045)
+    assert beside.plan is not None
+    collided = box_cell.engine.grasp(beside.plan)
+    assert collided.reason == "collided" and "force" in collided.aborted
+    with pytest.raises(NeedsRecovery):
+        box_cell.engine.cell.arm.move_gripper(0.04)
+    box_cell.engine.recover(MotionAborted(collided.aborted))
+    box_cell.engine.home()
+    np.testing.assert_allclose(
+        box_cell.engine.cell.arm.state().joints, box_cell.engine.cell.workspace.home, atol=0.01
+    )
+
+
+def test_a_grasp_out_of_reach_is_refused_before_anything_moves(box_cell: BoxCell):
+    planned = box_cell.present()
+    assert planned.plan is not None
+    far = dataclasses.replace(planned.plan, grasp=Grasp.from_vector(np.array([1.0, 0.0, 0.02, 0.0])))
+    joints = box_cell.engine.cell.arm.state().joints
+    done = box_cell.engine.grasp(far)
+    assert (done.reason, done.result, done.aborted) == ("OutOfWorkspace", None, "")
+    np.testing.assert_array_equal(box_cell.engine.cell.arm.state().joints, joints)
+
+
+def test_a_part_for_which_no_grasp_is_found_is_a_result_with_the_errors_name(box_cell: BoxCell):
+    certain = planner(PlannerConfig(n_candidates=20, min_quality=1.0))
+    planned = box_cell.engine.present(box_cell.part, box_cell.seed, certain)
+    assert planned.plan is None and planned.reason == "NoGraspFound"
+
+
+def test_an_operator_who_is_asked_sees_the_plan_and_may_have_the_part_placed_again(
+    box_cell: BoxCell, tmp_path, monkeypatch
+):
+    cell = box_cell.engine.cell
+    monkeypatch.setattr(type(cell.arm), "simulated", False)
+    asked = io.StringIO()
+    operator = Operator(cell, answers=io.StringIO("n\ny\n"), prompts=asked)
+    engine = TrialEngine(cell, operator, picture=tmp_path / "next.png")
+    planned = engine.present(
+        box_cell.part, box_cell.seed, BesideTheMiddle(engine, 0.0, 0.0, 0.0), then="then to the pallet"
+    )
+    assert planned.plan is not None and (tmp_path / "next.png").stat().st_size > 10_000
+    assert asked.getvalue().count(f"{planned.plan.summary}; then to the pallet") == 2
+
+
+def test_a_person_who_stops_the_arm_is_not_overruled(box_cell: BoxCell):
+    with pytest.raises(Stopped, match="by hand"):
+        box_cell.engine.recover(Stopped("by hand"))
+
+
+def test_the_displacement_of_the_seen_centre_follows_the_rigid_motion():
+    """By hand: the part turns by a quarter turn about its origin, 10 mm from which its seen centre lies."""
+    plan = planner(PlannerConfig(n_candidates=20)).plan(FRAME, np.random.default_rng(0))
+    x_grasp = plan.grasp.T_base_grasp.as_matrix()[:3, 0]
+    before = Pose(position=plan.view.centre_base - 0.01 * x_grasp, quat_wxyz=np.array([1.0, 0, 0, 0]))
+    done = ExecutedGrasp(reason="", before=before, displacement=np.array([0.001, 0.0, 0.002, np.pi / 2]))
+    # The centre moves from (10, 0) mm to (0, 10) mm as seen from the origin.
+    expected = [0.001 - 0.01, 0.01, 0.002, np.pi / 2]
+    np.testing.assert_allclose(done.displacement_of_centre(plan), expected, atol=1e-12)
+    assert dataclasses.replace(done, before=None).displacement_of_centre(plan) is None
+
+
+def test_a_real_cell_is_not_connected_where_nobody_can_be_asked(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    monkeypatch.setattr(Cell, "connected", None)  # would fail if it were tried
+    with (
+        pytest.raises(UsageError, match="standard input is no terminal"),
+        connected_engine(config_file("cells/panda_kinect2.yaml"), yes=False, picture=tmp_path, tape=None),
+    ):
+        pass
