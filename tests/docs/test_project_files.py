@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
+import pytest
 import yaml
 
 import mskgrasp
 from tests.docs.pages import ROOT
+
+TESTED_BY_NAME = ("mskgrasp",)
+"""Packages of which every module has a test module of its name."""
 
 
 def test_hooks_use_the_ruff_that_is_pinned():
@@ -39,3 +44,19 @@ def test_the_architecture_names_every_room():
         init.parent for package in ("mskgrasp", "hal") for init in (ROOT / package).glob("*/__init__.py")
     ]
     assert not [str(room) for room in rooms if f"`{room.parent.name}.{room.name}`" not in page]
+
+
+@pytest.mark.parametrize("package", TESTED_BY_NAME)
+def test_every_module_has_a_test_module_of_its_name_in_the_mirrored_folder(package: str):
+    """``mskgrasp/a/b.py`` is tested by ``tests/a/test_b.py``, ``hal/a/b.py`` by ``tests/hal/a/test_b.py``."""
+    tests = ROOT / "tests" if package == "mskgrasp" else ROOT / "tests" / package
+    modules = [path.relative_to(ROOT / package) for path in (ROOT / package).rglob("*.py")]
+    modules = [path for path in modules if not path.name.startswith("__")]
+    assert len(modules) > 10
+    without = [str(path) for path in modules if not has_tests(tests / path.with_name(f"test_{path.name}"))]
+    assert not without, f"without a test module of their name: {', '.join(sorted(without))}"
+
+
+def has_tests(path: Path) -> bool:
+    """Whether a file holds a test."""
+    return path.is_file() and bool(re.search(r"^def test_", path.read_text(encoding="utf-8"), flags=re.M))

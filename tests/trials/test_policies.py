@@ -16,7 +16,7 @@ from mskgrasp.trials.policies import Candidates, Chooser, RepeatedPlanner
 from mskgrasp.trials.predictors import NetworkPredictor, PartObservation
 from tests.planning.hand_made import FRAME, planner
 
-CONFIG = PlannerConfig(n_candidates=300, top_fraction=0.1)
+CONFIG = PlannerConfig(n_candidates=100, top_fraction=0.3)
 
 
 def rng(seed: int = 0) -> np.random.Generator:
