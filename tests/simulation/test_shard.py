@@ -15,7 +15,8 @@ from mskgrasp.core.grasp import MAX_DISPLACEMENT, lowest_grasp_z
 from mskgrasp.core.settings import REGION, TABLE_Z
 from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.parts import find_part
-from mskgrasp.simulation.shard import FIELDS, Simulator, discard_reason, draw_attempt
+from mskgrasp.simulation import shard
+from mskgrasp.simulation.shard import FIELDS, MOST_REDRAWS, Simulator, discard_reason, draw_attempt
 from mskgrasp.simulation.shard_task import ShardTask
 from tasks.attempt.outcome import MAX_PENETRATION, MAX_SPEED
 from tests.collecting import PARTS
@@ -81,6 +82,26 @@ def test_a_part_that_the_camera_does_not_see_has_no_grasp(simulator: Simulator, 
     monkeypatch.setattr(env, "begin_episode", beside_the_region)
     depth, grasp = draw_attempt(env, PART, 5, 0)
     assert grasp is None and depth.shape == (160, 160)
+
+
+def test_a_part_that_is_not_at_rest_is_drawn_again_and_discarded_where_it_never_is(
+    simulator: Simulator, monkeypatch
+):
+    """As if the part of the first attempt were at rest in its third scene, and that of the second in none."""
+    reasons = iter(["unsettled"] * 2 + [""] + ["unsettled"] * (1 + MOST_REDRAWS))
+    monkeypatch.setattr(shard, "discard_reason", lambda *_: next(reasons))
+    task = ShardTask(part=PART, folder=str(find_part(PART).folder), index=0, first=0, n=2, seed=5)
+    run, yields = simulator.run(task), []
+    with pytest.raises(StopIteration) as ended:
+        while True:
+            yields.append(next(run))
+    attempts, info = ended.value.value
+    assert yields[0] in (0, 1) and yields[1:] == [-1] and len(attempts) == 1
+    assert info.redrawn == 2 + MOST_REDRAWS and info.discarded == {"unsettled": 1}
+    assert next(reasons, None) is None
+    # The attempt that is kept is that of the third scene.
+    third = draw_attempt(simulator.load(task.folder), PART, 5, 0, 2)
+    np.testing.assert_array_equal(attempts.depth[0], third[0])
 
 
 def attempt(**changes: float) -> tuple[dict[str, torch.Tensor], dict[str, np.ndarray]]:

@@ -44,6 +44,9 @@ def test_without_a_tracker_a_success_is_counted_and_not_measured(box_cell: BoxCe
     assert trial.unmeasured.startswith("no tracker: measure by tape")
     assert planned.plan is not None
     np.testing.assert_array_equal(trial.point_base, planned.plan.view.centre_base)
+    # What the fingers feel is all that is known of a grasp over the part.
+    over = run_trial(engine, box_cell.present(up=0.06), part="box", number=1, seed=0).trial
+    assert (over.success, over.reason, over.measured) == (False, "missed", None)
 
 
 def test_after_a_contact_the_arm_is_recovered(box_cell: BoxCell):
