@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
-from hal import Camera, RgbdFrame, Workspace
+from hal import Camera, RgbdFrame
 from hal.camera_calibration import Calibration, write_calibration
 from hal.doctor.checks import (
     check_calibration,
@@ -22,59 +22,9 @@ from hal.doctor.checks import (
 )
 from hal.doctor.run import examine
 from hal.errors import CaptureFailed
-from hal.table import fit_table
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.geometry import Pose
-
-INTRINSICS = np.array([[365.5, 0, 79.5], [0, 365.5, 79.5], [0, 0, 1.0]])
-DOWN = Pose(position=np.array([0.5, 0.0, 0.8]), quat_wxyz=np.array([0.0, 1.0, -1.0, 0.0]) / np.sqrt(2))
-WORKSPACE = Workspace(
-    table_z=0.0,
-    region=(0.38, 0.62, -0.12, 0.12),
-    home=np.zeros(7),
-    min_height=0.006,
-    lift_height=0.1,
-    grasp_force=20.0,
-)
-
-
-def frame_of_table(z: float = 0.0, slope_x: float = 0.0, part: bool = False, pose: Pose = DOWN) -> RgbdFrame:
-    """A plane z + slope_x (x - 0.5) seen from `DOWN`; a part 4 cm high covers a fifth of the region."""
-    rows, columns = np.mgrid[0:160, 0:160]
-    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(INTRINSICS).T
-    unit = DOWN.apply(rays) - DOWN.position
-    # origin + t unit on the plane
-    normal = np.array([-slope_x, 0.0, 1.0])
-    t = (normal @ (np.array([0.5, 0.0, z]) - DOWN.position)) / (unit @ normal)
-    depth = t.astype(np.float32)
-    if part:
-        depth[50:100, 50:100] -= 0.04
-    return RgbdFrame(
-        colour=np.zeros((160, 160, 3), np.uint8),
-        depth=depth,
-        intrinsics=INTRINSICS,
-        T_base_camera=pose,
-        timestamp_s=time.monotonic(),
-        serial="a",
-    )
-
-
-def plane_of(frame: RgbdFrame):
-    return fit_table(frame.depth, frame.intrinsics, frame.T_base_camera, WORKSPACE.region, 0.0)
-
-
-@pytest.mark.parametrize("part", [False, True])
-@pytest.mark.parametrize(("z", "slope"), [(0.0, 0.0), (0.012, 0.0), (-0.024, 0.02)])
-def test_the_tables_height_and_tilt_are_found_with_a_part_on_it(z: float, slope: float, part: bool):
-    plane = plane_of(frame_of_table(z, slope, part))
-    assert plane is not None
-    assert plane.z == pytest.approx(z, abs=1e-4)
-    assert plane.tilt_rad == pytest.approx(np.arctan(slope), abs=1e-3)
-
-
-def test_an_image_without_depth_has_no_table():
-    frame = frame_of_table()
-    assert plane_of(dataclasses.replace(frame, depth=np.full_like(frame.depth, np.nan))) is None
+from tests.hal.flat_table import DOWN, WORKSPACE, frame_of_table
 
 
 @pytest.mark.parametrize(

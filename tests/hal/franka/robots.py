@@ -20,6 +20,8 @@ import numpy as np
 import pytest
 import yaml
 
+from hal import cell_from_yaml
+from hal.franka import FrankaArm
 from hal.franka.driver import DriverName
 
 HOSTS = (f"127.{os.getpid() >> 8 & 255}.{os.getpid() & 255}.{k}" for k in itertools.count(1))
@@ -130,6 +132,13 @@ def write_cell(
     }
     path.write_text(yaml.safe_dump(values))
     return path
+
+
+def arm_at(folder: Path, driver: DriverName, host: str, **settings: object) -> FrankaArm:
+    """The arm of `write_cell`, not connected."""
+    arm = cell_from_yaml(write_cell(folder, driver, host, **settings)).arm
+    assert isinstance(arm, FrankaArm)
+    return arm
 
 
 def build_model(folder: Path) -> Path:
