@@ -11,10 +11,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.franka import FrankyArmConfig, PandaPyArmConfig
+from hal.franka import PandaPyArmConfig
 from hal.franka.faults import explain
 from mskgrasp.core.grasp import pose_base_tcp
-from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER, forward, reachable, track
+from mskgrasp.core.panda_kinematics import forward, reachable, track
 
 HOME = np.array([0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398])
 PANDA = PandaPyArmConfig(driver="panda_py", host="x")
@@ -64,15 +64,6 @@ def test_a_vendors_text_has_one_meaning(text: str, kind: str):
     error = explain(RuntimeError(text), "panda_py", "robot")
     assert type(error).__name__ == kind
     assert "\n" not in str(error)
-
-
-def test_both_robots_have_their_own_limits():
-    fr3 = FrankyArmConfig(driver="franky", host="x", robot="fr3", joint_margin=0.0)
-    panda = FrankyArmConfig(driver="franky", host="x", robot="panda", joint_margin=0.0)
-    assert panda.joint_lower() == pytest.approx(JOINT_LOWER)
-    assert panda.joint_upper() == pytest.approx(JOINT_UPPER)
-    assert fr3.joint_lower()[5] == pytest.approx(0.5445)  # FR3: joint 6 does not reach zero
-    assert (LOWER > panda.joint_lower()).all() and (UPPER < panda.joint_upper()).all()
 
 
 def test_neither_vendor_nor_simulator_is_imported_before_an_arm_connects():

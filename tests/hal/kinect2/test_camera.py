@@ -207,8 +207,3 @@ def test_a_cold_camera_says_that_its_depth_drifts(bench: Bench, caplog: pytest.L
     with caplog.at_level(logging.WARNING), bench.camera(warm_up_s=1200):
         pass
     assert "drifts by millimetres for the first 20 minutes" in caplog.text
-
-
-def test_a_serial_without_quotes_is_explained():
-    with pytest.raises(BadConfig, match="must be in quotes"):
-        check_config(Kinect2Config, dict(driver="kinect2", serial=12345, calibration="c.yaml"), "cell.yaml")

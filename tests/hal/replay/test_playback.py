@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from hal import execute_grasp
-from hal.errors import CaptureFailed, NeedsRecovery, NotRecorded
-from hal.replay import ReplayCamera, ReplayCameraConfig
+from hal.errors import NeedsRecovery, NotRecorded
 from mskgrasp.core.grasp import Grasp
 from tests.hal.replay.program import GRASP, replayed
 
@@ -48,14 +47,3 @@ def test_commands_may_differ_by_the_tolerances_and_no_more(recording: Path):
 def test_a_frame_comes_where_it_was_taken(recording: Path):
     with replayed(recording).connected() as cell, pytest.raises(NotRecorded, match="asks for capture"):
         cell.camera.capture()
-
-
-def test_a_camera_may_begin_again(recording: Path):
-    with ReplayCamera(ReplayCameraConfig(driver="replay", recording=recording, loop=True)) as camera:
-        seen = []
-        for _ in range(11):
-            try:
-                seen.append(int(camera.capture().depth[1, 1]))
-            except CaptureFailed:
-                seen.append(0)
-    assert seen == [1, 2, 3, 0, 5, 1, 2, 3, 0, 5, 1]

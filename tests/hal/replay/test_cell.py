@@ -8,19 +8,8 @@ from pathlib import Path
 import pytest
 
 from hal import Cell, cell_from_yaml
-from hal.errors import (
-    BadRecording,
-    CaptureFailed,
-    NotConnected,
-    Stopped,
-)
-from hal.replay import (
-    ReplayArm,
-    ReplayArmConfig,
-    ReplayCamera,
-    ReplayCameraConfig,
-    recorded_cell,
-)
+from hal.errors import BadRecording
+from hal.replay import recorded_cell
 from mskgrasp.core.errors import BadConfig
 from tests.hal.replay.program import replayed, run_on
 from tests.hal.replay.toy import toy_cell
@@ -38,31 +27,6 @@ def test_the_same_program_gets_the_same_answers(recording: Path, tmp_path: Path)
         assert json.dumps(played) == json.dumps(live)  # NaN compares as text
     assert cell.workspace.region == (0.3, 0.6, -0.1, 0.1)
     assert cell.arm.limits.max_force == 70.0
-
-
-def test_stop_from_the_program_ends_what_follows(recording: Path):
-    arm = ReplayArm(ReplayArmConfig(driver="replay", recording=recording))
-    with arm:
-        arm.stop()
-        with pytest.raises(Stopped, match="stop"):
-            arm.move_gripper(0.08)
-
-
-def test_camera_and_arm_play_back_alone(recording: Path):
-    camera = ReplayCamera(ReplayCameraConfig(driver="replay", recording=recording))
-    with camera:
-        assert [camera.capture().depth[1, 1] for _ in range(3)] == [1, 2, 3]
-        with pytest.raises(CaptureFailed, match="no frame within 5 s"):
-            camera.capture()
-        assert camera.capture().depth[1, 1] == 5
-        with pytest.raises(CaptureFailed, match="all 5 frames.*camera.loop"):
-            camera.capture()
-    arm = ReplayArm(ReplayArmConfig(driver="replay", recording=recording))
-    with arm:
-        arm.move_gripper(0.08)
-        assert arm.state().gripper_width == 0.08
-    with pytest.raises(NotConnected):
-        arm.state()
 
 
 def test_cell_files_of_recordings_are_checked(recording: Path, tmp_path: Path):
