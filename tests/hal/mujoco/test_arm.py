@@ -79,7 +79,7 @@ def test_a_straight_motion_keeps_line_speed_and_acceleration(
 
 
 def test_after_contact_the_arm_rests_where_it_met_something(cell: Cell, paths: list[np.ndarray]):
-    """A finger on the nut: what still presses is under the reflex, and the next path begins where the arm is."""
+    """A finger on the nut: it presses by less than the reflex, and the next path begins where the arm is."""
     assert cell.feeder is not None and cell.tracker is not None
     cell.feeder.present("hex_nut_m30", 0)
     x, y, _ = cell.tracker.part_pose().position
