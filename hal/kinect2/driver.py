@@ -201,7 +201,8 @@ def import_vendor() -> Any:
             "pylibfreenect2 is not installed; build libfreenect2 first (docs/kinect2.md), then "
             "pip install 'mskgrasp[kinect2]'"
         )
-    if importlib.util.find_spec("pkg_resources") is None:
+    # Once the stand-in is there, `find_spec` refuses it: it has no spec.
+    if "pkg_resources" not in sys.modules and importlib.util.find_spec("pkg_resources") is None:
         # pylibfreenect2 0.1.4 asks it for its own version; setuptools 82 has dropped it.
         shim: Any = types.ModuleType("pkg_resources")
         shim.get_distribution = importlib.metadata.distribution

@@ -67,6 +67,7 @@ def _add_part(spec: mujoco.MjSpec, name: str, part: Part, physics: MujocoPhysics
     body = spec.worldbody.add_body(name=name, explicitinertial=True)
     body.add_freejoint(name=name)
     body.mass = part.mass
+    body.ipos = [0, 0, 0]  # where it is not set, MuJoCo ignores `iquat`, too
     body.iquat = part.quat_obj_principal
     body.inertia = part.principal_inertia
     contact = _contact(physics, physics.friction_table_part)

@@ -6,11 +6,8 @@ import itertools
 
 import numpy as np
 import pytest
-import torch
 
-from mskgrasp.core.grasp import FINGER_HALF_WIDTH, FINGER_THICKNESS, PAD_REACH, PALM_HEIGHT
-from mskgrasp.core.panda_kinematics import top_down
-from tasks.attempt.clearance import MARGIN, hand_clearance
+from tasks.attempt.clearance import hand_clearance
 
 FIELDS = ("success", "failure", "displacement", "tilt")
 
@@ -18,32 +15,6 @@ FIELDS = ("success", "failure", "displacement", "tilt")
 def box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> np.ndarray:
     """Corners (8, 3) in the grasp frame, from millimetres."""
     return np.array(list(itertools.product(x, y, z))) * 1e-3
-
-
-def test_the_hand_is_as_large_as_its_collision_shapes(env):
-    grasp = torch.tensor([[0.5, 0.0, 0.25, 0.0]], dtype=torch.float64)
-    env.motion.place(top_down(grasp)[0])
-    tcp = env.agent.tcp._objs[0].entity.pose
-    corners = {}
-    for name in ("panda_hand", "panda_leftfinger", "panda_rightfinger"):
-        link = env.agent.robot.links_map[name]._objs[0]
-        for shape in link.collision_shapes:
-            matrix = (tcp.inv() * link.entity.pose * shape.local_pose).to_transformation_matrix()
-            local = (
-                shape.vertices * shape.scale
-                if hasattr(shape, "vertices")
-                else np.array(list(itertools.product((-1, 1), repeat=3))) * shape.half_size
-            )
-            corners.setdefault(name, []).append(local @ matrix[:3, :3].T + matrix[:3, 3])
-    fingers = np.concatenate(corners["panda_leftfinger"] + corners["panda_rightfinger"])
-    slack = 2e-4
-    assert np.abs(fingers[:, 0]).max() == pytest.approx(FINGER_HALF_WIDTH, abs=slack)
-    assert np.abs(fingers[:, 1]).min() == pytest.approx(0.04, abs=slack)
-    assert np.abs(fingers[:, 1]).max() == pytest.approx(0.04 + FINGER_THICKNESS, abs=slack)
-    assert fingers[:, 2].max() == pytest.approx(PAD_REACH, abs=slack)
-    # z of the TCP points down: the palm's lowest point has the greatest.
-    assert np.concatenate(corners["panda_hand"])[:, 2].max() == pytest.approx(-PALM_HEIGHT, abs=slack)
-    assert slack < MARGIN
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,14 @@
 from __future__ import annotations
 
-from xml.etree import ElementTree
-
 import numpy as np
 import pytest
 import torch
 
 from mskgrasp.core.grasp import TABLE_CLEARANCE, lowest_grasp_z
 from mskgrasp.core.minimum_jerk import minimum_jerk_steps
-from mskgrasp.core.panda_kinematics import HOME, forward_pose
 from mskgrasp.core.settings import Physics
 from tasks.attempt.attempt import AHEAD
 from tasks.robot.motion import PandaMotion, run_up
-from tasks.robot.panda import BARE_FRAMES
 
 SOFT = {"finger_stiffness": 2000.0, "finger_damping": 50.0}
 
@@ -256,15 +252,3 @@ def test_where_an_arm_is_on_its_path_does_not_depend_on_the_rate(env, place, mon
         assert np.abs(other[:n] - finest[:n]).max() < 6e-5
         seconds = (other[:n] - finest[:n]) @ speeds[:n] / (speeds[:n] @ speeds[:n])
         assert abs(seconds) < 1e-4
-
-
-def test_without_bare_frames_the_hand_is_where_it_was(env):
-    links = env.agent.robot.links_map
-    assert not set(BARE_FRAMES) & set(links)
-    q = np.array(HOME) + np.array([0.2, 0.1, -0.15, -0.1, 0.3, 0.2, -0.4])
-    env.motion.place(q[None])
-    expected = forward_pose(q)
-    assert env.tcp_pose().position[0].numpy() == pytest.approx(expected.position, abs=1e-5)
-    assert abs(env.tcp_pose().quat_wxyz[0].numpy() @ expected.quat_wxyz) == pytest.approx(1, abs=1e-6)
-    masses = (float(mass.get("value", "0")) for mass in ElementTree.parse(env.agent.urdf_path).iter("mass"))
-    assert sum(float(link._objs[0].mass) for link in links.values()) == pytest.approx(sum(masses), abs=1e-4)

@@ -20,7 +20,11 @@ import numpy as np
 import pytest
 import yaml
 
-from hal.franka.driver import DriverName
+from hal import cell_from_yaml
+from hal.franka import FrankaArm, PandaPyArmConfig
+from hal.franka.driver import DriverName, DriverSettings
+from hal.franka.link import DriverLink
+from hal.franka.path import JointPath
 
 HOSTS = (f"127.{os.getpid() >> 8 & 255}.{os.getpid() & 255}.{k}" for k in itertools.count(1))
 TIMEOUT_S = 120.0
@@ -130,6 +134,33 @@ def write_cell(
     }
     path.write_text(yaml.safe_dump(values))
     return path
+
+
+def arm_at(folder: Path, driver: DriverName, host: str, **settings: object) -> FrankaArm:
+    """The arm of `write_cell`, not connected."""
+    arm = cell_from_yaml(write_cell(folder, driver, host, **settings)).arm
+    assert isinstance(arm, FrankaArm)
+    return arm
+
+
+@contextmanager
+def linked(driver: DriverName, host: str) -> Iterator[DriverLink]:
+    """A driver in its process, connected to a robot; patient with a busy machine."""
+    arm = PandaPyArmConfig(driver="panda_py", host=host)
+    settings = DriverSettings(
+        host=host, realtime=False, contact_torque=[20.0] * 7, contact_force=20.0,
+        stiffness=list(arm.stiffness), damping=list(arm.damping), settle_s=10.0,
+    )  # fmt: skip
+    link = DriverLink(driver, settings, TIMEOUT_S)
+    try:
+        yield link
+    finally:
+        link.close()
+
+
+def plain_path(path: JointPath) -> dict[str, list]:
+    """A path as it is sent to a driver."""
+    return {key: np.asarray(value).tolist() for key, value in vars(path).items()}
 
 
 def build_model(folder: Path) -> Path:

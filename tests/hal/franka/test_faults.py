@@ -5,44 +5,28 @@ The drivers are the real wheels over the real wire protocol; the faults are made
 
 from __future__ import annotations
 
-import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from hal import Arm, cell_from_yaml
-from hal.arm import JOINT_TOLERANCE
+from hal import Arm
 from hal.errors import (
     CommunicationLost,
-    DriverMissing,
-    IncompatibleDriver,
     MotionAborted,
     NeedsRecovery,
     NotConnected,
 )
-from hal.franka import FrankaArm
-from hal.franka.driver import DriverName, DriverSettings
-from hal.franka.path import JointPath, joint_path
-from mskgrasp.core.geometry import Pose
-from tests.hal.franka.robots import HOSTS, TIMEOUT_S, FakeRobot, fci5, robot_for, write_cell
-
-
-def arm_at(folder: Path, driver: DriverName, host: str, **settings: object) -> FrankaArm:
-    arm = cell_from_yaml(write_cell(folder, driver, host, **settings)).arm
-    assert isinstance(arm, FrankaArm)
-    return arm
+from hal.franka.driver import DriverName
+from tests.hal.franka.robots import TIMEOUT_S, FakeRobot, arm_at, fci5, robot_for, write_cell
 
 
 @contextmanager
@@ -315,124 +299,8 @@ def test_a_part_between_the_pads_is_held_at_its_width(driver: DriverName, robot:
         assert arm.grasp(20.0).holding is False
 
 
-def test_a_hand_that_was_never_homed_is_homed_by_the_first_command_and_not_by_connecting(tmp_path: Path):
-    with fci5() as robot:
-        robot.order("unhomed")
-        with arm_at(tmp_path, "panda_py", robot.host) as arm:
-            assert arm.state().gripper_width == pytest.approx(0.06)
-            arm.move_gripper(0.05)
-            arm.move_gripper(0.08)
-            assert arm.state().gripper_width == pytest.approx(0.0797)  # all that homing found
-
-
-@pytest.mark.parametrize(("driver", "version"), [("franky", 5), ("panda_py", 6)])
-def test_a_robot_of_another_version_is_reported_with_the_remedy(
-    driver: DriverName, version: int, tmp_path: Path
-):
-    with fci5(version=version) as robot:
-        with pytest.raises(IncompatibleDriver, match="which wheel fits") as caught:
-            arm_at(tmp_path, driver, robot.host).connect()
-        assert "\n" not in str(caught.value)
-
-
-def test_no_robot_at_the_address_is_reported(driver: DriverName, tmp_path: Path):
-    with pytest.raises(NotConnected, match="no robot at 127.0.0.250"):
-        arm_at(tmp_path, driver, "127.0.0.250").connect()
-
-
-def test_a_missing_package_is_reported_with_its_extra(driver: DriverName, tmp_path: Path, monkeypatch):
-    name = {"franky": "franky", "panda_py": "panda_py"}[driver]
-    (tmp_path / f"{name}.py").write_text(f"raise ModuleNotFoundError('No module named {name}')")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    with pytest.raises(DriverMissing, match=r"pip install 'mskgrasp\[franka\]'"):
-        arm_at(tmp_path, driver, "127.0.0.250").connect()
-
-
-def test_another_end_effector_in_desk_is_reported(tmp_path: Path):
-    """Our server alone: franky-sim's hand cannot be taken off."""
-    with fci5() as robot:
-        robot.order("flange")
-        with pytest.raises(NotConnected, match=r"end effector is at \(0.0000, .*choose it in Desk"):
-            arm_at(tmp_path, "panda_py", robot.host).connect()
-
-
-def test_a_driver_that_hangs_is_ended_and_told_even_where_it_reads_no_request(tmp_path: Path):
-    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
-        link = arm._link
-        assert link is not None
-        os.kill(link.pid, signal.SIGSTOP)
-        begin = time.monotonic()
-        with pytest.raises(CommunicationLost, match="did not answer 'move' within 1.0 s"):
-            link.ask("move", timeout_s=1.0, seconds=[0.0] * 100_000)  # more than a pipe holds
-        assert time.monotonic() - begin < 30
-        with pytest.raises(CommunicationLost, match="ended by SIGKILL"):
-            arm.state()
-
-
-def test_a_driver_whose_program_was_killed_while_it_connected_ends_by_itself(driver: DriverName):
-    """It must not take the robot later, when another program has left it."""
-    host = next(HOSTS)
-    settings = DriverSettings(
-        host=host, realtime=False, contact_torque=[20.0] * 7, contact_force=20.0,
-        stiffness=[], damping=[], settle_s=1.0,
-    )  # fmt: skip
-    request = {"id": 1, "op": "connect", "settings": asdict(settings), "alarm_s": 3}
-    with socket.create_server((host, 1337)):  # takes the call and says nothing
-        worker = subprocess.Popen(
-            [sys.executable, "-m", "hal.franka.worker", driver],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-        )
-        assert worker.stdin is not None
-        worker.stdin.write(json.dumps(request).encode() + b"\n")
-        worker.stdin.close()
-        assert worker.wait(TIMEOUT_S) in (0, -signal.SIGALRM)
-
-
-def test_pads_that_meet_something_on_their_way_are_reported(tmp_path: Path):
-    """Our server alone: the fingers of franky-sim never come to rest when pressed against a stop."""
-    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
-        robot.order("part 0.03")
-        with pytest.raises(MotionAborted, match="pads stopped at 0.0300 m instead of 0.0100 m"):
-            arm.move_gripper(0.01)
-        arm.recover()
-        arm.move_gripper(0.05)
-
-
 def test_leaving_the_context_in_mid_motion_stops_the_arm(tmp_path: Path):
     with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
         with once_moving(robot, arm.close), pytest.raises((MotionAborted, CommunicationLost)):
             slow(arm)
         assert_at_rest(robot)
-
-
-def test_the_config_bounds_the_speed_whatever_a_program_asks_for(tmp_path: Path):
-    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host, max_speed=0.05) as arm:
-        here = arm.state().T_base_tcp
-        target = Pose(position=here.position - np.array([0, 0, 0.05]), quat_wxyz=here.quat_wxyz)
-        begin = time.monotonic()
-        arm.move_to_pose(target, speed=1.0)
-        assert time.monotonic() - begin > 15 / 8 * 0.05 / 0.05 * 0.9
-
-
-def test_a_motion_that_the_solver_gives_up_is_planned_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Speeds that no joint can have are what makes it give up every time."""
-    impossible = [2, 3]
-
-    def path_from(*args: Any, **settings: Any) -> JointPath:
-        path = joint_path(*args, **settings)
-        if impossible[0] == 0:
-            return path
-        impossible[0] -= 1
-        return replace(path, speeds=1e3 * path.speeds)
-
-    monkeypatch.setattr("hal.franka.arm.joint_path", path_from)
-    with robot_for("franky") as robot, arm_at(tmp_path, "franky", robot.host) as arm:
-        goal = arm.state().joints + np.array([0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1])
-        arm.move_to_joints(goal, speed=0.5)
-        stood = arm.state().joints
-        assert impossible[0] == 0 and stood == pytest.approx(goal, abs=JOINT_TOLERANCE)
-        impossible[:] = impossible[1:]
-        with pytest.raises(MotionAborted, match="planner failed with error code"):
-            arm.move_to_joints(goal - 0.1, speed=0.5)
-        assert impossible[0] == 0 and arm.state().joints == pytest.approx(stood, abs=JOINT_TOLERANCE)

@@ -15,6 +15,8 @@ from mskgrasp.core.geometry import Pose
 
 FAKE = Path(__file__).parent / "fake"
 SERIAL = "000583142247"
+BUSY_S = 20.0
+"""A busy machine may take this much longer."""
 # The optical frame over the table's middle: the image's top is away from the base, z down.
 OVERHEAD = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 

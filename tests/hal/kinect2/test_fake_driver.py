@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import importlib.util
 import inspect
-import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -14,20 +13,6 @@ import pytest
 from tests.hal.kinect2.bench import FAKE
 
 STUB = Path(__file__).parent / "pylibfreenect2_0_1_4.pyi"
-
-
-@pytest.fixture
-def fake(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    from hal.kinect2.driver import import_vendor
-
-    before = set(sys.modules)
-    monkeypatch.syspath_prepend(str(FAKE))
-    try:
-        yield import_vendor()
-    finally:
-        for name in set(sys.modules) - before:
-            if name.split(".")[0] in ("pylibfreenect2", "pkg_resources"):
-                del sys.modules[name]
 
 
 def stub_classes() -> list[ast.ClassDef]:

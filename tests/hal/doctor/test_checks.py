@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
-from hal import Camera, RgbdFrame, Workspace
+from hal import Camera, RgbdFrame
 from hal.camera_calibration import Calibration, write_calibration
 from hal.doctor.checks import (
     check_calibration,
@@ -20,61 +19,9 @@ from hal.doctor.checks import (
     check_view,
     implausible,
 )
-from hal.doctor.run import examine
 from hal.errors import CaptureFailed
-from hal.table import fit_table
-from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.geometry import Pose
-
-INTRINSICS = np.array([[365.5, 0, 79.5], [0, 365.5, 79.5], [0, 0, 1.0]])
-DOWN = Pose(position=np.array([0.5, 0.0, 0.8]), quat_wxyz=np.array([0.0, 1.0, -1.0, 0.0]) / np.sqrt(2))
-WORKSPACE = Workspace(
-    table_z=0.0,
-    region=(0.38, 0.62, -0.12, 0.12),
-    home=np.zeros(7),
-    min_height=0.006,
-    lift_height=0.1,
-    grasp_force=20.0,
-)
-
-
-def frame_of_table(z: float = 0.0, slope_x: float = 0.0, part: bool = False, pose: Pose = DOWN) -> RgbdFrame:
-    """A plane z + slope_x (x - 0.5) seen from `DOWN`; a part 4 cm high covers a fifth of the region."""
-    rows, columns = np.mgrid[0:160, 0:160]
-    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(INTRINSICS).T
-    unit = DOWN.apply(rays) - DOWN.position
-    # origin + t unit on the plane
-    normal = np.array([-slope_x, 0.0, 1.0])
-    t = (normal @ (np.array([0.5, 0.0, z]) - DOWN.position)) / (unit @ normal)
-    depth = t.astype(np.float32)
-    if part:
-        depth[50:100, 50:100] -= 0.04
-    return RgbdFrame(
-        colour=np.zeros((160, 160, 3), np.uint8),
-        depth=depth,
-        intrinsics=INTRINSICS,
-        T_base_camera=pose,
-        timestamp_s=time.monotonic(),
-        serial="a",
-    )
-
-
-def plane_of(frame: RgbdFrame):
-    return fit_table(frame.depth, frame.intrinsics, frame.T_base_camera, WORKSPACE.region, 0.0)
-
-
-@pytest.mark.parametrize("part", [False, True])
-@pytest.mark.parametrize(("z", "slope"), [(0.0, 0.0), (0.012, 0.0), (-0.024, 0.02)])
-def test_the_tables_height_and_tilt_are_found_with_a_part_on_it(z: float, slope: float, part: bool):
-    plane = plane_of(frame_of_table(z, slope, part))
-    assert plane is not None
-    assert plane.z == pytest.approx(z, abs=1e-4)
-    assert plane.tilt_rad == pytest.approx(np.arctan(slope), abs=1e-3)
-
-
-def test_an_image_without_depth_has_no_table():
-    frame = frame_of_table()
-    assert plane_of(dataclasses.replace(frame, depth=np.full_like(frame.depth, np.nan))) is None
+from tests.hal.flat_table import DOWN, WORKSPACE, frame_of_table
 
 
 @pytest.mark.parametrize(
@@ -187,35 +134,3 @@ def test_a_wheel_for_another_robot_is_found():
     for arm in both:
         (finding,) = check_drivers(dict(type="devices", arm=arm, camera=dict(driver="replay")))
         assert finding.level in ("warn", "fail") and str(arm["driver"]) in finding.subject
-
-
-def test_an_arms_driver_in_the_place_of_a_camera_is_a_finding(tmp_path: Path):
-    path = tmp_path / "cell.yaml"
-    path.write_text("type: devices\ncamera: {driver: franky}\nworkspace: {table_z: 0.0}\n")
-    assert [f.level for f in examine(path, move=False) if f.subject == "cell file"] == ["fail"]
-
-
-def test_a_cell_without_its_devices_says_what_is_missing_and_goes_on(tmp_path: Path):
-    """No robot at that address, no Kinect, no calibration: each a line, none an exception."""
-    cell = dict(
-        type="devices",
-        arm=dict(driver="panda_py", host="127.0.0.1", connect_timeout_s=30.0),
-        camera=dict(driver="kinect2", calibration="camera.yaml"),
-        workspace=dict(table_z=0.0),
-    )
-    path = tmp_path / "cell.yaml"
-    path.write_text(yaml.safe_dump(cell))
-    findings = {finding.subject: finding for finding in examine(path, move=True)}
-    assert findings["workspace"].level == findings["cell file"].level == "ok"
-    for subject in ("driver kinect2", "calibration", "camera", "arm", "motion"):
-        assert findings[subject].level == "fail", findings[subject]
-    assert all("\n" not in finding.text for finding in findings.values())
-
-
-def test_a_wrong_cell_file_is_a_finding_and_a_missing_one_an_error(tmp_path: Path):
-    (tmp_path / "cell.yaml").write_text("type: devices\narms: {}")
-    assert [f.level for f in examine(tmp_path / "cell.yaml", move=False) if f.subject == "cell file"] == [
-        "fail"
-    ]
-    with pytest.raises(BadConfig, match="No such file"):
-        list(examine(tmp_path / "none.yaml", move=False))

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
 import trimesh
 from sapien.physx import PhysxRigidDynamicComponent
+from scipy.spatial.transform import Rotation
 
+from mskgrasp.core.errors import BadPart
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES, PAD_REACH, pose_base_grasp
 from mskgrasp.parts import find_part
+from tasks.scene.part_actor import build_part
 
 PARTS = ("hex_bolt_m20x50", "hex_nut_m30", "l_bracket_60x40", "parallel_key_a16x10x56", "spur_gear_m3_z17")
 
@@ -70,3 +75,44 @@ def test_a_descent_with_room_for_the_fingers_never_collides(env, name):
         outcome = env.attempt.run(torch.as_tensor(grasp[None], dtype=torch.float32))
         assert FAILURES[int(outcome["failure"][0])] != "collided"
     assert free >= 3
+
+
+@pytest.mark.parametrize("name", ["l_bracket_60x40", "hinge_60x30"])
+def test_the_axes_of_inertia_are_those_of_the_mesh(env, name):
+    """Parts whose principal axes are turned against those of their mesh file."""
+    part = find_part(name)
+    env.reset(seed=1, options=dict(parts=[name], reconfigure=True))
+    body = env.part._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
+    mesh = trimesh.load_mesh(part.mesh_path)
+    mesh.density = part.mass / mesh.volume
+    turn = Rotation.from_quat(body.cmass_local_pose.q, scalar_first=True).as_matrix()
+    tensor = turn @ np.diag(body.inertia) @ turn.T
+    scale = np.abs(mesh.moment_inertia).max()
+    assert np.abs(tensor - mesh.moment_inertia).max() < 1e-3 * scale
+    assert np.abs(tensor - np.diag(np.diag(tensor))).max() > 0.05 * scale
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (dict(n_hulls=2), r"PhysX took 1 of 2 hulls and 100.00% of their volume; delete .* make it again"),
+        (dict(hulls_volume=24.1e-6), r"PhysX took 1 of 1 hulls and 99.5\d% of their volume"),
+    ],
+)
+def test_a_body_that_is_not_the_part_is_refused(env, boxes, place, changes, message):
+    """A block of 24 cm^3; PhysX drops hulls and corners without a word."""
+    place("light")
+    wrong = dataclasses.replace(boxes["light"], name="wrong", **changes)
+    with pytest.raises(BadPart, match=f"part 'wrong': .*{message}") as caught:
+        build_part(env.scene, wrong, 0, 0.5)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_friction_of_a_part_is_that_of_its_shapes(env, boxes, place):
+    place("light")
+    body = build_part(env.scene, dataclasses.replace(boxes["light"], name="rough"), 0, 0.37)
+    component = body._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
+    for shape in component.collision_shapes:
+        material = shape.physical_material
+        assert (material.static_friction, material.dynamic_friction) == pytest.approx((0.37, 0.37))
+        assert material.restitution == 0

@@ -75,13 +75,6 @@ def test_a_finger_that_lands_on_the_part_ends_the_descent(attempt):
     assert reason(outcome) == "collided"
 
 
-def test_the_grip_is_no_force_on_hand_and_part_together(attempt, env):
-    """Each pad feels 30 N; nothing but the hand touches a part that is held aloft."""
-    assert attempt((0.5, 0.0, Z, 0.0), part="kilo")["success"]
-    assert np.asarray(env.contacts.pads_on_part()[0]) == pytest.approx(30, rel=0.05)
-    assert not np.asarray(env.contacts.load(holding=True)).any()
-
-
 def test_friction_holds_what_it_can_hold_and_no_more(attempt):
     """Two pads hold 2 mu F = 2 * 0.5 * 30 N; the lift adds at most 1.6 m/s^2 to gravity."""
     assert attempt((0.5, 0.0, Z, 0.0), part="heavy")["success"]

@@ -1,0 +1,135 @@
+"""Pictures of the board in the hand, taken by a camera that draws it, and their files."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hal import Cell
+from hal.calibrate.board_views import Picture, picture_paths, read_picture, take_pictures, write_picture
+from hal.calibrate.hand_eye import BadCalibrationSet, solve_hand_eye
+from hal.errors import MotionAborted, OutOfWorkspace
+from mskgrasp.core.errors import UsageError
+from mskgrasp.core.geometry import Pose, pose_distance
+from tests.hal.calibrate.toy_bench import BOARD, HELD, OVERHEAD, bench
+
+N = 8
+
+
+def take(cell: Cell, **changes: Any) -> tuple[int, list[tuple[int, Picture, int]]]:
+    kept: list[tuple[int, Picture, int]] = []
+    settings: dict[str, Any] = dict(
+        n=N, tilt_rad=np.radians(30), nearest=0.5, speed=0.2, settle_s=0.1, rng=np.random.default_rng(0),
+        keep=lambda *one: kept.append(one),
+    )  # fmt: skip
+    return take_pictures(cell, BOARD, HELD, **(settings | changes)), kept
+
+
+@pytest.fixture(scope="module")
+def taken() -> list[tuple[int, Picture, int]]:
+    return take(bench())[1]
+
+
+def test_as_many_pictures_as_asked_for_are_taken_and_the_hand_returns():
+    cell = bench()
+    start = cell.arm.state().T_base_tcp
+    n_taken, kept = take(cell)
+    found = [n_corners for _, _, n_corners in kept]
+    assert sum(n >= 6 for n in found) == N and n_taken == len(kept) < 2 * N
+    assert [number for number, _, _ in kept] == list(range(n_taken))
+    assert pose_distance(cell.arm.state().T_base_tcp, start) == pytest.approx((0, 0), abs=1e-6)
+
+
+def test_the_pictures_give_the_camera(taken: list[tuple[int, Picture, int]]):
+    """The camera drew the board by a homography; the solver never saw where from."""
+    found = solve_hand_eye(BOARD, [picture.view(BOARD) for _, picture, _ in taken])
+    distance, angle = pose_distance(found.T_base_camera, OVERHEAD)
+    assert distance < 3e-3 and np.degrees(angle) < 0.3
+
+
+def test_a_board_that_is_not_there_ends_after_five_pictures_and_the_hand_returns():
+    cell = bench(empty=True)
+    start = cell.arm.state().T_base_tcp
+    with pytest.raises(BadCalibrationSet, match="not found in any of the first 5 pictures"):
+        take(cell)
+    assert pose_distance(cell.arm.state().T_base_tcp, start) == pytest.approx((0, 0), abs=1e-6)
+
+
+def test_an_arm_that_reaches_too_few_poses_says_so(monkeypatch):
+    cell = bench()
+    reached: list[tuple[float, ...]] = []
+
+    def check(pose: Pose) -> None:
+        place = tuple(pose.position)
+        if place not in reached:
+            if len(reached) == 3:
+                raise OutOfWorkspace("out of reach")
+            reached.append(place)
+
+    monkeypatch.setattr(cell.arm, "check_pose", check)
+    with pytest.raises(BadCalibrationSet, match="the camera 3 times and it was found 3 times, at least 8"):
+        take(cell)
+
+
+def test_an_arm_that_never_rests_is_an_error(monkeypatch):
+    """Half a millimetre between two looks."""
+    cell = bench()
+    state, drift = cell.arm.state, itertools.count()
+
+    def drifting() -> Any:
+        now = state()
+        off = np.array([5e-4 * next(drift), 0, 0])
+        moved = Pose(position=now.T_base_tcp.position + off, quat_wxyz=now.T_base_tcp.quat_wxyz)
+        return type(now)(**{**vars(now), "T_base_tcp": moved})
+
+    monkeypatch.setattr(cell.arm, "state", drifting)
+    with pytest.raises(MotionAborted, match="does not come to rest; raise --settle-s"):
+        take(cell)
+
+
+def test_a_picture_survives_its_file_to_the_bit(taken: list[tuple[int, Picture, int]], tmp_path: Path):
+    picture = taken[0][1]
+    write_picture(tmp_path / "pose-000.npz", picture)
+    read = read_picture(tmp_path / "pose-000.npz")
+    for name in ("colour", "depth", "intrinsics"):
+        one, other = getattr(picture, name), getattr(read, name)
+        assert one.dtype == other.dtype and np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+    for name in ("T_base_camera", "T_base_tcp"):
+        assert np.array_equal(getattr(picture, name).as_vector(), getattr(read, name).as_vector())
+    assert read.serial == "toy"
+    assert [path.name for path in tmp_path.iterdir()] == ["pose-000.npz"]
+
+
+def test_pictures_are_listed_in_the_order_in_which_they_were_taken(tmp_path: Path):
+    for name in ("pose-010.npz", "pose-002.npz", "table.npz", "pose-001.npz.tmp", "pose-000.npz"):
+        (tmp_path / name).touch()
+    assert [path.name for path in picture_paths(tmp_path)] == ["pose-000.npz", "pose-002.npz", "pose-010.npz"]
+
+
+@pytest.mark.parametrize("spoil", ["cut", "emptied", "text", "missing", "no pose", "pickle"])
+def test_a_file_that_is_no_picture_is_one_line(
+    taken: list[tuple[int, Picture, int]], tmp_path: Path, spoil: str
+):
+    path = tmp_path / "pose-003.npz"
+    write_picture(path, taken[0][1])
+    whole = path.read_bytes()
+    match spoil:
+        case "cut":
+            path.write_bytes(whole[: len(whole) // 2])
+        case "emptied":
+            path.write_bytes(b"")
+        case "text":
+            path.write_text("a picture")
+        case "missing":
+            path.unlink()
+        case "no pose":
+            np.savez(path, colour=np.zeros((4, 4, 3), np.uint8))
+        case _:
+            np.savez(path, colour=np.array([{}], dtype=object))
+    with pytest.raises(UsageError, match=r"pose-003.npz cannot be read as a picture \(\w+\)") as caught:
+        read_picture(path)
+    assert "\n" not in str(caught.value)

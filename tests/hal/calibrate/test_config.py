@@ -1,0 +1,42 @@
+"""Where the operator says that the board is in the hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hal.calibrate.config import CalibrateConfig
+from mskgrasp.core.config import check_config
+from mskgrasp.core.errors import BadConfig
+
+
+@pytest.mark.parametrize(
+    ("turn", "point", "in_hand"),
+    [
+        (0.0, [0.05, 0.02, 0.0], [0.21, 0.02, 0.01]),
+        (90.0, [0.05, 0.0, 0.0], [0.16, 0.05, 0.01]),  # x as printed is the hand's y
+        (180.0, [0.05, 0.02, 0.0], [0.11, -0.02, 0.01]),
+        (-90.0, [0.0, 0.05, 0.0], [0.21, 0.0, 0.01]),
+    ],
+)
+def test_a_point_of_the_board_is_where_turn_and_place_put_it(
+    turn: float, point: list[float], in_hand: list[float]
+):
+    config = CalibrateConfig(board_at=(0.16, 0.0, 0.01), board_turn_deg=turn)
+    assert config.T_tcp_board().apply(np.array(point)) == pytest.approx(in_hand, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"poses": 7}, "'poses': input should be greater than or equal to 8"),
+        ({"tilt_deg": 60}, "'tilt_deg': input should be less than or equal to 50"),
+        ({"board_turn_deg": 181}, "'board_turn_deg'"),
+        ({"speed": 0}, "'speed': input should be greater than 0"),
+        ({"board": {"square": 0.04, "marker": 0.05}}, "marker 0.05 m must be 0.4 to 0.9 times the square"),
+    ],
+)
+def test_a_wrong_value_is_one_line_that_names_it(values: dict, message: str):
+    with pytest.raises(BadConfig) as caught:
+        check_config(CalibrateConfig, values, "calibration")
+    assert message in str(caught.value) and "\n" not in str(caught.value)

@@ -1,0 +1,43 @@
+"""The doctor on whole cell files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from hal.doctor.run import examine
+from mskgrasp.core.errors import BadConfig
+
+
+def test_an_arms_driver_in_the_place_of_a_camera_is_a_finding(tmp_path: Path):
+    path = tmp_path / "cell.yaml"
+    path.write_text("type: devices\ncamera: {driver: franky}\nworkspace: {table_z: 0.0}\n")
+    assert [f.level for f in examine(path, move=False) if f.subject == "cell file"] == ["fail"]
+
+
+def test_a_cell_without_its_devices_says_what_is_missing_and_goes_on(tmp_path: Path):
+    """No robot at that address, no Kinect, no calibration: each a line, none an exception."""
+    cell = dict(
+        type="devices",
+        arm=dict(driver="panda_py", host="127.0.0.1", connect_timeout_s=30.0),
+        camera=dict(driver="kinect2", calibration="camera.yaml"),
+        workspace=dict(table_z=0.0),
+    )
+    path = tmp_path / "cell.yaml"
+    path.write_text(yaml.safe_dump(cell))
+    findings = {finding.subject: finding for finding in examine(path, move=True)}
+    assert findings["workspace"].level == findings["cell file"].level == "ok"
+    for subject in ("driver kinect2", "calibration", "camera", "arm", "motion"):
+        assert findings[subject].level == "fail", findings[subject]
+    assert all("\n" not in finding.text for finding in findings.values())
+
+
+def test_a_wrong_cell_file_is_a_finding_and_a_missing_one_an_error(tmp_path: Path):
+    (tmp_path / "cell.yaml").write_text("type: devices\narms: {}")
+    assert [f.level for f in examine(tmp_path / "cell.yaml", move=False) if f.subject == "cell file"] == [
+        "fail"
+    ]
+    with pytest.raises(BadConfig, match="No such file"):
+        list(examine(tmp_path / "none.yaml", move=False))

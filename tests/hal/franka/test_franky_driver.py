@@ -1,0 +1,76 @@
+"""The driver on franky, in its process, against a simulated FR3."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from hal.errors import MotionAborted
+from hal.franka.driver import column_major
+from hal.franka.frames import F_T_EE
+from hal.franka.link import DriverLink
+from hal.franka.path import JointPath, joint_path
+from mskgrasp.core.panda_kinematics import forward
+from tests.hal.franka.robots import TIMEOUT_S, FakeRobot, franky_sim, linked, plain_path
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[FakeRobot]:
+    with franky_sim() as robot:
+        yield robot
+
+
+@pytest.fixture(scope="module")
+def link(robot: FakeRobot) -> Iterator[DriverLink]:
+    with linked("franky", robot.host) as link:
+        yield link
+
+
+def path_by(link: DriverLink, way: list[float]) -> JointPath:
+    here = np.array(link.ask("state", timeout_s=TIMEOUT_S)["joints"])
+    return joint_path(here, here + way, speed=np.full(7, 0.5), acceleration=np.full(7, 3.0))
+
+
+def test_a_state_is_the_robots_in_libfrankas_terms(robot: FakeRobot, link: DriverLink):
+    before = time.monotonic()
+    state = link.ask("state", timeout_s=TIMEOUT_S)
+    assert before <= state["seconds"] <= time.monotonic()
+    assert state["joints"] == pytest.approx(robot.joints(), abs=2e-3)  # MuJoCo creeps
+    # An FR3 has the Panda's Denavit-Hartenberg parameters.
+    assert state["o_t_ee"] == pytest.approx(column_major(forward(np.array(state["joints"]))[0]), abs=1e-4)
+    assert state["f_t_ee"] == pytest.approx(column_major(F_T_EE), abs=1e-6)
+    assert state["mode"] == "idle"
+    assert 0 <= state["width"] <= state["max_width"] == pytest.approx(0.08, abs=1e-3)
+
+
+def test_a_path_is_followed_to_its_end_in_its_time(robot: FakeRobot, link: DriverLink):
+    """One joint all but stands, which the solver would give up."""
+    path = path_by(link, [0.15, 1e-6, 0.0, 0.1, 0.0, -0.1, 0.2])
+    begin = float(robot.order("clock"))
+    link.ask("move", timeout_s=TIMEOUT_S, **plain_path(path))
+    assert float(robot.order("clock")) - begin >= path.duration_s - 0.01
+    robot.wait(0.5)  # the simulated arm lags behind its commands
+    assert robot.joints() == pytest.approx(path.joints[-1], abs=3e-3)
+
+
+def test_a_stop_is_in_force_until_recover(robot: FakeRobot, link: DriverLink):
+    path = path_by(link, [-0.1, 0, 0, 0, 0, 0, 0])
+    before = robot.joints()
+    link.ask("stop", timeout_s=TIMEOUT_S)
+    with pytest.raises(MotionAborted, match="preempted"):
+        link.ask("move", timeout_s=TIMEOUT_S, **plain_path(path))
+    assert link.ask("move_gripper", timeout_s=TIMEOUT_S, width=0.02, speed=0.1) is False
+    assert robot.joints() == pytest.approx(before, abs=3e-3)
+    assert link.ask("recover", timeout_s=TIMEOUT_S) is True
+    assert link.ask("move_gripper", timeout_s=TIMEOUT_S, width=0.07, speed=0.1) is True
+    assert link.ask("state", timeout_s=TIMEOUT_S)["width"] == pytest.approx(0.07, abs=2e-3)
+
+
+def test_a_reflex_without_an_error_is_recovered_from(robot: FakeRobot, link: DriverLink):
+    robot.order("reflex")
+    assert link.ask("state", timeout_s=TIMEOUT_S)["mode"] == "reflex"
+    assert link.ask("recover", timeout_s=TIMEOUT_S) is True
+    assert link.ask("state", timeout_s=TIMEOUT_S)["mode"] == "idle"

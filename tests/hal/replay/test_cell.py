@@ -1,0 +1,43 @@
+"""A recorded run plays back as it was, and nothing but it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from hal import Cell, cell_from_yaml
+from hal.errors import BadRecording
+from hal.replay import recorded_cell
+from mskgrasp.core.errors import BadConfig
+from tests.hal.replay.program import replayed, run_on
+from tests.hal.replay.toy import toy_cell
+
+
+def test_the_same_program_gets_the_same_answers(recording: Path, tmp_path: Path):
+    live: list[object] = []
+    with recorded_cell(toy_cell(), tmp_path / "again.h5").connected() as cell:
+        run_on(cell, live)
+    cell = replayed(recording)
+    for _ in range(2):  # it can be opened again and begins anew
+        played: list[object] = []
+        with cell.connected():
+            run_on(cell, played)
+        assert json.dumps(played) == json.dumps(live)  # NaN compares as text
+    assert cell.workspace.region == (0.3, 0.6, -0.1, 0.1)
+    assert cell.arm.limits.max_force == 70.0
+
+
+def test_cell_files_of_recordings_are_checked(recording: Path, tmp_path: Path):
+    def build(text: str) -> Cell:
+        (tmp_path / "cell.yaml").write_text(text)
+        return cell_from_yaml(tmp_path / "cell.yaml")
+
+    assert build(f"type: replay\nrecording: {recording}").feeder is not None
+    with pytest.raises(BadRecording, match="there is no recording"):
+        build("type: replay\nrecording: none.h5")
+    with pytest.raises(BadConfig, match="unknown key 'loop'"):
+        build(f"type: replay\nrecording: {recording}\nloop: true")
+    with pytest.raises(BadConfig, match="is recorded itself"):
+        build(f"type: recorded\ncell: {tmp_path / 'cell.yaml'}\nout: {tmp_path / 'x.h5'}")

@@ -1,0 +1,49 @@
+"""A program that departs from the recording is stopped where it does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hal import execute_grasp
+from hal.errors import NeedsRecovery, NotRecorded
+from mskgrasp.core.grasp import Grasp
+from tests.hal.replay.program import GRASP, replayed
+
+
+def test_another_command_is_refused_names_both_and_nothing_follows_before_recover(recording: Path):
+    with replayed(recording).connected() as cell:
+        assert cell.feeder is not None
+        with pytest.raises(
+            NotRecorded, match=r"was present\(part nut, seed 3\).*present\(part nut, seed 4\)"
+        ):
+            cell.feeder.present("nut", 4)
+        cell.feeder.present("nut", 3)
+        cell.camera.capture()
+        with pytest.raises(NotRecorded, match=r"was move_gripper\(width 0.08\).*grasp\(force 20.0\)"):
+            cell.arm.grasp(20.0)
+        with pytest.raises(NeedsRecovery, match=r"recover\(\)"):
+            cell.arm.move_gripper(0.08)
+        cell.arm.recover()
+        cell.arm.move_gripper(0.08)
+
+
+def test_commands_may_differ_by_the_tolerances_and_no_more(recording: Path):
+    with replayed(recording).connected() as cell:
+        assert cell.feeder is not None
+        cell.feeder.present("nut", 3)
+        cell.camera.capture()
+        execute_grasp(cell, Grasp.from_vector(GRASP + np.array([5e-4, 0, 0, 5e-3])))
+    with replayed(recording).connected() as cell:
+        assert cell.feeder is not None
+        cell.feeder.present("nut", 3)
+        cell.camera.capture()
+        with pytest.raises(NotRecorded):
+            execute_grasp(cell, Grasp.from_vector(GRASP + np.array([2e-3, 0, 0, 0])))
+
+
+def test_a_frame_comes_where_it_was_taken(recording: Path):
+    with replayed(recording).connected() as cell, pytest.raises(NotRecorded, match="asks for capture"):
+        cell.camera.capture()

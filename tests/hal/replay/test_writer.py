@@ -1,0 +1,59 @@
+"""The file of a recording: whole or not there."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from hal.errors import NotConnected
+from hal.replay import read_recording, recorded_cell
+from mskgrasp.core.errors import UsageError
+from tests.hal.replay.toy import ToyArm, toy_cell
+
+
+def test_the_file_is_plain_hdf5_as_documented(recording: Path):
+    with h5py.File(recording) as file:
+        assert file.attrs["kind"] == "mskgrasp cell recording" and file.attrs["schema"] == 1
+        assert file["frames/depth"].shape == (4, 4, 6) and file["frames/depth"].dtype == np.float32
+        assert file["frames/colour"].dtype == np.uint8 and file["frames"].attrs["serial"] == "toy"
+        events = [json.loads(text) for text in file["events"].asstr()[:]]
+    assert events[0]["call"] == "present" and events[0]["arguments"] == {"part": "nut", "seed": 3}
+    aborted = next(event for event in events if event["error"])
+    assert aborted["error"][0] == "MotionAborted" and aborted["after"]["T_base_tcp"][2] > 0.1
+
+
+def test_a_killed_program_leaves_what_happened_until_then(tmp_path: Path):
+    code = (
+        "import os\nfrom pathlib import Path\nfrom hal.replay import recorded_cell\n"
+        "from tests.hal.replay.toy import toy_cell\n"
+        f"with recorded_cell(toy_cell(), Path({str(tmp_path / 'run.h5')!r})).connected() as cell:\n"
+        "    cell.camera.capture()\n    cell.arm.move_gripper(0.05)\n    os.kill(os.getpid(), 9)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[3])
+    assert done.returncode == -signal.SIGKILL
+    assert not (tmp_path / "run.h5").exists()
+    found = read_recording(tmp_path / "run.h5.part")
+    assert [event.call for event in found.events] == ["capture", "move_gripper"] and found.n_frames == 1
+    assert found.frame(0, 0.0).depth[1, 1] == 1
+
+
+def test_a_cell_that_does_not_open_leaves_no_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def refuse(_: object) -> None:
+        raise NotConnected("no robot there")
+
+    monkeypatch.setattr(ToyArm, "connect", refuse)
+    with pytest.raises(NotConnected), recorded_cell(toy_cell(), tmp_path / "run.h5").connected():
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_is_not_overwritten(recording: Path):
+    with pytest.raises(UsageError, match="exists already"):
+        recorded_cell(toy_cell(), recording)

@@ -1,0 +1,168 @@
+"""The motions of a grasp, on an arm that is at once where it is sent and writes down what it is asked."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hal import Cell, GraspOutcome, execute_grasp, go_home, let_go, put_down
+from hal.errors import NeedsRecovery, OutOfWorkspace, Stopped
+from hal.execute import above_grasp, lower
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import Grasp
+from tests.hal.replay.toy import ToyArm, toy_cell
+
+GRASP = Grasp.from_vector(np.array([0.4, 0.1, 0.06, 0.3]))
+
+
+class WritingArm(ToyArm):
+    """Notes the verbs that move it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.log: list[tuple[str, Any]] = []
+        self.between = 0.031
+
+    def _move_to_joints(self, joints: np.ndarray, speed: float) -> None:
+        self.log.append(("joints", joints.tolist()))
+        super()._move_to_joints(joints, speed)
+
+    def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
+        self.log.append(("pose", T_base_tcp.position.round(6).tolist()))
+        super()._move_to_pose(T_base_tcp, speed)
+
+    def _move_gripper(self, width: float) -> None:
+        self.log.append(("gripper", round(width, 6)))
+        super()._move_gripper(width)
+
+    def _grasp(self, force: float) -> GraspOutcome:
+        self.log.append(("grasp", force))
+        self._width = self.between
+        return GraspOutcome(width=self.between, holding=self.between > 0)
+
+    def _wait(self, seconds: float) -> None:
+        self.log.append(("wait", seconds))
+
+
+@pytest.fixture
+def arm() -> WritingArm:
+    return WritingArm()
+
+
+@pytest.fixture
+def cell(arm: WritingArm) -> Cell:
+    arm.connect()
+    return dataclasses.replace(toy_cell(), arm=arm)
+
+
+def test_a_grasp_is_open_above_down_close_lift_hold(cell: Cell, arm: WritingArm):
+    """The table is at 0: 12 cm above it the straight descent begins; the lift is 10 cm."""
+    result = execute_grasp(cell, GRASP)
+    assert arm.log == [
+        ("gripper", 0.08),
+        ("pose", [0.4, 0.1, 0.12]),
+        ("pose", [0.4, 0.1, 0.06]),
+        ("grasp", 20.0),
+        ("pose", [0.4, 0.1, 0.16]),
+        ("wait", 0.2),
+    ]
+    assert (result.lifted, result.holding, result.aborted) == (True, True, None)
+    assert result.width == 0.031 and result.T_base_tcp.position[2] == pytest.approx(0.16)
+
+
+def test_the_hand_comes_from_above_a_tall_part_too(cell: Cell):
+    high = Grasp.from_vector(np.array([0.4, 0.0, 0.2, 0.0]))
+    assert above_grasp(cell, high).position == pytest.approx([0.4, 0.0, 0.22])
+    raised = dataclasses.replace(cell, workspace=dataclasses.replace(cell.workspace, table_z=0.05))
+    assert above_grasp(raised, GRASP).position == pytest.approx([0.4, 0.1, 0.17])
+    assert above_grasp(cell, GRASP).quat_wxyz == pytest.approx(GRASP.T_base_tcp.quat_wxyz)
+
+
+def test_nothing_between_the_pads_is_not_lifted(cell: Cell, arm: WritingArm):
+    arm.between = 0.0
+    result = execute_grasp(cell, GRASP)
+    assert arm.log[-1] == ("grasp", 20.0)
+    assert (result.lifted, result.holding, result.aborted) == (False, False, None)
+
+
+def test_a_part_lost_on_the_way_up_was_lifted_and_is_not_held(cell: Cell, arm: WritingArm, monkeypatch):
+    monkeypatch.setattr(arm, "_wait", lambda _: setattr(arm, "_width", 0.0004))
+    result = execute_grasp(cell, GRASP)
+    assert (result.lifted, result.holding) == (True, False) and result.width == 0.0004
+
+
+@pytest.mark.parametrize("top", [0.15, 0.11, 0.05])
+def test_a_grasp_whose_lift_approach_or_target_is_out_of_the_box_moves_nothing(
+    cell: Cell, arm: WritingArm, top: float
+):
+    arm.limits = dataclasses.replace(arm.limits, box_upper=np.array([1.0, 1.0, top]))
+    with pytest.raises(OutOfWorkspace, match="outside the workspace"):
+        execute_grasp(cell, GRASP)
+    assert arm.log == []
+    arm.move_gripper(0.05)  # a refusal is no fault
+
+
+def test_contact_is_a_result_after_which_the_arm_must_be_recovered(cell: Cell, arm: WritingArm):
+    """The toy arm meets something below 5 cm."""
+    result = execute_grasp(cell, Grasp.from_vector(np.array([0.4, 0.1, 0.03, 0.3])))
+    assert result.aborted is not None and "contact force over 20 N" in result.aborted
+    assert (result.lifted, result.holding) == (False, False)
+    assert result.T_base_tcp.position == pytest.approx([0.4, 0.1, 0.12])  # where it stood before
+    with pytest.raises(NeedsRecovery):
+        arm.move_gripper(0.05)
+
+
+def test_a_stop_is_raised_and_nothing_follows(cell: Cell, arm: WritingArm, monkeypatch):
+    def stopped(force: float) -> GraspOutcome:
+        arm.stop()
+        return GraspOutcome(width=0.05, holding=False)
+
+    monkeypatch.setattr(arm, "_grasp", stopped)
+    with pytest.raises(Stopped):
+        execute_grasp(cell, GRASP)
+    assert arm.log[-1] == ("pose", [0.4, 0.1, 0.06])
+
+
+def test_a_part_is_released_two_millimetres_up_and_the_hand_rises(cell: Cell, arm: WritingArm):
+    execute_grasp(cell, GRASP)
+    arm.log.clear()
+    put_down(cell, GRASP)
+    assert arm.log == [("pose", [0.4, 0.1, 0.062]), ("gripper", 0.08), ("pose", [0.4, 0.1, 0.12])]
+    arm.log.clear()
+    lower(cell, GRASP, height=0.01)
+    assert arm.log == [("pose", [0.4, 0.1, 0.07])]
+
+
+@pytest.mark.parametrize(
+    ("width", "opening", "opened"),
+    [(0.031, 0.0, 0.051), (0.031, 0.06, 0.06), (0.031, 0.04, 0.051), (0.07, 0.0, 0.08), (0.07, 0.075, 0.08)],
+)
+def test_fingers_open_by_two_centimetres_at_least_and_no_farther_than_they_can(
+    cell: Cell, arm: WritingArm, width: float, opening: float, opened: float
+):
+    arm.move_gripper(width)
+    arm.log.clear()
+    let_go(cell, GRASP, opening=opening)
+    assert arm.log[0] == ("gripper", opened)
+
+
+def test_on_its_way_home_the_hand_first_rises(cell: Cell, arm: WritingArm):
+    home = cell.workspace.home.tolist()
+
+    def steps(z: float) -> list[tuple[str, Any]]:
+        arm.move_to_pose(Pose(position=np.array([0.5, 0.2, z]), quat_wxyz=GRASP.T_base_tcp.quat_wxyz))
+        arm.log.clear()
+        go_home(cell)
+        return arm.log
+
+    # To 12 cm over the table, or by 5 cm.
+    assert steps(0.06) == [("gripper", 0.08), ("pose", [0.5, 0.2, 0.12]), ("joints", home)]
+    assert steps(0.2) == [("gripper", 0.08), ("pose", [0.5, 0.2, 0.25]), ("joints", home)]
+    # And no higher than the box.
+    assert steps(0.98) == [("gripper", 0.08), ("pose", [0.5, 0.2, 1.0]), ("joints", home)]
+    arm.log.clear()
+    go_home(cell)
+    assert arm.log == [("gripper", 0.08)]
