@@ -11,7 +11,7 @@ import yaml
 import mskgrasp
 from tests.docs.pages import ROOT
 
-TESTED_BY_NAME = ("mskgrasp",)
+TESTED_BY_NAME = ("hal", "mskgrasp", "tasks")
 """Packages of which every module has a test module of its name."""
 
 
