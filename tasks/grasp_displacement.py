@@ -14,7 +14,7 @@ from mani_skill.utils.registration import register_env
 from mani_skill.utils.structs.actor import Actor
 from mani_skill.utils.structs.pose import Pose as ManiSkillPose
 from mani_skill.utils.structs.types import SimConfig
-from sapien.physx import PhysxMaterial
+from sapien.physx import PhysxMaterial, PhysxRigidDynamicComponent, PhysxRigidStaticComponent
 from torch import Tensor
 
 from mskgrasp.core.config import check_config
@@ -35,6 +35,7 @@ from tasks.scene.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_
 from tasks.scene.part_actor import build_part
 from tasks.scene.physics import MOST_HULLS, sim_config
 from tasks.scene.standing import StandingPoses, standing_poses
+from tasks.scene.table_friction import TableFriction
 
 _EXACT = ExecutionNoise()
 
@@ -127,14 +128,7 @@ class GraspDisplacementEnv(BaseEnv):
         super().__init__(*args, robot_uids=panda_for(self.physics, self.region), num_envs=num_envs, **kwargs)
 
     def _check_noise(self, num_envs: int) -> None:
-        noise, part = self.noise, self.physics.friction_pad_part
-        low = noise.friction_pad_part[0] if noise.friction_pad_part else part
-        if (
-            low < part / 2
-        ):  # PhysX averages both coefficients: without any on the pads half of the part's is left
-            raise BadConfig(
-                f"noise: friction_pad_part from {low:g} on needs physics.friction_pad_part <= {2 * low:g}"
-            )
+        noise = self.noise
         if num_envs > 1 and noise != ExecutionNoise(
             arm_position_std=noise.arm_position_std, arm_angle_std=noise.arm_angle_std
         ):
@@ -184,7 +178,7 @@ class GraspDisplacementEnv(BaseEnv):
         self._build_table()
         actors = []
         for i, part in enumerate(self.parts):
-            actor = build_part(self.scene, part, i, self.physics.friction_pad_part)
+            actor = build_part(self.scene, part, i)
             self.remove_from_state_dict_registry(actor)
             actors.append(actor)
         self.part = Actor.merge(actors, name="part")
@@ -196,13 +190,14 @@ class GraspDisplacementEnv(BaseEnv):
         builder = self.scene.create_actor_builder()
         half = np.array([0.5, 0.7, 0.02])
         pose = sapien.Pose(p=to_world(np.array([0.45, 0.0, TABLE_Z - half[2]])))
-        mu = self.physics.friction_table
+        # PhysX averages both materials, and a part's is without friction.
+        mu = 2 * self.physics.friction_table_part if self.gpu_sim_enabled else 0.0
         builder.add_box_collision(pose, half, material=PhysxMaterial(mu, mu, 0.0))
         if self.scene.can_render():
             material = sapien.render.RenderMaterial(base_color=(0.33, 0.35, 0.38, 1.0), roughness=0.9)
             builder.add_box_visual(pose, half, material=material)
         builder.initial_pose = sapien.Pose()
-        builder.build_static(name="table")
+        self._table = builder.build_static(name="table")
 
     def _after_reconfigure(self, options: dict) -> None:
         self._resting_z = torch.zeros(self.num_envs, device=self.device)
@@ -213,12 +208,17 @@ class GraspDisplacementEnv(BaseEnv):
             if part.content_hash not in self._standing:
                 self._standing[part.content_hash] = standing_poses(part, self.physics)
         self.standing = [self._standing[part.content_hash] for part in self.parts]
-        # The rate of a part must not depend on what lies in the other sub-scenes.
-        one = self.num_envs == 1
-        coarse_hz = self.physics.coarse_hz(self.parts[0].mass) if one else self.physics.rate_hz
-        self.motion = PandaMotion(self.scene, self.agent, self.physics, coarse_hz)
+        self.motion = PandaMotion(self.scene, self.agent, self.physics, self._table_friction())
         self.contacts = HandContacts(self.scene, self.agent, self.part)
         self.attempt = Attempt(self.agent, self.part, self._hulls, self.motion, self.contacts, self.physics)
+
+    def _table_friction(self) -> TableFriction | None:
+        """Friction of the part on the table; PhysX's own on a GPU."""
+        if self.gpu_sim_enabled:
+            return None
+        table = self._table._objs[0].find_component_by_type(PhysxRigidStaticComponent)
+        part = self.part._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
+        return TableFriction(self.scene.px, part, table, self.physics.friction_table_part)
 
     def _initialize_episode(self, env_idx: Tensor, options: dict) -> None:
         self._outcome = None
@@ -274,7 +274,7 @@ class GraspDisplacementEnv(BaseEnv):
         if error.finger_force is not None:
             self.agent.set_finger_force(error.finger_force)
         if error.friction_pad_part is not None:
-            self.agent.set_pad_friction(2 * error.friction_pad_part - self.physics.friction_pad_part)
+            self.agent.set_pad_friction(error.friction_pad_part)
         if self.noise.moves_camera and self.scene.can_render():
             true = error.true_camera(self.T_base_camera)
             self._overhead_sensor.camera._render_cameras[0].set_local_pose(sapien_camera_pose(true))

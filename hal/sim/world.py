@@ -141,7 +141,7 @@ class SapienWorld:
         # A fresh scene each time, so that a trial does not depend on those before it.
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
         self._beside = [
-            restore(self.env.scene, lying, pose, number, self.physics.friction_pad_part)
+            restore(self.env.scene, lying, pose, number, 2 * self.physics.friction_table_part)
             for number, (lying, pose) in enumerate(staying)
         ]
         self.env.motion.place(self._home)

@@ -57,6 +57,18 @@ def sliding(scene: BodyScene, workshop: Workshop) -> Iterator[Check]:
     yield near("way of a block that slides to rest", "v^2 / (2 mu g)", "m", expected, way, 0.05)
     scene.place(workshop.block(), rest)
     scene.step(0.05)
+    before, spin = scene.pose(), 20.0
+    scene.body.set_angular_velocity([0.0, 0.0, spin])
+    scene.step(0.3)
+    turned = turn_about(before, scene.pose(), 2)
+    # On its four corners, at r from the middle: friction mu m g at r brakes a moment of inertia m r^2 / 3.
+    corner = math.hypot(BLOCK[0], BLOCK[1]) / 2
+    expected = math.degrees(spin**2 * corner / (6 * mu * GRAVITY))
+    yield near(
+        "turn of a block that spins to rest", "w^2 r / (6 mu g)", "deg", expected, math.degrees(turned), 0.05
+    )
+    scene.place(workshop.block(), rest)
+    scene.step(0.05)
     before = scene.pose().position
     scene.push([0.0, 0.9 * mu * mass * GRAVITY, 0.0], 0.3)
     way = float(np.linalg.norm((scene.pose().position - before)[:2]))

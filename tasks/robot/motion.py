@@ -19,6 +19,7 @@ from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.settings import Physics
 from tasks.robot.panda import GraspPanda
 from tasks.scene.arrays import arrays_for
+from tasks.scene.table_friction import TableFriction
 
 STILL_FINGER = 2e-3
 """A finger slower than this, m/s, has stopped. Speeds are differences of positions: PhysX's
@@ -58,20 +59,26 @@ class PandaMotion:
     Args:
         scene: The scene of all n sub-scenes.
         agent: The Panda in them.
-        physics: Rate, finger speed and force.
-        coarse_hz: Coarse rate, simulation steps a second.
+        physics: Rates, finger speed and force.
+        friction: Of the part on the table, where the engine has none.
     """
 
-    def __init__(self, scene: ManiSkillScene, agent: GraspPanda, physics: Physics, coarse_hz: int):
+    def __init__(
+        self,
+        scene: ManiSkillScene,
+        agent: GraspPanda,
+        physics: Physics,
+        friction: TableFriction | None = None,
+    ):
         self._scene = scene
         self._agent = agent
         self._physics = physics
-        self._coarse_hz = coarse_hz
         self.gpu = scene.gpu_sim_enabled
         self.arrays = arrays_for(scene)
         """Kind of array that all methods compute with and return; they take either kind."""
         self.n = scene.num_envs
         self._advance = scene.step if self.gpu else scene.px.step
+        self._friction = friction
         self._articulation = agent.robot._objs[0]
         self._arm_drives = [joint._objs[0] for joint in agent.arm_joints]
         self._finger_drives = [joint._objs[0] for joint in agent.finger_joints]
@@ -95,9 +102,9 @@ class PandaMotion:
 
     @contextmanager
     def coarsely(self, rate_hz: int | None = None) -> Iterator[None]:
-        """Simulates with a coarse rate while the context lasts, by default that of the part."""
+        """Simulates with a coarse rate while the context lasts, by default that of the physics settings."""
         fine = self.rate_hz
-        self._set_rate(min(fine, rate_hz or self._coarse_hz))
+        self._set_rate(min(fine, rate_hz or self._physics.coarse_rate_hz))
         try:
             yield
         finally:
@@ -136,6 +143,8 @@ class PandaMotion:
             self._articulation.qvel = np.zeros(9, np.float32)
         self.set_fingers(fingers)
         self._unwatched = 0
+        if self._friction is not None:
+            self._friction.reset()
         self.set_arm(q, xp.zeros_like(q))
 
     def set_arm(self, q: Array, qd: Array) -> None:
@@ -192,6 +201,8 @@ class PandaMotion:
             self._scene.px.gpu_apply_articulation_target_position()
             self._scene.px.gpu_apply_articulation_target_velocity()
         for _ in range(n_steps):
+            if self._friction is not None:
+                self._friction.apply()
             self._advance()
             self.seconds += 1 / self.rate_hz
             self._unwatched += 1

@@ -76,8 +76,9 @@ class GraspPanda(Panda):
 
     @property
     def urdf_config(self) -> dict:
-        """Pads with the friction that the physics settings state (the material of all parts is equal)."""
-        mu = self.physics.friction_pad_part
+        """Hand and fingers with the friction that the physics settings state."""
+        # PhysX averages both materials, and a part's has no friction.
+        mu = 2 * self.physics.friction_pad_part
         pad = dict(
             material="pad",
             patch_radius=self.physics.pad_patch_radius,
@@ -85,7 +86,7 @@ class GraspPanda(Panda):
         )
         return dict(
             _materials=dict(pad=dict(static_friction=mu, dynamic_friction=mu, restitution=0.0)),
-            link={name: pad for name in FINGER_LINKS},
+            link=dict.fromkeys(FINGER_LINKS, pad) | {"panda_hand": dict(material="pad")},
         )
 
     @property
@@ -149,12 +150,13 @@ class GraspPanda(Panda):
             )
 
     def set_pad_friction(self, coefficient: float) -> None:
-        """Gives the material of the pads a coefficient; the effective one is its mean with the part's."""
+        """Sets the effective coefficient between pads and part."""
+        material = 2 * coefficient  # as in `urdf_config`
         for name in FINGER_LINKS:
             for link in self.robot.links_map[name]._objs:
                 for shape in link.collision_shapes:
-                    shape.physical_material.set_static_friction(coefficient)
-                    shape.physical_material.set_dynamic_friction(coefficient)
+                    shape.physical_material.set_static_friction(material)
+                    shape.physical_material.set_dynamic_friction(material)
 
     @property
     def rest_qpos(self) -> np.ndarray:

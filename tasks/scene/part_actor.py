@@ -19,8 +19,14 @@ LEAST_KEPT = 2e-3
 STEEL_GREY = (0.55, 0.57, 0.6, 1.0)
 
 
-def build_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: float) -> Actor:
+def build_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: float = 0.0) -> Actor:
     """Loads a part into one sub-scene.
+
+    Args:
+        scene: All sub-scenes.
+        part: Its folder is read.
+        scene_index: Of the sub-scene.
+        friction: Coefficient of its material; the effective one is the mean with the other body's.
 
     Raises:
         BadPart: PhysX could not cook every hull of the part.
@@ -37,7 +43,7 @@ def build_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: fl
     return actor
 
 
-def add_hulls(builder: sapien.ActorBuilder, part: Part, friction: float) -> None:
+def add_hulls(builder: sapien.ActorBuilder, part: Part, friction: float = 0.0) -> None:
     """Gives a body the part's hulls, mass and inertia.
 
     The hulls are stored in millimetres and scaled, because PhysX drops hull vertices that lie closer

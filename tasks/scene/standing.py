@@ -85,7 +85,7 @@ def _scene_with(part: Part, physics: Physics) -> tuple[sapien.Scene, PhysxRigidD
     scene = sapien.Scene([PhysxCpuSystem()])
     scene.set_timestep(1 / physics.rate_hz)
     table = scene.create_actor_builder()
-    mu = physics.friction_table
+    mu = 2 * physics.friction_table_part  # PhysX averages both materials, and a part's is without friction
     table.add_box_collision(
         sapien.Pose(p=[0, 0, TABLE_Z - TABLE_HALF_SIZE[2]]),
         np.array(TABLE_HALF_SIZE),
@@ -93,7 +93,7 @@ def _scene_with(part: Part, physics: Physics) -> tuple[sapien.Scene, PhysxRigidD
     )
     table.build_static(name="table")
     builder = scene.create_actor_builder()
-    add_hulls(builder, part, physics.friction_pad_part)
+    add_hulls(builder, part)
     body = builder.build(name=part.name).find_component_by_type(PhysxRigidDynamicComponent)
     assert isinstance(body, PhysxRigidDynamicComponent)
     return scene, body

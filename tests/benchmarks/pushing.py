@@ -5,6 +5,7 @@ its centre and pushes it by 9.1 mm. In both engines it rests on its four corners
 v^2 / (2 mu g) is 1.3 mm at 0.1 m/s and 0.01 mm at 0.01 m/s.
 
 Each row also gives the bar turned upside down: the same body, whose corners an engine lists in another order.
+The task replaces PhysX's friction of part and table by its own (`tasks.scene.table_friction`).
 
 Run: python -m tests.benchmarks.pushing
 """
@@ -21,6 +22,7 @@ from sapien import physx
 
 from hal.mujoco.settings import MujocoPhysics
 from mskgrasp.core.settings import Physics
+from tasks.scene.table_friction import TableFriction
 from tests.benchmarks.quasi_static import Push, corners, rectangle
 
 SIZE = (0.08, 0.02, 0.012)
@@ -68,7 +70,12 @@ def on_paper(physics: Physics, points: np.ndarray) -> np.ndarray:
     return push.run(np.array(START), -PAD[0] / 2, WAY) - START
 
 
-def in_sapien(physics: Physics, speed: float, over: bool) -> np.ndarray:
+def in_physx(physics: Physics, speed: float, over: bool) -> np.ndarray:
+    """The same in plain SAPIEN with PhysX's friction; the pad is kinematic."""
+    return in_sapien(physics, speed, over, own_friction=False)
+
+
+def in_sapien(physics: Physics, speed: float, over: bool, *, own_friction: bool = True) -> np.ndarray:
     """The same in plain SAPIEN with the settings of the task; the pad is kinematic."""
     physx.set_scene_config(enable_tgs=True, enable_pcm=physics.persistent_manifold, cpu_workers=0)
     physx.set_body_config(
@@ -77,26 +84,36 @@ def in_sapien(physics: Physics, speed: float, over: bool) -> np.ndarray:
         sleep_threshold=0.0,
     )
     physx.set_shape_config(contact_offset=physics.contact_offset, rest_offset=0.0)
-    scene = sapien.Scene([physx.PhysxCpuSystem()])
+    system = physx.PhysxCpuSystem()
+    scene = sapien.Scene([system])
     scene.set_timestep(1 / physics.rate_hz)
-    part = physx.PhysxMaterial(physics.friction_pad_part, physics.friction_pad_part, 0.0)
-    table = physx.PhysxMaterial(physics.friction_table, physics.friction_table, 0.0)
+    slippery = physx.PhysxMaterial(0.0, 0.0, 0.0)
+    rubber = physx.PhysxMaterial(2 * physics.friction_pad_part, 2 * physics.friction_pad_part, 0.0)
+    rough = physx.PhysxMaterial(2 * physics.friction_table_part, 2 * physics.friction_table_part, 0.0)
     builder = scene.create_actor_builder()
-    builder.add_box_collision(sapien.Pose([0, 0, -0.02]), np.array([0.5, 0.5, 0.02]), material=table)
-    builder.build_static()
+    builder.add_box_collision(
+        sapien.Pose([0, 0, -0.02]), np.array([0.5, 0.5, 0.02]), material=slippery if own_friction else rough
+    )
+    table = builder.build_static().find_component_by_type(physx.PhysxRigidStaticComponent)
+    assert isinstance(table, physx.PhysxRigidStaticComponent)
     builder = scene.create_actor_builder()
-    builder.add_box_collision(half_size=np.array(SIZE) / 2, material=part)
+    builder.add_box_collision(half_size=np.array(SIZE) / 2, material=slippery)
     builder.set_mass_and_inertia(MASS, sapien.Pose(), inertia().astype(np.float32))
     bar = builder.build()
     bar.set_pose(sapien.Pose([*START[:2], SIZE[2] / 2], _turned(START[2], over)))
     builder = scene.create_actor_builder()
-    builder.add_box_collision(half_size=np.array(PAD) / 2, material=part)
+    builder.add_box_collision(half_size=np.array(PAD) / 2, material=rubber)
     pad = builder.build_kinematic()
     pad.set_pose(sapien.Pose(pad_centre(first_contact() + _CLEAR)))
     body = pad.find_component_by_type(physx.PhysxRigidDynamicComponent)
     assert isinstance(body, physx.PhysxRigidDynamicComponent)
+    pushed = bar.find_component_by_type(physx.PhysxRigidDynamicComponent)
+    assert isinstance(pushed, physx.PhysxRigidDynamicComponent)
+    friction = TableFriction(system, pushed, table, physics.friction_table_part)
     for face in steps(speed, physics.rate_hz):
         body.set_kinematic_target(sapien.Pose(pad_centre(face)))
+        if own_friction:
+            friction.apply()
         scene.step()
     return _moved(np.asarray(bar.pose.to_transformation_matrix(), dtype=np.float64))
 
@@ -173,7 +190,7 @@ def main() -> None:
         ("the other", four[[1, 3]]),
     ):
         print(f"{'on paper, ' + name:28s} {_show(on_paper(physics, points))}")
-    for name, run in (("SAPIEN", in_sapien), ("MuJoCo", in_mujoco)):
+    for name, run in (("PhysX's friction", in_physx), ("the task's", in_sapien), ("MuJoCo", in_mujoco)):
         for speed in SPEEDS:
             shown = "   upside down ".join(_show(run(physics, speed, over)) for over in (False, True))
             print(f"{f'{name}, {speed:g} m/s':28s} {shown}", flush=True)

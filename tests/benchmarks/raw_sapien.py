@@ -1,7 +1,7 @@
 """Grasp attempts in plain SAPIEN, with the task's physics and shortcuts but without its loop and ManiSkill's.
 
-What any program on this engine can reach: skipped air, an end as soon as the outcome is certain, heavy parts
-lifted in coarse steps.
+What any program on this engine can reach: skipped air, an end as soon as the outcome is certain, a lift in
+coarse steps.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from tasks.robot.reflex import NEAR_S, WINDOW_S
 from tasks.scene.camera import FAR, NEAR
 from tasks.scene.frames import sapien_camera_pose, to_world
 from tasks.scene.part_actor import _visual
+from tasks.scene.table_friction import TableFriction
 
 OPEN = MAX_OPENING / 2
 
@@ -44,7 +45,6 @@ class RawSapien:
         """A fresh scene with this part."""
         p = self.physics
         self.hulls = hull_corners(part)
-        self.coarse_hz = p.coarse_hz(part.mass)
         physx.set_shape_config(contact_offset=p.contact_offset, rest_offset=0.0)
         physx.set_body_config(
             solver_position_iterations=p.position_iterations,
@@ -56,17 +56,19 @@ class RawSapien:
         self.scene = sapien.Scene([self.system, sapien.render.RenderSystem()])
         self._rate(p.rate_hz)
         self.scene.set_ambient_light([0.5, 0.5, 0.5])
-        pad = physx.PhysxMaterial(p.friction_pad_part, p.friction_pad_part, 0.0)
-        table = physx.PhysxMaterial(p.friction_table, p.friction_table, 0.0)
+        slippery = physx.PhysxMaterial(0.0, 0.0, 0.0)
         builder = self.scene.create_actor_builder()
         pose = sapien.Pose(p=to_world(np.array([0.45, 0.0, -0.02])))
-        builder.add_box_collision(pose, np.array([0.5, 0.7, 0.02]), material=table)
+        builder.add_box_collision(pose, np.array([0.5, 0.7, 0.02]), material=slippery)
         builder.add_box_visual(pose, np.array([0.5, 0.7, 0.02]))
         builder.initial_pose = sapien.Pose()
-        builder.build_static(name="table")
+        table = builder.build_static(name="table").find_component_by_type(physx.PhysxRigidStaticComponent)
+        assert isinstance(table, physx.PhysxRigidStaticComponent)
         self._load_robot()
         builder = self.scene.create_actor_builder()
-        builder.add_multiple_convex_collisions_from_file(str(part.hulls_path), scale=[1e-3] * 3, material=pad)
+        builder.add_multiple_convex_collisions_from_file(
+            str(part.hulls_path), scale=[1e-3] * 3, material=slippery
+        )
         builder.set_mass_and_inertia(
             part.mass, sapien.Pose(q=part.quat_obj_principal), part.principal_inertia.astype(np.float32)
         )
@@ -75,6 +77,7 @@ class RawSapien:
         body = self.part.find_component_by_type(physx.PhysxRigidDynamicComponent)
         assert isinstance(body, physx.PhysxRigidDynamicComponent)
         self.body = body
+        self.friction = TableFriction(self.system, body, table, p.friction_table_part)
         component = sapien.render.RenderBodyComponent()
         component.attach(_visual(part))
         self.part.add_component(component)
@@ -88,7 +91,7 @@ class RawSapien:
         p = self.physics
         loader = self.scene.create_urdf_loader()
         for name in ("panda_leftfinger", "panda_rightfinger"):
-            loader.set_link_material(name, p.friction_pad_part, p.friction_pad_part, 0.0)
+            loader.set_link_material(name, 2 * p.friction_pad_part, 2 * p.friction_pad_part, 0.0)
             loader.set_link_min_patch_radius(name, p.pad_patch_radius)
             loader.set_link_patch_radius(name, p.pad_patch_radius)
         urdf = str(Path(PACKAGE_ASSET_DIR) / "robots/panda/panda_v2.urdf")
@@ -160,7 +163,7 @@ class RawSapien:
                 self._drive(drives, k)
             elif k == n:
                 self._stop(path[-1])
-            self.system.step()
+            self._step()
             if k % every == 0:
                 near = bool(self._on_hand())
             if not near:
@@ -182,7 +185,7 @@ class RawSapien:
             target = max(-OPEN, target - p.finger_speed / p.rate_hz)
             for joint in self.joints[7:]:
                 joint.set_drive_target(target)
-            self.system.step()
+            self._step()
             if k % every != every - 1:
                 continue
             fingers = self.robot.qpos[7:]
@@ -205,7 +208,7 @@ class RawSapien:
         behind = self._behind() + (1 - MIN_RISE) * p.lift_height + LOST_MARGIN
         if not self._rise(grasp, fine, behind):
             return False
-        self._rate(self.coarse_hz)
+        self._rate(p.coarse_rate_hz)
         m = self._n((1 - fine[-1]) * seconds)
         held = self._rise(grasp, fine[-1] + (1 - fine[-1]) * np.arange(1, m + 1) / m, behind)
         if held:
@@ -223,7 +226,7 @@ class RawSapien:
         drives = self._moving(path)
         for k in range(len(path)):
             self._drive(drives, k)
-            self.system.step()
+            self._step()
             if k % every == every - 1:
                 if self.robot.qpos[7:].sum() <= MIN_GAP or self._behind() > most_behind:
                     return False
@@ -259,10 +262,15 @@ class RawSapien:
         self._stop(q)
         for joint in self.joints[7:]:
             joint.set_drive_target(opening)
+        self.friction.reset()
+
+    def _step(self) -> None:
+        self.friction.apply()
+        self.system.step()
 
     def _wait(self, seconds: float) -> None:
         for _ in range(self._n(seconds)):
-            self.system.step()
+            self._step()
 
     def _moving(self, path: np.ndarray) -> list[tuple]:
         """The joints that a path moves, with their places and speeds."""

@@ -1,10 +1,11 @@
-"""A bar that slides and turns to rest on the table: SAPIEN against Coulomb's law and its solver's own.
+"""A bar that slides and turns to rest on the table: PhysX and the task against Coulomb's law.
 
 PhysX replaces the contacts of two bodies that share a normal by two anchors, the points farthest apart, and
 gives each half of the friction. Of an anchor's two tangential impulses, each grows in proportion to the slip
 along its axis times the effective mass there, and both together are cut to mu times the load
 (DyTGSContactPrep.cpp, solveContact). A sliding anchor's friction therefore points along effective mass times
-slip, not along the slip: away from the centre of mass these differ, by up to 30 degrees for this bar.
+slip, not along the slip: away from the centre of mass these differ, by up to 30 degrees for this bar. The
+task has its own friction on the table (`tasks.scene.table_friction`).
 
 Run: python -m tests.benchmarks.spinning
 """
@@ -17,6 +18,7 @@ from sapien import physx
 from scipy.integrate import solve_ivp
 
 from mskgrasp.core.settings import Physics
+from tasks.scene.table_friction import TableFriction
 from tests.benchmarks.pushing import MASS, SIZE, inertia
 from tests.benchmarks.quasi_static import corners
 
@@ -65,8 +67,13 @@ def on_paper(
     return found.y[:3, -1]
 
 
-def in_sapien(physics: Physics, velocity: tuple[float, float], spin: float, *, over: bool) -> np.ndarray:
-    """The same in plain SAPIEN; upside down on request, so that its anchors lie on the other diagonal."""
+def in_sapien(
+    physics: Physics, velocity: tuple[float, float], spin: float, *, over: bool, own_friction: bool
+) -> np.ndarray:
+    """The same in plain SAPIEN, with the task's friction or PhysX's.
+
+    Upside down on request, so that PhysX's anchors lie on the other diagonal.
+    """
     physx.set_scene_config(enable_tgs=True, enable_pcm=physics.persistent_manifold, cpu_workers=0)
     physx.set_body_config(
         solver_position_iterations=physics.position_iterations,
@@ -74,12 +81,15 @@ def in_sapien(physics: Physics, velocity: tuple[float, float], spin: float, *, o
         sleep_threshold=0.0,
     )
     physx.set_shape_config(contact_offset=physics.contact_offset, rest_offset=0.0)
-    scene = sapien.Scene([physx.PhysxCpuSystem()])
+    system = physx.PhysxCpuSystem()
+    scene = sapien.Scene([system])
     scene.set_timestep(1 / physics.rate_hz)
-    material = physx.PhysxMaterial(physics.friction_table_part, physics.friction_table_part, 0.0)
+    mu = 0.0 if own_friction else physics.friction_table_part
+    material = physx.PhysxMaterial(mu, mu, 0.0)
     builder = scene.create_actor_builder()
     builder.add_box_collision(sapien.Pose([0, 0, -0.02]), np.array([0.5, 0.5, 0.02]), material=material)
-    builder.build_static()
+    table = builder.build_static().find_component_by_type(physx.PhysxRigidStaticComponent)
+    assert isinstance(table, physx.PhysxRigidStaticComponent)
     builder = scene.create_actor_builder()
     builder.add_box_collision(half_size=np.array(SIZE) / 2, material=material)
     builder.set_mass_and_inertia(MASS, sapien.Pose(), inertia().astype(np.float32))
@@ -88,12 +98,20 @@ def in_sapien(physics: Physics, velocity: tuple[float, float], spin: float, *, o
     assert isinstance(body, physx.PhysxRigidDynamicComponent)
     body.set_angular_damping(0.0)
     bar.set_pose(sapien.Pose([0, 0, SIZE[2] / 2], [0, 1, 0, 0] if over else [1, 0, 0, 0]))
-    for _ in range(20):
+    friction = TableFriction(system, body, table, physics.friction_table_part)
+
+    def step() -> None:
+        if own_friction:
+            friction.apply()
         scene.step()
+
+    for _ in range(20):
+        step()
     body.set_linear_velocity(np.array([*velocity, 0.0]))
     body.set_angular_velocity(np.array([0.0, 0.0, spin]))
+    friction.reset()
     for _ in range(round(TIME_S * physics.rate_hz)):
-        scene.step()
+        step()
     pose = bar.pose.to_transformation_matrix()
     return np.array([*pose[:2, 3], np.arctan2(pose[1, 0], pose[0, 0])], dtype=np.float64)
 
@@ -111,9 +129,9 @@ def main() -> None:
             for law, solver in (("Coulomb", False), ("PhysX' law", True)):
                 moved = on_paper(physics, velocity, spin, diagonal, solver=solver)
                 print(f"  {f'{law}, {name}':34s}{_show(moved)}")
-            print(
-                f"  {'SAPIEN, ' + name:34s}{_show(in_sapien(physics, velocity, spin, over=over))}", flush=True
-            )
+            for whose, own in (("PhysX", False), ("the task", True)):
+                moved = in_sapien(physics, velocity, spin, over=over, own_friction=own)
+                print(f"  {f'{whose}, {name}':34s}{_show(moved)}", flush=True)
 
 
 def _show(moved: np.ndarray) -> str:

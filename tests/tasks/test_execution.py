@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 
-from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES, lowest_grasp_z
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise
@@ -87,11 +86,3 @@ def test_an_error_of_the_camera_moves_the_picture(boxes):
         assert tried >= 2
     finally:
         made.close()
-
-
-def test_less_friction_than_the_part_alone_brings_is_refused(boxes):
-    with pytest.raises(BadConfig, match="friction_pad_part from 0.1 on needs"):
-        gymnasium.make(
-            "GraspDisplacement-v1", parts=[str(boxes["light"].folder)], render_backend="none",
-            noise=dict(friction_pad_part=[0.1, 0.5]),
-        )  # fmt: skip

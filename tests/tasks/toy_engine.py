@@ -134,7 +134,7 @@ def toy_attempt(scene: ToyScene, physics: Physics) -> Attempt:
         robot=_Robot(scene), arm_joints=[joint] * 7, finger_joints=[joint] * 2, tcp=_Body(scene, scene.hand)
     )
     any_scene: Any = scene
-    motion = PandaMotion(any_scene, agent, physics, physics.coarse_rate_hz)
+    motion = PandaMotion(any_scene, agent, physics)
     motion.place(np.tile(HOME, (scene.num_envs, 1)))
     corners = np.array(np.meshgrid(*([-side / 2, side / 2] for side in SIZE))).reshape(3, -1).T
     hulls = [[corners]] * scene.num_envs

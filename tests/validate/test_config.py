@@ -135,4 +135,3 @@ def test_drawn_settings_lie_within_their_ranges_and_can_be_simulated():
     for one in drawn:
         mass = one.finger_armature + 0.015
         assert one.finger_damping**2 == pytest.approx(4 * one.finger_stiffness * mass)
-        assert one.friction_table >= 0

@@ -31,7 +31,7 @@ def test_a_block_slides_as_far_as_coulomb_says(scene: BodyScene, workshop: Works
     way = checks["way of a block that slides to rest"]
     # 0.5 m/s, friction 0.4.
     assert way.passed and way.expected == pytest.approx(0.25 / (2 * 0.4 * 9.81))
-    assert all(check.passed for check in checks.values()) and len(checks) == 3
+    assert all(check.passed for check in checks.values()) and len(checks) == 4
 
 
 def test_a_table_with_less_friction_than_stated_fails_every_check(
