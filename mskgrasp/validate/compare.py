@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -43,6 +45,12 @@ class Comparison:
     def as_dict(self) -> dict[str, float | None]:
         """For JSON, which knows no NaN: what is unknown is None."""
         return {key: value if np.isfinite(value) else None for key, value in asdict(self).items()}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Comparison:
+        """The inverse of `as_dict`."""
+        known: dict[str, Any] = {key: np.nan if value is None else value for key, value in values.items()}
+        return cls(**known)
 
 
 def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:

@@ -10,6 +10,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -53,17 +54,6 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
     }
     by_part = {part.name: compare(_of(mujoco, part.name), _of(sapien, part.name)) for part in parts}
     differing = disagreements(mujoco, sapien)
-    told = [f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN" for (ours, theirs), count in differing]
-    worst = sorted(by_part.items(), key=lambda item: item[1].agreement)
-    print_sections(
-        [
-            Section(
-                title="MuJoCo against SAPIEN",
-                text=told,
-                tables=[_table([*rows.items(), *worst])],
-            )
-        ]
-    )
     failed = complaints(rows["all"])
     record = {
         "settings": config.model_dump(mode="json"),
@@ -72,11 +62,24 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
         "disagreements": [[ours, theirs, count] for (ours, theirs), count in differing],
         "failed": failed,
     }
+    print_sections(sections(record))
     path = config.out / "engines.json"
     path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     print(f"wrote {path}")
     print(f"the engines differ: {'; '.join(failed)}" if failed else "the engines agree")
     return 1 if failed else 0
+
+
+def sections(record: dict[str, Any]) -> list[Section]:
+    """Differences in words and by part, those that disagree most first, from what ``engines.json`` holds."""
+    found = [
+        f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN"
+        for ours, theirs, count in record["disagreements"]
+    ]
+    rows = {name: Comparison.from_dict(one) for name, one in record["engines"].items()}
+    whole = [(name, one) for name, one in rows.items() if name == "all" or name.endswith(SHIFTED)]
+    by_part = sorted((item for item in rows.items() if item not in whole), key=lambda item: item[1].agreement)
+    return [Section(title="MuJoCo against SAPIEN", text=found, tables=[_table([*whole, *by_part])])]
 
 
 def complaints(found: Comparison) -> list[str]:

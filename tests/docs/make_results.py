@@ -33,6 +33,7 @@ from mskgrasp.palletize.report import result_section
 from mskgrasp.palletize.summary import PlacementSummary
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table, cell_text
+from mskgrasp.validate.engines import sections as engine_sections
 from mskgrasp.validate.tables import sections as validation_sections
 from tests.docs.pages import ROOT
 
@@ -70,6 +71,8 @@ def _fact(name: str, value: str) -> str:
 
 
 def _sections(report: dict[str, Any]) -> list[Section]:
+    if "engines" in report:
+        return engine_sections(report)
     if "closed_form" in report:
         return validation_sections(report)
     if "experiment" in report:
@@ -118,6 +121,10 @@ def record(name: str) -> None:
 
 
 def _size(report: dict[str, Any]) -> str:
+    if "engines" in report:
+        settings = report["settings"]
+        grasps = settings["grasps_per_part"]
+        return f"{grasps} grasps of each of {len(report['engines']) - 3} parts; seed {settings['seed']}"
     if "closed_form" in report:
         settings = report["settings"]
         most = settings["grasps_per_part"]

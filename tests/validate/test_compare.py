@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
 
-from mskgrasp.validate.compare import compare
+from mskgrasp.validate.compare import Comparison, compare
 from tests.validate.made_up import moved, outcomes
 
 
@@ -40,3 +41,11 @@ def test_grasps_whose_part_was_not_at_rest_are_left_out():
     after = moved(before, np.where(unsettled[:, None], 0.1, 0.0))
     told = compare(dataclasses.replace(after, settled=~unsettled), before)
     assert told.n == len(before.success) - 50 and told.shift_p90 == pytest.approx(0, abs=1e-12)
+
+
+def test_a_comparison_is_read_back_from_what_a_report_stores():
+    before = outcomes()
+    nothing = compare(dataclasses.replace(before, success=np.zeros(len(before.success), bool)), before)
+    stored = json.loads(json.dumps(nothing.as_dict()))
+    assert stored["shift_median"] is None
+    assert repr(Comparison.from_dict(stored)) == repr(nothing)
