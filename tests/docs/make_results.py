@@ -10,8 +10,8 @@ rendered from ``reports/NAME.json``:
     record   rows of the table above the figures, for a run of runs.yaml those that its entry lacks; notes
     report   what the command wrote, or the path of a file in the repository that holds it
 
-Reports of evaluate, palletize and validate are shown as their pages are. Any other report has ``tables``, each
-with a header, rows and perhaps a title; tests.benchmarks write theirs with ``--out``.
+Reports of evaluate, palletize and validate are shown as their programs show them. Any other report has
+``tables``, each with a header, rows and perhaps a title; tests.benchmarks write theirs with ``--out``.
 """
 
 from __future__ import annotations
@@ -87,6 +87,7 @@ def _run(name: str) -> dict[str, Any]:
 
 
 def _sections(report: dict[str, Any] | str) -> list[Section]:
+    """What is shown of a report, or of the file of the repository that holds it."""
     if isinstance(report, str):
         path = ROOT / report
         if path.suffix == ".csv":
@@ -141,6 +142,7 @@ def record(name: str) -> None:
         CalledProcessError: The command failed.
     """
     facts = read_yaml(RUNS)[name]
+    recorded = f"commit {_commit()}, {datetime.date.today().isoformat()}"
     out = ROOT / "out" / "results" / name
     shutil.rmtree(out, ignore_errors=True)  # results of an earlier state of the code must not count
     command = [sys.executable, *shlex.split(facts["command"])[1:], "--out", str(out)]
@@ -154,7 +156,7 @@ def record(name: str) -> None:
         record=dict(
             n=facts.get("n") or _size(report),
             simulation=f"{physics.rate_hz} Hz, {physics.position_iterations} iterations",
-            recorded=f"commit {_commit()}, {datetime.date.today().isoformat()}",
+            recorded=recorded,
             machine=_machine(),
         ),
         report=facts.get("stored", report),

@@ -39,8 +39,8 @@ LEVEL = 0.99
 DESCRIPTION = """Plans, grasps, corrects and places a fixed set of parts in the simulated cell, and prints
 the differences from the run stored in the repository, with intervals over parts.
 
-The exit status is 1 if a figure is worse than chance explains. --store replaces the stored run; use it through
-make results ARGS="--record regression", which also renders the page of results."""
+The exit status is 1 if a figure is worse than chance explains. --store replaces the stored run; use it
+through make results ARGS="--record regression", which also renders the page of results."""
 
 
 @dataclass(frozen=True, kw_only=True)
