@@ -47,7 +47,7 @@ test-all: $(TESTABLE) ## Run the slow tests, too: every family, the faults of bo
 		--durations 15 -m "slow or not slow"
 
 # The folder is removed first: results of an earlier state of the code must not count.
-regression: $(READY) ## Plan, grasp and place a fixed set, compare with the stored run (ARGS=--store replaces it)
+regression: $(READY) ## Plan, grasp and place a fixed set, compare with the stored run
 	rm -rf out/regression
 	$(RUN) tests.sim_in_the_loop.regression --workers 2 $(ARGS)
 

@@ -50,12 +50,7 @@ def model_card(meta: ModelMeta) -> str:
         "",
         f"## On held-out {side} parts",
         "",
-        *_table(_quality_rows(report["gqn"])),
-        "",
-        *_table(_displacement_rows(report["gdn"])),
-        "",
-        *_table(_axis_rows(report["gdn"])),
-        "",
+        *(line for rows in result_rows(report) for line in (*_table(rows), "")),
         "Intervals are of 95 %, bootstrapped over parts. RMSE is over all random grasps that succeeded;",
         "a planner chooses among those of which the network is most confident.",
         "",
@@ -64,6 +59,16 @@ def model_card(meta: ModelMeta) -> str:
         _LIMITS,
     ]
     return "\n".join(lines)
+
+
+def result_rows(report: dict[str, Any]) -> list[list[tuple[str, ...]]]:
+    """Tables of a model's metrics, each with its header first.
+
+    Args:
+        report: Metrics of one side of the data, by network.
+    """
+    tables = [_quality_rows(report["gqn"]), _displacement_rows(report["gdn"]), _axis_rows(report["gdn"])]
+    return [rows for rows in tables if rows]
 
 
 def _quality_rows(gqn: dict[str, Any]) -> list[tuple[str, ...]]:
@@ -114,8 +119,6 @@ def _axis_rows(gdn: dict[str, Any]) -> list[tuple[str, ...]]:
 
 
 def _table(rows: list[tuple[str, ...]]) -> list[str]:
-    if not rows:
-        return []
     head, *body = ("| " + " | ".join(row) + " |" for row in rows)
     return [head, "|" + "---|" * len(rows[0]), *body]
 

@@ -7,8 +7,6 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from hal.sensor_noise import NoiseModel, SensorNoise, add_noise
 from mskgrasp.core.errors import NoPartFound
@@ -16,6 +14,8 @@ from mskgrasp.core.grasp import PartView
 from mskgrasp.dataset import ShardInfo, list_shards, u16_to_depth
 from mskgrasp.dataset.shards import read_columns
 from mskgrasp.perception import part_detection as finding
+from mskgrasp.runtime.console_table import Table
+from tests.benchmarks.report import show
 
 NARROW = 0.008
 """Parts of which a side is less are told apart, metres."""
@@ -26,6 +26,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--data", type=Path, required=True, help="dataset folder")
     parser.add_argument("--images", type=int, default=450)
+    parser.add_argument("--out", type=Path, help="folder for report.json")
     options = parser.parse_args()
     paths = list_shards(options.data)
     rng = np.random.default_rng(0)
@@ -36,9 +37,7 @@ def main() -> None:
         images += [(u16_to_depth(arrays["depth"][row]), info) for row in rows]
     exact = [view(depth, info, 0.002) for depth, info in images]
     narrow = np.array([one is not None and one.size.min() < NARROW for one in exact])
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("noise", "method", "parts", "not found", "centre mm", "90 %", "size mm", "90 %", "top mm"):
-        table.add_column(name, justify="right")
+    rows = []
     models: tuple[NoiseModel, ...] = ("iid", "kinect2")
     for model in models:
         noisy = [
@@ -49,8 +48,9 @@ def main() -> None:
             with patch.object(finding, "QUIET", quiet):
                 seen = [view(d, info, height) for d, (_, info) in zip(noisy, images, strict=True)]
             for kind, chosen in (("narrow", narrow), ("other", ~narrow)):
-                table.add_row(model, method, kind, *errors(seen, exact, chosen))
-    Console(width=120).print(table)
+                rows.append((model, method, kind, *errors(seen, exact, chosen)))
+    header = ("noise", "method", "parts", "not found", "centre mm", "90 %", "size mm", "90 %", "top mm")
+    show([Table(header=header, rows=rows)], options.out)
 
 
 def view(depth: np.ndarray, info: ShardInfo, min_height: float) -> PartView | None:
@@ -72,7 +72,7 @@ def errors(seen: list[PartView | None], exact: list[PartView | None], chosen: np
     size = 1e3 * np.array([a.size - b.size for a, b in found]).reshape(-1, 3)
     values = (np.hypot(off[:, 0], off[:, 1]), np.abs(size[:, :2]).mean(axis=1), size[:, 2])
     if not found:
-        return [f"{len(pairs)} of {len(pairs)}"]
+        return [f"{len(pairs)} of {len(pairs)}", *5 * [""]]
     shown = [np.percentile(v, share) for v in values[:2] for share in (50, 90)] + [np.median(values[2])]
     return [f"{len(pairs) - len(found)} of {len(pairs)}", *(f"{v:.1f}" for v in shown)]
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import sapien
@@ -22,8 +23,10 @@ from sapien import physx
 
 from hal.mujoco.settings import MujocoPhysics
 from mskgrasp.core.settings import Physics
+from mskgrasp.runtime.console_table import Table
 from tasks.scene.table_friction import TableFriction
 from tests.benchmarks.quasi_static import Push, corners, rectangle
+from tests.benchmarks.report import show
 
 SIZE = (0.08, 0.02, 0.012)
 MASS = 0.15072
@@ -172,33 +175,39 @@ def _moved(pose: np.ndarray) -> np.ndarray:
 
 
 def main() -> None:
-    """Prints the motion on paper and in both engines."""
+    """Prints the motion by quasi-static mechanics and in both engines."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--rate-hz", type=int, default=Physics().rate_hz)
     parser.add_argument("--iterations", type=int, default=Physics().position_iterations)
     parser.add_argument("--pcm", action="store_true", help="keep PhysX' contact points from step to step")
+    parser.add_argument("--out", type=Path, help="folder for report.json")
     given = parser.parse_args()
     physics = Physics(
         rate_hz=given.rate_hz, position_iterations=given.iterations, persistent_manifold=given.pcm
     )
-    print("motion of the bar: x mm, y mm, turn deg")
     four = corners(*SIZE[:2])
+    rows = []
     for name, points in (
         ("even pressure", rectangle(*SIZE[:2])),
         ("four corners", four),
         ("one diagonal", four[[0, 2]]),
-        ("the other", four[[1, 3]]),
+        ("the other diagonal", four[[1, 3]]),
     ):
-        print(f"{'on paper, ' + name:28s} {_show(on_paper(physics, points))}")
-    for name, run in (("PhysX's friction", in_physx), ("the task's", in_sapien), ("MuJoCo", in_mujoco)):
+        rows.append((f"quasi-static, {name}", *_row(on_paper(physics, points)), "", "", ""))
+    for name, run in (
+        ("SAPIEN, PhysX's friction", in_physx),
+        ("SAPIEN, friction of the task", in_sapien),
+        ("MuJoCo", in_mujoco),
+    ):
         for speed in SPEEDS:
-            shown = "   upside down ".join(_show(run(physics, speed, over)) for over in (False, True))
-            print(f"{f'{name}, {speed:g} m/s':28s} {shown}", flush=True)
+            moved = [_row(run(physics, speed, over)) for over in (False, True)]
+            rows.append((f"{name}, {speed:g} m/s", *moved[0], *moved[1]))
+    header = ("motion of the bar", "x, mm", "y, mm", "turn, deg", "upside down: x, mm", "y, mm", "turn, deg")
+    show([Table(header=header, rows=rows)], given.out)
 
 
-def _show(moved: np.ndarray) -> str:
-    x, y, turn = moved * [1e3, 1e3, 180 / np.pi]
-    return f"{x:7.2f} {y:7.2f} {turn:7.2f}"
+def _row(moved: np.ndarray) -> list[str]:
+    return [f"{value:.2f}" for value in moved * [1e3, 1e3, 180 / np.pi]]
 
 
 if __name__ == "__main__":

@@ -4,17 +4,26 @@
     python -m tests.docs.make_results --record NAME..   run commands of docs/results/runs.yaml anew, store
                                                         their reports in docs/results/reports, then render
 
-A page holds its own words and, between ``<!-- run: NAME -->`` and ``<!-- end -->``, what is rendered.
+A page holds its own words, without figures, and, between ``<!-- run: NAME -->`` and ``<!-- end -->``, what is
+rendered from ``reports/NAME.json``:
+
+    record   rows of the table above the figures, for a run of runs.yaml those that its entry lacks; notes
+    report   what the command wrote, or the path of a file in the repository that holds it
+
+Reports of evaluate, palletize and validate are shown as their programs show them. Any other report has
+``tables``, each with a header, rows and perhaps a title; tests.benchmarks write theirs with ``--out``.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import datetime
 import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -29,13 +38,17 @@ from mskgrasp.evaluate.comparison import DisplacementSummary
 from mskgrasp.evaluate.report import Report
 from mskgrasp.evaluate.report import sections as evaluation_sections
 from mskgrasp.evaluate.summary import SuccessSummary
+from mskgrasp.learning.model_card import result_rows
 from mskgrasp.palletize.report import result_section
 from mskgrasp.palletize.summary import PlacementSummary
+from mskgrasp.parts.catalogue import SPLITS
+from mskgrasp.parts.commands.rate import Rate
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table, cell_text
 from mskgrasp.validate.engines import sections as engine_sections
 from mskgrasp.validate.tables import sections as validation_sections
 from tests.docs.pages import ROOT
+from tests.sim_in_the_loop.regression import Row, stored_figures
 
 RESULTS = ROOT / "docs" / "results"
 RUNS = RESULTS / "runs.yaml"
@@ -51,26 +64,46 @@ def rendered(page: str) -> str:
 
 
 def block(name: str) -> str:
-    """The table of facts and the tables of figures of a stored run, as Markdown."""
+    """The table of facts, the tables of figures and the notes of a stored run, as Markdown."""
     stored = json.loads((REPORTS / f"{name}.json").read_text(encoding="utf-8"))
-    facts = read_yaml(RUNS)[name] | stored["record"]
-    lines = ["", "| | |", "|---|---|", *(f"| {fact} | {_fact(fact, facts[fact])} |" for fact in FACTS), ""]
+    facts = _run(name) | stored["record"]
+    lines = ["", "| | |", "|---|---|", *(f"| {fact} | {facts[fact]} |" for fact in FACTS), ""]
     shown = [one for one in _sections(stored["report"]) if not one.page_only and (one.text or one.tables)]
     for section in shown:
-        if len(shown) > 1:
+        if section.title and len(shown) > 1:
             lines += [f"### {section.title}", ""]
         for paragraph in section.text:
             lines += [paragraph, ""]
         for table in section.tables:
             lines += [*_markdown(table), ""]
+    for note in facts.get("notes", []):
+        lines += [note, ""]
     return "\n".join(lines) + "\n"
 
 
-def _fact(name: str, value: str) -> str:
-    return f"`{value}`" if name == "command" else value
+def _run(name: str) -> dict[str, Any]:
+    """What runs.yaml says of a run, as Markdown; nothing of a report that no command of it makes."""
+    run = read_yaml(RUNS).get(name)
+    return run | dict(command=f"`{run['command']}`") if run else {}
 
 
-def _sections(report: dict[str, Any]) -> list[Section]:
+def _sections(report: dict[str, Any] | str) -> list[Section]:
+    """What is shown of a report, or of the file of the repository that holds it."""
+    if isinstance(report, str):
+        path = ROOT / report
+        if path.suffix == ".csv":
+            return [Section(title="", tables=[_rating(path)])]
+        return _sections(json.loads(path.read_text(encoding="utf-8")))
+    if "tables" in report:
+        return [
+            Section(title=one.get("title", ""), tables=[Table(header=one["header"], rows=one["rows"])])
+            for one in report["tables"]
+        ]
+    if "metrics" in report:
+        tables = [Table(header=head, rows=rows) for head, *rows in result_rows(report["metrics"]["test"])]
+        return [Section(title="", tables=tables)]
+    if "weights" in report:
+        return [Section(title="", tables=[stored_figures([Row(**row) for row in report["rows"]])])]
     if "engines" in report:
         return engine_sections(report)
     if "closed_form" in report:
@@ -81,6 +114,17 @@ def _sections(report: dict[str, Any]) -> list[Section]:
         whole = Report(summary=summary, trials={}, worst={}, settings={}, versions={})
         return evaluation_sections(whole, Path())
     return [result_section(TypeAdapter(PlacementSummary).validate_python(report))]
+
+
+def _rating(path: Path) -> Table:
+    """Parts of the catalogue by their success in random grasps."""
+    with open(path, encoding="utf-8", newline="") as file:
+        rated = [part for part in csv.DictReader(file) if part["attempts"]]
+    inside = [one for one in rated if Rate.low <= int(one["successes"]) / int(one["attempts"]) <= Rate.high]
+    groups = {"all": rated, f"{Rate.low:.0%} to {Rate.high:.0%} of grasps succeed": inside}
+    groups |= {f"of these, {side}": [one for one in inside if one["split"] == side] for side in SPLITS}
+    rows = [(name, len(parts), sum(int(one["attempts"]) for one in parts)) for name, parts in groups.items()]
+    return Table(header=("rated parts", "parts", "attempts"), rows=rows)
 
 
 def _markdown(table: Table) -> Iterator[str]:
@@ -95,26 +139,30 @@ def _markdown(table: Table) -> Iterator[str]:
 def record(name: str) -> None:
     """Runs a command and stores its report with commit, date and machine.
 
+    A command that keeps its report in the repository itself (``stored`` in runs.yaml) is referred to.
+
     Raises:
         CalledProcessError: The command failed.
     """
     facts = read_yaml(RUNS)[name]
+    recorded = f"commit {_commit()}, {datetime.date.today().isoformat()}"
     out = ROOT / "out" / "results" / name
+    shutil.rmtree(out, ignore_errors=True)  # results of an earlier state of the code must not count
     command = [sys.executable, *shlex.split(facts["command"])[1:], "--out", str(out)]
     subprocess.run(command, cwd=ROOT, check=not facts.get("may_fail"))
-    text = (out / facts.get("report", "report.json")).read_text(encoding="utf-8")
-    report = json.loads(text.replace(f"{ROOT}/", ""))
+    path = ROOT / facts["stored"] if "stored" in facts else out / facts.get("report", "report.json")
+    report = json.loads(path.read_text(encoding="utf-8").replace(f"{ROOT}/", ""))
     for setting in ("out", "workers"):  # of the machine, not of the measurement
         report.get("settings", {}).pop(setting, None)
     physics = Physics()
     values = dict(
         record=dict(
-            n=_size(report),
+            n=facts.get("n") or _size(report),
             simulation=f"{physics.rate_hz} Hz, {physics.position_iterations} iterations",
-            recorded=f"commit {_commit()}, {datetime.date.today().isoformat()}",
+            recorded=recorded,
             machine=_machine(),
         ),
-        report=report,
+        report=facts.get("stored", report),
     )
     REPORTS.mkdir(exist_ok=True)
     (REPORTS / f"{name}.json").write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
@@ -142,6 +190,8 @@ def _size(report: dict[str, Any]) -> str:
         settings = report["settings"]
         n_trials = len(report["trials"])
         return f"{n_trials} trials, {settings['trials']} a part and policy, seed {settings['seed']}"
+    if "weights" in report:
+        return f"{len(report['rows'])} grasps of {len({row['part'] for row in report['rows']})} parts"
     tried = sum(row["tried"] for row in report["corrections"].values())
     return f"{tried} placements of {len(report['parts'])} parts; the same grasps for all corrections"
 

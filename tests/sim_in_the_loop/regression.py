@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 from rich.console import Console
-from rich.table import Table
+from rich.table import Table as ConsoleTable
 from scipy.stats import binomtest
 
 from mskgrasp.core.config import Config
@@ -25,6 +25,7 @@ from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.placement_records import Placement
 from mskgrasp.palletize.run import palletize
 from mskgrasp.runtime.cli import run
+from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.options import parse
 from mskgrasp.runtime.run_folder import TRIALS, file_digest, read_trials
 from tests.sim_in_the_loop.record import PARTS
@@ -38,8 +39,8 @@ LEVEL = 0.99
 DESCRIPTION = """Plans, grasps, corrects and places a fixed set of parts in the simulated cell, and prints
 the differences from the run stored in the repository, with intervals over parts.
 
-The exit status is 1 if a figure is worse than chance explains. --store replaces the stored run: commit it
-with the change that explains it."""
+The exit status is 1 if a figure is worse than chance explains. --store replaces the stored run; use it
+through make results ARGS="--record regression", which also renders the page of results."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -255,9 +256,22 @@ def _median(values: np.ndarray) -> float:
     return float(np.median(values))
 
 
+def stored_figures(rows: Sequence[Row]) -> Table:
+    """Table of the figures of a run."""
+    figures = [(one, one.stored) for one in compare(rows, rows)]
+    return Table(
+        header=("figure", "trials", "value"),
+        rows=[
+            (one.title, one.n, f"{value * one.scale:.2f} {one.unit}")
+            for one, value in figures
+            if value is not None
+        ],
+    )
+
+
 def print_differences(differences: Sequence[Difference], console: Console) -> None:
     """Prints a row for each figure."""
-    table = Table(title="The loop, against the stored run")
+    table = ConsoleTable(title="The loop, against the stored run")
     for name in ("figure", "trials", "stored", "now", "difference", f"{LEVEL:.0%}", ""):
         table.add_column(name, justify="left" if name in ("figure", "") else "right")
     for one in differences:
