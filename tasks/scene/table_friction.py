@@ -57,7 +57,7 @@ class TableFriction:
         self.reset()
 
     def reset(self) -> None:
-        """Forgets the last step, as after the part was put elsewhere."""
+        """Forgets the last step, as after the part was put elsewhere: the next step is without friction."""
         self._with_friction: np.ndarray | None = None
         """Velocity (6,) that the part would have now if nothing but friction had changed it."""
         self._timestep = self._system.timestep
@@ -67,8 +67,10 @@ class TableFriction:
         body, step = self._body, self._system.timestep
         ratio, self._timestep = step / self._timestep, step
         now = np.concatenate([body.linear_velocity, body.angular_velocity]).astype(np.float64)
-        free = now if self._with_friction is None else now + MEMORY * ratio * (now - self._with_friction)
-        self._with_friction = now
+        last, self._with_friction = self._with_friction, now
+        if last is None:  # the contacts are those of another place
+            return
+        free = now + MEMORY * ratio * (now - last)
         if max(abs(free).max(), abs(now).max()) < AT_REST:
             return
         points, impulses = self._contacts()
