@@ -9,7 +9,6 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -53,13 +52,15 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
     }
     by_part = {part.name: compare(_of(mujoco, part.name), _of(sapien, part.name)) for part in parts}
     differing = disagreements(mujoco, sapien)
-    told = [f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN" for (ours, theirs), count in differing]
+    differences = [
+        f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN" for (ours, theirs), count in differing
+    ]
     worst = sorted(by_part.items(), key=lambda item: item[1].agreement)
     print_sections(
         [
             Section(
                 title="MuJoCo against SAPIEN",
-                text=told,
+                text=differences,
                 tables=[_table([*rows.items(), *worst])],
             )
         ]
@@ -110,7 +111,7 @@ def _advance(bar: Bar) -> Callable[[int], None]:
 
 def _of(outcomes: Outcomes, part: str) -> Outcomes:
     rows = outcomes.part == part
-    return replace(outcomes, **{name: values[rows] for name, values in vars(outcomes).items()})
+    return outcomes.rows(rows)
 
 
 def _table(rows: Sequence[tuple[str, Comparison]]) -> Table:
