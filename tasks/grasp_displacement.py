@@ -208,7 +208,8 @@ class GraspDisplacementEnv(BaseEnv):
             if part.content_hash not in self._standing:
                 self._standing[part.content_hash] = standing_poses(part, self.physics)
         self.standing = [self._standing[part.content_hash] for part in self.parts]
-        self.motion = PandaMotion(self.scene, self.agent, self.physics, self._table_friction())
+        self._friction = self._table_friction()
+        self.motion = PandaMotion(self.scene, self.agent, self.physics, self._friction)
         self.contacts = HandContacts(self.scene, self.agent, self.part)
         self.attempt = Attempt(self.agent, self.part, self._hulls, self.motion, self.contacts, self.physics)
 
@@ -238,6 +239,8 @@ class GraspDisplacementEnv(BaseEnv):
         pose = torch.as_tensor(np.asarray(given), dtype=torch.float32, device=self.device).reshape(-1, 7)
         self._resting_z[env_idx] = pose[:, 2]
         self.part.set_pose(ManiSkillPose.create_from_pq(to_world(pose[:, :3]), pose[:, 3:]))
+        if self._friction is not None:
+            self._friction.reset()
         if len(env_idx) == self.num_envs and self.agent.control_mode == "grasp":
             # This mode's controller sets no targets: the drives would pull towards the last attempt.
             self.motion.place(np.tile(HOME, (self.num_envs, 1)))
@@ -266,6 +269,12 @@ class GraspDisplacementEnv(BaseEnv):
             self.scene._gpu_apply_all()
             self.scene.px.gpu_update_articulation_kinematics()
             self.scene._gpu_fetch_all()
+
+    def set_state_dict(self, state: dict, env_idx: Tensor | None = None) -> None:
+        """Sets the state of `get_state_dict`, of which the last step's contacts are no part."""
+        super().set_state_dict(state, env_idx)
+        if self._friction is not None:
+            self._friction.reset()
 
     def _apply_error(self, error: ExecutionError | None) -> None:
         """Sets gripper force, pad friction and camera pose to those of an attempt, in a single sub-scene."""
@@ -341,6 +350,11 @@ class GraspDisplacementEnv(BaseEnv):
         grasp = torch.as_tensor(action, dtype=torch.float32, device=self.device).reshape(-1, 4)
         self._outcome = self.try_grasp(grasp)
         return grasp
+
+    def _before_simulation_step(self) -> None:
+        # ManiSkill itself steps the scene in the other control modes; in mode grasp `PandaMotion` does.
+        if self._friction is not None:
+            self._friction.apply()
 
     # ------------------------------------------------------------------ outcome
 

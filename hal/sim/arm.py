@@ -184,8 +184,10 @@ class SapienArm(Arm):
     def _grasp(self, force: float) -> GraspOutcome:
         env = self._world.env
         env.agent.set_finger_force(force)
-        reach = self._world.reach(self._state().T_base_tcp)
-        if reach is not None and reach + PAD_GAP < MAX_OPENING / 2:
+        state = self._state()
+        reach = self._world.reach(state.T_base_tcp)
+        # Fingers that are as near already, as those of a hand that holds the part, must not open.
+        if reach is not None and reach + PAD_GAP < state.gripper_width / 2:
             with env.motion.coarsely(AIR_HZ):
                 env.motion.move_fingers(reach + PAD_GAP, check=self._stop.is_set)
         self._force = force

@@ -44,7 +44,8 @@ def restore(scene: ManiSkillScene, lying: Lying, pose: sapien.Pose, number: int,
         lying: The part.
         pose: ManiSkill's world.
         number: Tells it from others of its name.
-        friction: Its coefficient.
+        friction: Coefficient of its material; the effective one is the mean with that of the other body: none
+            on the table and on the part presented, twice the effective one on the pads.
     """
     body = build_part(scene, replace(lying.part, name=f"{lying.part.name}-beside-{number}"), 0, friction)
     body.set_pose(pose)

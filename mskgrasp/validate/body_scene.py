@@ -24,9 +24,8 @@ from tasks.scene.frames import base_pose
 
 ALOFT = 0.25
 """Height at which the hand holds bodies that must not meet the table, m."""
-
-
 GRAVITY = 9.81
+"""m/s^2."""
 BLOCK = (0.04, 0.02, 0.03)
 """Edges of the block of most experiments, m."""
 

@@ -9,7 +9,6 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -113,7 +112,7 @@ def _advance(bar: Bar) -> Callable[[int], None]:
 
 def _of(outcomes: Outcomes, part: str) -> Outcomes:
     rows = outcomes.part == part
-    return replace(outcomes, **{name: values[rows] for name, values in vars(outcomes).items()})
+    return outcomes.rows(rows)
 
 
 def _table(rows: Sequence[tuple[str, Comparison]]) -> Table:

@@ -16,12 +16,9 @@ from mskgrasp.core.panda_kinematics import forward_pose, top_down
 from mskgrasp.core.settings import Physics
 from mskgrasp.parts import Part, read_part
 from mskgrasp.parts.hulls import hull_corners
+from tasks.attempt.attempt import SPEED_WINDOW_S
 from tasks.attempt.outcome import MAX_DRIFT, MAX_TURN, MIN_PAD_FORCE, Observed, judge
-
-PEAK_ACCELERATION = 1.5
-"""Of the hand on straight lines, m/s^2, as in the task."""
-SPEED_WINDOW_S = 0.02
-"""The last part of the hold, over which the part's speed in the hand is measured, s."""
+from tasks.robot.motion import PEAK_ACCELERATION
 
 
 def mujoco_physics(physics: Physics) -> MujocoPhysics:

@@ -60,9 +60,7 @@ def judge(seen: Observed) -> tuple[Array, Array]:
         failure: (n,) uint8, index into `mskgrasp.core.grasp.FAILURES`; the earliest reason wins.
     """
     holds = seen.pads_touch & (seen.gap > MIN_GAP) & (seen.rise >= MIN_RISE)
-    overlap = (
-        seen.penetration > MAX_PENETRATION
-    )  # NaN compares false: an unknown penetration is not counted as one
+    overlap = seen.penetration > MAX_PENETRATION  # false where it is NaN: not known
     steady = (seen.relative_speed < MAX_RELATIVE_SPEED) & ~overlap
     success = seen.settled & ~seen.collided & seen.held_closed & holds & steady
     xp = array_namespace(seen.gap)

@@ -7,13 +7,13 @@ from sapien.physx import PhysxCpuSystem, PhysxRigidBaseComponent, PhysxRigidDyna
 from scipy.linalg.lapack import dposv
 
 ROUNDS = 6
-"""Of the solution of a step, which starts from the last velocity."""
+"""Iterations of the least squares of a step, which start from the present velocity."""
 STILL = 1e-5
 """Speed below which friction is viscous instead of Coulomb's, m/s."""
 MEMORY = 0.98
-"""Share of the last step's other changes that is expected of the next one. With all of it, this friction and
-that of a finger on the same part wind each other up; with less, a part that is pushed almost hard enough to
-slide creeps, here by 0.1 mm/s."""
+"""Share of the last step's change of velocity, without friction's, that is expected of the next step. With
+all of it, this friction and that of a finger on the same part amplify each other; with less, a part that is
+pushed almost hard enough to slide creeps, at 1000 Hz by 0.1 mm/s."""
 AT_REST = 1e-6
 """A part slower than this, m/s and rad/s, that nothing accelerates needs no friction."""
 
@@ -30,9 +30,8 @@ class TableFriction:
 
     with the part's spatial inertia M, the impulses n_i of the last step and the points' Jacobians J_i, by
     weighted least squares (maximum dissipation; Moreau, On unilateral constraints, friction and plasticity,
-    1974). w0 is the velocity without friction: the
-    present one, changed by `MEMORY` of what everything but friction changed in the last step. Without that, a
-    part that is pushed too weakly to slide would creep.
+    1974). w0 is the velocity without friction: the present one, changed by `MEMORY` of what everything but
+    friction changed in the last step. Without that, a part that is pushed too weakly to slide would creep.
 
     Args:
         system: Engine of the scene.
@@ -57,7 +56,7 @@ class TableFriction:
         self.reset()
 
     def reset(self) -> None:
-        """Forgets the last step, as after the part was put elsewhere."""
+        """Forgets the last step, as after the part was put elsewhere: the next step is without friction."""
         self._with_friction: np.ndarray | None = None
         """Velocity (6,) that the part would have now if nothing but friction had changed it."""
         self._timestep = self._system.timestep
@@ -67,8 +66,10 @@ class TableFriction:
         body, step = self._body, self._system.timestep
         ratio, self._timestep = step / self._timestep, step
         now = np.concatenate([body.linear_velocity, body.angular_velocity]).astype(np.float64)
-        free = now if self._with_friction is None else now + MEMORY * ratio * (now - self._with_friction)
-        self._with_friction = now
+        last, self._with_friction = self._with_friction, now
+        if last is None:  # the contacts are those of another place
+            return
+        free = now + MEMORY * ratio * (now - last)
         if max(abs(free).max(), abs(now).max()) < AT_REST:
             return
         points, impulses = self._contacts()

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 import yaml
 
-from mskgrasp.collect.run import is_done, main
-from mskgrasp.core.errors import BadDataset
+from mskgrasp.collect.config import CollectConfig
+from mskgrasp.collect.run import check_out, is_done, main
+from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock
 from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.simulation.shard_task import ShardTask
@@ -150,6 +151,15 @@ def test_a_wrong_configuration_is_one_line_that_names_it(tmp_path, text, code, m
     assert done.returncode == code
     assert message in done.stderr.strip().splitlines()[-1]
     assert not (tmp_path / "data").exists()
+
+
+def test_a_dataset_made_with_settings_that_no_longer_exist_is_not_added_to(collected, tmp_path):
+    out = Path(shutil.copytree(collected, tmp_path / "data"))
+    settings = yaml.safe_load((out / "config.yaml").read_text())
+    settings["physics"]["coarse_mass"] = 0.04  # as simulation version 2 stored it
+    (out / "config.yaml").write_text(yaml.safe_dump(settings))
+    with pytest.raises(UsageError, match=r"unknown key 'physics.coarse_mass'; .*; choose another --out"):
+        check_out(CollectConfig(out=out))
 
 
 def test_shards_of_other_software_are_not_added_to(collected, tmp_path):

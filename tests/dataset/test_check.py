@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import sys
@@ -14,8 +15,10 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES, pose_base_tcp
 from mskgrasp.dataset import read_shard
+from mskgrasp.dataset.card import read_card
 from mskgrasp.dataset.check import check_dataset
 from mskgrasp.dataset.commands.command_line import main
+from mskgrasp.dataset.export import export_npz
 from tests.collecting import REPOSITORY
 
 KEY, NUT = "parallel_key_a16x10x56", "hex_nut_m30"
@@ -280,6 +283,20 @@ def test_settings_that_changed_after_the_shards_were_made_are_named(data):
     assert "physics.finger_force is 40.0, the shards were made with 30.0" in only(data, "config.yaml")
     (data / "config.yaml").unlink()
     assert "cannot read configuration" in only(data, "config.yaml")
+
+
+def test_a_dataset_made_with_settings_that_no_longer_exist_is_sound_and_exported(data, tmp_path):
+    settings = yaml.safe_load((data / "config.yaml").read_text())
+    # As simulation version 2 stored it.
+    settings["physics"] |= dict(coarse_rate_hz=250, coarse_mass=0.04)
+    (data / "config.yaml").write_text(yaml.safe_dump(settings))
+    for path in (data / "shards").iterdir():
+        attribute(path, "physics", json.dumps(settings["physics"]))
+    assert faults(data) == {}
+    assert read_card(data).physics["coarse_mass"] == 0.04
+    assert export_npz(data, tmp_path / "data.npz") == 12
+    with np.load(tmp_path / "data.npz") as stored:
+        assert json.loads(str(stored["physics_json"])) == settings["physics"]
 
 
 def test_foreign_files_are_named_and_leftovers_only_noted(data):

@@ -73,6 +73,23 @@ def test_the_usual_control_modes_still_work(boxes, mode):
     env.close()
 
 
+@pytest.mark.parametrize(("mode", "friction"), [("pd_joint_delta_pos", 0.4), ("pd_ee_delta_pose", 0.1)])
+def test_in_the_usual_control_modes_the_table_brakes_a_part_as_coulomb_says(boxes, mode, friction):
+    env = make(boxes, obs_mode="none", control_mode=mode, physics=dict(friction_table_part=friction))
+    base = env.unwrapped
+    assert isinstance(base, GraspDisplacementEnv)
+    env.reset(seed=0)
+    rest = np.zeros(env.action_space.shape, np.float32)
+    env.step(rest)
+    start, speed = base.part_pose().position, 0.2
+    base.part.set_linear_velocity(torch.tensor([0.0, speed, 0.0]))
+    for _ in range(6):
+        env.step(rest)
+    way = float((base.part_pose().position - start).norm())
+    env.close()
+    assert way == pytest.approx(speed**2 / (2 * friction * 9.81), rel=0.03)
+
+
 def test_state_can_be_saved_and_restored(boxes):
     env = make(boxes, obs_mode="none")
     base = env.unwrapped
@@ -84,6 +101,19 @@ def test_state_can_be_saved_and_restored(boxes):
     base.set_state_dict(state)
     assert torch.allclose(base.part_pose().as_vector(), pose, atol=1e-6)
     env.close()
+
+
+def test_the_table_does_not_brake_a_part_that_a_restored_state_puts_into_the_air(env):
+    env.reset(seed=0)
+    env.motion.step(20)
+    state = env.get_state_dict()
+    flying = state["actors"]["part"].clone()
+    flying[0, 2] += 0.1
+    flying[0, 7] = 0.3
+    env.set_state_dict({"actors": {"part": flying}})
+    env.motion.step()
+    assert float(env.part.linear_velocity[0, 0]) == pytest.approx(0.3, rel=1e-5)
+    assert float(env.part.angular_velocity.norm()) == pytest.approx(0, abs=1e-5)
 
 
 def test_record_episode_writes_a_trajectory(boxes, tmp_path):

@@ -17,6 +17,7 @@ from mani_skill.utils.wrappers.record import RecordEpisode
 
 import tasks  # noqa: F401 (registers the task)
 from mskgrasp.core.grasp import FAILURES
+from mskgrasp.core.settings import Physics
 from mskgrasp.dataset import list_shards, read_shard, u16_to_depth
 from mskgrasp.dataset.commands.command_line import main
 from mskgrasp.dataset.commands.maniskill import export_maniskill
@@ -134,3 +135,17 @@ def test_shards_of_before_the_coarse_rate_are_exported_as_they_were_made(tmp_pat
     export_maniskill(folder, tmp_path / "x.h5")
     env_info = json.loads((tmp_path / "x.json").read_text())["env_info"]
     assert env_info["env_kwargs"]["physics"]["coarse_rate_hz"] == coarse
+
+
+def test_settings_that_the_task_no_longer_has_are_not_exported_to_it(tmp_path):
+    folder = synthetic.write_dataset(tmp_path / "boxes", n_parts=1, n_attempts=3, seed=0)
+    with h5py.File(list_shards(folder)[0], "r+") as file:
+        file.attrs["physics"] = json.dumps(
+            Physics(coarse_rate_hz=250, lift_height=0.15).model_dump() | dict(coarse_mass=0.04)
+        )
+    export_maniskill(folder, tmp_path / "x.h5")
+    env_info = json.loads((tmp_path / "x.json").read_text())["env_info"]
+    kwargs = dict(env_info["env_kwargs"], obs_mode="none", render_backend="none", parts=["washer_m36"])
+    env = gymnasium.make(env_info["env_id"], **kwargs)
+    assert env.unwrapped.physics == Physics(coarse_rate_hz=250, lift_height=0.15)
+    env.close()

@@ -41,3 +41,17 @@ def test_long_steps_in_free_air_leave_a_part_in_the_hand_as_short_ones_do(
     assert held == held_finely
     moved, turned = pose_distance(coarse, fine)
     assert moved < 0.2e-3 and np.degrees(turned) < 0.3
+
+
+def test_a_second_grasp_presses_harder_and_does_not_drop_the_part(cell: Cell):
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present("hex_nut_m30", 1)
+    x, y, _ = cell.tracker.part_pose().position
+    first = execute_grasp(cell, Grasp.from_vector(np.array([x, y, 0.0115, 0.3])))
+    aloft = cell.tracker.part_pose()
+    again = cell.arm.grasp(45.0)
+    assert first.holding and again.holding and again.width == pytest.approx(first.width, abs=2e-4)
+    moved, turned = pose_distance(aloft, cell.tracker.part_pose())
+    assert moved < 0.2e-3 and np.degrees(turned) < 0.3
+    cell.arm.move_gripper(0.08)
+    go_home(cell)
