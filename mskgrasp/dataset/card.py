@@ -12,6 +12,7 @@ import numpy as np
 
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.metrics import wilson_interval
+from mskgrasp.dataset.label_error import read_label_error
 from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
 
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
@@ -153,7 +154,9 @@ def tables(card: Card) -> list[Table]:
             ("displacement", f"median {moved[0]:.2f} mm, 90 % under {moved[1]:.1f} mm"),
             ("turn", f"median {turned[0]:.2f} degrees, 90 % under {turned[1]:.1f} degrees"),
         ]
+    simulations = {names.get("simulation", "unknown") for names, _ in card.versions}
     facts += [
+        ("error of a label", read_label_error(simulations)),
         ("depth images", f"{card.image[1]} x {card.image[0]} pixels, uint16, 0.1 mm"),
         ("seed", f"{card.seed}"),
         ("schema", f"version {SCHEMA_VERSION}"),

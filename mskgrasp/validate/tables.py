@@ -21,7 +21,7 @@ def sections(record: Record) -> list[Section]:
             _errors(record),
             _grid(record),
             _sensitivity(record),
-            _label_error(record),
+            label_error_section(record),
             _impossible(record),
         ]
     return [section for section in found if section]
@@ -123,7 +123,8 @@ def _sensitivity(record: Record) -> Section:
     return Section(title="Sensitivity: differences to production", tables=[Table(header=header, rows=rows)])
 
 
-def _label_error(record: Record) -> Section:
+def label_error_section(record: Record) -> Section:
+    """The error of a label, and the ranges from which hand and table were drawn."""
     found = record["label_error"]
     if not found:
         return Section(title="Error of a label")

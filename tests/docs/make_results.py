@@ -27,6 +27,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,8 @@ from pydantic import TypeAdapter
 
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.settings import Physics
+from mskgrasp.dataset.label_error import STORED as LABEL_ERROR
+from mskgrasp.dataset.label_error import LabelError
 from mskgrasp.evaluate.comparison import DisplacementSummary
 from mskgrasp.evaluate.report import Report
 from mskgrasp.evaluate.report import sections as evaluation_sections
@@ -46,6 +49,7 @@ from mskgrasp.parts.commands.rate import Rate
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table, cell_text
 from mskgrasp.validate.engines import sections as engine_sections
+from mskgrasp.validate.tables import label_error_section
 from mskgrasp.validate.tables import sections as validation_sections
 from tests.docs.pages import ROOT
 from tests.sim_in_the_loop.regression import Row, stored_figures
@@ -108,6 +112,8 @@ def _sections(report: dict[str, Any] | str) -> list[Section]:
         return engine_sections(report)
     if "closed_form" in report:
         return validation_sections(report)
+    if "label_error" in report:
+        return [label_error_section(report)]
     if "experiment" in report:
         kind = SuccessSummary if report["experiment"] == "success" else DisplacementSummary
         summary = TypeAdapter(kind).validate_python(report)
@@ -164,6 +170,11 @@ def record(name: str) -> None:
         ),
         report=facts.get("stored", report),
     )
+    if name == "label_error":  # a dataset's card states it, too
+        known = report["label_error"] | {"simulation": report["versions"]["simulation"]}
+        stored = {field.name: known[field.name] for field in fields(LabelError)}
+        LABEL_ERROR.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+        values["report"] = {key: report[key] for key in ("settings", "versions", "label_error")}
     REPORTS.mkdir(exist_ok=True)
     (REPORTS / f"{name}.json").write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 

@@ -135,3 +135,13 @@ def test_drawn_settings_lie_within_their_ranges_and_can_be_simulated():
     for one in drawn:
         mass = one.finger_armature + 0.015
         assert one.finger_damping**2 == pytest.approx(4 * one.finger_stiffness * mass)
+
+
+def test_the_error_of_a_label_is_measured_with_the_parts_and_ranges_of_the_default():
+    configs = REPOSITORY / "configs" / "validate"
+    whole, alone = (
+        read_config(ValidateConfig, configs / f"{name}.yaml") for name in ("default", "label_error")
+    )
+    assert alone.ranges == whole.ranges and alone.parts == whole.parts
+    assert alone.physics == whole.physics == Physics()
+    assert alone.n_variants > whole.n_variants
