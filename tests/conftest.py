@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import signal
 from pathlib import Path
 
 # One core a process: the tests measure nothing, and torch's and Mesa's threads only get in each other's way.
@@ -18,6 +19,9 @@ from tests.collecting import collect
 # How long an example takes says more of the machine than of the code.
 settings.register_profile("mskgrasp", deadline=None)
 settings.load_profile("mskgrasp")
+
+# Shells start background jobs with Ctrl-C ignored, which the programs under test would inherit.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LONGEST = (
     "parts/recipes/test_families.py",

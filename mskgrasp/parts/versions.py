@@ -10,7 +10,7 @@ import json
 from functools import lru_cache
 from pathlib import Path
 
-PART_VERSION = 1
+PART_VERSION = 2
 """Building a part from a solid: pieces, decomposition, measurements, stable poses, files."""
 
 IMPORT_VERSION = 1

@@ -23,6 +23,7 @@ from mskgrasp.parts.solids.measure import (
     longest_axis,
     mass_properties,
 )
+from mskgrasp.parts.solids.overlap import overlapped
 from mskgrasp.parts.solids.solid import MAX_HULL_VERTICES, Solid
 from mskgrasp.parts.solids.stable_poses import stable_poses
 
@@ -54,12 +55,12 @@ def write_solid(
     dimensions: dict[str, float],
     recipe_hash: str,
 ) -> Part:
-    """Measures a solid, moves its centroid to the origin and stores it as a part."""
+    """Measures a solid, lets its hulls overlap, moves its centroid to the origin and stores it as a part."""
     masses = mass_properties(solid.mesh, density)
     centroid_mm = masses.centroid * 1000
     mesh = trimesh.Trimesh(solid.mesh.vertices - centroid_mm, solid.mesh.faces, process=False)
     # Rounded to the precision of the file, so that everything measured below holds for the stored hulls.
-    hulls = [_corners((points - centroid_mm).astype(np.float32)) for points in solid.hulls]
+    hulls = [_corners((points - centroid_mm).astype(np.float32)) for points in overlapped(solid.hulls)]
     for number, points in enumerate(hulls):
         _check_hull(name, number, points)
     fit = hull_fit(mesh, hulls)

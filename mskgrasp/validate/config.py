@@ -135,6 +135,10 @@ class ValidateConfig(Config):
 
     @model_validator(mode="after")
     def _check(self) -> ValidateConfig:
+        if self.engine == "sapien" and not self.physics.friction_table_part > 0:
+            raise ValueError(
+                "physics.friction_table_part must be above 0: closed-form checks slide on the table"
+            )
         if not self.rates_hz or not self.iterations or not self.references:
             raise ValueError("rates_hz, iterations and references need at least one value each")
         for rate in self.rates_hz:
@@ -150,8 +154,9 @@ class ValidateConfig(Config):
             for label, values in labels.items():
                 self._check_variant(f"{group}: {label}", values)
         for name, (low, high) in self.ranges.items():
-            if name not in Physics.model_fields or not low <= high:
-                raise ValueError(f"ranges: {name} must be a setting of physics, from low to high")
+            known = Physics.model_fields.get(name)
+            if known is None or known.annotation is not float or not low <= high:
+                raise ValueError(f"ranges: {name} must be a real-valued setting of physics, from low to high")
         return self
 
     @property

@@ -18,11 +18,12 @@ import gymnasium
 import numpy as np
 import torch
 
+from mskgrasp.core.errors import BadPart
 from mskgrasp.core.settings import Physics
 from mskgrasp.parts import read_part
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.simulation.shard import draw_attempt
-from mskgrasp.simulation.versions import versions
+from mskgrasp.simulation.versions import SIMULATION_VERSION, versions
 from mskgrasp.validate.altered_part import mesh_rests, resting_start
 from mskgrasp.validate.config import Setting, drawn_physics
 from tasks import GraspDisplacementEnv
@@ -90,12 +91,13 @@ def draw_grasps(
     """Draws n starts and grasps of each part as the collector does; those that were drawn before are kept.
 
     Raises:
+        BadPart: The camera sees one in none of its poses.
         WorkerFailed: Processes died again and again.
     """
     drawn = []
     for folder in folders:
         part = read_part(folder)
-        name = f"{part.name}-{part.content_hash[:12]}-{seed}-{n}.npz"
+        name = f"{part.name}-{part.content_hash[:12]}-{SIMULATION_VERSION}-{seed}-{n}.npz"
         drawn.append(Drawn(folder=folder, file=out / "grasps" / name))
     jobs = [(str(one.folder), n, seed, str(one.file)) for one in drawn if not one.file.exists()]
     _in_parallel(_draw, jobs, workers, report)
@@ -201,6 +203,8 @@ def _draw(folder: str, n: int, seed: int, file: str) -> int:
             grasps.append(grasp[0])
             poses.append(env.part_pose().as_vector()[0].numpy())
     made.close()
+    if not grasps:
+        raise BadPart(f"{env.parts[0].name}: the camera sees it in none of its poses: leave it out of parts")
     _write(Path(file), pose=np.stack(poses), grasp=np.stack(grasps))
     return len(grasps)
 

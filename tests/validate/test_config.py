@@ -120,6 +120,20 @@ def test_empty_lists_are_refused():
             ValidateConfig(**{name: ()})
 
 
+@pytest.mark.parametrize(
+    "ranges", [{"rate_hz": (500, 1000)}, {"skip_air": (0, 1)}, {"nothing": (0, 1)}, {"hold_s": (1, 0.5)}]
+)
+def test_ranges_of_what_cannot_be_drawn_are_refused(ranges):
+    with pytest.raises(ValueError, match=f"ranges: {next(iter(ranges))} must be a real-valued setting"):
+        ValidateConfig(ranges=ranges)
+
+
+def test_a_table_without_friction_is_refused_where_parts_slide_on_it():
+    with pytest.raises(ValueError, match="friction_table_part must be above 0"):
+        ValidateConfig(physics=Physics(friction_table_part=0.0))
+    ValidateConfig(physics=Physics(friction_table_part=0.0), engine="mujoco")
+
+
 def test_drawn_settings_lie_within_their_ranges_and_can_be_simulated():
     ranges = {
         "friction_pad_part": (0.3, 0.8),

@@ -1,0 +1,85 @@
+"""Convex pieces extended into their neighbours, so that no contact is made with the face between two."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from manifold3d import Manifold, OpType
+from scipy.spatial import ConvexHull
+
+from mskgrasp.parts.solids.solid import MAX_HULL_VERTICES
+
+REACH_MM = 1.0
+"""Depth to which a piece reaches into its neighbours: far more than a pad sinks into a part."""
+
+_TOUCH_MM = 0.05
+"""Pieces that are no farther apart, and overlap by no more, touch."""
+_OUTSIDE = 1e-3
+"""Largest share of the volume that a corner adds that may lie outside all pieces."""
+
+
+def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[np.ndarray]:
+    """The pieces, each with as much of the neighbours that it touches as leaves their union unchanged.
+
+    A contact pushes along the shortest way out of a piece. Where two pieces meet at a face, that way leads
+    through this face for a corner of a pad that presses beside it: sideways, as if the part had a step there.
+
+    Args:
+        hulls: Corners (n, 3) of each piece, mm.
+        reach_mm: Depth of the overlap, mm.
+
+    Returns:
+        As many pieces in the same order. Neighbours on a concave side, and pieces that would need too many
+        corners, are left as they are.
+    """
+    pieces = [np.asarray(points, dtype=float) for points in hulls]
+    bodies = [Manifold.hull_points(points) for points in pieces]
+    boxes = [(points.min(axis=0) - _TOUCH_MM, points.max(axis=0) + _TOUCH_MM) for points in pieces]
+    found = []
+    for number, points in enumerate(pieces):
+        low, high = boxes[number]
+        near = [
+            other
+            for other in range(len(pieces))
+            if other != number and (boxes[other][0] <= high).all() and (boxes[other][1] >= low).all()
+        ]
+        union = Manifold.batch_boolean([bodies[n] for n in (number, *near)], OpType.Add)
+        for other in near:
+            points = _extended(points, pieces[number], pieces[other], bodies[other], union, reach_mm)
+        found.append(points)
+    return found
+
+
+def _extended(
+    points: np.ndarray, own: np.ndarray, other: np.ndarray, body: Manifold, union: Manifold, reach_mm: float
+) -> np.ndarray:
+    """Points (n, 3) and those corners of a neighbour's slice next to the piece that leave the union as is."""
+    plane = _plane_between(own, other)
+    if plane is None:
+        return points
+    normal, offset = plane
+    # trim_by_plane keeps the side that the normal points to.
+    slab = body.trim_by_plane(tuple(-normal), -(offset + reach_mm))
+    if slab.is_empty():
+        return points
+    volume = Manifold.hull_points(points).volume()
+    corners = np.asarray(slab.to_mesh64().vert_properties)[:, :3]
+    for corner in corners[corners @ normal > offset + 1e-3]:
+        grown = np.concatenate([points, corner[None]])
+        grown = grown[np.sort(ConvexHull(grown).vertices)]
+        if len(grown) > MAX_HULL_VERTICES:
+            continue
+        extended = Manifold.hull_points(grown)
+        added = extended.volume() - volume
+        if added > 0 and (extended - union).volume() <= _OUTSIDE * added:
+            points, volume = grown, extended.volume()
+    return points
+
+
+def _plane_between(points: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """The side of a convex body (outward normal, offset) beyond which a body lies that touches it."""
+    planes = np.unique(np.round(ConvexHull(points).equations, 6), axis=0)
+    beyond = (other @ planes[:, :3].T + planes[:, 3]).min(axis=0)
+    best = int(beyond.argmax())
+    return (planes[best, :3], -float(planes[best, 3])) if abs(beyond[best]) < _TOUCH_MM else None
