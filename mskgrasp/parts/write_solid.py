@@ -60,12 +60,13 @@ def write_solid(
     centroid_mm = masses.centroid * 1000
     mesh = trimesh.Trimesh(solid.mesh.vertices - centroid_mm, solid.mesh.faces, process=False)
     # Rounded to the precision of the file, so that everything measured below holds for the stored hulls.
-    hulls = [_corners((points - centroid_mm).astype(np.float32)) for points in overlapped(solid.hulls)]
+    pieces = [_corners((points - centroid_mm).astype(np.float32)) for points in solid.hulls]
+    hulls = [_corners(points.astype(np.float32)) for points in overlapped(pieces)]
     for number, points in enumerate(hulls):
         _check_hull(name, number, points)
     fit = hull_fit(mesh, hulls)
     _check_fit(name, fit)
-    resting, probability = stable_poses(np.concatenate(hulls).astype(np.float64))
+    resting, probability = stable_poses(np.concatenate(pieces).astype(np.float64))
     record: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "name": name,

@@ -8,6 +8,7 @@ import numpy as np
 from manifold3d import Manifold, OpType
 from scipy.spatial import ConvexHull
 
+from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, aspect_ratio
 from mskgrasp.parts.solids.solid import MAX_HULL_VERTICES
 
 REACH_MM = 1.0
@@ -30,8 +31,8 @@ def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[
         reach_mm: Depth of the overlap, mm.
 
     Returns:
-        As many pieces in the same order. Neighbours on a concave side, and pieces that would need too many
-        corners, are left as they are.
+        As many pieces in the same order. What would fill a concave side, need too many corners, or make a
+        piece more slender than PhysX accepts, is left out.
     """
     pieces = [np.asarray(points, dtype=float) for points in hulls]
     bodies = [Manifold.hull_points(points) for points in pieces]
@@ -64,11 +65,12 @@ def _extended(
     if slab.is_empty():
         return points
     volume = Manifold.hull_points(points).volume()
+    most_slender = max(0.9 * MOST_ASPECT_RATIO, aspect_ratio(points))
     corners = np.asarray(slab.to_mesh64().vert_properties)[:, :3]
     for corner in corners[corners @ normal > offset + 1e-3]:
         grown = np.concatenate([points, corner[None]])
         grown = grown[np.sort(ConvexHull(grown).vertices)]
-        if len(grown) > MAX_HULL_VERTICES:
+        if len(grown) > MAX_HULL_VERTICES or aspect_ratio(grown) > most_slender:
             continue
         extended = Manifold.hull_points(grown)
         added = extended.volume() - volume
