@@ -16,6 +16,8 @@ REACH_MM = 1.0
 
 _TOUCH_MM = 0.05
 """Pieces that are no farther apart, and overlap by no more, touch."""
+_FLAT_MM = 0.01
+"""A corner that protrudes by less from the hull of the others is dropped: PhysX would drop it, too."""
 _OUTSIDE = 1e-3
 """Largest share of the volume that a corner adds that may lie outside all pieces."""
 
@@ -48,7 +50,7 @@ def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[
         union = Manifold.batch_boolean([bodies[n] for n in (number, *near)], OpType.Add)
         for other in near:
             points = _extended(points, pieces[number], pieces[other], bodies[other], union, reach_mm)
-        found.append(points)
+        found.append(_without_flat_corners(points))
     return found
 
 
@@ -85,3 +87,15 @@ def _plane_between(points: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, f
     beyond = (other @ planes[:, :3].T + planes[:, 3]).min(axis=0)
     best = int(beyond.argmax())
     return (planes[best, :3], -float(planes[best, 3])) if abs(beyond[best]) < _TOUCH_MM else None
+
+
+def _without_flat_corners(points: np.ndarray) -> np.ndarray:
+    """The corners without those that an extension has left on an edge or a face."""
+    number = 0
+    while number < len(points):
+        others = np.delete(points, number, axis=0)
+        if (ConvexHull(others).equations @ [*points[number], 1.0]).max() < _FLAT_MM:
+            points = others
+        else:
+            number += 1
+    return points
