@@ -91,7 +91,9 @@ def test_sapien_loads_every_hull_where_it_should_be(builtin_parts):
         for shape in body.collision_shapes:
             cooked = shape.vertices * shape.scale * 1000
             same = [points for points in stored if len(points) == len(cooked)]
-            distances = [np.linalg.norm(cooked[:, None] - points[None], axis=2).min(axis=1) for points in same]
+            distances = [
+                np.linalg.norm(cooked[:, None] - points[None], axis=2).min(axis=1) for points in same
+            ]
             closest = int(np.argmin([distance.max() for distance in distances]))
             assert distances[closest].max() < 1e-3, part.name
             stored = [points for points in stored if points is not same[closest]]
