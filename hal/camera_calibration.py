@@ -75,7 +75,7 @@ class _CalibrationFile(Config):
 
 
 def write_calibration(path: Path, calibration: Calibration) -> None:
-    """Writes a calibration as YAML; the file appears whole or not at all."""
+    """Write a calibration as YAML; the file appears whole or not at all."""
     pose, intrinsics = calibration.T_base_camera, calibration.intrinsics
     values = {
         "schema_version": _SCHEMA,
@@ -102,7 +102,7 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
 
 
 def read_calibration(path: Path, *, serial: str | None) -> Calibration:
-    """Reads a calibration.
+    """Read a calibration.
 
     Args:
         path: The file.

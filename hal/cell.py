@@ -39,7 +39,7 @@ class PartFeeder(Protocol):
     """Places parts on the table; a simulator does so by itself."""
 
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """Places a part at a position and turn determined by the seed.
+        """Place a part at a position and turn determined by the seed.
 
         Args:
             part: Name or folder.
@@ -61,7 +61,7 @@ class BoardHolder(Protocol):
     """Attaches a calibration board to the hand; on a real cell an operator does."""
 
     def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
-        """Fixes a flat board to the hand until the next part is presented.
+        """Fixe a flat board to the hand until the next part is presented.
 
         Args:
             image: (h, w) uint8 grey levels of the printed side.
@@ -93,6 +93,6 @@ class Cell:
 
     @contextmanager
     def connected(self) -> Iterator[Cell]:
-        """Connects camera and arm; releases both at the end of the block."""
+        """Connect camera and arm; release both at the end of the block."""
         with self.camera, self.arm:
             yield self

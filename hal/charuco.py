@@ -91,7 +91,7 @@ class Corners:
 
 
 def detect(board: Board, colour: np.ndarray) -> Corners:
-    """Detects the board's corners in (h, w, 3) RGB or (h, w) grey, uint8; there may be none."""
+    """Detect the board's corners in (h, w, 3) RGB or (h, w) grey, uint8; there may be none."""
     grey = colour if colour.ndim == 2 else cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY)
     parameters = cv2.aruco.DetectorParameters()
     # Small markers are blurred into each other: only the middle of each module is read, in smaller steps than

@@ -86,7 +86,7 @@ class DriverProcess:
         return self._process.pid
 
     def ask(self, op: str, *, timeout_s: float, **values: Any) -> Answer:
-        """Sends a request and waits for its answer; requests of several threads may overlap.
+        """Send a request and wait for its answer; requests of several threads may overlap.
 
         Raises:
             NoAnswer: No answer within ``timeout_s``; the process was killed.
@@ -116,7 +116,7 @@ class DriverProcess:
         return Answer(result=reply["result"], payload=[payload])
 
     def close(self) -> None:
-        """Lets the driver release its device and ends the process; safe to call twice."""
+        """Let the driver release its device and end the process; safe to call twice."""
         assert self._process.stdin is not None and self._process.stdout is not None
         with self._writing:
             self._process.stdin.close()
@@ -129,12 +129,12 @@ class DriverProcess:
         self._log.close()
 
     def kill(self) -> None:
-        """Ends the process at once; its device is left to the kernel."""
+        """End the process at once; its device is left to the kernel."""
         self._process.kill()
         self._process.wait()
 
     def _send(self, request: dict[str, Any], deadline_s: float) -> None:
-        """Writes a request; a driver that hangs reads none, and a request may be longer than the pipe.
+        """Write a request; a driver that hangs reads none, and a request may be longer than the pipe.
 
         Raises:
             TimeoutError: It could not be written in time.
@@ -217,7 +217,7 @@ class AnswerPipe:
         action: Callable[[], Answer],
         explain: Callable[[BaseException], HalError],
     ) -> None:
-        """Runs an action and writes its answer, or the error that explains why it failed.
+        """Run an action and write its answer, or the error that explains why it failed.
 
         Args:
             request: As `requests` yields it. With ``alarm_s`` the kernel ends the process when the action

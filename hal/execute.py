@@ -45,7 +45,7 @@ class GraspResult:
 
 
 def execute_grasp(cell: Cell, grasp: Grasp) -> GraspResult:
-    """Opens, approaches, descends, closes, lifts and holds.
+    """Open, approach, descend, close, lift and hold.
 
     Args:
         cell: Connected, without an error in force.
@@ -96,7 +96,7 @@ def above_grasp(cell: Cell, grasp: Grasp) -> Pose:
 
 
 def put_down(cell: Cell, grasp: Grasp, *, height: float = PUT_DOWN, opening: float = MAX_OPENING) -> None:
-    """Lowers a lifted part to where it was grasped, opens the fingers and rises.
+    """Lower a lifted part to where it was grasped, open the fingers and rise.
 
     Args:
         cell: The hand holds the part over the table.
@@ -113,7 +113,7 @@ def put_down(cell: Cell, grasp: Grasp, *, height: float = PUT_DOWN, opening: flo
 
 
 def lower(cell: Cell, grasp: Grasp, *, height: float = 0.0) -> None:
-    """Lowers a lifted part to where it was grasped, or ``height`` metres above.
+    """Lower a lifted part to where it was grasped, or ``height`` metres above.
 
     Raises:
         MotionAborted: The part met the table early, because it hangs lower in the hand than before.
@@ -122,7 +122,7 @@ def lower(cell: Cell, grasp: Grasp, *, height: float = 0.0) -> None:
 
 
 def let_go(cell: Cell, place: Grasp, *, opening: float) -> None:
-    """Opens the fingers and rises straight.
+    """Open the fingers and rise straight.
 
     Args:
         cell: The hand is at ``place`` and holds a part.
@@ -143,7 +143,7 @@ def let_go(cell: Cell, place: Grasp, *, opening: float) -> None:
 
 
 def go_home(cell: Cell) -> None:
-    """Opens the fingers, retreats upward and moves the arm out of the camera's sight."""
+    """Open the fingers, retreat upward and move the arm out of the camera's sight."""
     arm = cell.arm
     arm.move_gripper(MAX_OPENING)
     state = arm.state()

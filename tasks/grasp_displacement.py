@@ -91,7 +91,7 @@ class GraspDisplacementEnv(BaseEnv):
         num_envs: int = 1,
         **kwargs: Any,
     ):
-        """Builds the environment.
+        """Build the environment.
 
         Args:
             *args: Passed to ManiSkill.
@@ -252,7 +252,7 @@ class GraspDisplacementEnv(BaseEnv):
             self._apply_error(self._errors[0])
 
     def begin_episode(self, seed: int) -> None:
-        """Begins the episode of ``reset(seed=seed)`` for `try_grasp`, without its other work.
+        """Begin the episode of ``reset(seed=seed)`` for `try_grasp`, without its other work.
 
         A reset takes as long as twenty steps of the simulation. No observation is made, the controllers of
         the other control modes are not reset, nor is torch's generator seeded: nothing here is drawn from it.
@@ -271,13 +271,13 @@ class GraspDisplacementEnv(BaseEnv):
             self.scene._gpu_fetch_all()
 
     def set_state_dict(self, state: dict, env_idx: Tensor | None = None) -> None:
-        """Sets the state of `get_state_dict`, of which the last step's contacts are no part."""
+        """Set the state of `get_state_dict`, of which the last step's contacts are no part."""
         super().set_state_dict(state, env_idx)
         if self._friction is not None:
             self._friction.reset()
 
     def _apply_error(self, error: ExecutionError | None) -> None:
-        """Sets gripper force, pad friction and camera pose to those of an attempt, in a single sub-scene."""
+        """Set gripper force, pad friction and camera pose to those of an attempt, in a single sub-scene."""
         if error is None:
             return
         if error.finger_force is not None:

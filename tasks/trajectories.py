@@ -49,7 +49,7 @@ def write_trajectories(
     T_base_camera: Pose,
     description: str,
 ) -> int:
-    """Writes ``path`` (.h5) with a group ``traj_i`` for each episode, and the .json file beside it.
+    """Write ``path`` (.h5) with a group ``traj_i`` for each episode, and the .json file beside it.
 
     Args:
         path: Must end in .h5.

@@ -19,7 +19,7 @@ _RULER = 0.1
 
 
 def print_board(board: Board, path: Path) -> str:
-    """Draws the board at true scale with a ruler to check it by, as PDF or PNG.
+    """Draw the board at true scale with a ruler to check it by, as PDF or PNG.
 
     Returns:
         The name of the paper.

@@ -59,7 +59,7 @@ class Picture:
         )
 
     def view(self, board: Board) -> View:
-        """Detects the board in it."""
+        """Detect the board in it."""
         return View(
             T_base_tcp=self.T_base_tcp, corners=detect(board, self.colour), intrinsics=self.intrinsics
         )
@@ -78,7 +78,7 @@ def take_pictures(
     rng: np.random.Generator,
     keep: Callable[[int, Picture, int], None],
 ) -> int:
-    """Moves the board before the camera, takes pictures, and returns the hand.
+    """Move the board before the camera, take pictures, and return the hand.
 
     Args:
         cell: Connected, the board in the hand.
@@ -175,7 +175,7 @@ def _still_picture(cell: Cell) -> Picture:
 
 
 def write_picture(path: Path, picture: Picture) -> None:
-    """Writes a picture; the file appears whole or not at all."""
+    """Write a picture; the file appears whole or not at all."""
     unfinished = path.with_name(path.name + ".tmp")
     with unfinished.open("wb") as file:
         np.savez_compressed(
@@ -191,7 +191,7 @@ def write_picture(path: Path, picture: Picture) -> None:
 
 
 def read_picture(path: Path) -> Picture:
-    """Reads a picture.
+    """Read a picture.
 
     Raises:
         UsageError: The file is missing, damaged, or no picture.

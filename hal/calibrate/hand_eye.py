@@ -88,7 +88,7 @@ class HandEye:
 
 
 def solve_hand_eye(board: Board, views: Sequence[View]) -> HandEye:
-    """Estimates the pose of the camera in the base.
+    """Estimate the pose of the camera in the base.
 
     Raises:
         BadCalibrationSet: Too few views with the board, too little tilt, a board too small in the image,

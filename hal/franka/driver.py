@@ -74,35 +74,35 @@ class Driver(Protocol):
     """The vendor's package behind a few verbs; anything it raises is explained by `hal.franka.faults`."""
 
     def connect(self, settings: DriverSettings) -> None:
-        """Opens robot and gripper; nothing moves."""
+        """Open robot and gripper; nothing moves."""
         ...
 
     def state(self) -> DriverState:
-        """Measures; may be called during a motion."""
+        """Measure; may be called during a motion."""
         ...
 
     def move(self, path: JointPath) -> None:
-        """Follows a path to its end; returns when the arm is there, or raises."""
+        """Follow a path to its end; return when the arm is there, or raise."""
         ...
 
     def home_gripper(self) -> bool:
-        """Opens and closes the fingers to find their greatest width."""
+        """Open and close the fingers to find their greatest width."""
         ...
 
     def move_gripper(self, width: float, speed: float) -> bool:
-        """Moves the pads to a width in metres, at m/s."""
+        """Move the pads to a width in metres, at m/s."""
         ...
 
     def grasp(self, speed: float, force: float) -> bool:
-        """Closes with N until the pads hold something or meet."""
+        """Close with N until the pads hold something or meet."""
         ...
 
     def stop(self) -> None:
-        """Ends a motion of arm and fingers, and any to come before `recover`; from another thread."""
+        """End a motion of arm and fingers, and any to come before `recover`; from another thread."""
         ...
 
     def recover(self) -> bool:
-        """Acknowledges the robot's errors, and a stop.
+        """Acknowledge the robot's errors, and a stop.
 
         Returns:
             False where a stopped gripper never answered: its link must be opened again.

@@ -55,7 +55,7 @@ class Kinect2Camera(Camera):
         self._calibration: Calibration | None = None
 
     def connect(self) -> None:
-        """Opens the camera and waits for its first frame.
+        """Open the camera and wait for its first frame.
 
         Raises:
             BadConfig: The calibration file is missing, or another camera's.
@@ -108,14 +108,14 @@ class Kinect2Camera(Camera):
             )
 
     def close(self) -> None:
-        """Stops the stream and releases the camera, once a capture of another thread is over."""
+        """Stop the stream and release the camera, once a capture of another thread is over."""
         with self._lock:
             if self._process is not None:
                 process, self._process = self._process, None
                 process.close()
 
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
-        """Takes a frame that is exposed after this call.
+        """Take a frame that is exposed after this call.
 
         Raises:
             NotConnected: Outside the camera's context.

@@ -30,7 +30,7 @@ class ExposureClock:
         return (((ticks - self._last_ticks + _WRAP // 2) % _WRAP) - _WRAP // 2) * TICK_S
 
     def date(self, ticks: int, arrived_s: float) -> tuple[float, float]:
-        """Dates a frame.
+        """Date a frame.
 
         Args:
             ticks: Its timestamp, which wraps after six days.

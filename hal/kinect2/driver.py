@@ -94,7 +94,7 @@ class Kinect2Driver:
         self._registered = self._vendor.Frame(WIDTH, HEIGHT, 4)
 
     def capture(self, timeout_s: float) -> RawFrame:
-        """Captures a frame exposed after this call.
+        """Capture a frame exposed after this call.
 
         Raises:
             CaptureFailed: None came in time.
@@ -158,7 +158,7 @@ class Kinect2Driver:
         )
 
     def close(self) -> None:
-        """Stops the stream and releases the camera."""
+        """Stop the stream and release the camera."""
         self._device.stop()
         self._device.close()
 

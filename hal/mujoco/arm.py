@@ -39,13 +39,13 @@ class MujocoArm(Arm):
         self._open = False
 
     def connect(self) -> None:
-        """Builds the world unless the camera has built it."""
+        """Build the world unless the camera has built it."""
         if not self._open:
             self._world.open()
             self._open = True
 
     def close(self) -> None:
-        """Frees the world unless the camera still uses it."""
+        """Free the world unless the camera still uses it."""
         if self._open:
             self._open = False
             self._world.close()

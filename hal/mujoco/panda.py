@@ -115,7 +115,7 @@ _FINGER_Z = 0.0584
 
 
 def add_panda(spec: mujoco.MjSpec, physics: MujocoPhysics) -> None:
-    """Adds arm, hand and fingers at the world's origin.
+    """Add arm, hand and fingers at the world's origin.
 
     Joints: ``joint1`` to ``joint7``, ``finger1``, ``finger2``. Actuators: a torque for each joint of the
     arm, and ``opening``, whose control is the wanted distance of the pads. Site: ``tcp``.

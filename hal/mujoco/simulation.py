@@ -118,7 +118,7 @@ class Simulation:
     # ------------------------------------------------------------------ motions
 
     def follow(self, joints: np.ndarray, *, stop: Callable[[], bool]) -> bool:
-        """Moves the arm along a path and lets it come to rest.
+        """Move the arm along a path and let it come to rest.
 
         Where the hand is over all parts, and these are at rest, nothing can happen: the arm is placed along
         its path and the parts stay as they are.
@@ -159,7 +159,7 @@ class Simulation:
         return True
 
     def stand(self, seconds: float, *, stop: Callable[[], bool]) -> None:
-        """Simulates a time in which the arm holds its target."""
+        """Simulate a time in which the arm holds its target."""
         still = np.zeros(7)
         for k in range(self.n_steps(seconds)):
             if k % _BLOCK == 0 and stop():
@@ -167,7 +167,7 @@ class Simulation:
             self._step(self.target, still, still)
 
     def move_fingers(self, width: float, *, force: float | None, stop: Callable[[], bool]) -> None:
-        """Moves the pads to a distance, or until they hold something.
+        """Move the pads to a distance, or until they hold something.
 
         Args:
             width: Distance of the pads, metres; negative to press on what they meet.
@@ -199,7 +199,7 @@ class Simulation:
         self._opening = width
 
     def halt(self) -> None:
-        """Makes the arm stand where it is, so that it no longer presses on what it has met."""
+        """Make the arm stand where it is, so that it no longer presses on what it has met."""
         self.target = self.joints
         self.stand(SETTLE_S, stop=lambda: False)
 
@@ -241,7 +241,7 @@ class Simulation:
         self._measured += 1
 
     def _forget_forces(self) -> None:
-        """Begins a new mean, which takes steps that were not yet measured as free of force."""
+        """Begin a new mean, which takes steps that were not yet measured as free of force."""
         self._forces[:] = 0
         self._sum[:] = 0
         self._measured = 0
@@ -249,7 +249,7 @@ class Simulation:
     # ------------------------------------------------------------------ steps
 
     def _step(self, joints: np.ndarray, speeds: np.ndarray, accelerations: np.ndarray) -> None:
-        """Advances by a step, the arm controlled towards a state by the torques of its dynamics."""
+        """Advance by a step, the arm controlled towards a state by the torques of its dynamics."""
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
         self._wanted[:7] = (
@@ -264,7 +264,7 @@ class Simulation:
         self._measure_force()
 
     def _place(self, path: _Path, k: int) -> None:
-        """Puts the arm at a step of a path."""
+        """Put the arm at a step of a path."""
         data = self.data
         data.qpos[:7], data.qvel[:7] = path.joints[k], path.speeds[k]
         data.qvel[7:9] = 0
@@ -303,7 +303,7 @@ class Simulation:
         return bool((np.abs(speeds).max(axis=(0, 2)) < _REST_SPEED).all())
 
     def _settle(self) -> None:
-        """Waits until the parts have been at rest for a while."""
+        """Wait until the parts have been at rest for a while."""
         quiet, enough = 0, self.n_steps(_REST_S)
         for _ in range(self.n_steps(_SETTLING_S)):
             self.stand(self.step_s, stop=lambda: False)

@@ -12,7 +12,7 @@ _WHITE = 0.8
 
 
 def show_board(entity: sapien.Entity, image: np.ndarray, size: tuple[float, float], pose: Pose) -> None:
-    """Adds a flat board to what is seen of an entity; it follows the entity from now on.
+    """Add a flat board to what is seen of an entity; it follows the entity from now on.
 
     Args:
         entity: What carries the board.

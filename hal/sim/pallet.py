@@ -37,7 +37,7 @@ def outside(region: Region, bodies: list[Lying]) -> list[tuple[Lying, sapien.Pos
 
 
 def restore(scene: ManiSkillScene, lying: Lying, pose: sapien.Pose, number: int, friction: float) -> Lying:
-    """Adds a part to a new scene at its pose in the last one, as a dynamic body.
+    """Add a part to a new scene at its pose in the last one, as a dynamic body.
 
     Args:
         scene: The new one.

@@ -167,7 +167,7 @@ def _square(
 def stick_tape(
     entity: sapien.Entity, part: Part, quat_base_obj: np.ndarray, tape: Tape
 ) -> tuple[Square, Square]:
-    """Adds the squares to what is seen of a part; they follow it from now on.
+    """Add the squares to what is seen of a part; they follow it from now on.
 
     Args:
         entity: The part.

@@ -82,7 +82,7 @@ class SapienWorld:
         return env
 
     def open(self) -> None:
-        """Builds the world for its first user."""
+        """Build the world for its first user."""
         if self._gym is None:
             self._build()
         self._users += 1
@@ -109,7 +109,7 @@ class SapienWorld:
             raise
 
     def close(self) -> None:
-        """Frees the world after its last user."""
+        """Free the world after its last user."""
         self._users = max(0, self._users - 1)
         if self._users == 0:
             self._free()
@@ -122,7 +122,7 @@ class SapienWorld:
             self._gym = None
 
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """Places a part on the table, arm at home, everything at rest.
+        """Place a part on the table, arm at home, everything at rest.
 
         Args:
             part: Name or folder.
@@ -159,7 +159,7 @@ class SapienWorld:
         return self._fine_colour.capture()
 
     def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
-        """Attaches a flat board to the hand, visual only.
+        """Attache a flat board to the hand, visual only.
 
         Args:
             image: (h, w) grey levels of its printed side, uint8.

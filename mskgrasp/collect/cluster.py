@@ -32,7 +32,7 @@ _ADDRESS = re.compile(r"auto|[A-Za-z0-9_.-]+:[0-9]{1,5}|\[[0-9A-Fa-f:]+\]:[0-9]{
 
 
 def check_cluster(address: str) -> None:
-    """Refuses an address that cannot be one, and a machine without Ray.
+    """Refuse an address that cannot be one, and a machine without Ray.
 
     Raises:
         UsageError: The message names the extra to install, or the form of an address.
@@ -113,11 +113,11 @@ class RayExecutor:
         return self._n_slots or 2 * count_cores() + 1
 
     def submit(self, number: int, job: ShardTask) -> None:
-        """Starts a task."""
+        """Start a task."""
         self._running[self._start(job)] = number
 
     def events(self) -> Iterator[Delivered | Completed | Died]:
-        """Waits a moment for tasks that end.
+        """Wait a moment for tasks that end.
 
         Raises:
             WorkerFailed: A node reports an error, or cannot start a task.
@@ -150,7 +150,7 @@ class RayExecutor:
             yield Completed(number, reply.worker)
 
     def close(self) -> None:
-        """Cancels all tasks."""
+        """Cancel all tasks."""
         import ray
 
         for reference in self._running:
@@ -161,7 +161,7 @@ class RayExecutor:
 def make_shards_on_cluster(
     config: CollectConfig, tasks: Sequence[ShardTask], parts: Mapping[str, Part]
 ) -> ShardEvents:
-    """Makes shards on the cluster's cores and yields all steps of one when it is complete.
+    """Make shards on the cluster's cores and yield all steps of one when it is complete.
 
     Args:
         config: The run; this process is `connected`.
@@ -197,7 +197,7 @@ def make_shards_on_cluster(
 
 
 def wait_until_seen(out: Path, tasks: Sequence[ShardTask]) -> None:
-    """Waits until the shards that nodes have written appear on this machine.
+    """Wait until the shards that nodes have written appear on this machine.
 
     Raises:
         WorkerFailed: They do not, within `VISIBLE_S`.

@@ -75,7 +75,7 @@ def settings_digest(out: Path) -> str:
 
 
 def make_shard(part: PackedPart, settings: RunSettings, task: ShardTask) -> ShardReply:
-    """Makes a shard and writes it to the shared folder."""
+    """Make a shard and write it to the shared folder."""
     worker = f"{socket.gethostname()}:{os.getpid()}"
     try:
         simulator = _ready_simulator(settings)

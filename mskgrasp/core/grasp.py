@@ -158,7 +158,7 @@ def object_displacement(T_tcp_obj_before: Pose, T_tcp_obj_after: Pose) -> tuple[
 
 
 def _tcp_to_grasp_frame(T_tcp_obj: Pose) -> Pose:
-    """Turns a pose in the TCP frame (z down) by Rx(pi) into the grasp frame (z up)."""
+    """Turn a pose in the TCP frame (z down) by Rx(pi) into the grasp frame (z up)."""
     x, y, z = components(T_tcp_obj.position)
     qw, qx, qy, qz = components(T_tcp_obj.quat_wxyz)
     # Multiplied out: (0, 1, 0, 0) * (qw, qx, qy, qz).

@@ -46,7 +46,7 @@ class Placement:
 
     @property
     def key(self) -> tuple[str, int, int, Correction]:
-        """Identifies the placement in its run."""
+        """Identifier of the placement in its run."""
         return self.part, self.number, self.slot, self.correction
 
     @property

@@ -152,7 +152,7 @@ def read_index() -> Index:
 
 
 def write_index(index: Index) -> None:
-    """Writes the index atomically."""
+    """Write the index atomically."""
     record = {
         "index_version": INDEX_VERSION,
         "parts": {name: asdict(entry) for name, entry in sorted(index.parts.items())},
@@ -196,7 +196,7 @@ def entry_of(name: str) -> Entry:
 
 
 def make_index(entries: Iterable[Entry], failures: Mapping[str, str], before: Index) -> Index:
-    """Makes the index of the usable, distinct parts, with groups, split and ratings.
+    """Make the index of the usable, distinct parts, with groups, split and ratings.
 
     Args:
         entries: Of all built parts.

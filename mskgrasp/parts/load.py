@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:
-    """Loads a part; a built-in one is built and a CAD file imported the first time, which takes seconds.
+    """Load a part; a built-in one is built and a CAD file imported the first time, which takes seconds.
 
     A CAD file becomes a part of its name with the density of steel, and replaces an import of that name made
     of another file or with other options; name the part itself to use it as imported.

@@ -76,7 +76,7 @@ def report_console() -> Console:
 
 
 def print_table(table: Table, console: Console | None = None) -> None:
-    """Prints one table without its caption; `rich.text.Text` in a cell keeps its style.
+    """Print one table without its caption; `rich.text.Text` in a cell keeps its style.
 
     Args:
         table: The table.

@@ -70,11 +70,11 @@ class Executor(Protocol):
         ...
 
     def submit(self, number: int, job: Any) -> None:
-        """Starts a job; `events` refer to it by its number."""
+        """Start a job; `events` refer to it by its number."""
         ...
 
     def events(self) -> Iterator[Delivered | Completed | Died]:
-        """Waits for a moment, and yields what has happened; nothing is submitted meanwhile.
+        """Wait for a moment, and yield what has happened; nothing is submitted meanwhile.
 
         Raises:
             WorkerFailed: A job failed for a reason that trying again does not remove.
@@ -82,5 +82,5 @@ class Executor(Protocol):
         ...
 
     def close(self) -> None:
-        """Ends all jobs and the executor's own processes."""
+        """End all jobs and the executor's own processes."""
         ...

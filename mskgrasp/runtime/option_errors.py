@@ -24,7 +24,7 @@ def parse_arguments(
     also_legal: Sequence[str] = (),
     **settings: Any,
 ) -> Any:
-    """Parses arguments into an instance of a type.
+    """Parse arguments into an instance of a type.
 
     Args:
         kind: What tyro makes: a configuration, or a union of subcommands.

@@ -71,11 +71,11 @@ def progress(
 
 
 def advance_to(bar: Bar, done: int, total: int) -> None:
-    """Moves a bar to ``done`` of ``total``, which may only now be known."""
+    """Move a bar to ``done`` of ``total``, which may only now be known."""
     bar.total = total
     bar.update(done - bar.n)
 
 
 def note(message: str, stream: TextIO | None = None) -> None:
-    """Writes a line above any bar, to standard error or the given stream."""
+    """Write a line above any bar, to standard error or the given stream."""
     Bar.write(message, file=sys.stderr if stream is None else stream)

@@ -102,7 +102,7 @@ def run_jobs(
     rest: Callable[[Job, int], Job | None] = whole,
     remedy: str = REMEDY,
 ) -> Generator[JobResult[Job, Any] | JobDone[Job] | JobLost[Job], None, None]:
-    """Does jobs on an executor, and closes it at the end; closing the iterator stops all jobs.
+    """Run jobs on an executor, and close it at the end; closing the iterator stops all jobs.
 
     Which worker does which job is left to chance: a job's results must depend on the job alone.
 

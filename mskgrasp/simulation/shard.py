@@ -42,7 +42,7 @@ class Simulator:
         self._env: gymnasium.Env | None = None
 
     def load(self, folder: str) -> GraspDisplacementEnv:
-        """Builds a fresh scene with the part, free of state that earlier shards left in PhysX."""
+        """Build a fresh scene with the part, free of state that earlier shards left in PhysX."""
         if self._env is None:
             self._env = gymnasium.make(
                 "GraspDisplacement-v1",
@@ -64,12 +64,12 @@ class Simulator:
         return env
 
     def write(self, task: ShardTask, dataset: Path) -> Iterator[int]:
-        """Makes a shard and writes it into a dataset's folder; yields as `run`."""
+        """Make a shard and write it into a dataset's folder; yield as `run`."""
         attempts, info = yield from self.run(task)
         write_shard(shard_path(dataset, task.part, task.index), attempts, info)
 
     def run(self, task: ShardTask) -> Generator[int, None, tuple[Attempts, ShardInfo]]:
-        """Makes the attempts of a shard and returns them.
+        """Make the attempts of a shard and return them.
 
         Yields:
             After each 1 for a success, 0 for a failure and -1 for a discarded one.
@@ -115,7 +115,7 @@ class Simulator:
         return attempts, info
 
     def close(self) -> None:
-        """Frees the simulation."""
+        """Free the simulation."""
         if self._env is not None:
             self._env.close()
 
@@ -135,7 +135,7 @@ def _try(
 def draw_attempt(
     env: GraspDisplacementEnv, part: str, seed: int, attempt: int, draw: int = 0
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Places the part as determined by seed and attempt number, takes a depth image and draws a grasp.
+    """Place the part as determined by seed and attempt number, take a depth image and draw a grasp.
 
     Args:
         env: Holds the part.

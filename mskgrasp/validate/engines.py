@@ -31,7 +31,7 @@ MOST_SHIFT = (0.5e-3, 3e-3)
 
 
 def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
-    """Compares outcomes of both engines part by part; 0 if they agree as they should, 1 otherwise.
+    """Compare outcomes of both engines part by part; 0 if they agree as they should, 1 otherwise.
 
     Raises:
         DriverMissing: MuJoCo is not installed.

@@ -54,7 +54,7 @@ class Fidelity:
 
 
 def check_parts(scene: BodyScene, parts: Sequence[Part], report: Callable[[], None]) -> list[Fidelity]:
-    """Loads every part into the engine and compares it with its mesh."""
+    """Load every part into the engine and compare it with its mesh."""
     found = []
     for part in parts:
         scene.place(part, (*scene.env.region_centre, 0.5))

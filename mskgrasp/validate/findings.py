@@ -88,7 +88,7 @@ class Judged:
 def judge(
     outcomes: Mapping[str, Outcomes], setting: str, reference: str, n: int, margins: Margins, origin: str = ""
 ) -> Judged:
-    """Compares the first n grasps of each part under a setting and a reference.
+    """Compare the first n grasps of each part under a setting and a reference.
 
     Displacements are compared where the reference's floor was simulated, too.
     """
@@ -247,7 +247,7 @@ class DiscardSummary:
 
 
 def summarise_discards(outcomes: Outcomes) -> DiscardSummary:
-    """Counts the physically impossible outcomes and the worst values of the others."""
+    """Count the physically impossible outcomes and the worst values of the others."""
     way = np.linalg.norm(outcomes.displacement[:, :3], axis=1)
     reasons = {
         "unsettled": ~outcomes.settled,

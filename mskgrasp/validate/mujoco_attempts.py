@@ -104,7 +104,7 @@ def try_grasps(
 
 
 def _move(simulation: Simulation, grasp: np.ndarray, start: float, goal: float, speed: float) -> bool:
-    """Moves between heights over a grasp; False where the hand met something."""
+    """Move between heights over a grasp; False where the hand met something."""
     distance = abs(goal - start)
     if distance == 0:
         return True

@@ -88,7 +88,7 @@ class Drawn:
 def draw_grasps(
     folders: Sequence[Path], n: int, seed: int, out: Path, workers: int, report: Callable[[int], None]
 ) -> list[Drawn]:
-    """Draws n starts and grasps of each part as the collector does; those that were drawn before are kept.
+    """Draw n starts and grasps of each part as the collector does; those that were drawn before are kept.
 
     Raises:
         BadPart: The camera sees one in none of its poses.
@@ -112,7 +112,7 @@ def run_settings(
     workers: int,
     report: Callable[[int], None],
 ) -> dict[str, Outcomes]:
-    """Tries the drawn grasps under every setting; outcomes stored in ``out`` are read.
+    """Try the drawn grasps under every setting; outcomes stored in ``out`` are read.
 
     Args:
         settings: Tried in parallel with the parts.

@@ -39,7 +39,7 @@ from mskgrasp.validate.tables import sections
 
 
 def validate(config: ValidateConfig) -> int:
-    """Runs a validation; 0 if all checks pass, 1 otherwise.
+    """Run a validation; 0 if all checks pass, 1 otherwise.
 
     Raises:
         DriverMissing: A second engine is to be compared and is not installed.

@@ -91,7 +91,7 @@ class Attempt:
         motion.watch = self._speed.update
 
     def run(self, commanded: Tensor, executed: Tensor | None = None) -> dict[str, Tensor]:
-        """Executes one grasp in every sub-scene; all of them wait for the slowest.
+        """Execute one grasp in every sub-scene; all of them wait for the slowest.
 
         Args:
             commanded: (n, 4) x, y, z, theta, base frame.
@@ -227,7 +227,7 @@ class Attempt:
         return first - self._arrays.xp.floor((first - reach - AHEAD) / step) * step
 
     def _wait_for_rest(self, parts: Array) -> None:
-        """Waits until parts (n,) that nothing holds are at rest: the pose of a falling part is arbitrary."""
+        """Wait until parts (n,) that nothing holds are at rest: the pose of a falling part is arbitrary."""
         if not bool(parts.any()):
             return
         motion = self._motion
@@ -241,7 +241,7 @@ class Attempt:
                 before = now
 
     def _lift(self, grasp: Array, lifted: Array, lifting: Array) -> Array:
-        """Lifts and holds; ends early where no part is left in its hand.
+        """Lift and hold; end early where no part is left in its hand.
 
         Args:
             grasp: (n, 4) where the fingers closed.
@@ -284,7 +284,7 @@ class Attempt:
         return deepest
 
     def _observe(self, lifting: Array, penetration: Array) -> _InHand:
-        """Measures what hangs in the hands, in the last part of the hold."""
+        """Measure what hangs in the hands, in the last part of the hold."""
         xp = self._arrays.xp
         if bool(lifting.any()):
             speed = self.relative_speed()

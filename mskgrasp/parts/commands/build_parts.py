@@ -32,7 +32,7 @@ class BuildResult:
 
 
 def build_parts(names: Sequence[str], before: Index, workers: int) -> Generator[BuildResult]:
-    """Builds parts and yields their results as they finish; close the iterator to stop early.
+    """Build parts and yield their results as they finish; close the iterator to stop early.
 
     Args:
         names: Of built-in parts.

@@ -95,7 +95,7 @@ def _draw(
     normal: np.ndarray,
     owner: np.ndarray,
 ) -> None:
-    """Draws triangles (n, 3, 3) given in pixels and depth into the buffers."""
+    """Draw triangles (n, 3, 3) given in pixels and depth into the buffers."""
     h, w = depth.shape
     for (a, b, c), corner_normals in zip(triangles, normals, strict=True):
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

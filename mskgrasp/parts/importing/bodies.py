@@ -34,7 +34,7 @@ class RepairedBodies:
 
 
 def repair_bodies(objects: Sequence[Surface], *, bodies: Bodies) -> RepairedBodies:
-    """Makes closed bodies from the objects of a file.
+    """Make closed bodies from the objects of a file.
 
     Args:
         objects: As separated in the file (an STL is one object), millimetres.

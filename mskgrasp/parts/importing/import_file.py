@@ -61,7 +61,7 @@ def import_file(
     bodies: Bodies = "one",
     check_name: Callable[[str], None] = lambda name: None,
 ) -> Imported:
-    """Imports a file as a part, replacing an imported part of the same name.
+    """Import a file as a part, replacing an imported part of the same name.
 
     Args:
         path: STL, OBJ, PLY, GLB, 3MF or STEP.
@@ -125,7 +125,7 @@ def import_part(path: Path, **options: object) -> Part:
 
 
 def check_density(density: float) -> None:
-    """Checks that a density is plausible.
+    """Check that a density is plausible.
 
     Raises:
         BadPart: No solid has this density.

@@ -101,7 +101,7 @@ def split_by(points: np.ndarray, cutter: np.ndarray) -> list[np.ndarray]:
 
 
 def merge_hulls(hulls: Sequence[np.ndarray], slack: float = 0.002) -> list[np.ndarray]:
-    """Joins pieces that make a nearly convex body together, those that add the least volume first.
+    """Join pieces that make a nearly convex body together, those that add the least volume first.
 
     Args:
         hulls: Corner points (n, 3) of each piece.
@@ -165,7 +165,7 @@ def _frusta(section: Any) -> tuple[Any | None, list[np.ndarray]]:
 
 
 def _convex_runs(slabs: list[tuple[float, float, float, float]]) -> list[list[tuple[float, float]]]:
-    """Runs of (z, radius) along the axis that turn into convex bodies."""
+    """Run of (z, radius) along the axis that turn into convex bodies."""
     runs: list[list[tuple[float, float]]] = []
     for z0, r0, z1, r1 in slabs:
         if runs and abs(runs[-1][-1][0] - z0) < 1e-5 and abs(runs[-1][-1][1] - r0) < 1e-5:

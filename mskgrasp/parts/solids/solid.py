@@ -220,7 +220,7 @@ def drill(radius: float, start: Sequence[float], axis: str, length: float) -> Ma
 
 
 def solid(body: Manifold, hulls: Iterable[np.ndarray]) -> Solid:
-    """Pairs a body with its convex pieces."""
+    """Pair a body with its convex pieces."""
     data = body.to_mesh64()
     mesh = trimesh.Trimesh(
         np.asarray(data.vert_properties)[:, :3], np.asarray(data.tri_verts), process=False, validate=False

@@ -15,7 +15,7 @@ from mskgrasp.parts.solids.surface import Surface
 
 
 def load_obj(content: bytes) -> Loaded:
-    """Reads an OBJ; its unit is unknown. Polygons are triangulated.
+    """Read an OBJ; its unit is unknown. Polygons are triangulated.
 
     Raises:
         Unreadable: A line is damaged, or there are no vertices.

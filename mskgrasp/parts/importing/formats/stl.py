@@ -22,7 +22,7 @@ _COARSEST = 1e-5
 
 
 def load_stl(content: bytes) -> Loaded:
-    """Reads an STL; its unit is unknown.
+    """Read an STL; its unit is unknown.
 
     Raises:
         Unreadable: It is other text, cut off, or too far from its origin.

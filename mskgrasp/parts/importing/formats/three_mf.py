@@ -84,7 +84,7 @@ class _Model:
 
 
 def load_3mf(content: bytes) -> Loaded:
-    """Reads the build items of a 3MF, each instance in its place, in the unit that the file states.
+    """Read the build items of a 3MF, each instance in its place, in the unit that the file states.
 
     Raises:
         Unreadable: It is damaged, unpacks to more than 1 GiB, or is not made of triangles.
