@@ -17,13 +17,13 @@ from mskgrasp.core.geometry import Pose, pose_distance
 from mskgrasp.core.grasp import MAX_OPENING
 
 JOINT_TOLERANCE = 5e-3
-"""A joint motion has arrived within this, radians."""
+"""Greatest error of each joint at the end of a joint motion, radians."""
 POSITION_TOLERANCE = 2e-3
-"""A straight motion has arrived within this, metres."""
+"""Greatest position error of the TCP at the end of a straight motion, metres."""
 ROTATION_TOLERANCE = 1e-2
-"""A straight motion has arrived within this, radians."""
+"""Greatest rotation error of the TCP at the end of a straight motion, radians."""
 WIDTH_TOLERANCE = 2e-3
-"""The pads have arrived within this, metres."""
+"""Greatest error of the pads' distance at the end of a motion, metres."""
 
 STOPPED = "stop() was called; call recover() when it is safe"
 

@@ -34,11 +34,11 @@ class NoAnswer(ProcessEnded):
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What a driver returns to a request.
+    """Answer of a driver to a request.
 
     Attributes:
-        result: Serialisable as JSON.
-        payload: Bytes that follow it.
+        result: Result, serialisable as JSON.
+        payload: Bytes sent after the result.
     """
 
     result: Any
@@ -49,10 +49,10 @@ class Answer:
 
 
 class DriverProcess:
-    """Starts a driver's process, sends it requests, and kills it when it does not answer in time.
+    """Process of a driver: started, sent requests, and killed when it does not answer in time.
 
     Args:
-        arguments: Of ``python -m``: the module that serves, and its arguments.
+        arguments: Arguments of ``python -m``: the driver's module, and its own arguments.
         errors: Errors that the driver may raise, by the names of their classes.
         exit_s: Time the driver has to release its device before its process is killed, s.
     """
@@ -223,7 +223,7 @@ class AnswerPipe:
             request: As `requests` yields it. With ``alarm_s`` the kernel ends the process when the action
                 takes longer: the program may have been killed, and Python's lock may be held.
             action: Performs the request.
-            explain: The package's error for an exception of the vendor.
+            explain: Converts an exception of the vendor to an error of `hal`.
         """
         payload: Sequence[bytes | memoryview] = ()
         try:

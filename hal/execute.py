@@ -32,8 +32,8 @@ class GraspResult:
     Attributes:
         lifted: The fingers closed on something and the arm lifted it.
         holding: The fingers hold something after lift and hold.
-        width: Distance of the pads then, metres.
-        T_base_tcp: Measured TCP then.
+        width: Distance of the pads after lift and hold, metres.
+        T_base_tcp: Measured pose of the TCP after lift and hold.
         aborted: Reason if the motion ended early, else None; the arm then needs `recover`.
     """
 
@@ -100,8 +100,8 @@ def put_down(cell: Cell, grasp: Grasp, *, height: float = PUT_DOWN, opening: flo
 
     Args:
         cell: The hand holds the part over the table.
-        grasp: At which it was grasped.
-        height: Of the release above the grasp, metres; falling 2 mm, a part may shift by 1 mm.
+        grasp: Grasp of the lifted part, base frame.
+        height: Height of the release above the grasp, metres; a part that falls 2 mm may shift by 1 mm.
         opening: As in `let_go`.
 
     Raises:
@@ -126,7 +126,7 @@ def let_go(cell: Cell, place: Grasp, *, opening: float) -> None:
 
     Args:
         cell: The hand is at ``place`` and holds a part.
-        place: Base frame; the hand may be a little higher.
+        place: Pose of the hand as a grasp, base frame; the hand may be a little higher.
         opening: Distance of the pads afterwards, metres; 0 for the least that releases the part, which is
             `RELEASE` more than now. The fingers had room on the way down to the grasp, but since then the
             part has moved between them: one inside a bore may push it as it opens all the way.

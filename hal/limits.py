@@ -113,7 +113,7 @@ def check_joint_path(
     """Refuse a joint motion that brings the hand to the table or out of the box.
 
     Args:
-        limits: Of the arm.
+        limits: Limits of the arm.
         forward: ``T_base_tcp`` at joints (7,).
         start: (7,) current joints, radians.
         goal: (7,) radians, within their limits.
@@ -133,7 +133,7 @@ def check_joint_path(
 
 
 def _check_way(limits: ArmLimits, poses: list[Pose], what: str) -> None:
-    """Refuse a path that leads out; an arm guided out of its limits may come back, but go no farther."""
+    """Refuse a path that leaves the limits; an arm guided out of them may return, but go no farther."""
     heights = np.array([lowest_point(pose) for pose in poses])
     if heights.min() < min(heights[0], limits.table_z + TABLE_CLEARANCE) - _SLACK:
         raise OutOfWorkspace(

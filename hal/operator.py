@@ -17,7 +17,7 @@ class StoppedByOperator(MskgraspError):
 
 
 class Operator:
-    """Asks before a real arm moves, and asks for parts on a cell without a feeder.
+    """Operator, who is asked before a real arm moves, and for parts on a cell without a feeder.
 
     Nothing is asked on a simulated cell, nor on any cell with ``yes``.
 

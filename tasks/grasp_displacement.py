@@ -53,7 +53,7 @@ class GraspDisplacementEnv(BaseEnv):
     - the part: one for each sub-scene, given by ``parts`` or drawn from the starter set
     - its resting pose, by the poses' probabilities; poses that the engine does not hold are left out
     - its place, uniform in a 24 x 24 cm region, and its turn about the vertical
-    - where ``noise`` asks for it: errors of arm, gripper force, friction and camera (`core.settings`)
+    - if ``noise`` enables them: errors of arm, gripper force, friction and camera (`core.settings`)
 
     **Success Conditions:**
     - after the lift and 0.2 s of holding, both pads touch the part and their gap is over 0.5 mm
@@ -271,7 +271,7 @@ class GraspDisplacementEnv(BaseEnv):
             self.scene._gpu_fetch_all()
 
     def set_state_dict(self, state: dict, env_idx: Tensor | None = None) -> None:
-        """Set the state of `get_state_dict`, of which the last step's contacts are no part."""
+        """Set the state of `get_state_dict`, which does not include the last step's contacts."""
         super().set_state_dict(state, env_idx)
         if self._friction is not None:
             self._friction.reset()

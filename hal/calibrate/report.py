@@ -19,7 +19,7 @@ from mskgrasp.reports.style import saved_figure
 
 _SHOWN = 6
 _DEPTH_MATTERS = 0.003
-"""A depth that is off by less is within what a Kinect's warm-up changes, metres."""
+"""Greatest depth error that the drift of a warming Kinect explains, metres."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,7 +33,7 @@ class Finding:
     """Result of one check.
 
     Attributes:
-        level: Whether the cell is usable.
+        level: Severity: "ok", "warn" or "fail".
         subject: Subject of the check.
         text: Finding and, unless ok, the remedy.
     """

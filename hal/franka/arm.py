@@ -39,7 +39,7 @@ _TRIES = 3
 
 
 class FrankaArm(Arm):
-    """Moves the arm through a driver in a process of its own; nothing recovers automatically.
+    """Arm moved by a driver in a separate process; nothing recovers automatically.
 
     Args:
         config: Driver, robot, speeds and forces.

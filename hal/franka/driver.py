@@ -53,11 +53,11 @@ class DriverState:
         joints: (7,) radians.
         o_t_ee: (16,) pose of the end effector in the base, column-major, metres.
         f_t_ee: (16,) pose of the end effector in the flange, column-major, metres.
-        width: Of the gripper, metres.
-        max_width: As homing found it, metres; 0 before homing.
-        mode: Of the robot.
+        width: Distance of the pads, metres.
+        max_width: Greatest width, found by homing, metres; 0 before homing.
+        mode: Mode of the robot.
         errors: Names of libfranka's errors in force, empty where there are none.
-        seconds: On the monotonic clock.
+        seconds: Time of the measurement on the monotonic clock, s.
     """
 
     joints: list[float]
@@ -90,11 +90,11 @@ class Driver(Protocol):
         ...
 
     def move_gripper(self, width: float, speed: float) -> bool:
-        """Move the pads to a width in metres, at m/s."""
+        """Move the pads to a width in metres, at a speed in m/s."""
         ...
 
     def grasp(self, speed: float, force: float) -> bool:
-        """Close with N until the pads hold something or meet."""
+        """Close with a force in N until the pads hold something or meet."""
         ...
 
     def stop(self) -> None:

@@ -18,7 +18,7 @@ _OWED_S = 0.5
 
 
 class FrankyDriver:
-    """Moves with the robot's own joint position control, which arrives without a lasting error."""
+    """Driver with the robot's own joint position control, which leaves no lasting error."""
 
     def __init__(self) -> None:
         import franky
@@ -77,11 +77,11 @@ class FrankyDriver:
         return self._wait(self._gripper.homing_async)
 
     def move_gripper(self, width: float, speed: float) -> bool:
-        """Move the pads to a width in metres, at m/s."""
+        """Move the pads to a width in metres, at a speed in m/s."""
         return self._wait(lambda: self._gripper.move_async(width, speed))
 
     def grasp(self, speed: float, force: float) -> bool:
-        """Close with N until the pads hold something or meet; any width is within the tolerance."""
+        """Close with a force in N until the pads hold something or meet, at any width."""
         return self._wait(
             lambda: self._gripper.grasp_async(0.0, speed, force, epsilon_inner=0.08, epsilon_outer=0.08)
         )

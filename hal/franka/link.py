@@ -18,10 +18,10 @@ _ALARM_S = 5
 
 
 class DriverLink:
-    """Connects a driver in a process of its own to a robot.
+    """Connection of a driver in a separate process to a robot.
 
     Args:
-        name: Which driver.
+        name: Name of the driver.
         settings: Sent to the driver when it connects.
         connect_timeout_s: Time a robot has to accept the connection, s.
 

@@ -22,7 +22,7 @@ _SILENCE_S = 2.0
 _CORRECTION_HZ = 4.0
 """Rate of the correction at the goal, 1/s: slow against the arm's own time constant."""
 _MAX_CORRECTION = 0.05
-"""Radians; more than friction and gravity explain means that something holds the arm."""
+"""Greatest correction at the goal, radians: friction and gravity need less, a blocked arm more."""
 _ARRIVED = 1e-3
 
 
@@ -31,7 +31,7 @@ class RobotSilent(RuntimeError):
 
 
 class PandaPyDriver:
-    """Moves with panda_py's joint impedance controller, whose goal follows the path.
+    """Driver with panda_py's joint impedance controller, whose goal follows the path.
 
     The controller runs in C++ at 1 kHz; a late target here makes the arm lag, not stumble. It has no
     integral part and friction leaves an error (panda-py issue 49), so the goal is shifted slowly until the
@@ -157,11 +157,11 @@ class PandaPyDriver:
         return self._wait(self._gripper.homing)
 
     def move_gripper(self, width: float, speed: float) -> bool:
-        """Move the pads to a width in metres, at m/s."""
+        """Move the pads to a width in metres, at a speed in m/s."""
         return self._wait(lambda: self._gripper.move(width, speed))
 
     def grasp(self, speed: float, force: float) -> bool:
-        """Close with N until the pads hold something or meet; any width is within the tolerance."""
+        """Close with a force in N until the pads hold something or meet, at any width."""
         return self._wait(
             lambda: self._gripper.grasp(0.0, speed, force, epsilon_inner=0.08, epsilon_outer=0.08)
         )

@@ -27,10 +27,10 @@ _STOP_S = 1.0
 
 
 class Worker:
-    """Performs requests with a driver.
+    """Server that performs requests with a driver.
 
     Args:
-        name: Which driver.
+        name: Name of the driver.
     """
 
     def __init__(self, name: DriverName):

@@ -42,7 +42,7 @@ class Kinect2Camera(Camera):
     """Frames of a Kinect v2, upright, metric and in the base frame.
 
     Args:
-        config: Which camera, its calibration, its corrections.
+        config: Serial number, calibration file and corrections of the camera.
     """
 
     def __init__(self, config: Kinect2Config):

@@ -10,7 +10,7 @@ _WRAP = 1 << 32
 
 
 class ExposureClock:
-    """Aligns ticks with arrivals: the frame with the least delay so far gives the offset.
+    """Alignment of ticks with arrivals: the frame with the least delay so far gives the offset.
 
     Args:
         latency_s: Greatest delay from exposure to arrival, s.

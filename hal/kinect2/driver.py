@@ -62,7 +62,7 @@ class Kinect2Driver:
     """An open, streaming Kinect v2.
 
     Args:
-        settings: Which camera, and the bounds of a valid frame.
+        settings: Serial number of the camera, and bounds of a valid frame.
 
     Raises:
         DriverMissing: pylibfreenect2 cannot be imported.

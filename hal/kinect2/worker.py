@@ -19,7 +19,7 @@ _CLOSE_S = 5
 
 
 class Worker:
-    """Performs requests with the driver."""
+    """Server that performs requests with the driver."""
 
     def __init__(self) -> None:
         self._driver: Kinect2Driver | None = None

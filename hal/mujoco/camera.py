@@ -22,7 +22,7 @@ _AMBIENT = 0.35
 
 
 class MujocoCamera(Camera):
-    """Casts a ray through the centre of every pixel, the arm included.
+    """Camera that casts a ray through the centre of every pixel; it sees the arm, too.
 
     Args:
         world: The simulated world.

@@ -25,11 +25,11 @@ from mskgrasp.core.panda_kinematics import (
 )
 
 TORQUE_LIMIT = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)
-"""N m; Franka Emika Panda datasheet."""
+"""Greatest torques of the joints, N m; Franka Emika Panda datasheet."""
 FINGER_STIFFNESS = 4000.0
-"""Of the drive of the fingers' opening, N/m; with the force limit it decides how soon pads press in full."""
+"""Stiffness of the drive of the fingers' opening, N/m; decides how soon pads press with the full force."""
 FINGER_DAMPING = 50.0
-"""Of the same drive, N s/m: critical, with the armature of two fingers."""
+"""Damping of the same drive, N s/m: critical, with the armature of two fingers."""
 ROBOT, OTHERS = 2, 1
 """Collision classes: the robot's shapes do not collide with each other."""
 SEEN, HIDDEN = 1, 3
@@ -111,7 +111,7 @@ boxes of franka_description)."""
 _PAD = ((0.0, 0.00758, 0.04525), (0.0175, 0.0152, 0.0185))
 """Rubber tip of the left finger: centre and size (franka_description)."""
 _FINGER_Z = 0.0584
-"""Of the finger's frame in the hand's, metres."""
+"""z of the fingers' frames in the hand's frame, metres."""
 
 
 def add_panda(spec: mujoco.MjSpec, physics: MujocoPhysics) -> None:

@@ -20,14 +20,14 @@ from mskgrasp.parts import Part
 from mskgrasp.parts.hulls import hull_corners
 
 NATURAL_RATE = 100.0
-"""Of the arm's controller, rad/s: it is critically damped and knows the arm's inertia, as the real one does,
-and follows a path to 0.1 mm."""
+"""Natural frequency of the arm's controller, rad/s: it is critically damped, knows the arm's inertia
+as the real one does, and follows a path to 0.1 mm."""
 SETTLE_S = 0.05
 """Time in which the arm comes to rest at the end of a motion, s: five times that of the controller."""
 REFLEX_S = 0.024
 """The force on the hand that a reflex sees is the mean over this time, s, as in the SAPIEN cell."""
 MOVE_FORCE = 20.0
-"""Of the fingers while they hold nothing, N."""
+"""Greatest force of the fingers while they hold nothing, N."""
 STILL_FINGER = 2e-3
 """A finger slower than this, m/s, has met what it holds."""
 FINGER_CHECK_S = 0.02
@@ -88,7 +88,7 @@ class Simulation:
         """Force of the grip, N; None while the hand is to hold nothing."""
         self._limit_fingers(MOVE_FORCE)
         self.target = np.array(home, dtype=float)
-        """(7,) where the arm was sent, radians: a motion starts there."""
+        """(7,) commanded joints, radians: a motion starts there."""
         self._forces = np.zeros((self.n_steps(REFLEX_S), 3))
         self._sum = np.zeros(3)
         self._row = 0
@@ -171,7 +171,7 @@ class Simulation:
 
         Args:
             width: Distance of the pads, metres; negative to press on what they meet.
-            force: Of the grip, N; None where nothing is to be held.
+            force: Force of the grip, N; None where nothing is to be held.
             stop: Read every few steps; True ends the motion.
         """
         self.force = force
@@ -213,7 +213,7 @@ class Simulation:
         return float(np.linalg.norm(self._sum)) / len(self._forces)
 
     def grip(self) -> tuple[np.ndarray, float]:
-        """Forces (2,) of both fingers on the part, N, and how deep a finger and the part overlap, metres."""
+        """Forces (2,) of both fingers on the part, N, and depth of a finger's overlap with it, metres."""
         model, data = self.model, self.data
         part = model.body("part0").id
         fingers = [model.body(name).id for name in FINGERS]

@@ -27,7 +27,7 @@ class MujocoWorld:
     Args:
         physics: Settings of the simulation.
         overhead: Settings of the camera.
-        region: Where parts lie, base frame, metres.
+        region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
         home: (7,) joints of the arm while a part is placed.
         part: Part on the table at first.
         seed: Determines its position and turn.

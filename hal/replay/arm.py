@@ -18,10 +18,10 @@ from mskgrasp.core.geometry import Pose
 
 
 class ReplayArm(Arm):
-    """Compares each command with the recorded one and returns the recorded answer, errors included.
+    """Arm that compares each command with the recorded one and returns the recorded answer or error.
 
     A command that differs by more than the tolerances is refused (`NotRecorded`): it is unknown what the
-    arm would have done. What the recorded arm checked, it checked then; nothing moves here.
+    arm would have done. Limits were checked by the recorded arm; nothing moves here.
 
     Args:
         config: Recording and tolerances.
@@ -96,10 +96,10 @@ class ReplayArm(Arm):
         self._acknowledge()
 
     def check_pose(self, T_base_tcp: Pose) -> None:
-        """Refuse what the recorded arm refused.
+        """Refuse a target that the recorded arm refused.
 
         Raises:
-            OutOfWorkspace: It did.
+            OutOfWorkspace: The recorded arm refused it.
             NotRecorded: The recording holds no such call.
         """
         self._playback.same_question("check_pose", {"T_base_tcp": plain(T_base_tcp)})

@@ -16,7 +16,7 @@ from mskgrasp.core.geometry import pose_distance
 
 
 class Playback:
-    """Steps through the commands of a recording; queries are answered from those between two commands.
+    """Position in a recording's commands; queries are answered from those between two commands.
 
     Args:
         recording: Recorded calls.

@@ -21,7 +21,7 @@ class RecordingCamera(Camera):
 
     Args:
         camera: The recorded camera.
-        writer: Of the recording.
+        writer: Writer of the recording.
     """
 
     def __init__(self, camera: Camera, writer: RecordingWriter):
@@ -60,7 +60,7 @@ class RecordingArm(Arm):
 
     Args:
         arm: The recorded arm.
-        writer: Of the recording.
+        writer: Writer of the recording.
     """
 
     def __init__(self, arm: Arm, writer: RecordingWriter):

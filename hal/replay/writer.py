@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 
 class RecordingWriter:
-    """Writes calls as they happen; ``FILE.part`` becomes ``FILE`` when the last user closes it.
+    """Writer of calls as they happen; ``FILE.part`` becomes ``FILE`` when the last user closes it.
 
     Args:
         path: The recording; must not exist yet.
@@ -104,11 +104,11 @@ class RecordingWriter:
         """Perform a call and record its result or error.
 
         Args:
-            name: The verb.
+            name: Name of the method.
             arguments: Its arguments.
-            do: Calls it.
-            result: Makes plain values of what it returns.
-            after: Reads the arm's state once it is over.
+            do: Performs the call.
+            result: Converts the returned value to plain values.
+            after: Reads the arm's state after the call.
         """
         begun_s = time.monotonic()
         error: tuple[str, str] | None = None

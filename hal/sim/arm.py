@@ -49,7 +49,7 @@ _WAYPOINT_M = 0.01
 
 
 class SapienArm(Arm):
-    """Moves the Panda of a `SapienWorld`; a contact force over the reflex limit ends a motion."""
+    """The Panda of a `SapienWorld`; a contact force over the reflex limit ends a motion."""
 
     simulated = True
 

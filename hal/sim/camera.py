@@ -14,11 +14,11 @@ from tasks.scene.camera import FAR
 
 
 class SapienCamera(Camera):
-    """Renders the view of a camera over the table, the arm included.
+    """Rendered camera over the table; it sees the arm, too.
 
     Args:
-        world: What stands on the table.
-        noise: How the sensor errs; not at all by default.
+        world: The simulated world to render.
+        noise: Noise of the sensor; off by default.
     """
 
     def __init__(self, world: SapienWorld, noise: SensorNoise | None = None):

@@ -27,7 +27,7 @@ from mskgrasp.simulation.shard_task import ShardTask
 from mskgrasp.simulation.versions import versions
 
 VISIBLE_S = 120.0
-"""How long a file that a node has written may take to appear here (NFS keeps listings for a minute), s."""
+"""Greatest time until a file written by a node appears here (NFS caches listings for a minute), s."""
 _ADDRESS = re.compile(r"auto|[A-Za-z0-9_.-]+:[0-9]{1,5}|\[[0-9A-Fa-f:]+\]:[0-9]{1,5}")
 
 
@@ -100,7 +100,7 @@ class RayExecutor:
 
     Args:
         start: Starts a Ray task for a job; the task returns a `ShardReply`.
-        n_slots: Bound on jobs at once; 0: as the cores of the cluster ask for.
+        n_slots: Greatest number of jobs at once; 0: according to the cluster's cores.
     """
 
     def __init__(self, start: Callable[[ShardTask], Any], n_slots: int):
@@ -109,7 +109,7 @@ class RayExecutor:
         self._running: dict[Any, int] = {}
 
     def n_slots(self) -> int:
-        """Some more than there are cores: none waits for this process, and an autoscaler sees a demand."""
+        """A few more than there are cores: no core waits for this process, and an autoscaler sees demand."""
         return self._n_slots or 2 * count_cores() + 1
 
     def submit(self, number: int, job: ShardTask) -> None:

@@ -34,8 +34,8 @@ class PartSummary:
     """Attempts on one part in numbers.
 
     Attributes:
-        part: Its name.
-        family: Its family.
+        part: Name of the part.
+        family: Family of the part.
         attempts: Number of attempts.
         successes: Number of those that lifted the part.
         success_interval: 95 % Wilson interval of the success rate.

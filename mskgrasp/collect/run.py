@@ -210,7 +210,7 @@ def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
     """Whether a shard is on disk and whole; a damaged one is reported, and will be made again.
 
     Raises:
-        BadDataset: The part, or what simulates it, has changed since the shard was made.
+        BadDataset: The part or the simulation has changed since the shard was made.
     """
     path = shard_path(out, task.part, task.index)
     if not path.exists():

@@ -69,7 +69,7 @@ def check_config(
     """Validate plain values as a configuration.
 
     Args:
-        model: Of the configuration.
+        model: Class of the configuration.
         values: A mapping of plain values.
         source: Their origin, for messages.
         name: Gives the name of a value in messages from its location.

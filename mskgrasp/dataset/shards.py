@@ -116,7 +116,7 @@ def read_shard(path: Path) -> tuple[Attempts, ShardInfo]:
 
 
 def read_unchecked(path: Path) -> tuple[Attempts, ShardInfo]:
-    """Read a shard as it is, for those who look for what is wrong with it.
+    """Read a shard without checking its values, for programs that look for faults.
 
     Raises:
         BadDataset: The file is missing, truncated, foreign or of another schema.

@@ -20,7 +20,7 @@ def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:
 
     Args:
         source: Name of a part, a part folder, or an STL, OBJ, PLY, GLB, 3MF or STEP file.
-        unit: Of a CAD file's coordinates; None takes what the format says, and mm where it says nothing.
+        unit: Unit of a CAD file's coordinates; None: that of the format, or mm where it states none.
 
     Raises:
         UnknownPart: There is no such part; the message lists similar names.

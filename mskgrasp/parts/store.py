@@ -42,7 +42,7 @@ def kept_in(folder: Path) -> Iterator[None]:
 
 
 def parts_folder() -> Path:
-    """Where parts are kept: ``$XDG_CACHE_HOME/mskgrasp/parts`` or ``~/.cache/mskgrasp/parts``."""
+    """Folder of the stored parts: ``$XDG_CACHE_HOME/mskgrasp/parts`` or ``~/.cache/mskgrasp/parts``."""
     override = _FOLDER_OVERRIDE.get()
     if override is not None:
         return override
@@ -162,7 +162,7 @@ def recipe_hash(folder: Path) -> str | None:
 
 
 def read_record(folder: Path) -> dict[str, Any]:
-    """All of ``part.json``, with what Part leaves out (``hull_error_p95``, ``hull_volume_ratio``, ...)."""
+    """All of ``part.json``, with fields that Part lacks (``hull_error_p95``, ``hull_volume_ratio``, ...)."""
     return _record(folder, _read(folder, "part.json"))
 
 

@@ -16,7 +16,7 @@ def print_sections(sections: Sequence[Section], console: Console | None = None) 
 
     Args:
         sections: In their order; one without text and tables is left out.
-        console: Where to; None: `report_console`.
+        console: Console to print on; None: `report_console`.
     """
     console = console or report_console()
     for section in sections:

@@ -29,7 +29,7 @@ def write_html(
 
     Args:
         path: The file, ``report.html``.
-        title: Of the report.
+        title: Title of the report.
         conclusion: Its result in one sentence.
         sections: In their order; empty ones are left out.
         command: The command that made it; None: that of this process.

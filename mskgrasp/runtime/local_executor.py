@@ -26,7 +26,7 @@ class _Worker:
     process: Any
     connection: Connection
     number: int | None = None
-    """Of its job."""
+    """Number of its job; None while it is idle."""
 
 
 class LocalExecutor:
@@ -35,7 +35,7 @@ class LocalExecutor:
     Args:
         context: See `worker_pool.Work`, as for the others.
         settings: Argument of `context`.
-        n_workers: How many processes.
+        n_workers: Greatest number of processes.
         lost_by: Errors with which a process counts as dead.
     """
 
@@ -54,7 +54,7 @@ class LocalExecutor:
         self._workers: list[_Worker] = []
 
     def n_slots(self) -> int:
-        """As many as there may be processes."""
+        """Greatest number of processes."""
         return self._n_workers
 
     def submit(self, number: int, job: Any) -> None:

@@ -27,7 +27,7 @@ def parse_arguments(
     """Parse arguments into an instance of a type.
 
     Args:
-        kind: What tyro makes: a configuration, or a union of subcommands.
+        kind: Type that tyro makes: a configuration, or a union of subcommands.
         arguments: The command line without the program's name.
         prog: The command that starts the program.
         options_of: Type whose fields are suggested for an unknown option; ``kind`` by default.

@@ -37,7 +37,7 @@ def parse(
     Args:
         model: The pydantic model; each of its fields becomes an option, its docstrings the help.
         prog: The command that starts the program, for ``--help``.
-        description: What the program does, for ``--help``.
+        description: Purpose of the program, for ``--help``.
         default_config: The YAML file used where the user gives no ``--config``.
         argv: The arguments; the process's own by default.
 

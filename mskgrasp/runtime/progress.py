@@ -45,7 +45,7 @@ def progress(
 
     Args:
         items: Iterated over by the bar; None: the caller calls ``update``.
-        unit: What is counted, singular.
+        unit: Name of the counted unit, singular.
         total: Number of units, those done before included; None: the length of ``items``.
         done: Units that an earlier run finished; the bar starts there.
         title: Text before the bar.

@@ -1,4 +1,4 @@
-"""Set-up of worker processes: one core each, no Ctrl-C, no life beyond that of their parent."""
+"""Set-up of worker processes: one core each, no Ctrl-C, an end with their parent."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ FIELDS = (
     "pose_base_obj", "pose_tcp_obj_before", "pose_tcp_obj_after",
 )  # fmt: skip
 MOST_REDRAWS = 4
-"""An attempt whose part was not at rest is drawn again so often at most."""
+"""Greatest number of times that an attempt whose part was not at rest is drawn again."""
 
 
 class Simulator:
@@ -72,7 +72,7 @@ class Simulator:
         """Make the attempts of a shard and return them.
 
         Yields:
-            After each 1 for a success, 0 for a failure and -1 for a discarded one.
+            1 after each success, 0 after a failure and -1 after a discarded attempt.
         """
         env = self.load(task.folder)
         part = env.parts[0]
@@ -123,7 +123,7 @@ class Simulator:
 def _try(
     env: GraspDisplacementEnv, task: ShardTask, attempt: int, draw: int
 ) -> tuple[dict[str, np.ndarray], str]:
-    """One attempt as a row of the shard, and why it cannot be one; empty where it can."""
+    """One attempt as a row of the shard, and the reason why it is not one; empty where it is."""
     depth, grasp = draw_attempt(env, task.part, task.seed, attempt, draw)
     if grasp is None:
         return {}, "part_not_seen"
@@ -139,10 +139,10 @@ def draw_attempt(
 
     Args:
         env: Holds the part.
-        part: Its name.
-        seed: Of the run.
+        part: Name of the part.
+        seed: Seed of the run.
         attempt: Number of the attempt among those of the part.
-        draw: How often the attempt was drawn before, with a part that was not at rest.
+        draw: Number of times that the attempt was drawn before, with a part that was not at rest.
 
     Returns:
         The depth image (h, w), uint16 in 0.1 mm, and the grasp (1, 4), float32, base frame; None where the
@@ -165,7 +165,7 @@ def draw_attempt(
 
 
 def discard_reason(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> str:
-    """Why an attempt is no label; empty where it is one."""
+    """Reason why an attempt is not a label; empty where it is one."""
     if not bool(outcome["executable"][0]):
         return "unreachable"
     if not bool(outcome["settled"][0]):

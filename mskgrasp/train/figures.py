@@ -34,7 +34,7 @@ def draw_uncertainty(models: Models, samples: Samples, rows: torch.Tensor, path:
     Args:
         models: Networks that predict a variance.
         samples: The dataset.
-        rows: Of held-out parts, successes among them.
+        rows: Rows of held-out parts, successes among them.
         path: The picture, PNG.
     """
     held = rows[samples.success[rows]]

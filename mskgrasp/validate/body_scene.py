@@ -25,16 +25,16 @@ from tasks.scene.frames import base_pose
 ALOFT = 0.25
 """Height at which the hand holds bodies that must not meet the table, m."""
 GRAVITY = 9.81
-"""m/s^2."""
+"""Acceleration of gravity, m/s^2."""
 BLOCK = (0.04, 0.02, 0.03)
 """Edges of the block of most experiments, m."""
 
 
 class Workshop:
-    """Makes part folders of plain bodies.
+    """Maker of part folders of plain bodies.
 
     Args:
-        folder: Where they are kept.
+        folder: Folder for the parts.
     """
 
     def __init__(self, folder: Path):
@@ -161,8 +161,8 @@ class BodyScene:
         """Close the hand aloft on a weightless part, then give the part its weight.
 
         Args:
-            part: What is held; its axes are those of the base.
-            along: Where its centroid is, seen from the point between the pads, base frame, metres.
+            part: Part to hold; its axes are those of the base.
+            along: Position of its centroid relative to the point between the pads, base frame, metres.
         """
         x, y = self.env.region_centre
         self.place(part, (x + along[0], y + along[1], ALOFT + along[2]))

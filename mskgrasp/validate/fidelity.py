@@ -23,12 +23,12 @@ class Fidelity:
     """Errors of a part in the engine.
 
     Attributes:
-        part: Its name.
+        part: Name of the part.
         hulls: Number of cooked shapes.
         surface_p95: Distance of hulls and mesh that 95 % of both surfaces keep, m.
         volume_ratio: Volume of the hulls by that of the mesh.
-        mass_error: Of the engine's mass against density times the mesh's volume, as a share.
-        inertia_error: The worst principal inertia against the mesh's, as a share.
+        mass_error: Relative error of the engine's mass against density times the mesh's volume.
+        inertia_error: Greatest relative error of a principal inertia against the mesh's.
     """
 
     part: str
@@ -49,7 +49,7 @@ class Fidelity:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Convert to plain values for JSON."""
         return asdict(self) | {"passed": self.passed}
 
 

@@ -31,7 +31,7 @@ def try_grasp(part: Part, pose: np.ndarray, grasp: np.ndarray, physics: Physics)
     """One attempt: descend, close, lift, hold, judge.
 
     Args:
-        part: Its folder is read.
+        part: The part, read from its folder.
         pose: (7,) ``T_base_obj`` at the start.
         grasp: (4,) x, y, z, theta, base frame.
         physics: Speeds, times and forces; both engines share them.

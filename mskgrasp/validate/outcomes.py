@@ -39,7 +39,7 @@ class Outcomes:
     Attributes:
         success: (n,) bool.
         failure: (n,) index into `mskgrasp.core.grasp.FAILURES`.
-        settled: (n,) bool, the part was at rest before anything touched it; the rest of the others means
+        settled: (n,) bool, the part was at rest before anything touched it; otherwise the other values mean
             nothing.
         displacement: (n, 4) object displacement, NaN where not successful.
         tilt: (n,) rad.
@@ -91,7 +91,7 @@ def draw_grasps(
     """Draw n starts and grasps of each part as the collector does; those that were drawn before are kept.
 
     Raises:
-        BadPart: The camera sees one in none of its poses.
+        BadPart: The camera sees a part in none of its poses.
         WorkerFailed: Processes died again and again.
     """
     drawn = []
@@ -118,7 +118,7 @@ def run_settings(
         settings: Tried in parallel with the parts.
         drawn: The grasps.
         altered: For settings with altered parts the folder of each by the part's name; others are left out.
-        out: Where outcomes are kept.
+        out: Folder of the stored outcomes.
         workers: Processes.
         report: Called with the number of grasps that were tried.
 

@@ -77,7 +77,7 @@ def validate(config: ValidateConfig) -> int:
 
 
 def findings(config: ValidateConfig, outcomes: dict[str, Outcomes]) -> dict[str, Any]:
-    """What is stored of the outcomes under all settings."""
+    """Results to store, computed from the outcomes under all settings."""
     judged = grid(config, outcomes)
     setting, shown = choose(judged)
     own = next(one for one in judged if one.setting == config.production)

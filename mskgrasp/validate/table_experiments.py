@@ -18,7 +18,7 @@ from mskgrasp.validate.check import Check, near, within
 FACETS = 16
 """Sides of a prism that stands for a cylinder: two rings of as many corners are the 32 of a hull."""
 RADIUS, ROLLED = 0.015, 0.0177
-"""Of the cylinder, and its distance from the centre, m."""
+"""Radius of the cylinder, and its distance from the centre, m."""
 TOWER = (0.02, 0.02, 0.04)
 """Edges of the prism that topples, m."""
 

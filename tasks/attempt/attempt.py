@@ -54,11 +54,11 @@ ARRIVAL_S = 0.024
 LOST_MARGIN = 0.02
 """A part is lost where it is lower in the hand than a success allows by more than this, m."""
 PARKED = (0.45, 0.0, 0.35, 0.0)
-"""Where a hand waits whose grasp cannot be executed, clear of every part: x, y, z, theta, base frame."""
+"""Pose of a hand whose grasp cannot be executed, clear of every part: x, y, z, theta, base frame."""
 
 
 class Attempt:
-    """Executes grasps and measures the motion of the parts.
+    """Execution of grasps, and measurement of the motion of the parts.
 
     Args:
         agent: The Panda of n sub-scenes.
@@ -244,7 +244,7 @@ class Attempt:
         """Lift and hold; end early where no part is left in its hand.
 
         Args:
-            grasp: (n, 4) where the fingers closed.
+            grasp: (n, 4) x, y, z, theta at which the fingers closed, base frame.
             lifted: (n, 4) the same, at the end of the lift.
             lifting: (n,) bool, hands that hold a part; the others stay where they are.
 
@@ -284,7 +284,7 @@ class Attempt:
         return deepest
 
     def _observe(self, lifting: Array, penetration: Array) -> _InHand:
-        """Measure what hangs in the hands, in the last part of the hold."""
+        """Measure the parts in the hands, in the last part of the hold."""
         xp = self._arrays.xp
         if bool(lifting.any()):
             speed = self.relative_speed()

@@ -25,11 +25,11 @@ STILL_FINGER = 2e-3
 """A finger slower than this, m/s, has stopped. Speeds are differences of positions: PhysX's
 TGS solver reports the velocity of a pressed joint with the drive's impulse still in it."""
 PEAK_ACCELERATION = 1.5
-"""Of the hand on straight lines, m/s^2: the drives then overshoot by less than 0.4 mm."""
+"""Peak acceleration of the hand on straight lines, m/s^2: the drives then overshoot by less than 0.4 mm."""
 FINGER_TIMEOUT_S = 0.5
 """Time for which fingers that do not come to rest (the part slides through them) are waited for, s."""
 FINGER_MASS = 0.015
-"""Of a finger of the Panda without its motor, kg."""
+"""Mass of a finger of the Panda without its motor, kg."""
 CHECK_S = 0.02
 """Time between two checks of closing fingers, and of the part's speed, s. Fingers that press and did not move
 for this long have closed."""
@@ -54,13 +54,13 @@ def finger_lag(physics: Physics) -> float:
 
 
 class PandaMotion:
-    """Writes drive targets and advances the simulation.
+    """Motions by drive targets, which advance the simulation.
 
     Args:
         scene: The scene of all n sub-scenes.
         agent: The Panda in them.
         physics: Rates, finger speed and force.
-        friction: Of the part on the table, where the engine has none.
+        friction: Friction of the part on the table, where the engine has none.
     """
 
     def __init__(
@@ -311,7 +311,7 @@ class PandaMotion:
         A target inside the part keeps pressing with the drive's force limit.
 
         Args:
-            target: Of each finger, negative to press.
+            target: Target of each finger, metres from the middle, negative to press.
             force: The drives' force limit, N; that of the physics settings by default.
             check: Called every few steps; True ends the motion, the fingers stay where they are.
             frozen: (n,) bool, hands whose fingers do not move.

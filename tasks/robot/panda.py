@@ -22,12 +22,12 @@ from mskgrasp.core.panda_kinematics import HOME
 from mskgrasp.core.settings import REGION, Physics
 
 ARM_TORQUE_LIMIT = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
-"""N m; Franka Emika Panda datasheet."""
+"""Greatest torques of the joints, N m; Franka Emika Panda datasheet."""
 ARM_STIFFNESS = np.full(7, 1e4)
-"""N m/rad. The real controller knows the arm's inertia and follows a path to a tenth of a millimetre; these
-drives do not know it and need this stiffness to overshoot by less than 0.4 mm at the end of a descent."""
+"""Stiffness of the drives, N m/rad. The real controller knows the arm's inertia and follows a path to 0.1 mm;
+these drives do not, and need this stiffness to overshoot by less than 0.4 mm at the end of a descent."""
 ARM_DAMPING = np.array([250.0, 250.0, 220.0, 200.0, 80.0, 80.0, 60.0])
-"""N m s/rad; about critical for the inertia that each joint sees in the workspace."""
+"""Damping of the drives, N m s/rad; about critical for the inertia that each joint sees in the workspace."""
 FINGER_LINKS = ("panda_leftfinger", "panda_rightfinger")
 HAND_LINKS = ("panda_hand", *FINGER_LINKS)
 BARE_FRAMES = ("panda_link8", "panda_leftfinger_pad", "panda_rightfinger_pad")
@@ -176,7 +176,7 @@ class GraspPanda(Panda):
 
 
 def drop_bare_frames(builder: ArticulationBuilder) -> None:
-    """Remove `BARE_FRAMES`; what hangs on one of them hangs on its parent then."""
+    """Remove `BARE_FRAMES`; their child links become those of their parents."""
     links = builder.link_builders
     for bare in [link for link in links if link.name in BARE_FRAMES]:
         joint = bare.joint_record

@@ -24,8 +24,8 @@ def build_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: fl
 
     Args:
         scene: All sub-scenes.
-        part: Its folder is read.
-        scene_index: Of the sub-scene.
+        part: The part, read from its folder.
+        scene_index: Index of the sub-scene.
         friction: Coefficient of its material; the effective one is the mean with the other body's.
 
     Raises:

@@ -36,7 +36,7 @@ class TableFriction:
     Args:
         system: Engine of the scene.
         body: The part.
-        table: Its top is horizontal.
+        table: The table, with a horizontal top.
         coefficient: Coulomb's, mu.
     """
 

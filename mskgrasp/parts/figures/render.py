@@ -40,12 +40,12 @@ def render(
     """A picture (height, width, 3) in 0..1 of bodies seen from outside, filling the frame, white behind.
 
     Args:
-        bodies: What to draw.
+        bodies: Bodies to draw.
         width: Pixels.
         height: Pixels.
         table: Whether to draw a table at z = 0, fading out, with the bodies' shadow.
         azimuth: Direction of the viewer about z, degrees.
-        elevation: Of the viewer above the table, degrees.
+        elevation: Elevation of the viewer above the table, degrees.
     """
     w, h = width * SUPERSAMPLING, height * SUPERSAMPLING
     view = _view(np.radians(azimuth), np.radians(elevation))

@@ -87,7 +87,7 @@ def rod(radius: float, z0: float, z1: float, multiple: int = 4) -> list[np.ndarr
     """A cylinder about z as one prism, or as two halves where one would be too coarse.
 
     Args:
-        radius: Of the true cylinder.
+        radius: Radius of the true cylinder.
         z0: Lower end.
         z1: Upper end.
         multiple: The number of sides is a multiple of it (6 to agree with a hexagon).
@@ -178,7 +178,7 @@ def few_corners(points: np.ndarray, most: int = MAX_HULL_VERTICES) -> np.ndarray
 
 
 def _distance_off_plane(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
-    """How far points lie from the plane through nearly coplanar ones."""
+    """Distance (n,) of points from the plane through nearly coplanar ones."""
     centre = flat.mean(axis=0)
     normal = np.linalg.svd(flat - centre)[2][-1]
     return np.abs((points - centre) @ normal)

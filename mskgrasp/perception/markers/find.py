@@ -24,7 +24,7 @@ SIZE_TOLERANCE = 0.1
 LEAST_FILL = 0.9
 """Least share of its smallest rectangle that a square fills; a disc fills 0.79."""
 REGION_MARGIN = 0.05
-"""How far a part in the region may reach beyond it, metres."""
+"""Greatest reach of a part in the region beyond it, metres."""
 _STEP = 3
 _NAMES = ("larger", "smaller")
 

@@ -18,7 +18,7 @@ SLOT = 2.0
 
 
 def recipes() -> Iterator[Recipe]:
-    """The built-in couplings and clamp collars; none of them follows a standard's every dimension."""
+    """The built-in couplings and clamp collars; none follows a standard in every dimension."""
     for file_name, name, make, density, source in (
         ("sleeve_coupling.csv", "sleeve_coupling_{D}x{d}x{L}", sleeve_coupling, STEEL, OWN),
         ("clamp_coupling.csv", "clamp_coupling_{D}x{d}x{L}", clamp_coupling, ALUMINIUM, OWN),
