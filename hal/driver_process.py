@@ -1,4 +1,4 @@
-"""Transport between a program and a vendor's driver that runs in a process of its own.
+"""Transport between a program and a vendor's driver that runs in a separate process.
 
 A vendor's package may hang, crash, or hold Python's global lock; a process can be killed. Requests and
 answers are JSON objects, one a line, on its standard input and output; plain bytes may follow an answer.

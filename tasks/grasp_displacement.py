@@ -70,7 +70,7 @@ class GraspDisplacementEnv(BaseEnv):
     None. ``info["displacement"]`` holds dx, dy, dz, dtheta of the part in the hand.
 
     **Additional Notes:**
-    - ``obs_mode`` renders nothing by itself; `capture_depth` takes the overhead image in float metres
+    - ``obs_mode`` alone renders nothing; `capture_depth` takes the overhead image in float metres
     - ``reset(options=dict(pose_base_obj=...))`` places the part at this pose, ``options=dict(parts=[...],
       reconfigure=True)`` loads other parts
     """
@@ -359,7 +359,7 @@ class GraspDisplacementEnv(BaseEnv):
     # ------------------------------------------------------------------ outcome
 
     def evaluate(self) -> dict[str, Tensor]:
-        """Outcome of the last attempt; in the other control modes, whether the part is held aloft now."""
+        """Outcome of the last attempt; in the other control modes, whether the part is held up now."""
         if self._outcome is not None:
             return dict(self._outcome, fail=~self._outcome["success"])
         risen = self.part.pose.p[:, 2] - self._resting_z

@@ -1,6 +1,6 @@
 """Interface of the vendors' drivers, and the messages between the processes.
 
-A driver runs in a process of its own (`hal.franka.worker`), because both packages hold Python's global
+A driver runs in a separate process (`hal.franka.worker`), because both packages hold Python's global
 lock while they connect, and a robot that another program holds never answers: in the program's process that
 would block everything, Ctrl-C included. A process can be killed; the robot stops when its link closes.
 """

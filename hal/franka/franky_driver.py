@@ -92,7 +92,7 @@ class FrankyDriver:
         self._robot.stop()
 
     def recover(self) -> bool:
-        """Acknowledge the robot's errors, and a stop; False where the gripper still owes an answer.
+        """Acknowledge the robot's errors, and a stop; False where the gripper has not answered yet.
 
         Raises:
             RuntimeError: The robot did not recover.

@@ -171,7 +171,7 @@ class PandaPyDriver:
         self._stopped.set()
 
     def recover(self) -> bool:
-        """Acknowledge the robot's errors, and a stop; False where the gripper still owes an answer."""
+        """Acknowledge the robot's errors, and a stop; False where the gripper has not answered yet."""
         self._stopped.clear()
         with self._use:
             if MODES[int(self._robot.read_once().robot_mode)] == "reflex":

@@ -75,7 +75,7 @@ class Kinect2Camera(Camera):
             max_skew_s=config.max_skew_s,
             timeout_s=config.connect_timeout_s,
         )
-        # Opening and starting take up to ten seconds of their own.
+        # Opening and starting take up to another ten seconds.
         opening_s = config.connect_timeout_s + 10
         process = DriverProcess(["hal.kinect2.worker"], _ERRORS, _EXIT_S)
         try:

@@ -93,7 +93,7 @@ _CAPSULES = (
     ((0.0, 0.0, 0.01), 0.04, 0.14),
 )
 """Centre, radius and length between the ends of each link's capsule, after the capsules that Franka's
-controller checks against self-collision (franka_description); they stand for the covers in images, too."""
+controller checks against self-collision (franka_description); they represent the covers in images, too."""
 
 _FIRST_TO_COLLIDE = 4
 """Index of the first link that may come near a part; those before it stay over the table."""
@@ -229,7 +229,7 @@ def _add_finger_drive(spec: mujoco.MjSpec, physics: MujocoPhysics) -> None:
 
 
 def _robot_shape(physics: MujocoPhysics) -> dict:
-    """Contacts of the robot: its friction counts, whatever it touches, and a pad resists turning."""
+    """Contacts of the robot: its friction applies to all that it touches, and a pad resists turning."""
     mu = physics.friction_pad_part
     return dict(
         contype=ROBOT,

@@ -33,11 +33,11 @@ STILL_FINGER = 2e-3
 FINGER_CHECK_S = 0.02
 """Time between two measurements of that speed, s."""
 FINGER_TIMEOUT_S = 0.5
-"""Fingers that never come to rest are not waited for longer than this, s."""
+"""Greatest time to wait for fingers that never come to rest, s."""
 AIR = 0.01
 """A hand at least this much over all parts moves through air, m."""
 _BLOCK = 8
-"""Steps of a path between two looks at what is near the hand."""
+"""Steps of a path between two checks for parts near the hand."""
 _REST_SPEED = (1e-3, 1e-2)
 """A part slower than this is at rest, m/s and rad/s."""
 _REST_S = 0.06
@@ -241,7 +241,7 @@ class Simulation:
         self._measured += 1
 
     def _forget_forces(self) -> None:
-        """Begin a new mean, which takes steps that were not yet measured as free of force."""
+        """Begin a new mean, which counts steps not yet measured as free of force."""
         self._forces[:] = 0
         self._sum[:] = 0
         self._measured = 0

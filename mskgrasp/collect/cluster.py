@@ -1,4 +1,4 @@
-"""Executor of jobs on a Ray cluster, some of whose nodes may die, and the shards of a run made on it."""
+"""Executor of jobs on a Ray cluster, whose nodes may fail, and the shards of a run made on it."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class CollectConfig(Config):
     seed: int = Field(default=0, ge=0)
     """Seed of all random numbers; the data do not depend on the number of workers."""
     workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
-    """Processes; 0: one for each core."""
+    """Processes; 0: one per core."""
     cluster: str | None = None
     """Run on a Ray cluster: auto, or host:port of its head. workers then bounds the cores that are used."""
     part_filter: PartFilter = PartFilter()

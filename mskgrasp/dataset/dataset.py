@@ -64,7 +64,7 @@ class Dataset:
 
 
 def open_dataset(folder: str | Path) -> Dataset:
-    """Open a dataset folder; arrays are read when asked for.
+    """Open a dataset folder; arrays are read on demand.
 
     Raises:
         BadDataset: No such folder, or no finished shard in it.

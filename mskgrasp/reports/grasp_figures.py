@@ -91,7 +91,7 @@ def draw_jaw(
 
 
 def _arrow(axes: Axes, start: np.ndarray, shift: np.ndarray, width: float = 1.8, head: float = 11) -> None:
-    # An annotation, because its head keeps its size on paper whatever the length.
+    # An annotation, because its head keeps its size on paper at any length.
     axes.annotate(
         "",
         xy=tuple(start + shift),

@@ -49,7 +49,7 @@ def parse(
     path = path or default_config
     default = read_config(model, path) if path is not None else None
     note = f" Settings come from --config FILE (default: {default_config}); options override it."
-    # Without a file there may be required options: tyro asks for them.
+    # Without a file there may be required options: tyro demands them.
     known: dict[str, Any] = {} if default is None else {"default": default}
     description += note if default_config else ""
     parsed = parse_arguments(

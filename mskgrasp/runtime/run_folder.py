@@ -39,7 +39,7 @@ def opened_run(
         config: Settings of the run.
         out: The folder.
         inputs: Digests of the files and parts that the results depend on, by their names in messages.
-        scene_version: Version of the formula that draws the scenes from the seed; a folder without one has 1.
+        scene_version: Version of the formula that draws the scenes from the seed; 1 for a folder without one.
         may_change: Names of settings that may differ when a run is resumed.
 
     Raises:

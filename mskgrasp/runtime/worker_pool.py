@@ -155,8 +155,8 @@ def results(
 ) -> Generator[Result, None, None]:
     """Results of jobs done by processes of this machine, with a line on stderr where a process was lost.
 
-    With one worker, or one job, the jobs are done in this process, and whatever they raise is raised here,
-    unless `apart` asks for processes of their own.
+    With one worker, or one job, the jobs are done in this process, and any error is raised here,
+    unless `apart` requests separate processes.
     """
     if not jobs:
         return

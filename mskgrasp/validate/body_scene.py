@@ -1,4 +1,4 @@
-"""Plain bodies in the very scene that makes the labels: same hand, same table, same settings."""
+"""Plain bodies in the scene that makes the labels: same hand, same table, same settings."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ class BodyScene:
             self.env.motion.step(1)
 
     def pinch(self, part: Part, along: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
-        """Close the hand aloft on a weightless part, then give the part its weight.
+        """Close the raised hand on a weightless part, then give the part its weight.
 
         Args:
             part: Part to hold; its axes are those of the base.

@@ -124,7 +124,7 @@ class ValidateConfig(Config):
     """Variants, by a group and a label for the table: values of physics settings, ``density`` (a
     factor), ``hulls`` or ``rest`` (mesh). Each is compared with production on the same grasps."""
     ranges: Annotated[dict[str, tuple[float, float]], tyro.conf.Suppress] = {}
-    """Physics settings of the hand and the table that are not known better: drawn together, uniformly, for
+    """Physics settings of the hand and the table that are uncertain: drawn together, uniformly, for
     each grasp, they give the error of a label. The fingers' damping stays critical."""
     engine: Engine = "sapien"
     """mujoco: compare the settings under test with a second engine, and nothing else; needs ``[mujoco]``."""

@@ -30,7 +30,7 @@ MIRRORED = 12
 
 
 def holding_limit(scene: BodyScene, workshop: Workshop) -> Iterator[Check]:
-    """A block held aloft: the weaker the grip, the sooner it slips."""
+    """A block held above the table: the weaker the grip, the sooner it slips."""
     mu = scene.physics.friction_pad_part
     block = workshop.box("heavy", BLOCK, 2 * mu * scene.physics.finger_force / GRAVITY)
 

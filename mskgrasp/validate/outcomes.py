@@ -141,7 +141,7 @@ def run_settings(
 
 @dataclass(frozen=True, kw_only=True)
 class _Trial:
-    """The grasps of one part under one setting; `folder` is that of the part as it is simulated."""
+    """The grasps of one part under one setting; `folder` is that of the simulated part."""
 
     setting: Setting
     drawn: Drawn
@@ -164,7 +164,7 @@ def _trials(
 def _in_parallel(
     function: Callable[..., int], jobs: Sequence[tuple], workers: int, report: Callable[[int], None]
 ) -> None:
-    # In processes of their own even with one worker: every job loads its own scenes.
+    # In separate processes even with one worker: every job loads its own scenes.
     work = Work(_caller, function, name=lambda job: Path(job[-1]).name)
     for tried in results(work, jobs, workers, apart=True):
         report(tried)

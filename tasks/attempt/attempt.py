@@ -116,7 +116,7 @@ class Attempt:
         lifted = _raised(grasp, physics.lift_height)
         executable = can_execute(xp.stack([grasp, start, lifted])).all(0)
         if not bool(executable.all()):
-            # To the others a hand that stays parked looks like one whose pads have nothing between them.
+            # For the others a parked hand counts as one whose pads have nothing between them.
             parked = xp.broadcast_to(self._arrays.of(np.array(PARKED, np.float32)), grasp.shape)
             grasp, start, lifted = (
                 xp.where(executable[:, None], one, parked) for one in (grasp, start, lifted)

@@ -126,7 +126,7 @@ class PandaMotion:
         return self.fingers().sum(-1)
 
     def place(self, q: Array, width: Array | None = None) -> None:
-        """Set the arm to joints (n, 7) at once, at rest, fingers open by ``width`` (n,) metres or wholly."""
+        """Set the arm to joints (n, 7) at once, at rest, fingers open by ``width`` (n,) metres or fully."""
         xp, arrays = self.arrays.xp, self.arrays
         opening = arrays.full(self.n, MAX_OPENING) if width is None else arrays.of(width)
         fingers = xp.astype(opening, xp.float32) / 2

@@ -14,7 +14,7 @@ from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import Part
 
 LEAST_KEPT = 2e-3
-"""Share of the hulls' volume that cooking may lose: corners that hardly stand out are dropped."""
+"""Share of the hulls' volume that cooking may lose: corners that protrude very little are dropped."""
 
 STEEL_GREY = (0.55, 0.57, 0.6, 1.0)
 

@@ -45,7 +45,7 @@ class StandingPoses:
 
 
 def standing_poses(part: Part, physics: Physics) -> StandingPoses:
-    """Settle every resting pose of a part, in a scene of its own.
+    """Settle every resting pose of a part, in a separate scene.
 
     The mesh decides a part's resting poses, the engine simulates its hulls. These may lean by a degree, or
     lack the edge on which the mesh stands.

@@ -1,6 +1,6 @@
 """Physics settings of the simulated cell.
 
-The reason for a default stands beside it; the measurements are in docs/results/physics_settings.md.
+The reason for a default is given with it; the measurements are in docs/results/physics_settings.md.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Software renderer for pictures of parts: orthographic, z-buffered, no GPU.
 
-A renderer of our own, 0.5 to 1.3 s a picture: matplotlib's Poly3DCollection (0.05 s) sorts triangles, not
+Our own renderer, 0.5 to 1.3 s a picture: matplotlib's Poly3DCollection (0.05 s) sorts triangles, not
 pixels, and draws a bracket's far wall over its near one; PyVista (0.2 s) draws as well, but adds 580 MB of
 packages.
 """

@@ -26,7 +26,7 @@ def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[
     """The pieces, each with as much of the neighbours that it touches as leaves their union unchanged.
 
     A contact pushes along the shortest way out of a piece. Where two pieces meet at a face, that way leads
-    through this face for a corner of a pad that presses beside it: sideways, as if the part had a step there.
+    through this face for a corner of a pad that presses near it: sideways, as if the part had a step there.
 
     Args:
         hulls: Corners (n, 3) of each piece, mm.

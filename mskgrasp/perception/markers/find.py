@@ -92,7 +92,7 @@ def find_markers(
         if len(measured) < LEAST_DEPTHS:
             raise MarkersNotFound(
                 f"no depth: on the {_NAMES[i]} square {len(measured)} depths are valid, at least "
-                f"{LEAST_DEPTHS} are needed; use larger squares or matt tape, or tell the squares' heights"
+                f"{LEAST_DEPTHS} are needed; use larger squares or matt tape, or give the squares' heights"
             )
         depths.append(float(np.median(measured)))
     return Markers(

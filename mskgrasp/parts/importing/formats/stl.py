@@ -1,6 +1,6 @@
 """STL, binary and text.
 
-A reader of our own: for intact files trimesh's gives the same triangles, but it accepts text that
+Our own reader: for intact files trimesh's gives the same triangles, but it accepts text that
 is cut off, refuses text with CR line ends, with a facet on one line or with a solid
 called ``vertex...``, and takes a binary file by its exact length alone.
 """

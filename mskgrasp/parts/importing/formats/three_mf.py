@@ -1,6 +1,6 @@
 """3MF: a zip of XML, by the 3MF core specification 1.3 and its production extension.
 
-A reader of our own: trimesh's unpacks the whole archive (1.1 GB of memory for a file of 0.4 MB), merges
+Our own reader: trimesh's unpacks the whole archive (1.1 GB of memory for a file of 0.4 MB), merges
 objects of several model files that share an id, takes supports for the part, drops references to missing
 objects without an error, and checks neither a DTD nor required extensions.
 """

@@ -183,7 +183,7 @@ def two_piece_collar(size: dict[str, float]) -> s.Solid:
     holes = _clamp_screws(outer, bore, screw, np.array([width / 2]))
     holes += [hole.rotate((0.0, 0.0, 180.0)) for hole in holes]
     body = tube(outer, bore, 0, width).drilled(gap, *holes)
-    # The bolts fill their holes to the bottom: a void inside would be a body of its own.
+    # The bolts fill their holes to the bottom: a void inside would be a separate body.
     x = (outer + bore) / 2
     reach = np.sqrt(outer**2 - x**2) + 1
     bolt = sh.tool(s.drill(screw / 2 + 0.1, (x, -0.5 * reach, width / 2), "y", 1.25 * reach))
