@@ -61,7 +61,7 @@ class BoardHolder(Protocol):
     """Holder that attaches a calibration board to the hand; on a real cell an operator does."""
 
     def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
-        """Fixe a flat board to the hand until the next part is presented.
+        """Fix a flat board to the hand until the next part is presented.
 
         Args:
             image: (h, w) uint8 grey levels of the printed side.

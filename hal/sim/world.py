@@ -159,7 +159,7 @@ class SapienWorld:
         return self._fine_colour.capture()
 
     def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
-        """Attache a flat board to the hand, visual only.
+        """Attach a flat board to the hand, visual only.
 
         Args:
             image: (h, w) grey levels of its printed side, uint8.
