@@ -17,13 +17,13 @@ from mskgrasp.core.geometry import Pose, pose_distance
 from mskgrasp.core.grasp import MAX_OPENING
 
 JOINT_TOLERANCE = 5e-3
-"""A joint motion has arrived within this, radians."""
+"""Greatest error of each joint at the end of a joint motion, radians."""
 POSITION_TOLERANCE = 2e-3
-"""A straight motion has arrived within this, metres."""
+"""Greatest position error of the TCP at the end of a straight motion, metres."""
 ROTATION_TOLERANCE = 1e-2
-"""A straight motion has arrived within this, radians."""
+"""Greatest rotation error of the TCP at the end of a straight motion, radians."""
 WIDTH_TOLERANCE = 2e-3
-"""The pads have arrived within this, metres."""
+"""Greatest error of the pads' distance at the end of a motion, metres."""
 
 STOPPED = "stop() was called; call recover() when it is safe"
 
@@ -81,7 +81,7 @@ class Arm(Device):
     # ------------------------------------------------------------------ commands
 
     def state(self) -> ArmState:
-        """Measures joints, TCP and gripper width.
+        """Measure joints, TCP and gripper width.
 
         Raises:
             NotConnected, CommunicationLost: The arm is not connected or does not answer.
@@ -90,7 +90,7 @@ class Arm(Device):
         return self._state()
 
     def move_to_joints(self, joints: np.ndarray, *, speed: float = 0.3) -> None:
-        """Moves all joints to (7,) radians at a fraction ``speed`` of their greatest speeds.
+        """Move all joints to (7,) radians at a fraction ``speed`` of their greatest speeds.
 
         Raises:
             OutOfWorkspace: A joint limit would be passed; nothing moved.
@@ -109,7 +109,7 @@ class Arm(Device):
                 raise MotionAborted(f"the arm stopped {error:.4f} rad short of its joint target")
 
     def move_to_pose(self, T_base_tcp: Pose, *, speed: float = 0.1) -> None:
-        """Moves the TCP along a straight line to a pose, ``speed`` m/s at most.
+        """Move the TCP along a straight line to a pose, ``speed`` m/s at most.
 
         Raises:
             OutOfWorkspace: The pose is outside the box, too near the table, or out of reach; nothing moved.
@@ -129,7 +129,7 @@ class Arm(Device):
                 )
 
     def move_gripper(self, width: float) -> None:
-        """Moves the pads to a distance in metres; to hold something use `grasp`.
+        """Move the pads to a distance in metres; to hold something use `grasp`.
 
         Raises:
             OutOfWorkspace: The width is outside 0 .. 0.08 m; nothing moved.
@@ -148,7 +148,7 @@ class Arm(Device):
                 )
 
     def grasp(self, force: float) -> GraspOutcome:
-        """Closes the fingers until they hold something with ``force`` newtons, or meet.
+        """Close the fingers until they hold something with ``force`` newtons, or meet.
 
         A grasp that finds nothing is an outcome, not an error.
 
@@ -162,7 +162,7 @@ class Arm(Device):
             return self._grasp(force)
 
     def wait(self, seconds: float) -> None:
-        """Holds still for a time, seconds of the cell's own clock.
+        """Hold still for a time, seconds of the cell's own clock.
 
         Raises:
             OutOfWorkspace: The time is outside 0 .. 3600 s.
@@ -175,13 +175,13 @@ class Arm(Device):
             self._wait(seconds)
 
     def stop(self) -> None:
-        """Stops the motion in progress, which ends with `Stopped`; safe from any thread."""
+        """Stop the motion in progress, which ends with `Stopped`; safe from any thread."""
         self._stop.set()
         if self._connected():
             self._halt()
 
     def recover(self) -> None:
-        """Acknowledges an error so that the arm may move again; waits for a motion in progress.
+        """Acknowledge an error so that the arm may move again; wait for a motion in progress.
 
         Raises:
             NeedsRecovery: The cause is still present, such as a pressed user stop.
@@ -201,7 +201,7 @@ class Arm(Device):
     # ------------------------------------------------------------------ checks
 
     def check_pose(self, T_base_tcp: Pose) -> None:
-        """Refuses a target outside the workspace, out of reach or too near the table; moves nothing.
+        """Refuse a target outside the workspace, out of reach or too near the table; move nothing.
 
         Raises:
             OutOfWorkspace: Names the limit that the target violates.

@@ -41,7 +41,7 @@ class Camera(Device):
 
     @abstractmethod
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
-        """Takes a fresh frame.
+        """Take a fresh frame.
 
         Raises:
             NotConnected: Outside the camera's context.

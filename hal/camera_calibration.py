@@ -15,7 +15,7 @@ from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.geometry import Pose
 
 NORM_TOLERANCE = 1e-3
-"""How far from 1 the length of a quaternion in a file may be; more is a typing error, not rounding."""
+"""Greatest deviation of a quaternion's length from 1 in a file; more is a typing error, not rounding."""
 _SCHEMA = 1
 
 
@@ -30,7 +30,7 @@ class Calibration:
         rms_translation_m: RMS residual between the poses of the board and the arm, metres.
         rms_rotation_rad: RMS residual of the rotations, radians.
         n_poses: Number of poses of the arm; 0: measured by hand, rough.
-        made: When, as ISO 8601.
+        made: Time of the calibration, ISO 8601.
     """
 
     serial: str
@@ -43,7 +43,7 @@ class Calibration:
 
     @property
     def by_hand(self) -> bool:
-        """Whether the place was measured with a tape, not with a board."""
+        """Whether the position was measured with a tape, not with a board."""
         return self.n_poses == 0
 
 
@@ -75,7 +75,7 @@ class _CalibrationFile(Config):
 
 
 def write_calibration(path: Path, calibration: Calibration) -> None:
-    """Writes a calibration as YAML; the file appears whole or not at all."""
+    """Write a calibration as YAML; the file appears whole or not at all."""
     pose, intrinsics = calibration.T_base_camera, calibration.intrinsics
     values = {
         "schema_version": _SCHEMA,
@@ -102,11 +102,11 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
 
 
 def read_calibration(path: Path, *, serial: str | None) -> Calibration:
-    """Reads a calibration.
+    """Read a calibration.
 
     Args:
         path: The file.
-        serial: Of the camera that will be used; None where it is not known yet. A place measured by
+        serial: Serial number of the camera to use; None if not known yet. A position measured by
             hand is accepted for every camera.
 
     Raises:
@@ -146,7 +146,7 @@ def read_calibration(path: Path, *, serial: str | None) -> Calibration:
 
 
 def calibration_path(path: str | Path, cell_file: Path) -> Path:
-    """Where a cell file's ``camera.calibration`` is: a relative path starts beside the cell file."""
+    """Path of a cell file's ``camera.calibration``; a relative one is relative to the cell file's folder."""
     return cell_file.parent / path
 
 

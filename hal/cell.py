@@ -36,10 +36,10 @@ class Workspace:
 
 
 class PartFeeder(Protocol):
-    """Places parts on the table; a simulator does so by itself."""
+    """Feeder that places parts on the table, such as a simulator."""
 
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """Places a part at a position and turn determined by the seed.
+        """Place a part at a position and turn determined by the seed.
 
         Args:
             part: Name or folder.
@@ -50,7 +50,7 @@ class PartFeeder(Protocol):
 
 
 class PartTracker(Protocol):
-    """Measures the part's pose: the simulator's ground truth, or markers on a real part."""
+    """Source of the part's pose: the simulator's ground truth, or markers on a real part."""
 
     def part_pose(self) -> Pose:
         """Current ``T_base_obj``."""
@@ -58,10 +58,10 @@ class PartTracker(Protocol):
 
 
 class BoardHolder(Protocol):
-    """Attaches a calibration board to the hand; on a real cell an operator does."""
+    """Holder that attaches a calibration board to the hand; on a real cell an operator does."""
 
     def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
-        """Fixes a flat board to the hand until the next part is presented.
+        """Fix a flat board to the hand until the next part is presented.
 
         Args:
             image: (h, w) uint8 grey levels of the printed side.
@@ -73,7 +73,7 @@ class BoardHolder(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """Camera, arm and workspace, and what a backend adds to them.
+    """Camera, arm and workspace, with optional feeder, tracker and board holder.
 
     Attributes:
         camera: Camera over the table.
@@ -93,6 +93,6 @@ class Cell:
 
     @contextmanager
     def connected(self) -> Iterator[Cell]:
-        """Connects camera and arm; releases both at the end of the block."""
+        """Connect camera and arm; release both at the end of the block."""
         with self.camera, self.arm:
             yield self

@@ -91,7 +91,7 @@ class Corners:
 
 
 def detect(board: Board, colour: np.ndarray) -> Corners:
-    """Detects the board's corners in (h, w, 3) RGB or (h, w) grey, uint8; there may be none."""
+    """Detect the board's corners in (h, w, 3) RGB or (h, w) grey, uint8; there may be none."""
     grey = colour if colour.ndim == 2 else cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY)
     parameters = cv2.aruco.DetectorParameters()
     # Small markers are blurred into each other: only the middle of each module is read, in smaller steps than
@@ -101,7 +101,7 @@ def detect(board: Board, colour: np.ndarray) -> Corners:
     parameters.errorCorrectionRate = 1.0
     parameters.maxErroneousBitsInBorderRate = 0.5
     detector = cv2.aruco.CharucoDetector(_cv_board(board), detectorParams=parameters)
-    # A marker module of a depth camera's colour image is two pixels wide: too few to be read as it is.
+    # A marker module of a depth camera's colour image is two pixels wide: too few to be read directly.
     larger = cv2.resize(grey, None, fx=_ZOOM, fy=_ZOOM, interpolation=cv2.INTER_CUBIC)
     pixels, ids, _, _ = detector.detectBoard(larger)
     if pixels is None or ids is None or len(ids) == 0:

@@ -12,7 +12,7 @@ class Device(ABC):
 
     @abstractmethod
     def connect(self) -> None:
-        """Opens the device; nothing moves.
+        """Open the device; nothing moves.
 
         Raises:
             DriverMissing, NotConnected: No driver, or no such device.
@@ -20,7 +20,7 @@ class Device(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Stops and releases the device; safe to call twice."""
+        """Stop and release the device; safe to call twice."""
 
     def __enter__(self) -> Self:
         self.connect()

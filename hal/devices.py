@@ -63,7 +63,7 @@ class WorkspaceConfig(Config):
         return self
 
     def lower(self) -> np.ndarray:
-        """(3,) of the box, m."""
+        """(3,) lower corner of the box, base frame, m."""
         return np.array(self.box_lower if self.box_lower is not None else (0.25, -0.4, self.table_z))
 
 
@@ -77,7 +77,7 @@ class DevicesConfig(Config):
 
 
 def devices_cell(values: dict[str, Any], path: Path) -> Cell:
-    """Builds the cell that a file of this type describes; nothing is connected yet.
+    """Build the cell that a file of this type describes; nothing is connected yet.
 
     Raises:
         BadConfig: The file is not valid, or its sections do not fit each other.
@@ -159,7 +159,7 @@ def _camera(values: dict[str, Any], workspace: Workspace, path: Path) -> tuple[C
 
 
 def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
-    """Refuses a workspace whose grasps or home the arm would refuse later, with a part in its hand."""
+    """Refuse a workspace whose grasps or home the arm would refuse later, with a part in its hand."""
     if workspace.grasp_force > arm.limits.max_force:
         raise BadConfig(
             f"{path}: workspace.grasp_force {workspace.grasp_force:g} N is over the arm's "

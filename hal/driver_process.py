@@ -1,4 +1,4 @@
-"""Transport between a program and a vendor's driver that runs in a process of its own.
+"""Transport between a program and a vendor's driver that runs in a separate process.
 
 A vendor's package may hang, crash, or hold Python's global lock; a process can be killed. Requests and
 answers are JSON objects, one a line, on its standard input and output; plain bytes may follow an answer.
@@ -34,11 +34,11 @@ class NoAnswer(ProcessEnded):
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What a driver returns to a request.
+    """Answer of a driver to a request.
 
     Attributes:
-        result: Serialisable as JSON.
-        payload: Bytes that follow it.
+        result: Result, serialisable as JSON.
+        payload: Bytes sent after the result.
     """
 
     result: Any
@@ -49,10 +49,10 @@ class Answer:
 
 
 class DriverProcess:
-    """Starts a driver's process, sends it requests, and kills it when it does not answer in time.
+    """Process of a driver: started, sent requests, and killed when it does not answer in time.
 
     Args:
-        arguments: Of ``python -m``: the module that serves, and its arguments.
+        arguments: Arguments of ``python -m``: the driver's module, and its own arguments.
         errors: Errors that the driver may raise, by the names of their classes.
         exit_s: Time the driver has to release its device before its process is killed, s.
     """
@@ -86,7 +86,7 @@ class DriverProcess:
         return self._process.pid
 
     def ask(self, op: str, *, timeout_s: float, **values: Any) -> Answer:
-        """Sends a request and waits for its answer; requests of several threads may overlap.
+        """Send a request and wait for its answer; requests of several threads may overlap.
 
         Raises:
             NoAnswer: No answer within ``timeout_s``; the process was killed.
@@ -116,7 +116,7 @@ class DriverProcess:
         return Answer(result=reply["result"], payload=[payload])
 
     def close(self) -> None:
-        """Lets the driver release its device and ends the process; safe to call twice."""
+        """Let the driver release its device and end the process; safe to call twice."""
         assert self._process.stdin is not None and self._process.stdout is not None
         with self._writing:
             self._process.stdin.close()
@@ -129,12 +129,12 @@ class DriverProcess:
         self._log.close()
 
     def kill(self) -> None:
-        """Ends the process at once; its device is left to the kernel."""
+        """End the process at once; its device is left to the kernel."""
         self._process.kill()
         self._process.wait()
 
     def _send(self, request: dict[str, Any], deadline_s: float) -> None:
-        """Writes a request; a driver that hangs reads none, and a request may be longer than the pipe.
+        """Write a request; a driver that hangs reads none, and a request may be longer than the pipe.
 
         Raises:
             TimeoutError: It could not be written in time.
@@ -217,13 +217,13 @@ class AnswerPipe:
         action: Callable[[], Answer],
         explain: Callable[[BaseException], HalError],
     ) -> None:
-        """Runs an action and writes its answer, or the error that explains why it failed.
+        """Run an action and write its answer, or the error that explains why it failed.
 
         Args:
             request: As `requests` yields it. With ``alarm_s`` the kernel ends the process when the action
                 takes longer: the program may have been killed, and Python's lock may be held.
             action: Performs the request.
-            explain: The package's error for an exception of the vendor.
+            explain: Converts an exception of the vendor to an error of `hal`.
         """
         payload: Sequence[bytes | memoryview] = ()
         try:

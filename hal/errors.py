@@ -36,7 +36,7 @@ class MotionAborted(HalError):
 
 
 class Stopped(MotionAborted):
-    """stop() was called: no program may resume the motion by itself."""
+    """stop() was called: no program may resume the motion automatically."""
 
 
 class NeedsRecovery(HalError):

@@ -32,8 +32,8 @@ class GraspResult:
     Attributes:
         lifted: The fingers closed on something and the arm lifted it.
         holding: The fingers hold something after lift and hold.
-        width: Distance of the pads then, metres.
-        T_base_tcp: Measured TCP then.
+        width: Distance of the pads after lift and hold, metres.
+        T_base_tcp: Measured pose of the TCP after lift and hold.
         aborted: Reason if the motion ended early, else None; the arm then needs `recover`.
     """
 
@@ -45,7 +45,7 @@ class GraspResult:
 
 
 def execute_grasp(cell: Cell, grasp: Grasp) -> GraspResult:
-    """Opens, approaches, descends, closes, lifts and holds.
+    """Open, approach, descend, close, lift and hold.
 
     Args:
         cell: Connected, without an error in force.
@@ -96,12 +96,12 @@ def above_grasp(cell: Cell, grasp: Grasp) -> Pose:
 
 
 def put_down(cell: Cell, grasp: Grasp, *, height: float = PUT_DOWN, opening: float = MAX_OPENING) -> None:
-    """Lowers a lifted part to where it was grasped, opens the fingers and rises.
+    """Lower a lifted part to where it was grasped, open the fingers and rise.
 
     Args:
         cell: The hand holds the part over the table.
-        grasp: At which it was grasped.
-        height: Of the release above the grasp, metres; falling 2 mm, a part may shift by 1 mm.
+        grasp: Grasp of the lifted part, base frame.
+        height: Height of the release above the grasp, metres; a part that falls 2 mm may shift by 1 mm.
         opening: As in `let_go`.
 
     Raises:
@@ -113,7 +113,7 @@ def put_down(cell: Cell, grasp: Grasp, *, height: float = PUT_DOWN, opening: flo
 
 
 def lower(cell: Cell, grasp: Grasp, *, height: float = 0.0) -> None:
-    """Lowers a lifted part to where it was grasped, or ``height`` metres above.
+    """Lower a lifted part to where it was grasped, or ``height`` metres above.
 
     Raises:
         MotionAborted: The part met the table early, because it hangs lower in the hand than before.
@@ -122,11 +122,11 @@ def lower(cell: Cell, grasp: Grasp, *, height: float = 0.0) -> None:
 
 
 def let_go(cell: Cell, place: Grasp, *, opening: float) -> None:
-    """Opens the fingers and rises straight.
+    """Open the fingers and rise straight.
 
     Args:
         cell: The hand is at ``place`` and holds a part.
-        place: Base frame; the hand may be a little higher.
+        place: Pose of the hand as a grasp, base frame; the hand may be a little higher.
         opening: Distance of the pads afterwards, metres; 0 for the least that releases the part, which is
             `RELEASE` more than now. The fingers had room on the way down to the grasp, but since then the
             part has moved between them: one inside a bore may push it as it opens all the way.
@@ -143,7 +143,7 @@ def let_go(cell: Cell, place: Grasp, *, opening: float) -> None:
 
 
 def go_home(cell: Cell) -> None:
-    """Opens the fingers, retreats upward and moves the arm out of the camera's sight."""
+    """Open the fingers, retreat upward and move the arm out of the camera's sight."""
     arm = cell.arm
     arm.move_gripper(MAX_OPENING)
     state = arm.state()

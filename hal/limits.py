@@ -54,7 +54,7 @@ def lowest_point(T_base_tcp: Pose) -> float:
 
 
 def check_target_joints(limits: ArmLimits, joints: np.ndarray) -> None:
-    """Refuses joints (7,) outside their limits.
+    """Refuse joints (7,) outside their limits.
 
     Raises:
         OutOfWorkspace: Names the joint and its limits.
@@ -71,7 +71,7 @@ def check_target_joints(limits: ArmLimits, joints: np.ndarray) -> None:
 
 
 def check_target_pose(limits: ArmLimits, T_base_tcp: Pose) -> None:
-    """Refuses a pose outside the box or too near the table.
+    """Refuse a pose outside the box or too near the table.
 
     Raises:
         OutOfWorkspace: Names the value and its limits.
@@ -94,7 +94,7 @@ def check_target_pose(limits: ArmLimits, T_base_tcp: Pose) -> None:
 
 
 def check_line(limits: ArmLimits, start: Pose, goal: Pose) -> None:
-    """Refuses a straight motion on which a tilting hand would touch the table.
+    """Refuse a straight motion on which a tilting hand would touch the table.
 
     Raises:
         OutOfWorkspace: Names the place.
@@ -110,10 +110,10 @@ def check_line(limits: ArmLimits, start: Pose, goal: Pose) -> None:
 def check_joint_path(
     limits: ArmLimits, forward: Callable[[np.ndarray], Pose], start: np.ndarray, goal: np.ndarray
 ) -> None:
-    """Refuses a joint motion that brings the hand to the table or out of the box.
+    """Refuse a joint motion that brings the hand to the table or out of the box.
 
     Args:
-        limits: Of the arm.
+        limits: Limits of the arm.
         forward: ``T_base_tcp`` at joints (7,).
         start: (7,) current joints, radians.
         goal: (7,) radians, within their limits.
@@ -133,7 +133,7 @@ def check_joint_path(
 
 
 def _check_way(limits: ArmLimits, poses: list[Pose], what: str) -> None:
-    """Refuses a path that leads out; an arm guided out of its limits may come back, but go no farther."""
+    """Refuse a path that leaves the limits; an arm guided out of them may return, but go no farther."""
     heights = np.array([lowest_point(pose) for pose in poses])
     if heights.min() < min(heights[0], limits.table_z + TABLE_CLEARANCE) - _SLACK:
         raise OutOfWorkspace(

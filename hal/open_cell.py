@@ -18,7 +18,7 @@ SIMULATED: tuple[CellType, ...] = ("sapien", "mujoco")
 
 @contextmanager
 def open_cell(path: str | Path) -> Iterator[Cell]:
-    """Opens the cell that a YAML file describes: connected, and released when the block ends.
+    """Open the cell that a YAML file describes: connected, and released when the block ends.
 
     Args:
         path: A file such as ``configs/cells/sapien.yaml``; its ``type`` chooses the backend.
@@ -32,7 +32,7 @@ def open_cell(path: str | Path) -> Iterator[Cell]:
 
 
 def cell_from_yaml(path: Path) -> Cell:
-    """Builds the cell that a YAML file describes; nothing is connected yet.
+    """Build the cell that a YAML file describes; nothing is connected yet.
 
     Raises:
         BadConfig: The file is missing or not valid.
@@ -41,7 +41,7 @@ def cell_from_yaml(path: Path) -> Cell:
 
 
 def cell_from_values(values: dict[str, Any], path: Path) -> Cell:
-    """Builds the cell that plain values describe; ``path`` is the file they come from.
+    """Build the cell that plain values describe; ``path`` is the file they come from.
 
     Raises:
         BadConfig: The values are not valid.

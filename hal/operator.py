@@ -17,7 +17,7 @@ class StoppedByOperator(MskgraspError):
 
 
 class Operator:
-    """Asks before a real arm moves, and asks for parts on a cell without a feeder.
+    """Operator, who is asked before a real arm moves, and for parts on a cell without a feeder.
 
     Nothing is asked on a simulated cell, nor on any cell with ``yes``.
 
@@ -47,7 +47,7 @@ class Operator:
         self._prompts = prompts or sys.stderr
 
     def present(self, cell: Cell, part: str, seed: int, *, name: str = "", keep: bool = False) -> None:
-        """Has a part placed on the table, arm at home: by the cell's feeder, else by the operator.
+        """Have a part placed on the table, arm at home: by the cell's feeder, else by the operator.
 
         Args:
             cell: Connected.
@@ -94,7 +94,7 @@ class Operator:
         )
 
     def recover(self, cell: Cell, reason: str) -> None:
-        """Recovers the arm after a contact, once the operator confirms.
+        """Recover the arm after a contact, once the operator confirms.
 
         Raises:
             StoppedByOperator: The operator ended the run; the arm stays stopped.
@@ -110,7 +110,7 @@ class Operator:
         cell.arm.recover()
 
     def inform(self, text: str) -> None:
-        """Prints a line for the operator."""
+        """Print a line for the operator."""
         print(text, file=self._prompts, flush=True)
 
     def _ask(self, question: str, legal: dict[str, bool]) -> bool:

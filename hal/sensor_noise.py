@@ -51,7 +51,7 @@ class SensorNoise(Config):
     def least_height(self) -> float:
         """Height over a table that may be noise, metres, once heights are smoothed (`part_detection`).
 
-        Higher, and flat parts are lost; lower, and noise around a part counts to it.
+        A greater height loses flat parts; a smaller one counts noise around a part as the part.
         """
         return 0.002 if self.model == "off" else 0.003
 
@@ -64,8 +64,8 @@ def add_noise(
     Args:
         depth: (h, w) metres along the optical axis, NaN where there is nothing.
         intrinsics: (3, 3) pinhole matrix, pixels; the centre of a pixel has integer coordinates.
-        noise: How the sensor errs.
-        rng: Where the randomness comes from.
+        noise: Noise model of the sensor.
+        rng: Random generator.
 
     Returns:
         (h, w) float32 metres, NaN where the sensor sees nothing.

@@ -47,7 +47,7 @@ def fit_table(
     region: tuple[float, float, float, float],
     table_z: float,
 ) -> TablePlane | None:
-    """Fits the plane of most points in the region; parts on it are outliers.
+    """Fit the plane of most points in the region; parts on it are outliers.
 
     Args:
         depth: (h, w) metres, NaN where invalid.

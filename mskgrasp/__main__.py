@@ -31,7 +31,7 @@ PROGRAMS = {
 
 
 def main() -> None:
-    """Runs the program that the first argument names with the others, as ``python -m`` does."""
+    """Run the program named by the first argument with the other arguments, as ``python -m`` does."""
     name = sys.argv[1] if len(sys.argv) > 1 else "--help"
     if name in ("-h", "--help"):
         print("usage: mskgrasp PROGRAM [OPTIONS]\n")

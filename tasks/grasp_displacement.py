@@ -53,7 +53,7 @@ class GraspDisplacementEnv(BaseEnv):
     - the part: one for each sub-scene, given by ``parts`` or drawn from the starter set
     - its resting pose, by the poses' probabilities; poses that the engine does not hold are left out
     - its place, uniform in a 24 x 24 cm region, and its turn about the vertical
-    - where ``noise`` asks for it: errors of arm, gripper force, friction and camera (`core.settings`)
+    - if ``noise`` enables them: errors of arm, gripper force, friction and camera (`core.settings`)
 
     **Success Conditions:**
     - after the lift and 0.2 s of holding, both pads touch the part and their gap is over 0.5 mm
@@ -70,7 +70,7 @@ class GraspDisplacementEnv(BaseEnv):
     None. ``info["displacement"]`` holds dx, dy, dz, dtheta of the part in the hand.
 
     **Additional Notes:**
-    - ``obs_mode`` renders nothing by itself; `capture_depth` takes the overhead image in float metres
+    - ``obs_mode`` alone renders nothing; `capture_depth` takes the overhead image in float metres
     - ``reset(options=dict(pose_base_obj=...))`` places the part at this pose, ``options=dict(parts=[...],
       reconfigure=True)`` loads other parts
     """
@@ -91,7 +91,7 @@ class GraspDisplacementEnv(BaseEnv):
         num_envs: int = 1,
         **kwargs: Any,
     ):
-        """Builds the environment.
+        """Build the environment.
 
         Args:
             *args: Passed to ManiSkill.
@@ -252,7 +252,7 @@ class GraspDisplacementEnv(BaseEnv):
             self._apply_error(self._errors[0])
 
     def begin_episode(self, seed: int) -> None:
-        """Begins the episode of ``reset(seed=seed)`` for `try_grasp`, without its other work.
+        """Begin the episode of ``reset(seed=seed)`` for `try_grasp`, without its other work.
 
         A reset takes as long as twenty steps of the simulation. No observation is made, the controllers of
         the other control modes are not reset, nor is torch's generator seeded: nothing here is drawn from it.
@@ -271,13 +271,13 @@ class GraspDisplacementEnv(BaseEnv):
             self.scene._gpu_fetch_all()
 
     def set_state_dict(self, state: dict, env_idx: Tensor | None = None) -> None:
-        """Sets the state of `get_state_dict`, of which the last step's contacts are no part."""
+        """Set the state of `get_state_dict`, which does not include the last step's contacts."""
         super().set_state_dict(state, env_idx)
         if self._friction is not None:
             self._friction.reset()
 
     def _apply_error(self, error: ExecutionError | None) -> None:
-        """Sets gripper force, pad friction and camera pose to those of an attempt, in a single sub-scene."""
+        """Set gripper force, pad friction and camera pose to those of an attempt, in a single sub-scene."""
         if error is None:
             return
         if error.finger_force is not None:
@@ -359,7 +359,7 @@ class GraspDisplacementEnv(BaseEnv):
     # ------------------------------------------------------------------ outcome
 
     def evaluate(self) -> dict[str, Tensor]:
-        """Outcome of the last attempt; in the other control modes, whether the part is held aloft now."""
+        """Outcome of the last attempt; in the other control modes, whether the part is held up now."""
         if self._outcome is not None:
             return dict(self._outcome, fail=~self._outcome["success"])
         risen = self.part.pose.p[:, 2] - self._resting_z

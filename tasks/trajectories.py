@@ -49,12 +49,12 @@ def write_trajectories(
     T_base_camera: Pose,
     description: str,
 ) -> int:
-    """Writes ``path`` (.h5) with a group ``traj_i`` for each episode, and the .json file beside it.
+    """Write ``path`` (.h5) with a group ``traj_i`` for each episode, and the .json file beside it.
 
     Args:
         path: Must end in .h5.
         episodes: In this order.
-        env_kwargs: With which ``gymnasium.make`` rebuilds the task.
+        env_kwargs: Arguments with which ``gymnasium.make`` rebuilds the task.
         intrinsics: (3, 3) of the overhead camera, integer coordinates at a pixel's centre.
         T_base_camera: Pose of its optical frame.
         description: Origin of the data.
@@ -97,7 +97,7 @@ def write_trajectories(
 
 
 def camera_parameters(intrinsics: np.ndarray, T_base_camera: Pose) -> dict[str, np.ndarray]:
-    """What ManiSkill calls ``sensor_param`` of a camera, float32, in its world and its pixel convention."""
+    """ManiSkill's ``sensor_param`` of a camera, float32, in its world and its pixel convention."""
     # ManiSkill's image plane has a pixel's corner, not its centre, at integer coordinates.
     shifted = np.array(intrinsics, dtype=np.float64)
     shifted[:2, 2] += 0.5

@@ -23,11 +23,11 @@ class Sight:
     """Rough pose and optics of the camera, known before the calibration.
 
     Attributes:
-        T_base_camera: Where it hangs, to some centimetres.
+        T_base_camera: Approximate pose of the camera's optical frame in the base, to a few centimetres.
         intrinsics: (3, 3) pinhole matrix in pixels.
-        width: Columns of its image.
-        height: Rows.
-        nearest: The board stays at least this far from it, metres.
+        width: Width of the image, pixels.
+        height: Height of the image, pixels.
+        nearest: Least distance of the board from the camera, metres.
     """
 
     T_base_camera: Pose
@@ -50,13 +50,13 @@ def candidate_poses(
     """``T_base_tcp`` with the board in the camera's view, tilted to all sides, over the table.
 
     Args:
-        board: What the hand holds.
-        T_tcp_board: How, to a centimetre or two.
-        sight: Where the camera is, about.
+        board: Board in the hand.
+        T_tcp_board: Approximate pose of the board in the tcp frame, to 1 or 2 cm.
+        sight: Approximate pose and optics of the camera.
         table_z: Height of the table, base frame, metres.
-        tilt_rad: Greatest tilt of the board against the camera's line of sight.
-        rng: The poses follow from it.
-        possible: Whether the arm can go there.
+        tilt_rad: Greatest tilt of the board against the camera's line of sight, radians.
+        rng: Random generator of the poses.
+        possible: Returns whether the arm can reach a ``T_base_tcp``.
     """
     # Outermost markers may be cut off: what must be seen are the inner corners.
     inner, outline = board.outline(-0.6 * board.square), board.outline(0.01)

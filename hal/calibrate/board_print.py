@@ -13,13 +13,13 @@ from mskgrasp.core.errors import UsageError
 _INCH = 0.0254
 _PAPERS = {"A4": (0.297, 0.210), "A3": (0.420, 0.297), "A2": (0.594, 0.420)}
 _BORDER = 0.010
-"""What printers leave white, and what the hand may cover, metres."""
+"""White border that printers leave, and that the hand may cover, metres."""
 _FOOT = 0.022
 _RULER = 0.1
 
 
 def print_board(board: Board, path: Path) -> str:
-    """Draws the board at true scale with a ruler to check it by, as PDF or PNG.
+    """Draw the board at true scale with a ruler to check it by, as PDF or PNG.
 
     Returns:
         The name of the paper.

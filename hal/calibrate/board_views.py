@@ -34,9 +34,9 @@ class Picture:
         colour: (h, w, 3) uint8, RGB.
         depth: (h, w) float32, metres, NaN where invalid.
         intrinsics: (3, 3) pixels.
-        T_base_camera: Where the camera was believed to be.
-        T_base_tcp: Where the hand was.
-        serial: The camera's.
+        T_base_camera: Pose of the camera's optical frame in the base, as configured at the time.
+        T_base_tcp: Measured pose of the TCP in the base.
+        serial: Serial number of the camera.
     """
 
     colour: np.ndarray
@@ -59,7 +59,7 @@ class Picture:
         )
 
     def view(self, board: Board) -> View:
-        """Detects the board in it."""
+        """Detect the board in the picture."""
         return View(
             T_base_tcp=self.T_base_tcp, corners=detect(board, self.colour), intrinsics=self.intrinsics
         )
@@ -78,22 +78,22 @@ def take_pictures(
     rng: np.random.Generator,
     keep: Callable[[int, Picture, int], None],
 ) -> int:
-    """Moves the board before the camera, takes pictures, and returns the hand.
+    """Move the board before the camera, take pictures, and return the hand.
 
     Args:
         cell: Connected, the board in the hand.
-        board: What is in the hand.
-        T_tcp_board: How, to a centimetre or two.
-        n: Pictures in which the board is to be found.
-        tilt_rad: Greatest tilt of the board against the line of sight.
-        nearest: The board stays this far from the camera, metres.
-        speed: Of the hand, m/s.
+        board: Board in the hand.
+        T_tcp_board: Approximate pose of the board in the tcp frame, to 1 or 2 cm.
+        n: Number of pictures in which the board is to be found.
+        tilt_rad: Greatest tilt of the board against the line of sight, radians.
+        nearest: Least distance of the board from the camera, metres.
+        speed: Speed of the hand, m/s.
         settle_s: Rest before each picture, seconds.
-        rng: The poses follow from it.
-        keep: Called with the number of the picture, the picture, and how many corners were found in it.
+        rng: Random generator of the poses.
+        keep: Called with the number of the picture, the picture, and its number of detected corners.
 
     Returns:
-        How many pictures were taken.
+        Number of pictures taken.
 
     Raises:
         BadCalibrationSet: The board is not found, or too few poses can be reached.
@@ -175,7 +175,7 @@ def _still_picture(cell: Cell) -> Picture:
 
 
 def write_picture(path: Path, picture: Picture) -> None:
-    """Writes a picture; the file appears whole or not at all."""
+    """Write a picture; the file appears whole or not at all."""
     unfinished = path.with_name(path.name + ".tmp")
     with unfinished.open("wb") as file:
         np.savez_compressed(
@@ -191,7 +191,7 @@ def write_picture(path: Path, picture: Picture) -> None:
 
 
 def read_picture(path: Path) -> Picture:
-    """Reads a picture.
+    """Read a picture.
 
     Raises:
         UsageError: The file is missing, damaged, or no picture.

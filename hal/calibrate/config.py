@@ -39,7 +39,7 @@ class CalibrateConfig(Config):
     nearest: float = Field(default=0.5, ge=0.2, le=2)
     """The board stays at least this far from the camera, m; a Kinect v2 sees nothing nearer than 0.5 m."""
     speed: float = Field(default=0.1, gt=0, le=0.5)
-    """Of the hand, m/s; the cell file may allow less."""
+    """Speed of the hand, m/s; the cell file may allow less."""
     settle_s: float = Field(default=0.5, ge=0, le=10)
     """Rest before each picture, s."""
     camera_at: tuple[float, float, float] | None = None

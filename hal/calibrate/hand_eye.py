@@ -1,7 +1,7 @@
 """Hand-eye calibration of a camera beside the arm (eye-to-hand). Pure functions.
 
-The closed form (Park and Martin, IEEE T-RO 1994, through OpenCV) starts a least-squares fit of where every
-corner of every view is seen, over the camera's pose in the base and the board's pose in the hand.
+The closed form (Park and Martin, IEEE T-RO 1994, through OpenCV) initialises a least-squares fit of the
+reprojected corners of all views, over the camera's pose in the base and the board's pose in the hand.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _LOSS_PX = 0.5
 
 
 class BadCalibrationSet(HalError):
-    """The views do not determine where the camera is; the message names the remedy."""
+    """The views do not determine the camera's pose; the message names the remedy."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,9 +39,9 @@ class View:
     """View of the board in the hand.
 
     Attributes:
-        T_base_tcp: Where the hand was, measured.
-        corners: Where the board's corners were in the image.
-        intrinsics: (3, 3) of that image.
+        T_base_tcp: Measured pose of the TCP in the base.
+        corners: Corners of the board detected in the image.
+        intrinsics: (3, 3) pinhole matrix of the image, pixels.
     """
 
     T_base_tcp: Pose
@@ -60,10 +60,10 @@ class HandEye:
         rms_px: (n,) RMS distance of corners found and expected, pixels.
         translation_m: (n,) distance of the board as seen and as held, metres.
         rotation_rad: (n,) angle between both, radians.
-        half_translation_m: How far two calibrations from half the views each put a point on the table
-            apart, metres: what another set of poses would change, about.
-        half_rotation_rad: The angle between both, radians.
-        scale: Size of the board's squares that fits best, as a share of what was said.
+        half_translation_m: Distance of a point on the table by two calibrations from half the views each,
+            metres: about the effect of another set of poses.
+        half_rotation_rad: The angle between the two calibrations, radians.
+        scale: Size of the board's squares that fits best, as a fraction of the configured size.
     """
 
     T_base_camera: Pose
@@ -88,7 +88,7 @@ class HandEye:
 
 
 def solve_hand_eye(board: Board, views: Sequence[View]) -> HandEye:
-    """Estimates the pose of the camera in the base.
+    """Estimate the pose of the camera in the base.
 
     Raises:
         BadCalibrationSet: Too few views with the board, too little tilt, a board too small in the image,

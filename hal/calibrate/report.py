@@ -19,7 +19,7 @@ from mskgrasp.reports.style import saved_figure
 
 _SHOWN = 6
 _DEPTH_MATTERS = 0.003
-"""A depth that is off by less is within what a Kinect's warm-up changes, metres."""
+"""Greatest depth error that the drift of a warming Kinect explains, metres."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ class DepthOffset:
 
 
 def depth_offset(board: Board, pictures: Sequence[Picture], found: HandEye) -> DepthOffset | None:
-    """Compares the measured depth of the board's interior with its pose; None without depth."""
+    """Compare the measured depth of the board's interior with its pose; None without depth."""
     offsets = []
     for i in found.used:
         picture = pictures[i]
@@ -107,7 +107,7 @@ def describe_table(plane: TablePlane | None, offset: DepthOffset | None, table_z
 def draw_corners(
     board: Board, pictures: Sequence[Picture], views: Sequence[View], found: HandEye | None, path: Path
 ) -> None:
-    """Draws some pictures with the corners detected (circles) and expected (crosses)."""
+    """Draw some pictures with the corners detected (circles) and expected (crosses)."""
     chosen = np.unique(np.linspace(0, len(pictures) - 1, min(_SHOWN, len(pictures))).round().astype(int))
     rows = (len(chosen) + 2) // 3
     with saved_figure(path, 12, 4.2 * rows) as figure:
@@ -127,7 +127,7 @@ def draw_corners(
 
 
 def draw_residuals(views: Sequence[View], found: HandEye, path: Path) -> None:
-    """Draws the residuals of each picture in pixels, millimetres and degrees."""
+    """Draw the residuals of each picture in pixels, millimetres and degrees."""
     rows = (
         ("corners, px (RMS)", found.rms_px),
         ("board, mm", found.translation_m * 1e3),

@@ -48,7 +48,7 @@ LOOKING_DOWN = np.array([0.0, 1.0, -1.0, 0.0]) / np.sqrt(2)
 
 
 def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
-    """Takes the pictures into ``config.out``.
+    """Take the pictures into ``config.out``.
 
     Returns:
         The cell's workspace.
@@ -90,7 +90,7 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
 
 
 def solve(config: CalibrateConfig, folder: Path, board: Board, workspace: Workspace | None) -> list[str]:
-    """Solves from the pictures in a folder, writes calibration and pictures into ``config.out``.
+    """Solve from the pictures in a folder, write calibration and pictures into ``config.out``.
 
     Returns:
         The result, line by line.
@@ -210,7 +210,7 @@ def _now() -> str:
 
 
 def main() -> int:
-    """Takes pictures, solves, reports."""
+    """Take pictures, solve, report."""
     config = parse(CalibrateConfig, prog="python -m hal.calibrate", description=DESCRIPTION)
     board, folder = config.board, config.out
     if config.print_board is not None:

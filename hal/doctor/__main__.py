@@ -5,7 +5,7 @@ from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
 
 def main() -> int | None:
-    """Imports the program and runs it."""
+    """Import the program and run it."""
     with ctrl_c_deferred():
         from hal.doctor.run import main as doctor
     return doctor()

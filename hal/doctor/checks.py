@@ -33,7 +33,7 @@ class Finding:
     """Result of one check.
 
     Attributes:
-        level: Whether the cell is usable.
+        level: Severity: "ok", "warn" or "fail".
         subject: Subject of the check.
         text: Finding and, unless ok, the remedy.
     """
@@ -236,7 +236,7 @@ def check_reach(arm: Arm, workspace: Workspace) -> Finding:
 
 
 def check_motion(arm: Arm) -> Iterator[Finding]:
-    """Moves every joint by a small step and back, and the fingers, and reports the errors."""
+    """Move every joint by a small step and back, and the fingers, and report the errors."""
     start = arm.state().joints
     try:
         target = start + _STEP
@@ -278,7 +278,7 @@ def check_motion(arm: Arm) -> Iterator[Finding]:
 
 
 def check_stream(camera: Camera, frames: list[RgbdFrame], *, timeout_s: float = 5.0) -> Iterator[Finding]:
-    """Takes frames, which are appended to ``frames``: reports their rate, age and completeness."""
+    """Take frames, append them to ``frames``, and report their rate, age and completeness."""
     ages = []
     try:
         camera.capture(timeout_s=timeout_s)  # the first may take its time
@@ -372,7 +372,7 @@ def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
 
 
 def attempt(subject: str, action: Any) -> Finding | None:
-    """Runs an action; returns its failure as a finding."""
+    """Run an action; return its failure as a finding."""
     try:
         action()
     except MskgraspError as error:

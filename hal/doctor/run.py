@@ -102,7 +102,7 @@ def _driver(values: dict[str, Any], section: str) -> Any:
 
 
 def main() -> int:
-    """Checks the cell and prints the findings."""
+    """Check the cell and print the findings."""
     config = parse(DoctorConfig, prog="python -m hal.doctor", description=DESCRIPTION)
     counts = dict.fromkeys(("ok", "warn", "fail"), 0)
     for finding in examine(config.cell, move=config.move):

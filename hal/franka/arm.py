@@ -39,7 +39,7 @@ _TRIES = 3
 
 
 class FrankaArm(Arm):
-    """Moves the arm through a driver in a process of its own; nothing recovers automatically.
+    """Arm moved by a driver in a separate process; nothing recovers automatically.
 
     Args:
         config: Driver, robot, speeds and forces.
@@ -54,7 +54,7 @@ class FrankaArm(Arm):
     # ------------------------------------------------------------------ connection
 
     def connect(self) -> None:
-        """Connects robot and gripper; nothing moves.
+        """Connect robot and gripper; nothing moves.
 
         Raises:
             DriverMissing: The extra [franka] is not installed.
@@ -85,7 +85,7 @@ class FrankaArm(Arm):
         return link
 
     def close(self) -> None:
-        """Stops the arm and closes its link; safe to call twice."""
+        """Stop the arm and close its link; safe to call twice."""
         if self._link is not None:
             link, self._link = self._link, None
             link.close()
@@ -153,7 +153,7 @@ class FrankaArm(Arm):
         )
 
     def _travel(self, path_from: Callable[[np.ndarray], JointPath]) -> None:
-        """Follows a path from the current joints (7,); plans again if the driver finds no trajectory."""
+        """Follow a path from the current joints (7,); plan again if the driver finds no trajectory."""
         for left in reversed(range(_TRIES)):
             path = path_from(np.array(self._ready().joints))
             try:
@@ -163,7 +163,7 @@ class FrankaArm(Arm):
                     raise
 
     def _stand_still(self) -> DriverState:
-        """Waits until the arm is at rest or the time is over; returns the last state."""
+        """Wait until the arm is at rest or the time is over; return the last state."""
         state, deadline = self._measure(), time.monotonic() + self._config.settle_s
         while time.monotonic() < deadline:
             time.sleep(_STANDING_S)

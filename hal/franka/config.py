@@ -40,9 +40,9 @@ class FrankaArmConfig(Config):
     max_joint_speed: float = Field(default=0.3, gt=0, le=1.0)
     """Greatest joint speed, as a fraction of the joint's limit."""
     acceleration: float = Field(default=1.0, gt=0, le=5.0)
-    """Of the TCP on a straight line, m/s^2."""
+    """Acceleration of the TCP on a straight line, m/s^2."""
     joint_acceleration: float = Field(default=2.0, gt=0, le=7.5)
-    """Of each joint, and of the hand's turn, rad/s^2."""
+    """Acceleration of each joint, and of the hand's rotation, rad/s^2."""
     contact_torque: float = Field(default=20.0, gt=0, le=80)
     """External torque on a joint at which the robot's reflex stops the arm, N m."""
     contact_force: float = Field(default=20.0, gt=0, le=80)
@@ -50,7 +50,7 @@ class FrankaArmConfig(Config):
     max_grasp_force: float = Field(default=40.0, gt=0, le=70)
     """Greatest gripper force, N (Franka Hand: 70 N continuously)."""
     gripper_speed: float = Field(default=0.05, gt=0, le=0.1)
-    """Of the pads, m/s."""
+    """Speed of the pads, m/s."""
     closed_width: float = Field(default=1e-3, ge=0, le=0.01)
     """Pads at this distance or less hold nothing, m."""
     connect_timeout_s: float = Field(default=10.0, gt=0, le=120)
@@ -82,6 +82,6 @@ class PandaPyArmConfig(FrankaArmConfig):
 
     driver: Literal["panda_py"]
     stiffness: Seven = (600.0, 600.0, 600.0, 600.0, 250.0, 150.0, 50.0)
-    """Of the joints, N m/rad; panda_py's own default."""
+    """Stiffness of the joints, N m/rad; panda_py's own default."""
     damping: Seven = (50.0, 50.0, 50.0, 20.0, 20.0, 20.0, 10.0)
-    """Of the joints, N m s/rad; panda_py's own default."""
+    """Damping of the joints, N m s/rad; panda_py's own default."""

@@ -1,6 +1,6 @@
 """Interface of the vendors' drivers, and the messages between the processes.
 
-A driver runs in a process of its own (`hal.franka.worker`), because both packages hold Python's global
+A driver runs in a separate process (`hal.franka.worker`), because both packages hold Python's global
 lock while they connect, and a robot that another program holds never answers: in the program's process that
 would block everything, Ctrl-C included. A process can be killed; the robot stops when its link closes.
 """
@@ -53,11 +53,11 @@ class DriverState:
         joints: (7,) radians.
         o_t_ee: (16,) pose of the end effector in the base, column-major, metres.
         f_t_ee: (16,) pose of the end effector in the flange, column-major, metres.
-        width: Of the gripper, metres.
-        max_width: As homing found it, metres; 0 before homing.
-        mode: Of the robot.
+        width: Distance of the pads, metres.
+        max_width: Greatest width, found by homing, metres; 0 before homing.
+        mode: Mode of the robot.
         errors: Names of libfranka's errors in force, empty where there are none.
-        seconds: On the monotonic clock.
+        seconds: Time of the measurement on the monotonic clock, s.
     """
 
     joints: list[float]
@@ -74,35 +74,35 @@ class Driver(Protocol):
     """The vendor's package behind a few verbs; anything it raises is explained by `hal.franka.faults`."""
 
     def connect(self, settings: DriverSettings) -> None:
-        """Opens robot and gripper; nothing moves."""
+        """Open robot and gripper; nothing moves."""
         ...
 
     def state(self) -> DriverState:
-        """Measures; may be called during a motion."""
+        """Measure; may be called during a motion."""
         ...
 
     def move(self, path: JointPath) -> None:
-        """Follows a path to its end; returns when the arm is there, or raises."""
+        """Follow a path to its end; return when the arm is there, or raise."""
         ...
 
     def home_gripper(self) -> bool:
-        """Opens and closes the fingers to find their greatest width."""
+        """Open and close the fingers to find their greatest width."""
         ...
 
     def move_gripper(self, width: float, speed: float) -> bool:
-        """Moves the pads to a width in metres, at m/s."""
+        """Move the pads to a width in metres, at a speed in m/s."""
         ...
 
     def grasp(self, speed: float, force: float) -> bool:
-        """Closes with N until the pads hold something or meet."""
+        """Close with a force in N until the pads hold something or meet."""
         ...
 
     def stop(self) -> None:
-        """Ends a motion of arm and fingers, and any to come before `recover`; from another thread."""
+        """End a motion of arm and fingers, and any to come before `recover`; from another thread."""
         ...
 
     def recover(self) -> bool:
-        """Acknowledges the robot's errors, and a stop.
+        """Acknowledge the robot's errors, and a stop.
 
         Returns:
             False where a stopped gripper never answered: its link must be opened again.

@@ -33,7 +33,7 @@ def pose_from_columns(values: Sequence[float]) -> Pose:
 
 
 def check_end_effector(f_t_ee: Sequence[float]) -> None:
-    """Refuses a robot whose end effector is not the Franka Hand's: every pose would be wrong.
+    """Refuse a robot whose end effector is not the Franka Hand's: every pose would be wrong.
 
     Raises:
         NotConnected: Names the configured end effector and where to change it.

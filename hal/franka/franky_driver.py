@@ -18,7 +18,7 @@ _OWED_S = 0.5
 
 
 class FrankyDriver:
-    """Moves with the robot's own joint position control, which arrives without a lasting error."""
+    """Driver with the robot's own joint position control, which leaves no lasting error."""
 
     def __init__(self) -> None:
         import franky
@@ -28,7 +28,7 @@ class FrankyDriver:
         self._abandoned: list[franky.BoolFuture] = []
 
     def connect(self, settings: DriverSettings) -> None:
-        """Opens robot and gripper; nothing moves."""
+        """Open robot and gripper; nothing moves."""
         franky = self._franky
         config = franky.RealtimeConfig.Enforce if settings.realtime else franky.RealtimeConfig.Ignore
         self._robot = franky.Robot(settings.host, realtime_config=config)
@@ -36,7 +36,7 @@ class FrankyDriver:
         self._gripper = franky.Gripper(settings.host)
 
     def state(self) -> DriverState:
-        """Measures; may be called during a motion."""
+        """Measure; may be called during a motion."""
         robot, gripper = self._robot.state, self._gripper.state
         if not self._robot.is_in_control:
             # The first of the waiting states is from before this call; the one after it is not.
@@ -53,7 +53,7 @@ class FrankyDriver:
         )
 
     def move(self, path: JointPath) -> None:
-        """Follows a path through its knots, with the knots' speeds; between them franky interpolates."""
+        """Follow a path through its knots, with the knots' speeds; between them franky interpolates."""
         franky = self._franky
         path = path.without_creep()
         waypoints = [
@@ -73,26 +73,26 @@ class FrankyDriver:
                 self._robot.stop()
 
     def home_gripper(self) -> bool:
-        """Opens and closes the fingers to find their greatest width."""
+        """Open and close the fingers to find their greatest width."""
         return self._wait(self._gripper.homing_async)
 
     def move_gripper(self, width: float, speed: float) -> bool:
-        """Moves the pads to a width in metres, at m/s."""
+        """Move the pads to a width in metres, at a speed in m/s."""
         return self._wait(lambda: self._gripper.move_async(width, speed))
 
     def grasp(self, speed: float, force: float) -> bool:
-        """Closes with N until the pads hold something or meet; any width is within the tolerance."""
+        """Close with a force in N until the pads hold something or meet, at any width."""
         return self._wait(
             lambda: self._gripper.grasp_async(0.0, speed, force, epsilon_inner=0.08, epsilon_outer=0.08)
         )
 
     def stop(self) -> None:
-        """Ends a motion of arm and fingers, and any to come before `recover`."""
+        """End a motion of arm and fingers, and any to come before `recover`."""
         self._stopped.set()
         self._robot.stop()
 
     def recover(self) -> bool:
-        """Acknowledges the robot's errors, and a stop; False where the gripper still owes an answer.
+        """Acknowledge the robot's errors, and a stop; False where the gripper has not answered yet.
 
         Raises:
             RuntimeError: The robot did not recover.

@@ -18,10 +18,10 @@ _ALARM_S = 5
 
 
 class DriverLink:
-    """Connects a driver in a process of its own to a robot.
+    """Connection of a driver in a separate process to a robot.
 
     Args:
-        name: Which driver.
+        name: Name of the driver.
         settings: Sent to the driver when it connects.
         connect_timeout_s: Time a robot has to accept the connection, s.
 
@@ -60,7 +60,7 @@ class DriverLink:
         return self._process.pid
 
     def ask(self, op: str, *, timeout_s: float, **values: Any) -> Any:
-        """Sends a request and waits for its answer.
+        """Send a request and wait for its answer.
 
         Raises:
             CommunicationLost: The robot or its driver did not answer within ``timeout_s``, or is gone; the
@@ -80,7 +80,7 @@ class DriverLink:
             raise
 
     def close(self) -> None:
-        """Stops the arm and ends the process; safe to call twice."""
+        """Stop the arm and end the process; safe to call twice."""
         self._process.close()
 
 

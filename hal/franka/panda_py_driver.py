@@ -22,7 +22,7 @@ _SILENCE_S = 2.0
 _CORRECTION_HZ = 4.0
 """Rate of the correction at the goal, 1/s: slow against the arm's own time constant."""
 _MAX_CORRECTION = 0.05
-"""Radians; more than friction and gravity explain means that something holds the arm."""
+"""Greatest correction at the goal, radians: friction and gravity need less, a blocked arm more."""
 _ARRIVED = 1e-3
 
 
@@ -31,7 +31,7 @@ class RobotSilent(RuntimeError):
 
 
 class PandaPyDriver:
-    """Moves with panda_py's joint impedance controller, whose goal follows the path.
+    """Driver with panda_py's joint impedance controller, whose goal follows the path.
 
     The controller runs in C++ at 1 kHz; a late target here makes the arm lag, not stumble. It has no
     integral part and friction leaves an error (panda-py issue 49), so the goal is shifted slowly until the
@@ -51,7 +51,7 @@ class PandaPyDriver:
         self._abandoned: list[Future[bool]] = []
 
     def connect(self, settings: DriverSettings) -> None:
-        """Opens robot and gripper; nothing moves."""
+        """Open robot and gripper; nothing moves."""
         libfranka = self._panda_py.libfranka
         config = libfranka.RealtimeConfig.kEnforce if settings.realtime else libfranka.RealtimeConfig.kIgnore
         self._settings = settings
@@ -62,7 +62,7 @@ class PandaPyDriver:
         self._gripper = libfranka.Gripper(settings.host)
 
     def state(self) -> DriverState:
-        """Measures; may be called during a motion."""
+        """Measure; may be called during a motion."""
         # After a motion get_state() returns its last sample for ever; during one the link is taken.
         with self._use:
             robot = self._panda.get_state() if self._moving else self._robot.read_once()
@@ -79,7 +79,7 @@ class PandaPyDriver:
         )
 
     def move(self, path: JointPath) -> None:
-        """Follows a path, then corrects the error that friction leaves."""
+        """Follow a path, then correct the error that friction leaves."""
         self._check()
         controller = self._panda_py.controllers.JointPosition(
             np.array(self._settings.stiffness), np.array(self._settings.damping)
@@ -124,7 +124,7 @@ class PandaPyDriver:
             time.sleep(_PERIOD_S)
 
     def _end(self) -> None:
-        """Joins the control loop; without it is_moving() stays true and states stay old."""
+        """Join the control loop; without it is_moving() stays true and states stay old."""
         with self._use:
             self._panda.stop_controller()
             self._moving = False
@@ -140,7 +140,7 @@ class PandaPyDriver:
             raise
 
     def _check_clock(self, now: float) -> None:
-        """Detects a lost link by the robot's clock, before libfranka reports it."""
+        """Detect a lost link by the robot's clock, before libfranka reports it."""
         seen, when = self._ticks
         if now > seen:
             self._ticks = (now, time.monotonic())
@@ -153,25 +153,25 @@ class PandaPyDriver:
             raise RuntimeError("Move command preempted!")
 
     def home_gripper(self) -> bool:
-        """Opens and closes the fingers to find their greatest width."""
+        """Open and close the fingers to find their greatest width."""
         return self._wait(self._gripper.homing)
 
     def move_gripper(self, width: float, speed: float) -> bool:
-        """Moves the pads to a width in metres, at m/s."""
+        """Move the pads to a width in metres, at a speed in m/s."""
         return self._wait(lambda: self._gripper.move(width, speed))
 
     def grasp(self, speed: float, force: float) -> bool:
-        """Closes with N until the pads hold something or meet; any width is within the tolerance."""
+        """Close with a force in N until the pads hold something or meet, at any width."""
         return self._wait(
             lambda: self._gripper.grasp(0.0, speed, force, epsilon_inner=0.08, epsilon_outer=0.08)
         )
 
     def stop(self) -> None:
-        """Ends a motion of arm and fingers, and any to come before `recover`."""
+        """End a motion of arm and fingers, and any to come before `recover`."""
         self._stopped.set()
 
     def recover(self) -> bool:
-        """Acknowledges the robot's errors, and a stop; False where the gripper still owes an answer."""
+        """Acknowledge the robot's errors, and a stop; False where the gripper has not answered yet."""
         self._stopped.clear()
         with self._use:
             if MODES[int(self._robot.read_once().robot_mode)] == "reflex":
@@ -182,7 +182,7 @@ class PandaPyDriver:
         return answered
 
     def _wait(self, command: Callable[[], bool]) -> bool:
-        """Runs a command of the gripper until it ends or `stop` is called."""
+        """Run a command of the gripper until it ends or `stop` is called."""
         if self._stopped.is_set():
             return False
         result: Future[bool] = Future()

@@ -80,10 +80,10 @@ def straight_path(
     Args:
         start: (7,) radians.
         goal: ``T_base_tcp`` at the end.
-        speed: Of the TCP, m/s at most.
-        turn_speed: Of the hand, rad/s at most.
-        acceleration: Of the TCP, m/s^2 at most.
-        turn_acceleration: Of the hand, rad/s^2 at most.
+        speed: Greatest speed of the TCP, m/s.
+        turn_speed: Greatest angular speed of the hand, rad/s.
+        acceleration: Greatest acceleration of the TCP, m/s^2.
+        turn_acceleration: Greatest angular acceleration of the hand, rad/s^2.
         joint_speed: (7,) greatest joint speeds, rad/s; the motion takes longer instead.
         lower: (7,) joint limits, radians.
         upper: (7,) joint limits, radians.

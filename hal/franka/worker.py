@@ -27,10 +27,10 @@ _STOP_S = 1.0
 
 
 class Worker:
-    """Performs requests with a driver.
+    """Server that performs requests with a driver.
 
     Args:
-        name: Which driver.
+        name: Name of the driver.
     """
 
     def __init__(self, name: DriverName):
@@ -41,7 +41,7 @@ class Worker:
         self._motions: queue.Queue[dict[str, Any] | None] = queue.Queue()
 
     def run(self) -> None:
-        """Serves until the requests end."""
+        """Serve until the requests end."""
         motions = threading.Thread(target=self._run_motions, daemon=True)
         motions.start()
         for request in requests():
@@ -114,7 +114,7 @@ def new_driver(name: DriverName) -> Driver:
 
 
 def main() -> None:
-    """Serves the driver named on the command line."""
+    """Serve the driver named on the command line."""
     name: DriverName = "franky" if sys.argv[1] == "franky" else "panda_py"
     Worker(name).run()
     # A vendor's destructor may wait for a robot that is gone; the kernel closes the link as well.

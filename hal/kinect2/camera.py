@@ -42,7 +42,7 @@ class Kinect2Camera(Camera):
     """Frames of a Kinect v2, upright, metric and in the base frame.
 
     Args:
-        config: Which camera, its calibration, its corrections.
+        config: Serial number, calibration file and corrections of the camera.
     """
 
     def __init__(self, config: Kinect2Config):
@@ -55,7 +55,7 @@ class Kinect2Camera(Camera):
         self._calibration: Calibration | None = None
 
     def connect(self) -> None:
-        """Opens the camera and waits for its first frame.
+        """Open the camera and wait for its first frame.
 
         Raises:
             BadConfig: The calibration file is missing, or another camera's.
@@ -75,7 +75,7 @@ class Kinect2Camera(Camera):
             max_skew_s=config.max_skew_s,
             timeout_s=config.connect_timeout_s,
         )
-        # Opening and starting take up to ten seconds of their own.
+        # Opening and starting take up to another ten seconds.
         opening_s = config.connect_timeout_s + 10
         process = DriverProcess(["hal.kinect2.worker"], _ERRORS, _EXIT_S)
         try:
@@ -108,14 +108,14 @@ class Kinect2Camera(Camera):
             )
 
     def close(self) -> None:
-        """Stops the stream and releases the camera, once a capture of another thread is over."""
+        """Stop the stream and release the camera, once a capture of another thread is over."""
         with self._lock:
             if self._process is not None:
                 process, self._process = self._process, None
                 process.close()
 
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
-        """Takes a frame that is exposed after this call.
+        """Take a frame that is exposed after this call.
 
         Raises:
             NotConnected: Outside the camera's context.

@@ -10,7 +10,7 @@ _WRAP = 1 << 32
 
 
 class ExposureClock:
-    """Aligns ticks with arrivals: the frame with the least delay so far gives the offset.
+    """Alignment of ticks with arrivals: the frame with the least delay so far gives the offset.
 
     Args:
         latency_s: Greatest delay from exposure to arrival, s.
@@ -30,7 +30,7 @@ class ExposureClock:
         return (((ticks - self._last_ticks + _WRAP // 2) % _WRAP) - _WRAP // 2) * TICK_S
 
     def date(self, ticks: int, arrived_s: float) -> tuple[float, float]:
-        """Dates a frame.
+        """Date a frame.
 
         Args:
             ticks: Its timestamp, which wraps after six days.

@@ -50,7 +50,7 @@ class Kinect2Config(Config):
     pipeline: Pipeline = "cpu"
     """Decoder of depth. OpenCL and CUDA mark a bad frame with a status that pylibfreenect2 hides."""
     depth_offset: float = Field(default=0.0, ge=-0.1, le=0.1)
-    """Added to every depth, m; Kinects measure some 0.02 to 0.03 m too far, each by a constant of its own."""
+    """Added to every depth, m; Kinects measure some 0.02 to 0.03 m too far, each by its own constant."""
     intrinsics: dict[Serial, PinholeIntrinsics] = {}
     """By serial; override those of the calibration file, which override the factory's."""
     warm_up_s: float = Field(default=1200.0, ge=0)

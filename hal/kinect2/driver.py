@@ -62,7 +62,7 @@ class Kinect2Driver:
     """An open, streaming Kinect v2.
 
     Args:
-        settings: Which camera, and the bounds of a valid frame.
+        settings: Serial number of the camera, and bounds of a valid frame.
 
     Raises:
         DriverMissing: pylibfreenect2 cannot be imported.
@@ -94,7 +94,7 @@ class Kinect2Driver:
         self._registered = self._vendor.Frame(WIDTH, HEIGHT, 4)
 
     def capture(self, timeout_s: float) -> RawFrame:
-        """Captures a frame exposed after this call.
+        """Capture a frame exposed after this call.
 
         Raises:
             CaptureFailed: None came in time.
@@ -158,7 +158,7 @@ class Kinect2Driver:
         )
 
     def close(self) -> None:
-        """Stops the stream and releases the camera."""
+        """Stop the stream and release the camera."""
         self._device.stop()
         self._device.close()
 

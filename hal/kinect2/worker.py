@@ -19,13 +19,13 @@ _CLOSE_S = 5
 
 
 class Worker:
-    """Performs requests with the driver."""
+    """Server that performs requests with the driver."""
 
     def __init__(self) -> None:
         self._driver: Kinect2Driver | None = None
 
     def run(self) -> None:
-        """Serves until the requests end."""
+        """Serve until the requests end."""
         pipe = AnswerPipe()
         for request in requests():
             pipe.answer(request, lambda request=request: self._perform(request), _explain)
@@ -54,7 +54,7 @@ def _explain(error: BaseException) -> HalError:
 
 
 def main() -> None:
-    """Serves on the process's own pipes."""
+    """Serve on the process's own pipes."""
     Worker().run()
     # A destructor may wait for a camera that is gone; the kernel releases it as well.
     os._exit(0)

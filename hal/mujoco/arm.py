@@ -22,14 +22,14 @@ JOINT_SPEED = 2.0
 JOINT_ACCELERATION = 5.0
 """Greatest acceleration of a joint, or of the hand's turn, rad/s^2 (Panda datasheet: 7.5 for joint 2)."""
 PEAK_ACCELERATION = 1.5
-"""Of the hand on straight lines, m/s^2, as in the SAPIEN cell."""
+"""Greatest acceleration of the hand on straight lines, m/s^2, as in the SAPIEN cell."""
 TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
 _WAYPOINT_M, _WAYPOINT_RAD = 0.01, 0.05
 
 
 class MujocoArm(Arm):
-    """Moves the Panda of a `MujocoWorld`; a contact force over the reflex limit ends a motion."""
+    """The Panda of a `MujocoWorld`; a contact force over the reflex limit ends a motion."""
 
     simulated = True
 
@@ -39,13 +39,13 @@ class MujocoArm(Arm):
         self._open = False
 
     def connect(self) -> None:
-        """Builds the world unless the camera has built it."""
+        """Build the world unless the camera has built it."""
         if not self._open:
             self._world.open()
             self._open = True
 
     def close(self) -> None:
-        """Frees the world unless the camera still uses it."""
+        """Free the world unless the camera still uses it."""
         if self._open:
             self._open = False
             self._world.close()

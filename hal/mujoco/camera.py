@@ -22,7 +22,7 @@ _AMBIENT = 0.35
 
 
 class MujocoCamera(Camera):
-    """Casts a ray through the centre of every pixel, the arm included.
+    """Camera that casts a ray through the centre of every pixel; it sees the arm, too.
 
     Args:
         world: The simulated world.
@@ -37,20 +37,20 @@ class MujocoCamera(Camera):
         self._open = False
 
     def connect(self) -> None:
-        """Builds the world unless the arm has built it, and restarts the sensor's noise."""
+        """Build the world unless the arm has built it, and restart the sensor's noise."""
         if not self._open:
             self._world.open()
             self._presented = 0
             self._open = True
 
     def close(self) -> None:
-        """Frees the world unless the arm still uses it."""
+        """Free the world unless the arm still uses it."""
         if self._open:
             self._open = False
             self._world.close()
 
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
-        """Takes a frame now; ``timeout_s`` is not needed.
+        """Take a frame now; ``timeout_s`` is not needed.
 
         Raises:
             NotConnected: Outside the camera's context.

@@ -58,7 +58,7 @@ class MujocoCellConfig(Config):
 
 
 def mujoco_cell(config: MujocoCellConfig) -> Cell:
-    """Builds the simulated cell; nothing is simulated before it is connected."""
+    """Build the simulated cell; nothing is simulated before it is connected."""
     home = np.array(config.home)
     world = MujocoWorld(
         physics=config.physics,

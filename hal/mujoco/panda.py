@@ -25,11 +25,11 @@ from mskgrasp.core.panda_kinematics import (
 )
 
 TORQUE_LIMIT = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)
-"""N m; Franka Emika Panda datasheet."""
+"""Greatest torques of the joints, N m; Franka Emika Panda datasheet."""
 FINGER_STIFFNESS = 4000.0
-"""Of the drive of the fingers' opening, N/m; with the force limit it decides how soon pads press in full."""
+"""Stiffness of the drive of the fingers' opening, N/m; decides how soon pads press with the full force."""
 FINGER_DAMPING = 50.0
-"""Of the same drive, N s/m: critical, with the armature of two fingers."""
+"""Damping of the same drive, N s/m: critical, with the armature of two fingers."""
 ROBOT, OTHERS = 2, 1
 """Collision classes: the robot's shapes do not collide with each other."""
 SEEN, HIDDEN = 1, 3
@@ -93,7 +93,7 @@ _CAPSULES = (
     ((0.0, 0.0, 0.01), 0.04, 0.14),
 )
 """Centre, radius and length between the ends of each link's capsule, after the capsules that Franka's
-controller checks against self-collision (franka_description); they stand for the covers in images, too."""
+controller checks against self-collision (franka_description); they represent the covers in images, too."""
 
 _FIRST_TO_COLLIDE = 4
 """Index of the first link that may come near a part; those before it stay over the table."""
@@ -111,11 +111,11 @@ boxes of franka_description)."""
 _PAD = ((0.0, 0.00758, 0.04525), (0.0175, 0.0152, 0.0185))
 """Rubber tip of the left finger: centre and size (franka_description)."""
 _FINGER_Z = 0.0584
-"""Of the finger's frame in the hand's, metres."""
+"""z of the fingers' frames in the hand's frame, metres."""
 
 
 def add_panda(spec: mujoco.MjSpec, physics: MujocoPhysics) -> None:
-    """Adds arm, hand and fingers at the world's origin.
+    """Add arm, hand and fingers at the world's origin.
 
     Joints: ``joint1`` to ``joint7``, ``finger1``, ``finger2``. Actuators: a torque for each joint of the
     arm, and ``opening``, whose control is the wanted distance of the pads. Site: ``tcp``.
@@ -229,7 +229,7 @@ def _add_finger_drive(spec: mujoco.MjSpec, physics: MujocoPhysics) -> None:
 
 
 def _robot_shape(physics: MujocoPhysics) -> dict:
-    """Contacts of the robot: its friction counts, whatever it touches, and a pad resists turning."""
+    """Contacts of the robot: its friction applies to all that it touches, and a pad resists turning."""
     mu = physics.friction_pad_part
     return dict(
         contype=ROBOT,

@@ -20,7 +20,7 @@ _TABLE_COLOUR, _PART_COLOUR = (0.33, 0.35, 0.38, 1.0), (0.55, 0.57, 0.6, 1.0)
 
 
 def build_model(physics: MujocoPhysics, parts: Sequence[Part]) -> mujoco.MjModel:
-    """Compiles the model of the cell; the first part is ``part0``, the one that is grasped.
+    """Compile the model of the cell; the first part is ``part0``, the one that is grasped.
 
     Sensors: ``<body>_force`` of every body of the hand and of ``part0`` counts the contacts of that body and
     sums their forces (number, x, y, z; MuJoCo gives the force that the body exerts); ``grip`` is the same for

@@ -27,7 +27,7 @@ class MujocoPhysics(Config):
     solver_iterations: int = Field(default=50, ge=10)
     """Greatest number of Newton iterations a step."""
     noslip_iterations: int = Field(default=10, ge=0)
-    """Iterations that take the slow slip of soft friction away; without them held parts creep."""
+    """Iterations that remove the slow slip of soft friction; without them held parts creep."""
     collision: Literal["hulls", "sdf"] = "hulls"
     """hulls: the part's convex pieces. sdf: the signed distance field of its mesh, bores and all; slower."""
     friction_pad_part: float = Field(default=_COMMON.friction_pad_part, ge=0, le=2)

@@ -20,24 +20,24 @@ from mskgrasp.parts import Part
 from mskgrasp.parts.hulls import hull_corners
 
 NATURAL_RATE = 100.0
-"""Of the arm's controller, rad/s: it is critically damped and knows the arm's inertia, as the real one does,
-and follows a path to 0.1 mm."""
+"""Natural frequency of the arm's controller, rad/s: it is critically damped, knows the arm's inertia
+as the real one does, and follows a path to 0.1 mm."""
 SETTLE_S = 0.05
 """Time in which the arm comes to rest at the end of a motion, s: five times that of the controller."""
 REFLEX_S = 0.024
 """The force on the hand that a reflex sees is the mean over this time, s, as in the SAPIEN cell."""
 MOVE_FORCE = 20.0
-"""Of the fingers while they hold nothing, N."""
+"""Greatest force of the fingers while they hold nothing, N."""
 STILL_FINGER = 2e-3
 """A finger slower than this, m/s, has met what it holds."""
 FINGER_CHECK_S = 0.02
 """Time between two measurements of that speed, s."""
 FINGER_TIMEOUT_S = 0.5
-"""Fingers that never come to rest are not waited for longer than this, s."""
+"""Greatest time to wait for fingers that never come to rest, s."""
 AIR = 0.01
 """A hand at least this much over all parts moves through air, m."""
 _BLOCK = 8
-"""Steps of a path between two looks at what is near the hand."""
+"""Steps of a path between two checks for parts near the hand."""
 _REST_SPEED = (1e-3, 1e-2)
 """A part slower than this is at rest, m/s and rad/s."""
 _REST_S = 0.06
@@ -88,7 +88,7 @@ class Simulation:
         """Force of the grip, N; None while the hand is to hold nothing."""
         self._limit_fingers(MOVE_FORCE)
         self.target = np.array(home, dtype=float)
-        """(7,) where the arm was sent, radians: a motion starts there."""
+        """(7,) commanded joints, radians: a motion starts there."""
         self._forces = np.zeros((self.n_steps(REFLEX_S), 3))
         self._sum = np.zeros(3)
         self._row = 0
@@ -118,7 +118,7 @@ class Simulation:
     # ------------------------------------------------------------------ motions
 
     def follow(self, joints: np.ndarray, *, stop: Callable[[], bool]) -> bool:
-        """Moves the arm along a path and lets it come to rest.
+        """Move the arm along a path and let it come to rest.
 
         Where the hand is over all parts, and these are at rest, nothing can happen: the arm is placed along
         its path and the parts stay as they are.
@@ -159,7 +159,7 @@ class Simulation:
         return True
 
     def stand(self, seconds: float, *, stop: Callable[[], bool]) -> None:
-        """Simulates a time in which the arm holds its target."""
+        """Simulate a time in which the arm holds its target."""
         still = np.zeros(7)
         for k in range(self.n_steps(seconds)):
             if k % _BLOCK == 0 and stop():
@@ -167,11 +167,11 @@ class Simulation:
             self._step(self.target, still, still)
 
     def move_fingers(self, width: float, *, force: float | None, stop: Callable[[], bool]) -> None:
-        """Moves the pads to a distance, or until they hold something.
+        """Move the pads to a distance, or until they hold something.
 
         Args:
             width: Distance of the pads, metres; negative to press on what they meet.
-            force: Of the grip, N; None where nothing is to be held.
+            force: Force of the grip, N; None where nothing is to be held.
             stop: Read every few steps; True ends the motion.
         """
         self.force = force
@@ -199,7 +199,7 @@ class Simulation:
         self._opening = width
 
     def halt(self) -> None:
-        """Makes the arm stand where it is, so that it no longer presses on what it has met."""
+        """Make the arm stand where it is, so that it no longer presses on what it has met."""
         self.target = self.joints
         self.stand(SETTLE_S, stop=lambda: False)
 
@@ -213,7 +213,7 @@ class Simulation:
         return float(np.linalg.norm(self._sum)) / len(self._forces)
 
     def grip(self) -> tuple[np.ndarray, float]:
-        """Forces (2,) of both fingers on the part, N, and how deep a finger and the part overlap, metres."""
+        """Forces (2,) of both fingers on the part, N, and depth of a finger's overlap with it, metres."""
         model, data = self.model, self.data
         part = model.body("part0").id
         fingers = [model.body(name).id for name in FINGERS]
@@ -241,7 +241,7 @@ class Simulation:
         self._measured += 1
 
     def _forget_forces(self) -> None:
-        """Begins a new mean, which takes steps that were not yet measured as free of force."""
+        """Begin a new mean, which counts steps not yet measured as free of force."""
         self._forces[:] = 0
         self._sum[:] = 0
         self._measured = 0
@@ -249,7 +249,7 @@ class Simulation:
     # ------------------------------------------------------------------ steps
 
     def _step(self, joints: np.ndarray, speeds: np.ndarray, accelerations: np.ndarray) -> None:
-        """Advances by a step, the arm controlled towards a state by the torques of its dynamics."""
+        """Advance by a step, the arm controlled towards a state by the torques of its dynamics."""
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
         self._wanted[:7] = (
@@ -264,7 +264,7 @@ class Simulation:
         self._measure_force()
 
     def _place(self, path: _Path, k: int) -> None:
-        """Puts the arm at a step of a path."""
+        """Put the arm at a step of a path."""
         data = self.data
         data.qpos[:7], data.qvel[:7] = path.joints[k], path.speeds[k]
         data.qvel[7:9] = 0
@@ -303,7 +303,7 @@ class Simulation:
         return bool((np.abs(speeds).max(axis=(0, 2)) < _REST_SPEED).all())
 
     def _settle(self) -> None:
-        """Waits until the parts have been at rest for a while."""
+        """Wait until the parts have been at rest for a while."""
         quiet, enough = 0, self.n_steps(_REST_S)
         for _ in range(self.n_steps(_SETTLING_S)):
             self.stand(self.step_s, stop=lambda: False)

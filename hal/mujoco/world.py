@@ -27,7 +27,7 @@ class MujocoWorld:
     Args:
         physics: Settings of the simulation.
         overhead: Settings of the camera.
-        region: Where parts lie, base frame, metres.
+        region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
         home: (7,) joints of the arm while a part is placed.
         part: Part on the table at first.
         seed: Determines its position and turn.
@@ -67,7 +67,7 @@ class MujocoWorld:
         return self._simulation
 
     def open(self) -> None:
-        """Builds the world for its first user.
+        """Build the world for its first user.
 
         Raises:
             DriverMissing: MuJoCo is not installed.
@@ -77,13 +77,13 @@ class MujocoWorld:
         self._users += 1
 
     def close(self) -> None:
-        """Frees the world after its last user."""
+        """Free the world after its last user."""
         self._users = max(0, self._users - 1)
         if self._users == 0:
             self._simulation = None
 
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """Places a part on the table, arm at home, everything at rest.
+        """Place a part on the table, arm at home, everything at rest.
 
         A new simulation each time, so that a trial does not depend on those before it.
 

@@ -30,7 +30,7 @@ _INTERRUPTED_S = 2.0
 
 
 def main() -> int:
-    """Records, and prints what the file holds."""
+    """Record, and print what the file holds."""
     config = parse(RecordConfig, prog="python -m hal.record", description=DESCRIPTION)
     code = _frames(config) if config.run is None else _run(config, config.run)
     if not config.out.exists():
@@ -45,7 +45,7 @@ def main() -> int:
 
 
 def _frames(config: RecordConfig) -> int:
-    """Captures frames, each with the arm's state, so that both can be related later."""
+    """Capture frames, each with the arm's state, so that both can be related later."""
     with recorded_cell(cell_from_yaml(config.cell), config.out).connected() as cell:
         due_s = time.monotonic()
         for _ in range(config.frames):
@@ -57,7 +57,7 @@ def _frames(config: RecordConfig) -> int:
 
 
 def _run(config: RecordConfig, command: str) -> int:
-    """Runs a program of this project on the recorded cell, and returns its exit code."""
+    """Run a program of this project on the recorded cell, and return its exit code."""
     words = shlex.split(command)
     if not words or words[0].split(".")[0] not in ("mskgrasp", "hal"):
         raise UsageError(
@@ -82,7 +82,7 @@ def _run(config: RecordConfig, command: str) -> int:
 
 
 def _pass_interrupt(process: subprocess.Popen[bytes]) -> None:
-    """Passes Ctrl-C on to a program that did not get it: terminals send it to both, kill does not."""
+    """Pass Ctrl-C on to a program that did not get it: terminals send it to both, kill does not."""
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(_INTERRUPTED_S)
         return

@@ -18,10 +18,10 @@ from mskgrasp.core.geometry import Pose
 
 
 class ReplayArm(Arm):
-    """Compares each command with the recorded one and returns the recorded answer, errors included.
+    """Arm that compares each command with the recorded one and returns the recorded answer or error.
 
     A command that differs by more than the tolerances is refused (`NotRecorded`): it is unknown what the
-    arm would have done. What the recorded arm checked, it checked then; nothing moves here.
+    arm would have done. Limits were checked by the recorded arm; nothing moves here.
 
     Args:
         config: Recording and tolerances.
@@ -42,14 +42,14 @@ class ReplayArm(Arm):
         self._astray = False
 
     def connect(self) -> None:
-        """Goes to the beginning of the recording."""
+        """Go to the beginning of the recording."""
         if not self._open:
             self._playback.open()
             self._acknowledge()
             self._open = True
 
     def close(self) -> None:
-        """Releases the recording; safe to call twice."""
+        """Release the recording; safe to call twice."""
         if self._open:
             self._open = False
             self._playback.close()
@@ -85,21 +85,21 @@ class ReplayArm(Arm):
         return GraspOutcome(**self._replay("grasp", force=force))
 
     def wait(self, seconds: float) -> None:
-        """Does not wait; see `Arm.wait`."""
+        """Do not wait; see `Arm.wait`."""
         self._replay("wait", seconds=seconds)
 
     def recover(self) -> None:
-        """Acknowledges a recorded error, or a command that differed from the recording."""
+        """Acknowledge a recorded error, or a command that differed from the recording."""
         self._require_connection()
         if not self._astray:
             self._step("recover", {})
         self._acknowledge()
 
     def check_pose(self, T_base_tcp: Pose) -> None:
-        """Refuses what the recorded arm refused.
+        """Refuse a target that the recorded arm refused.
 
         Raises:
-            OutOfWorkspace: It did.
+            OutOfWorkspace: The recorded arm refused it.
             NotRecorded: The recording holds no such call.
         """
         self._playback.same_question("check_pose", {"T_base_tcp": plain(T_base_tcp)})
@@ -133,7 +133,7 @@ class ReplayArm(Arm):
         return self._open
 
     def _halt(self) -> None:
-        """Does nothing: nothing moves."""
+        """Do nothing: nothing moves."""
 
     def _beneath(self, *_: Any, **__: Any) -> Any:
         raise AssertionError("a recording answers above the backend")

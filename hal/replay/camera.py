@@ -12,7 +12,7 @@ from hal.replay.reader import read_recording
 
 
 class ReplayCamera(Camera):
-    """Delivers the recorded frames one after the other, errors included.
+    """Camera that returns the recorded frames and errors one after the other.
 
     Args:
         config: Recording.
@@ -29,13 +29,13 @@ class ReplayCamera(Camera):
         self._open = False
 
     def connect(self) -> None:
-        """Goes to the beginning of the recording."""
+        """Go to the beginning of the recording."""
         if not self._open:
             self._playback.open()
             self._open = True
 
     def close(self) -> None:
-        """Releases the recording; safe to call twice."""
+        """Release the recording; safe to call twice."""
         if self._open:
             self._open = False
             self._playback.close()

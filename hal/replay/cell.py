@@ -59,7 +59,7 @@ class ReplayFeeder:
         self._playback = playback
 
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """Checks that it is the recorded part and seed.
+        """Check that it is the recorded part and seed.
 
         Raises:
             NotRecorded: It is not.

@@ -14,15 +14,15 @@ class Tolerances(Config):
     """Greatest differences between a command and the recorded one."""
 
     position: float = Field(default=1e-3, ge=0)
-    """Of the TCP, m."""
+    """Difference of the TCP's position, m."""
     rotation: float = Field(default=1e-2, ge=0)
-    """Of the hand, rad."""
+    """Difference of the hand's rotation, rad."""
     joints: float = Field(default=5e-3, ge=0)
-    """Of each joint, rad."""
+    """Difference of each joint, rad."""
     width: float = Field(default=5e-4, ge=0)
-    """Of the gripper, m."""
+    """Difference of the gripper's width, m."""
     other: float = Field(default=1e-3, ge=0)
-    """Of force (N), speed and waiting time (s)."""
+    """Difference of force (N), speed and waiting time (s)."""
 
 
 class ReplayCameraConfig(Config):

@@ -16,7 +16,7 @@ from mskgrasp.core.geometry import pose_distance
 
 
 class Playback:
-    """Steps through the commands of a recording; queries are answered from those between two commands.
+    """Position in a recording's commands; queries are answered from those between two commands.
 
     Args:
         recording: Recorded calls.
@@ -44,14 +44,14 @@ class Playback:
         self._answered: dict[str, int] = {}
 
     def open(self) -> None:
-        """Registers a user; the first one rewinds the recording."""
+        """Register a user; the first one rewinds the recording."""
         with self._lock:
             if self._users == 0:
                 self._next, self._answered = 0, {}
             self._users += 1
 
     def close(self) -> None:
-        """Unregisters a user."""
+        """Unregister a user."""
         with self._lock:
             self._users = max(0, self._users - 1)
 

@@ -62,7 +62,7 @@ class Recording:
 
 
 def read_recording(path: Path) -> Recording:
-    """Reads a recording except its images.
+    """Read a recording except its images.
 
     Raises:
         BadRecording: The file is missing, damaged, no recording, or of another version.

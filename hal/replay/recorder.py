@@ -21,7 +21,7 @@ class RecordingCamera(Camera):
 
     Args:
         camera: The recorded camera.
-        writer: Of the recording.
+        writer: Writer of the recording.
     """
 
     def __init__(self, camera: Camera, writer: RecordingWriter):
@@ -29,7 +29,7 @@ class RecordingCamera(Camera):
         self._open = False
 
     def connect(self) -> None:
-        """Opens the recording and the camera."""
+        """Open the recording and the camera."""
         if not self._open:
             self._writer.open()
             try:
@@ -40,7 +40,7 @@ class RecordingCamera(Camera):
             self._open = True
 
     def close(self) -> None:
-        """Releases the camera and the recording; safe to call twice."""
+        """Release the camera and the recording; safe to call twice."""
         if self._open:
             self._open = False
             try:
@@ -60,7 +60,7 @@ class RecordingArm(Arm):
 
     Args:
         arm: The recorded arm.
-        writer: Of the recording.
+        writer: Writer of the recording.
     """
 
     def __init__(self, arm: Arm, writer: RecordingWriter):
@@ -70,7 +70,7 @@ class RecordingArm(Arm):
         self._open = False
 
     def connect(self) -> None:
-        """Opens the recording and the arm."""
+        """Open the recording and the arm."""
         if not self._open:
             self._writer.open()
             try:
@@ -81,7 +81,7 @@ class RecordingArm(Arm):
             self._open = True
 
     def close(self) -> None:
-        """Releases the arm and the recording; safe to call twice."""
+        """Release the arm and the recording; safe to call twice."""
         if self._open:
             self._open = False
             try:
@@ -114,7 +114,7 @@ class RecordingArm(Arm):
         self._record("wait", seconds=seconds)
 
     def stop(self) -> None:
-        """See `Arm.stop`: stops first, then records."""
+        """See `Arm.stop`; the arm stops before the call is recorded."""
         self._arm.stop()
         self._writer.call("stop", {}, lambda: None)
 

@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 
 class RecordingWriter:
-    """Writes calls as they happen; ``FILE.part`` becomes ``FILE`` when the last user closes it.
+    """Writer of calls as they happen; ``FILE.part`` becomes ``FILE`` when the last user closes it.
 
     Args:
         path: The recording; must not exist yet.
@@ -57,7 +57,7 @@ class RecordingWriter:
         return self._path.with_name(self._path.name + ".part")
 
     def open(self) -> None:
-        """Creates the file for its first user."""
+        """Create the file for its first user."""
         self._users += 1
         if self._file is None:
             try:
@@ -79,7 +79,7 @@ class RecordingWriter:
             self._file.flush()
 
     def close(self) -> None:
-        """Finishes the file after its last user; deletes one without calls (the cell did not open)."""
+        """Finish the file after its last user; delete one without calls (the cell did not open)."""
         self._users = max(0, self._users - 1)
         if self._users == 0 and self._file is not None:
             with self._lock:
@@ -101,14 +101,14 @@ class RecordingWriter:
         result: Callable[[T], Any] = plain,
         after: Callable[[], dict[str, Any] | None] = lambda: None,
     ) -> T:
-        """Performs a call and records its result or error.
+        """Perform a call and record its result or error.
 
         Args:
-            name: The verb.
+            name: Name of the method.
             arguments: Its arguments.
-            do: Calls it.
-            result: Makes plain values of what it returns.
-            after: Reads the arm's state once it is over.
+            do: Performs the call.
+            result: Converts the returned value to plain values.
+            after: Reads the arm's state after the call.
         """
         begun_s = time.monotonic()
         error: tuple[str, str] | None = None
@@ -135,7 +135,7 @@ class RecordingWriter:
             )
 
     def frame(self, frame: RgbdFrame) -> int:
-        """Stores a frame and returns its index."""
+        """Store a frame and return its index."""
         with self._lock:
             if self._file is None:
                 return -1

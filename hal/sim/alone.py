@@ -34,9 +34,9 @@ def sapien_camera(
     """A rendered camera over the middle of a region, and its world, which places parts on the table.
 
     Args:
-        config: What it shows.
-        region: Where parts lie, base frame, metres.
-        home: (7,) where the rendered arm rests, radians; it does not move.
+        config: Part on the table, optics and noise of the camera.
+        region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
+        home: (7,) joints of the rendered arm, radians; it does not move.
 
     Raises:
         ValueError: The camera does not see the region.

@@ -49,7 +49,7 @@ _WAYPOINT_M = 0.01
 
 
 class SapienArm(Arm):
-    """Moves the Panda of a `SapienWorld`; a contact force over the reflex limit ends a motion."""
+    """The Panda of a `SapienWorld`; a contact force over the reflex limit ends a motion."""
 
     simulated = True
 
@@ -60,13 +60,13 @@ class SapienArm(Arm):
         self._force = 0.0
 
     def connect(self) -> None:
-        """Builds the world unless the camera has built it."""
+        """Build the world unless the camera has built it."""
         if not self._open:
             self._world.open()
             self._open = True
 
     def close(self) -> None:
-        """Frees the world unless the camera still uses it."""
+        """Free the world unless the camera still uses it."""
         if self._open:
             self._open = False
             self._world.close()
@@ -113,7 +113,7 @@ class SapienArm(Arm):
         self._follow(torch.cat([start[None], joints]), seconds)
 
     def _follow(self, waypoints: Tensor, seconds: float) -> None:
-        """Moves along joint waypoints (k, 7), evenly spaced, with a minimum-jerk profile."""
+        """Move along joint waypoints (k, 7), evenly spaced, with a minimum-jerk profile."""
         motion = self._world.env.motion
         path = _interpolate(waypoints, torch.from_numpy(minimum_jerk_steps(motion.n_steps(seconds))))
         # In free air long steps do: what the arm does there nothing feels.
@@ -144,7 +144,7 @@ class SapienArm(Arm):
         return float(np.linalg.norm(self._world.env.contacts.load(holding=True))) if self._force else 0.0
 
     def _follow_piece(self, path: Tensor, pressed: float) -> float:
-        """Follows joints (n, 7), one a step; returns the force that the hand still presses with."""
+        """Follow joints (n, 7), one a step; return the force that the hand still presses with."""
         motion, contacts = self._world.env.motion, self._world.env.contacts
         limit, holding = self._world.physics.reflex_force, self._force > 0
         reflex = Reflex(contacts, motion, holding=holding)
@@ -162,7 +162,7 @@ class SapienArm(Arm):
         return pressed
 
     def _pause(self, seconds: float, in_air: bool) -> None:
-        """Lets time pass; coarsely in free air."""
+        """Let time pass; coarsely in free air."""
         motion = self._world.env.motion
         with motion.coarsely(AIR_HZ) if in_air else nullcontext():
             motion.step(motion.n_steps(seconds))

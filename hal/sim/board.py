@@ -12,13 +12,13 @@ _WHITE = 0.8
 
 
 def show_board(entity: sapien.Entity, image: np.ndarray, size: tuple[float, float], pose: Pose) -> None:
-    """Adds a flat board to what is seen of an entity; it follows the entity from now on.
+    """Attach a flat board, visual only, to an entity; it moves with the entity from now on.
 
     Args:
-        entity: What carries the board.
+        entity: Entity that carries the board.
         image: (h, w) grey levels, uint8.
         size: Width and height, metres.
-        pose: Of the board in the entity's frame: x right and y down as it is read, z into it.
+        pose: Pose of the board in the entity's frame: x right and y down as it is read, z into it.
     """
     x, y = size[0] / 2, size[1] / 2
     vertices = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]], dtype=np.float32)

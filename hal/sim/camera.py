@@ -14,11 +14,11 @@ from tasks.scene.camera import FAR
 
 
 class SapienCamera(Camera):
-    """Renders the view of a camera over the table, the arm included.
+    """Rendered camera over the table; it sees the arm, too.
 
     Args:
-        world: What stands on the table.
-        noise: How the sensor errs; not at all by default.
+        world: The simulated world to render.
+        noise: Noise of the sensor; off by default.
     """
 
     def __init__(self, world: SapienWorld, noise: SensorNoise | None = None):
@@ -29,20 +29,20 @@ class SapienCamera(Camera):
         self._open = False
 
     def connect(self) -> None:
-        """Builds the world unless the arm has built it, and restarts the sensor's noise."""
+        """Build the world unless the arm has built it, and restart the sensor's noise."""
         if not self._open:
             self._world.open()
             self._presented = 0
             self._open = True
 
     def close(self) -> None:
-        """Frees the world unless the arm still uses it."""
+        """Free the world unless the arm still uses it."""
         if self._open:
             self._open = False
             self._world.close()
 
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
-        """Renders a frame now; ``timeout_s`` is not needed.
+        """Render a frame now; ``timeout_s`` is not needed.
 
         Raises:
             NotConnected: Outside the camera's context.

@@ -64,7 +64,7 @@ class SapienCellConfig(Config):
 
 
 def sapien_cell(config: SapienCellConfig) -> Cell:
-    """Builds the simulated cell; nothing is simulated before it is connected."""
+    """Build the simulated cell; nothing is simulated before it is connected."""
     home = np.array(config.home)
     world = SapienWorld(
         physics=config.physics,

@@ -14,12 +14,12 @@ SUPERSAMPLING = 2
 
 
 class FineColour:
-    """Renders ``scale`` x ``scale`` pixels of colour for every pixel of depth, as long as a scene lives.
+    """Camera with ``scale`` x ``scale`` pixels of colour for every pixel of depth, for one scene.
 
     Args:
-        env: What is seen.
-        overhead: The camera whose colour is to be finer.
-        scale: How much finer.
+        env: Environment to render.
+        overhead: Settings of the overhead camera.
+        scale: Number of colour pixels along an edge of a depth pixel.
     """
 
     def __init__(self, env: GraspDisplacementEnv, overhead: Overhead, scale: int):

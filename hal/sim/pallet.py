@@ -26,7 +26,7 @@ class Lying:
 
 
 def outside(region: Region, bodies: list[Lying]) -> list[tuple[Lying, sapien.Pose]]:
-    """Those whose origin lies on the table but not in a region, with their poses in ManiSkill's world."""
+    """Bodies whose origin lies on the table but not in a region, with their poses in ManiSkill's world."""
     x_min, x_max, y_min, y_max = region
     found = []
     for lying in bodies:
@@ -37,13 +37,13 @@ def outside(region: Region, bodies: list[Lying]) -> list[tuple[Lying, sapien.Pos
 
 
 def restore(scene: ManiSkillScene, lying: Lying, pose: sapien.Pose, number: int, friction: float) -> Lying:
-    """Adds a part to a new scene at its pose in the last one, as a dynamic body.
+    """Add a part to a new scene at its pose in the last one, as a dynamic body.
 
     Args:
-        scene: The new one.
-        lying: The part.
-        pose: ManiSkill's world.
-        number: Tells it from others of its name.
+        scene: The new scene.
+        lying: The part, and its body in the last scene.
+        pose: Pose of the part in ManiSkill's world.
+        number: Distinguishes it from other bodies of the same name.
         friction: Coefficient of its material; the effective one is the mean with that of the other body: none
             on the table and on the part presented, twice the effective one on the pads.
     """

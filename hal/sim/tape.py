@@ -19,7 +19,7 @@ from mskgrasp.parts import Part
 CELL = 0.0005
 """Distance of the rays from above, m."""
 MARGIN = 0.0005
-"""How far a square stays from the edge of the face, m: a border of tape and table is no tape edge."""
+"""Least distance of a square from the edge of the face, m: a border of tape and table is no tape edge."""
 RELIEF = 0.0015
 """Tape bridges steps, and bends over curves, up to this, m."""
 GAP = 0.004
@@ -27,7 +27,7 @@ GAP = 0.004
 SIGHT = np.radians(75.0)
 """Greatest elevation of obstacles as seen from a square, so that the camera sees it."""
 THICKNESS = 0.00015
-"""Of cloth tape, m."""
+"""Thickness of cloth tape, m."""
 _WHITE = [1.0, 1.0, 1.0, 1.0]
 _GAPS = (0.0, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032)
 
@@ -49,16 +49,16 @@ class Square:
 def place_tape(
     vertices: np.ndarray, faces: np.ndarray, quat_base_obj: np.ndarray, tape: Tape, *, name: str
 ) -> tuple[Square, Square]:
-    """Where the two squares go, as far from each other as they may.
+    """Positions of the two squares, as far from each other as possible.
 
     Their sides lie along those of the part's smallest rectangle seen from above.
 
     Args:
         vertices: (n, 3) of the mesh, obj frame, metres.
         faces: (m, 3) of the mesh.
-        quat_base_obj: (4,) how the part lies.
-        tape: How large the squares are.
-        name: Of the part, for the message.
+        quat_base_obj: (4,) orientation of the part.
+        tape: Sizes of the squares.
+        name: Name of the part, for the message.
 
     Returns:
         The larger and the smaller square.
@@ -90,7 +90,7 @@ def place_tape(
 
 
 def heights_from_above(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Where vertical rays meet a mesh first.
+    """Heights at which vertical rays from above first meet a mesh.
 
     Args:
         vertices: (n, 3), x and y in cells, all positive, z in metres.
@@ -167,13 +167,13 @@ def _square(
 def stick_tape(
     entity: sapien.Entity, part: Part, quat_base_obj: np.ndarray, tape: Tape
 ) -> tuple[Square, Square]:
-    """Adds the squares to what is seen of a part; they follow it from now on.
+    """Attach the squares, visual only, to a part; they move with it from now on.
 
     Args:
-        entity: The part.
-        part: Its mesh.
-        quat_base_obj: (4,) how it lies.
-        tape: How large the squares are.
+        entity: Simulated body of the part.
+        part: The part, for its mesh.
+        quat_base_obj: (4,) orientation of the part.
+        tape: Sizes of the squares.
 
     Returns:
         The larger and the smaller square.

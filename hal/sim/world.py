@@ -31,12 +31,12 @@ class SapienWorld:
     Args:
         physics: Settings of the simulation.
         overhead: Settings of the camera.
-        region: Where parts lie, base frame, metres.
+        region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
         home: (7,) joints of the arm while a part is placed.
-        part: What lies on the table at first.
-        seed: Its place and turn follow from it.
-        tape: Squares of tape that are stuck on top of a part once it lies; none where None.
-        colour_scale: Over 1, frames hold a fine colour image with so many pixels along a pixel of depth.
+        part: Part on the table at first.
+        seed: Determines its position and turn.
+        tape: Sizes of the tape squares on top of every part; None: no tape.
+        colour_scale: Above 1, frames hold a fine colour image with this many pixels along one of depth.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class SapienWorld:
         return env
 
     def open(self) -> None:
-        """Builds the world for its first user."""
+        """Build the world for its first user."""
         if self._gym is None:
             self._build()
         self._users += 1
@@ -101,7 +101,7 @@ class SapienWorld:
             render_backend=render_backend(),
         )
         try:
-            # Programs place parts of their own: a first part without room for tape must not stop them.
+            # Programs place their own parts: a first part without room for tape must not stop them.
             with contextlib.suppress(TapeDoesNotFit):
                 self.present(part, seed)
         except BaseException:
@@ -109,7 +109,7 @@ class SapienWorld:
             raise
 
     def close(self) -> None:
-        """Frees the world after its last user."""
+        """Free the world after its last user."""
         self._users = max(0, self._users - 1)
         if self._users == 0:
             self._free()
@@ -122,12 +122,12 @@ class SapienWorld:
             self._gym = None
 
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """Places a part on the table, arm at home, everything at rest.
+        """Place a part on the table, arm at home, everything at rest.
 
         Args:
             part: Name or folder.
-            seed: Its place and turn follow from it.
-            keep: What lies outside the region, where parts are put, stays; else the table is cleared.
+            seed: Determines its position and turn.
+            keep: Parts outside the region, such as on a pallet, stay; else the table is cleared.
 
         Raises:
             BadPart: There is no such part, or no room for the tape on it.
@@ -159,7 +159,7 @@ class SapienWorld:
         return self._fine_colour.capture()
 
     def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:
-        """Attaches a flat board to the hand, visual only.
+        """Attach a flat board to the hand, visual only.
 
         Args:
             image: (h, w) grey levels of its printed side, uint8.
@@ -176,7 +176,7 @@ class SapienWorld:
         return max([TABLE_Z, *(float(self._corners(one)[:, 2].max()) for one in bodies)])
 
     def reach(self, T_base_tcp: Pose) -> float | None:
-        """Greatest distance from the middle of what stands between the open pads, m.
+        """Greatest distance of the parts between the open pads from the middle between the pads, m.
 
         Returns:
             None where anything is in the way of the open hand, or nothing between the pads.

@@ -1,4 +1,4 @@
-"""Executor of jobs on a Ray cluster, some of whose nodes may die, and the shards of a run made on it."""
+"""Executor of jobs on a Ray cluster, whose nodes may fail, and the shards of a run made on it."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from mskgrasp.simulation.shard_task import ShardTask
 from mskgrasp.simulation.versions import versions
 
 VISIBLE_S = 120.0
-"""How long a file that a node has written may take to appear here (NFS keeps listings for a minute), s."""
+"""Greatest time until a file written by a node appears here (NFS caches listings for a minute), s."""
 _ADDRESS = re.compile(r"auto|[A-Za-z0-9_.-]+:[0-9]{1,5}|\[[0-9A-Fa-f:]+\]:[0-9]{1,5}")
 
 
 def check_cluster(address: str) -> None:
-    """Refuses an address that cannot be one, and a machine without Ray.
+    """Refuse an address that cannot be one, and a machine without Ray.
 
     Raises:
         UsageError: The message names the extra to install, or the form of an address.
@@ -100,7 +100,7 @@ class RayExecutor:
 
     Args:
         start: Starts a Ray task for a job; the task returns a `ShardReply`.
-        n_slots: Bound on jobs at once; 0: as the cores of the cluster ask for.
+        n_slots: Greatest number of jobs at once; 0: according to the cluster's cores.
     """
 
     def __init__(self, start: Callable[[ShardTask], Any], n_slots: int):
@@ -109,15 +109,15 @@ class RayExecutor:
         self._running: dict[Any, int] = {}
 
     def n_slots(self) -> int:
-        """Some more than there are cores: none waits for this process, and an autoscaler sees a demand."""
+        """A few more than there are cores: no core waits for this process, and an autoscaler sees demand."""
         return self._n_slots or 2 * count_cores() + 1
 
     def submit(self, number: int, job: ShardTask) -> None:
-        """Starts a task."""
+        """Start a task."""
         self._running[self._start(job)] = number
 
     def events(self) -> Iterator[Delivered | Completed | Died]:
-        """Waits a moment for tasks that end.
+        """Wait a moment for tasks that end.
 
         Raises:
             WorkerFailed: A node reports an error, or cannot start a task.
@@ -150,7 +150,7 @@ class RayExecutor:
             yield Completed(number, reply.worker)
 
     def close(self) -> None:
-        """Cancels all tasks."""
+        """Cancel all tasks."""
         import ray
 
         for reference in self._running:
@@ -161,7 +161,7 @@ class RayExecutor:
 def make_shards_on_cluster(
     config: CollectConfig, tasks: Sequence[ShardTask], parts: Mapping[str, Part]
 ) -> ShardEvents:
-    """Makes shards on the cluster's cores and yields all steps of one when it is complete.
+    """Make shards on the cluster's cores and yield all steps of one when it is complete.
 
     Args:
         config: The run; this process is `connected`.
@@ -197,7 +197,7 @@ def make_shards_on_cluster(
 
 
 def wait_until_seen(out: Path, tasks: Sequence[ShardTask]) -> None:
-    """Waits until the shards that nodes have written appear on this machine.
+    """Wait until the shards that nodes have written appear on this machine.
 
     Raises:
         WorkerFailed: They do not, within `VISIBLE_S`.

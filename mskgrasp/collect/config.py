@@ -14,7 +14,7 @@ from mskgrasp.core.settings.physics import LEAST_RATE_HZ
 
 
 class PartFilter(Config):
-    """Which parts are worth collecting and learning from; null switches a bound off."""
+    """Bounds on the parts to collect and to learn from; null switches a bound off."""
 
     min_length: float | None = None
     """Least length of a part's longest axis, m; shorter parts are not collected."""
@@ -46,15 +46,15 @@ class CollectConfig(Config):
     parts: tuple[str, ...] = ()
     """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
     sample: int = Field(default=0, ge=0)
-    """About so many of the parts, of every family some; 0: all. Only of the catalogue's parts."""
+    """Approximate number of parts, some of every family; 0: all. Only for the catalogue's parts."""
     attempts_per_part: int = Field(default=200, ge=1)
     """Grasps for each part."""
     shard_size: int = Field(default=100, ge=1)
     """Grasps in a file; a killed run loses at most the files being made."""
     seed: int = Field(default=0, ge=0)
-    """Everything random follows from it; the number of workers changes nothing."""
+    """Seed of all random numbers; the data do not depend on the number of workers."""
     workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
-    """Processes; 0: one for each core."""
+    """Processes; 0: one per core."""
     cluster: str | None = None
     """Run on a Ray cluster: auto, or host:port of its head. workers then bounds the cores that are used."""
     part_filter: PartFilter = PartFilter()

@@ -1,4 +1,4 @@
-"""One shard made in a process of a cluster's node, and what travels there and back."""
+"""Shard made in a process of a cluster's node, and the data sent to the node and back."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class RunSettings:
-    """What all shards of a run share, and what a node must agree with.
+    """Settings that all shards of a run share, and versions that a node must have.
 
     Attributes:
         config: The settings; `out` is absolute.
-        digest: Of the config.yaml in `out`.
+        digest: SHA-256 of the config.yaml in `out`.
         versions: Software versions of the collector.
     """
 
@@ -40,7 +40,7 @@ class RunSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class PackedPart:
-    """A part on its way to a node: name, content hash, files."""
+    """A part to be sent to a node: name, content hash, files."""
 
     name: str
     content_hash: str
@@ -53,9 +53,9 @@ class ShardReply:
 
     Attributes:
         worker: Host and process.
-        outcomes: Of each attempt: 1 success, 0 failure, -1 discarded.
-        error: Why there is no shard, one line; empty if there is.
-        trace: Where a defect happened; empty for errors that a user can repair.
+        outcomes: Outcome of each attempt: 1 success, 0 failure, -1 discarded.
+        error: Reason why there is no shard, one line; empty if there is one.
+        trace: Traceback of a defect; empty for errors that a user can correct.
     """
 
     worker: str
@@ -65,7 +65,7 @@ class ShardReply:
 
 
 _simulator: Simulator | None = None
-"""Built with the first shard of a process and kept for all others: Ray uses a process again."""
+"""Built with the first shard of a process and kept for all others: Ray reuses processes."""
 
 
 def settings_digest(out: Path) -> str:
@@ -75,7 +75,7 @@ def settings_digest(out: Path) -> str:
 
 
 def make_shard(part: PackedPart, settings: RunSettings, task: ShardTask) -> ShardReply:
-    """Makes a shard and writes it to the shared folder."""
+    """Make a shard and write it to the shared folder."""
     worker = f"{socket.gethostname()}:{os.getpid()}"
     try:
         simulator = _ready_simulator(settings)

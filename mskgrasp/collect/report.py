@@ -34,8 +34,8 @@ class PartSummary:
     """Attempts on one part in numbers.
 
     Attributes:
-        part: Its name.
-        family: Its family.
+        part: Name of the part.
+        family: Family of the part.
         attempts: Number of attempts.
         successes: Number of those that lifted the part.
         success_interval: 95 % Wilson interval of the success rate.
@@ -61,7 +61,7 @@ class PartSummary:
 
 
 def summarise(folder: Path, part_filter: PartFilter) -> list[PartSummary]:
-    """Reads a dataset and summarises each part."""
+    """Read a dataset and summarise each part."""
     parts: dict[str, list[tuple[Columns, ShardInfo]]] = {}
     for path in list_shards(folder):
         # Without the images: those of a large dataset do not fit into memory.
@@ -102,7 +102,7 @@ def _median(values: np.ndarray) -> float | None:
 
 
 def print_table(summaries: list[PartSummary], console: Console | None = None) -> None:
-    """Prints a row for each part and a total."""
+    """Print a row for each part and a total."""
     rows = [
         (
             row.part,
@@ -133,13 +133,13 @@ def _counts(counts: dict[str, int]) -> str:
 
 
 def write_summary(summaries: list[PartSummary], folder: Path) -> None:
-    """Writes the table's numbers as ``summary.json``."""
+    """Write the table's numbers as ``summary.json``."""
     text = json.dumps({"schema_version": 1, "parts": [asdict(row) for row in summaries]}, indent=1)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
 
 
 def draw_summary(folder: Path, seed: int) -> Path:
-    """Draws attempts of many parts, successes and failures mixed, as ``summary.png``."""
+    """Draw attempts of many parts, successes and failures mixed, as ``summary.png``."""
     paths = list_shards(folder)
     rng = np.random.default_rng(seed)
     chosen = rng.permutation(len(paths))[:N_PICTURES]

@@ -42,7 +42,7 @@ stopped resumes when it is started again with the same settings."""
 
 
 def main() -> int:
-    """Parses, collects, reports."""
+    """Parse, collect, report."""
     config = parse(
         CollectConfig,
         prog="python -m mskgrasp.collect",
@@ -54,7 +54,7 @@ def main() -> int:
 
 
 def collect(config: CollectConfig) -> None:
-    """Makes the shards that are missing and sums up the dataset."""
+    """Make the shards that are missing and sum up the dataset."""
     if config.cluster is not None:
         check_cluster(config.cluster)
     # Sets are stored as names of parts: a catalogue that grows must not change an existing dataset.
@@ -149,7 +149,7 @@ def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:
 
 
 def check_out(config: CollectConfig) -> None:
-    """Refuses an output folder that holds something else; changes nothing.
+    """Refuse an output folder that holds something else; change nothing.
 
     Raises:
         UsageError: A file is in the way, or the folder has other settings, or is no dataset.
@@ -180,7 +180,7 @@ def _is_leftover(path: Path) -> bool:
 
 
 def prepare_folder(config: CollectConfig) -> None:
-    """Opens the dataset's folder, and deletes half-written files of a killed run."""
+    """Open the dataset's folder, and delete half-written files of a killed run."""
     if not (config.out / "config.yaml").exists():
         write_config(config, config.out / "config.yaml")
     # After the settings: they mark a folder with other files as a dataset.
@@ -210,7 +210,7 @@ def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
     """Whether a shard is on disk and whole; a damaged one is reported, and will be made again.
 
     Raises:
-        BadDataset: The part, or what simulates it, has changed since the shard was made.
+        BadDataset: The part or the simulation has changed since the shard was made.
     """
     path = shard_path(out, task.part, task.index)
     if not path.exists():

@@ -15,7 +15,7 @@ ShardEvents = Generator[JobResult[ShardTask, int] | JobDone[ShardTask] | JobLost
 
 
 def make_shards(config: CollectConfig, tasks: Sequence[ShardTask], n_workers: int) -> ShardEvents:
-    """Makes shards in parallel and yields every step; closing the iterator stops all workers.
+    """Make shards in parallel and yield every step; closing the iterator stops all workers.
 
     Raises:
         WorkerFailed: A shard failed for a reason that trying again does not remove.

@@ -23,7 +23,7 @@ ConfigT = TypeVar("ConfigT", bound=BaseModel)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Reads a YAML file that holds a mapping; an empty file holds an empty mapping.
+    """Read a YAML file that holds a mapping; an empty file holds an empty mapping.
 
     Raises:
         BadConfig: The file is missing, is not YAML, or does not hold a mapping.
@@ -47,7 +47,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 
 def read_config(model: type[ConfigT], path: Path) -> ConfigT:
-    """Reads a YAML file as a configuration.
+    """Read a YAML file as a configuration.
 
     Raises:
         BadConfig: The file is missing, does not hold a YAML mapping, or does not fit the model.
@@ -66,10 +66,10 @@ def check_config(
     *,
     name: Callable[[tuple[int | str, ...]], str] = _key,
 ) -> ConfigT:
-    """Validates plain values as a configuration.
+    """Validate plain values as a configuration.
 
     Args:
-        model: Of the configuration.
+        model: Class of the configuration.
         values: A mapping of plain values.
         source: Their origin, for messages.
         name: Gives the name of a value in messages from its location.
@@ -86,7 +86,7 @@ def check_config(
 
 
 def write_config(config: BaseModel, path: Path) -> None:
-    """Writes the resolved configuration as YAML, so that a run can be repeated from its output."""
+    """Write the resolved configuration as YAML, so that a run can be repeated from its output."""
     write_whole(path, yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False).encode())
 
 

@@ -13,7 +13,7 @@ LOCK = ".lock"
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Writes a file atomically: its name always refers to the old content or to all of the new.
+    """Write a file atomically: its name always refers to the old content or to all of the new.
 
     The content is written to ``<name>.<random>.tmp`` in the same folder, synced and renamed, so that several
     processes, on one machine or more, can write the same file. A process that is killed leaves its temporary
@@ -42,7 +42,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 @contextmanager
 def exclusive_lock(folder: Path) -> Iterator[bool]:
-    """Locks a folder until the end of the block; gives False if another process holds the lock.
+    """Lock a folder until the end of the block; give False if another process holds the lock.
 
     The operating system releases the lock when a process ends for whatever reason; its empty file remains.
     """

@@ -17,12 +17,12 @@ Array = Any  # a numpy array or a torch tensor; this package must not import tor
 
 
 def wrap_angle(angle: Array) -> Array:
-    """Wraps angles in radians to [-pi, pi)."""
+    """Wrap angles in radians to [-pi, pi)."""
     return _wrap(angle, 2 * np.pi)
 
 
 def wrap_half_turn(angle: Array) -> Array:
-    """Wraps angles in radians to [-pi/2, pi/2): a parallel jaw looks the same after half a turn."""
+    """Wrap angles in radians to [-pi/2, pi/2): a parallel jaw looks the same after half a turn."""
     return _wrap(angle, np.pi)
 
 
@@ -44,7 +44,7 @@ def components(vectors: Array) -> Sequence[Array]:
 
 
 def joined(parts: Sequence[Array]) -> Array:
-    """Stacks k arrays (...) along a new last axis, (..., k); the inverse of `components`."""
+    """Stack k arrays (...) along a new last axis, (..., k); the inverse of `components`."""
     if hasattr(parts[0], "unbind"):
         return array_namespace(*parts).stack(list(parts), axis=-1)
     return np.concatenate([part[..., None] for part in parts], axis=-1)  # takes half of the time of stack
@@ -93,7 +93,7 @@ def quat_about_z(angle: Array) -> Array:
 
 
 def twist_and_swing(quat_wxyz: Array) -> tuple[Array, Array]:
-    """Splits rotations into a turn about z and a tilt away from z.
+    """Split rotations into a turn about z and a tilt away from z.
 
     The rotation is ``swing * twist`` with the twist about z. At a tilt of exactly 180 degrees the twist
     is undefined and reported as 0.

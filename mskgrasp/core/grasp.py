@@ -31,7 +31,7 @@ from mskgrasp.core.geometry import (
 )
 
 PAD_REACH = 0.0095
-"""How far the finger pads reach below the TCP, metres (collision box of the Panda hand's pads)."""
+"""Reach of the finger pads below the TCP, metres (collision box of the Panda hand's pads)."""
 TABLE_CLEARANCE = 0.001
 """Least distance between the pads and the table at the grasp, metres."""
 MAX_OPENING = 0.08
@@ -49,19 +49,19 @@ HAND_GEOMETRY = {
     "finger_thickness": FINGER_THICKNESS,
     "palm_height": PALM_HEIGHT,
 }
-"""The hand's measures above, as datasets state them, metres."""
+"""The dimensions of the hand above, as stored in datasets, metres."""
 MIN_GAP = 0.5e-3
 """Pads with a smaller gap hold nothing, metres."""
 MIN_RISE = 0.8
 """Least share of the lift height by which a held part has risen."""
 HOLD_S = 0.2
-"""How long a lifted part is held before it is judged, seconds."""
+"""Time for which a lifted part is held before it is judged, seconds."""
 MAX_DISPLACEMENT = 0.05
 """Largest displacement of a held part in the hand, metres; a row with a larger one is not used as a label."""
 EJECTED_DISTANCE = 0.05
 """A part that ends this far from its initial position, and not in the hand, was ejected, metres."""
 FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled", "unreachable")
-"""Why an attempt failed, by code: a shard stores the index into this tuple. The last two are no failures of a
+"""Reasons of failures, by code: a shard stores the index into this tuple. The last two are no failures of a
 grasp: ``unsettled``, the part was not at rest before (only datasets of simulation version 1 hold such), and
 ``unreachable``, the arm cannot execute the grasp, so that it was not tried (no dataset holds any)."""
 
@@ -138,7 +138,7 @@ def pose_base_tcp(grasp: Array) -> Pose:
 
 
 def object_displacement(T_tcp_obj_before: Pose, T_tcp_obj_after: Pose) -> tuple[Array, Array]:
-    """How a part moved and turned in the hand between before and after the grasp.
+    """Displacement of a part in the hand between before and after the grasp, and its tilt.
 
     Args:
         T_tcp_obj_before: The part in the commanded TCP frame, at rest before the grasp.
@@ -158,7 +158,7 @@ def object_displacement(T_tcp_obj_before: Pose, T_tcp_obj_after: Pose) -> tuple[
 
 
 def _tcp_to_grasp_frame(T_tcp_obj: Pose) -> Pose:
-    """Turns a pose in the TCP frame (z down) by Rx(pi) into the grasp frame (z up)."""
+    """Turn a pose in the TCP frame (z down) by Rx(pi) into the grasp frame (z up)."""
     x, y, z = components(T_tcp_obj.position)
     qw, qx, qy, qz = components(T_tcp_obj.quat_wxyz)
     # Multiplied out: (0, 1, 0, 0) * (qw, qx, qy, qz).

@@ -1,6 +1,6 @@
 """Kinematics of the Franka Panda (and of the FR3, which shares its geometry) with the Franka Hand.
 
-Numpy arrays and torch tensors alike, and without torch for numpy: the machine beside a real robot need not
+Numpy arrays and torch tensors alike, and without torch for numpy: the computer of a real robot need not
 have it. Parameters: Franka Control Interface documentation, "Denavit-Hartenberg parameters" (Craig's
 convention), end effector turned by -45 degrees and moved by 0.1034 m (Franka Hand).
 """

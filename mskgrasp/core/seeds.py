@@ -11,10 +11,10 @@ def scene_seeds(seed: int, part: str, number: int, draw: int = 0) -> tuple[int, 
     """Seeds of one scene with a part, the same for attempts, trials and placements.
 
     Args:
-        seed: Of the run.
+        seed: Seed of the run.
         part: Name of the part.
         number: Index of the attempt or trial among those of the part.
-        draw: How often the scene was drawn before.
+        draw: Number of times that the scene was drawn before.
 
     Returns:
         The seed of the part's place and turn, and that of a grasp drawn at random.

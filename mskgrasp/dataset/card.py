@@ -79,7 +79,7 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
     """Summarise a dataset without reading its images.
 
     Args:
-        folder: Of the dataset.
+        folder: Folder of the dataset.
         watch: Yields each of the files that will be read; may show a progress bar.
 
     Raises:

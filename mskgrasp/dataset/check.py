@@ -65,7 +65,7 @@ def check_dataset(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]
     """Read all of a dataset and report every fault; change nothing.
 
     Args:
-        folder: Of the dataset.
+        folder: Folder of the dataset.
         watch: Yields each of the files that will be read; may show a progress bar.
 
     Raises:
@@ -128,7 +128,7 @@ def _examine(path: Path) -> tuple[_Shard | None, list[str]]:
 
 
 def _settings(folder: Path, faults: list[Fault]) -> dict[str, Any]:
-    """Read the dataset's config.yaml as plain values: its schema belongs to the collector, a higher room."""
+    """Read the dataset's config.yaml as plain values: its schema belongs to the collector, a higher layer."""
     path = folder / "config.yaml"
     try:
         return read_yaml(path)

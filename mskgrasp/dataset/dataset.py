@@ -18,8 +18,8 @@ class Dataset:
     """The finished shards of a dataset, in the order of their names.
 
     Attributes:
-        folder: Of the dataset.
-        paths: Of the shards.
+        folder: Folder of the dataset.
+        paths: Paths of the shards.
     """
 
     folder: Path
@@ -34,7 +34,7 @@ class Dataset:
         """Some arrays of all attempts, joined; `mskgrasp.dataset.Attempts` gives shapes, units and frames.
 
         Args:
-            names: Of columns; none means all but the depth images.
+            names: Names of columns; none means all but the depth images.
 
         Returns:
             Arrays (n, ...) by name, and ``part``: (n,) names of the parts.
@@ -53,7 +53,7 @@ class Dataset:
         return joined | {"part": np.repeat([info.part for _, info in shards], counts)}
 
     def shards(self, parts: Sequence[str] | None = None) -> Iterator[tuple[Attempts, ShardInfo]]:
-        """Shard by shard, all columns and what the attempts share; of some parts only, if named.
+        """Shard by shard, all columns and the attempts' shared properties; of some parts only, if named.
 
         Raises:
             BadDataset: A shard is damaged.
@@ -64,7 +64,7 @@ class Dataset:
 
 
 def open_dataset(folder: str | Path) -> Dataset:
-    """Opens a dataset folder; arrays are read when asked for.
+    """Open a dataset folder; arrays are read on demand.
 
     Raises:
         BadDataset: No such folder, or no finished shard in it.

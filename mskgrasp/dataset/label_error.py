@@ -1,4 +1,4 @@
-"""Error of a simulated label: how far a grasp's outcome may be from that with another hand of the kind."""
+"""Error of a simulated label: difference of a grasp's outcome from that with another hand of the kind."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class LabelError:
         simulation: Version of the simulation.
         n: Grasps.
         agreement: Share of grasps whose S is the same.
-        shift_median: Of the distance between the displacements' translations, m.
+        shift_median: Median distance between the displacements' translations, m.
         shift_p90: Its 90th percentile, m.
-        turn_median: Of the difference of the displacements' turns, rad.
+        turn_median: Median difference of the displacements' turns, rad.
         turn_p90: Its 90th percentile, rad.
     """
 

@@ -18,7 +18,7 @@ from mskgrasp.core.grasp import (
 from mskgrasp.dataset.attempts import DEPTH_UNIT, Attempts, ShardInfo
 
 AROUND_REGION = 0.05
-"""How far a part in the region, or a grasp of it, may reach beyond the region, metres."""
+"""Greatest reach of a part in the region, or of its grasp, beyond the region, metres."""
 MAX_HEIGHT = 0.3
 """Greatest height of a graspable part above the table, metres."""
 BELOW_TABLE = 0.05

@@ -116,7 +116,7 @@ def read_shard(path: Path) -> tuple[Attempts, ShardInfo]:
 
 
 def read_unchecked(path: Path) -> tuple[Attempts, ShardInfo]:
-    """Reads a shard as it is, for those who look for what is wrong with it.
+    """Read a shard without checking its values, for programs that look for faults.
 
     Raises:
         BadDataset: The file is missing, truncated, foreign or of another schema.
@@ -126,7 +126,7 @@ def read_unchecked(path: Path) -> tuple[Attempts, ShardInfo]:
 
 
 def read_columns(path: Path, names: Sequence[str]) -> tuple[dict[str, np.ndarray], ShardInfo]:
-    """Reads some of a shard's arrays, for example without the images; their values are not checked.
+    """Read some of a shard's arrays, for example without the images; their values are not checked.
 
     Raises:
         BadDataset: The file is missing, truncated, foreign, of another schema, or an array has the wrong
@@ -139,7 +139,7 @@ def read_columns(path: Path, names: Sequence[str]) -> tuple[dict[str, np.ndarray
 
 
 def read_success(path: Path) -> tuple[np.ndarray, ShardInfo]:
-    """Reads which attempts of a shard lifted the part, (n,) bool, without the images.
+    """Read which attempts of a shard lifted the part, (n,) bool, without the images.
 
     Raises:
         BadDataset: The file is missing, truncated, foreign or of another schema.

@@ -19,7 +19,7 @@ does not change the results. A real cell asks its operator to place every part, 
 
 
 def main() -> int:
-    """Parses, evaluates, reports."""
+    """Parse, evaluate, report."""
     with ctrl_c_deferred():
         from mskgrasp.evaluate.config import EvaluateConfig
         from mskgrasp.evaluate.report import print_report

@@ -51,7 +51,7 @@ class EvaluateConfig(Config):
     seed: int = Field(default=0, ge=0)
     """Determines the parts' placements and the candidates."""
     planner: PlannerConfig = PlannerConfig(policy="quality")
-    """How grasps are chosen."""
+    """Settings of the choice of grasps."""
     replay: tuple[Path, str] | None = None
     """Only draw a stored trial again: the folder of a run, and the trial's name."""
 

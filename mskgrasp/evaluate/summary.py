@@ -31,16 +31,16 @@ Interval = tuple[float, float]
 class TrialStatistics:
     """Success and displacement errors of some trials; metres, radians, intervals of 95 %.
 
-    What no trial measured is None, not zero.
+    A quantity that no trial measured is None, not zero.
 
     Attributes:
-        success_interval: Wilson's.
+        success_interval: Wilson interval of the success rate.
         reasons: Numbers of failures by reason.
         unmeasured: Numbers of unmeasured successes by reason.
         measured: Number of trials with a measured and a predicted displacement, which the errors are of.
-        translation_interval: Of the RMSE, by bootstrap over parts; None for a single part.
+        translation_interval: Interval of the RMSE, by bootstrap over parts; None for a single part.
         rotation_interval: The same of the turn.
-        translation_rmse_of_zero: Of predicting no displacement for the same grasps.
+        translation_rmse_of_zero: RMSE of predicting no displacement for the same grasps.
         rotation_rmse_of_zero: The same of the turn.
         coverage_90: Share of the measurements within the predicted central 90 %, by component; None where a
             variance or a component is unknown.

@@ -21,13 +21,13 @@ class Checkpoint:
     """State after a finished epoch.
 
     Attributes:
-        fingerprint: Of the data; training does not resume with other data.
+        fingerprint: Fingerprint of the data; training does not resume with other data.
         samples_version: Version of the samples made from the data; 1 in files that do not name it.
         stage: Network that is being trained.
         epoch: Epochs of that stage that are finished.
         history: One row an epoch of all stages so far.
-        weights: Of both networks.
-        best: Of the stage's network, where its validation loss was lowest.
+        weights: Weights of both networks.
+        best: Weights of the stage's network at its lowest validation loss.
         optimiser: State of the stage's optimiser.
     """
 

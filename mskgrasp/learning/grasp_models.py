@@ -56,7 +56,7 @@ class ModelMeta(Config):
     @field_validator("network", mode="before")
     @classmethod
     def _without_former_fields(cls, values: Any) -> Any:
-        """Drops the other architecture's fields, which older descriptions list without effect."""
+        """Drop the other architecture's fields, which older descriptions list without effect."""
         if not isinstance(values, dict):
             return values
         architecture = values.get("architecture", "patch")
@@ -165,7 +165,7 @@ def save_model(folder: Path, models: Models) -> None:
 
 
 def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -> Models:
-    """Reads a model folder.
+    """Read a model folder.
 
     Raises:
         BadModel: It is missing, damaged or of another schema, or the weights do not fit the description.

@@ -1,4 +1,4 @@
-"""Metrics of trained networks on held-out parts beside constant predictors, and their calibration."""
+"""Metrics of trained networks on held-out parts, compared with constant predictors, and their calibration."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def model_card(meta: ModelMeta) -> str:
     """Write the card of a model.
 
     Args:
-        meta: Of a trained model.
+        meta: Description of a trained model.
     """
     known = meta.training
     report = meta.metrics.get("test", meta.metrics)

@@ -95,13 +95,13 @@ class HandNetworkConfig(_NetworkConfig):
     patch_columns: int | None = Field(default=None, ge=8, le=256)
     """Pixels across it; null: as many."""
     quality_stride: int = Field(default=1, ge=1, le=8)
-    """The quality network sees one pixel in so many, as it has thousands of grasps to score."""
+    """The quality network sees every n-th pixel, since it has thousands of grasps to score."""
     quality_columns: int | None = Field(default=None, ge=4, le=256)
-    """Number of these across the closing direction; null: all that the patch has."""
+    """Number of its pixels across the closing direction; null: all that the patch has."""
     layers: _Convolutions = (16, 32)
     """Channels of the quality network's convolutions, each of which halves the image."""
     displacement_layers: _Convolutions = (16, 32, 32)
-    """Channels of the displacement network's."""
+    """Channels of the displacement network's convolutions."""
 
     @model_validator(mode="after")
     def _quality_pixels_are_centred(self) -> HandNetworkConfig:
@@ -145,7 +145,7 @@ class Normalisation(Config):
     """Largest distance of the object centre from the grasp along each axis, metres."""
     target_mean: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     target_std: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    """Of the grasp displacement, metres and radians."""
+    """Standard deviation of the grasp displacement, metres and radians."""
     base_rate: float = Field(default=0.5, gt=0.0, lt=1.0)
     """Share of successes among the attempts; training balances successes and failures."""
 

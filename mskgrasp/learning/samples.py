@@ -42,7 +42,7 @@ class Samples:
             network sees them.
         theta: (n,) float32 angle of the grasp.
         centre_grasp: (n, 3) float32 object centre, estimated from the image, in the grasp frame, metres:
-            what a network sees of the part's place.
+            the networks' input for the part's position.
         origin_grasp: (n, 3) float32 the part's true centroid, the origin of obj, in the grasp frame, metres.
         height: (n,) float32 of the grasp above the table, metres.
         success: (n,) bool.

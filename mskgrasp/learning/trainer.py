@@ -31,7 +31,7 @@ from mskgrasp.learning.samples import SAMPLES_VERSION, Samples, part_sides
 from mskgrasp.learning.symmetry import mirror_and_turn
 
 _LEAST_TARGET_STD = (1e-4, 1e-4, 1e-4, 1e-3)
-"""Metres and radians: less variation (parts that never rise in the hand) is noise of the simulation."""
+"""Least deviation of a target, metres and radians: less (parts that never rise) is simulation noise."""
 
 
 class TrainingDiverged(MskgraspError):
@@ -56,7 +56,7 @@ class LearningConfig(Config):
 
     seed: int = Field(default=0, ge=0)
     sides: Literal["name", "catalogue"] = "name"
-    """How parts are split: by a hash of their name, or as the catalogue says (near-duplicates on one side,
+    """Split of the parts: by a hash of their name, or as the catalogue says (near-duplicates on one side,
     and test parts beside those of validation)."""
     validation_fraction: float = Field(default=0.2, gt=0.0, lt=1.0)
     """Share of the parts that training never sees, where they are split by name."""
@@ -329,7 +329,7 @@ def train(
         samples: The dataset.
         config: Settings.
         checkpoint_path: Replaced after every epoch.
-        device: Where the networks run.
+        device: Device of the networks.
         reporter: Receives the progress.
         sides: Split of the samples; None: according to the settings.
 

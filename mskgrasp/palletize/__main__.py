@@ -20,7 +20,7 @@ A real cell asks its operator to place every part, and before the arm moves (--y
 
 
 def main() -> int:
-    """Parses, palletizes, reports."""
+    """Parse, palletize, report."""
     with ctrl_c_deferred():
         from mskgrasp.palletize.config import PalletizeConfig
         from mskgrasp.palletize.report import print_report

@@ -46,7 +46,7 @@ class PalletizeConfig(Config):
     yes: bool = False
     """Ask no operator: the arm moves as soon as a grasp is planned."""
     planner: PlannerConfig = PlannerConfig()
-    """How grasps are chosen."""
+    """Settings of the choice of grasps."""
 
     @field_validator("target")
     @classmethod

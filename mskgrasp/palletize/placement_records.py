@@ -20,14 +20,14 @@ class Placement:
         correction: Displacement that was corrected for.
         target: x, y of the part's centre and direction of its longer side, base frame.
         placed: The part was released at the target.
-        reason: Why not; empty where it was.
+        reason: Reason why it was not; empty where it was.
         grasp: (4,) the executed grasp; None, as all that follows, where no grasp was found.
         predicted: (4,) expected displacement of the part's detected centre in the hand.
         measured: (4,) its true displacement; None where nothing tracks the part.
         translation_error: Distance of the placed part's centre from its target; None where not placed or not
             measured.
         rotation_error: Absolute error of its turn; None as before.
-        unmeasured: Why a placed part was not measured; empty where it was.
+        unmeasured: Reason why a placed part was not measured; empty where it was.
     """
 
     part: str
@@ -46,7 +46,7 @@ class Placement:
 
     @property
     def key(self) -> tuple[str, int, int, Correction]:
-        """Identifies the placement in its run."""
+        """Identifier of the placement in its run."""
         return self.part, self.number, self.slot, self.correction
 
     @property

@@ -83,7 +83,7 @@ def write_report(
 
 
 def print_report(summary: PlacementSummary, console: Console | None = None) -> None:
-    """Print the counts and errors of each correction, and what correcting gains."""
+    """Print the counts and errors of each correction, and the gain of correcting."""
     print_sections([result_section(summary)], console)
 
 
@@ -100,7 +100,7 @@ def _conclusion(summary: PlacementSummary) -> str:
 
 
 def result_section(summary: PlacementSummary) -> Section:
-    """Make the section of counts and errors by correction, and of what correcting gains."""
+    """Make the section of counts and errors by correction, and of the gain of correcting."""
     rows = [
         (
             name,
@@ -122,7 +122,7 @@ def _interval_text(interval: Interval | None, scale: float, digits: int = 1) -> 
 
 
 def gain_lines(summary: PlacementSummary) -> list[str]:
-    """State what correcting gains."""
+    """State the gain of correcting."""
     if not summary.compared:
         return ["No placement was measured under every correction: errors are unknown."]
     n, parts = summary.compared, summary.parts_compared

@@ -1,4 +1,4 @@
-"""Summary of placements in numbers: counts and errors by correction, and what correcting gains."""
+"""Summary of placements in numbers: counts and errors by correction, and the gain of correcting."""
 
 from __future__ import annotations
 

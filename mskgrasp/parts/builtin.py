@@ -54,7 +54,7 @@ def recipe_of(name: str) -> Recipe:
 
 
 def build_part(name: str) -> Part:
-    """Builds a part from its recipe, unless the parts folder has it up to date.
+    """Build a part from its recipe, unless the parts folder has it up to date.
 
     Raises:
         BadPart: There is no such recipe, or no set of hulls represents the shape closely enough.

@@ -64,20 +64,20 @@ class Entry:
     """One part of the catalogue; lengths in metres.
 
     Attributes:
-        name: Of the part.
+        name: Name of the part.
         family: Kind of part.
         source: Standard, or another origin of the dimensions.
         licence: SPDX identifier.
-        longest_axis: Of the oriented minimal box.
+        longest_axis: Longest edge of the oriented minimal box.
         extents: Edges of the bounding box, sorted, the longest last.
         volume: Cubic metres.
         mass: kg.
         n_hulls: Number of convex hulls.
         hull_error: Largest distance between hulls and mesh.
         hull_error_p95: 95th percentile of it.
-        hull_volume_ratio: Volume of the hulls' union by that of the mesh.
-        content_hash: Of the part.
-        recipe_hash: Of its recipe.
+        hull_volume_ratio: Volume of the hulls' union divided by that of the mesh.
+        content_hash: Content hash of the part.
+        recipe_hash: Hash of its recipe.
         group: Shared by near-duplicates: the name of the first of them.
         split: Side of the split, the same for all of a group.
         rating: From a collected dataset; None before the command ``rate``.
@@ -152,7 +152,7 @@ def read_index() -> Index:
 
 
 def write_index(index: Index) -> None:
-    """Writes the index atomically."""
+    """Write the index atomically."""
     record = {
         "index_version": INDEX_VERSION,
         "parts": {name: asdict(entry) for name, entry in sorted(index.parts.items())},
@@ -196,10 +196,10 @@ def entry_of(name: str) -> Entry:
 
 
 def make_index(entries: Iterable[Entry], failures: Mapping[str, str], before: Index) -> Index:
-    """Makes the index of the usable, distinct parts, with groups, split and ratings.
+    """Make the index of the usable, distinct parts, with groups, split and ratings.
 
     Args:
-        entries: Of all built parts.
+        entries: Entries of all built parts.
         failures: Reason of each part that could not be built.
         before: The previous index; ratings of parts that have not changed are kept.
     """

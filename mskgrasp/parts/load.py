@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 
 def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:
-    """Loads a part; a built-in one is built and a CAD file imported the first time, which takes seconds.
+    """Load a part; a built-in one is built and a CAD file imported the first time, which takes seconds.
 
     A CAD file becomes a part of its name with the density of steel, and replaces an import of that name made
     of another file or with other options; name the part itself to use it as imported.
 
     Args:
         source: Name of a part, a part folder, or an STL, OBJ, PLY, GLB, 3MF or STEP file.
-        unit: Of a CAD file's coordinates; None takes what the format says, and mm where it says nothing.
+        unit: Unit of a CAD file's coordinates; None: that of the format, or mm where it states none.
 
     Raises:
         UnknownPart: There is no such part; the message lists similar names.

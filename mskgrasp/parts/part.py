@@ -22,7 +22,7 @@ class Part:
         name: Unique, also the folder's name; lower case letters, digits, ``-`` and ``_``.
         folder: Holds ``mesh.ply``, ``hulls.glb`` and ``part.json``.
         family: Kind of part, for example ``hex_bolt``.
-        source: Where the dimensions come from, for example ``ISO 4017``.
+        source: Origin of the dimensions, for example ``ISO 4017``.
         licence: SPDX identifier.
         dimensions: Nominal dimensions, metres (counts without a unit are allowed).
         content_hash: Hex digest of mesh, hulls and physical data.

@@ -15,7 +15,7 @@ def random_resting_pose(
     region: Region,
     rng: np.random.RandomState,
 ) -> np.ndarray:
-    """Draws a part's pose on the table, wholly inside the region if it fits.
+    """Draw a part's pose on the table, entirely inside the region if it fits.
 
     Args:
         resting: ``T_table_obj`` of its k resting poses.

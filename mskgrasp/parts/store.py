@@ -33,7 +33,7 @@ _FOLDER_OVERRIDE: ContextVar[Path | None] = ContextVar("folder_override", defaul
 
 @contextmanager
 def kept_in(folder: Path) -> Iterator[None]:
-    """Uses another parts folder within the context."""
+    """Use another parts folder within the context."""
     token = _FOLDER_OVERRIDE.set(folder)
     try:
         yield
@@ -42,7 +42,7 @@ def kept_in(folder: Path) -> Iterator[None]:
 
 
 def parts_folder() -> Path:
-    """Where parts are kept: ``$XDG_CACHE_HOME/mskgrasp/parts`` or ``~/.cache/mskgrasp/parts``."""
+    """Folder of the stored parts: ``$XDG_CACHE_HOME/mskgrasp/parts`` or ``~/.cache/mskgrasp/parts``."""
     override = _FOLDER_OVERRIDE.get()
     if override is not None:
         return override
@@ -66,7 +66,7 @@ def content_hash(mesh: bytes, hulls: bytes, record: dict[str, Any]) -> str:
 
 
 def write_part(name: str, mesh: bytes, hulls: bytes, record: dict[str, Any]) -> Part:
-    """Writes a part to the parts folder under its name, replacing another part of that name.
+    """Write a part to the parts folder under its name, replacing another part of that name.
 
     The files are written to a temporary folder that is renamed at the end. Where another process was faster
     and its part has the same recipe, that part is kept.
@@ -83,7 +83,7 @@ def pack_part(part: Part) -> dict[str, bytes]:
 
 
 def receive_part(name: str, digest: str, contents: Mapping[str, bytes]) -> Part:
-    """Stores the files of a part that another machine sent.
+    """Store the files of a part that another machine sent.
 
     They are written to the folder ``received`` beside the parts folder, under the part's name and hash: a
     part of the same name on this machine is not touched.
@@ -129,7 +129,7 @@ def _put(root: Path, name: str, contents: Mapping[str, bytes], recipe: str) -> P
 
 
 def read_part(folder: Path | str) -> Part:
-    """Reads a part folder.
+    """Read a part folder.
 
     Raises:
         BadPart: A file is missing, damaged, of another schema version, or a link out of the folder.
@@ -162,7 +162,7 @@ def recipe_hash(folder: Path) -> str | None:
 
 
 def read_record(folder: Path) -> dict[str, Any]:
-    """All of ``part.json``, with what Part leaves out (``hull_error_p95``, ``hull_volume_ratio``, ...)."""
+    """All of ``part.json``, with fields that Part lacks (``hull_error_p95``, ``hull_volume_ratio``, ...)."""
     return _record(folder, _read(folder, "part.json"))
 
 

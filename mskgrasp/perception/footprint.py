@@ -61,7 +61,7 @@ def seen_footprint(
     """Detect the footprint of the part in a frame.
 
     Args:
-        frame: Of the part on the table.
+        frame: Frame of the part on the table.
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
         min_height: Least height of a part above the table, metres.

@@ -15,7 +15,7 @@ from mskgrasp.core.geometry import Array, Pose, quat_to_matrix
 from mskgrasp.core.grasp import PartView
 
 REGION_MARGIN = 0.05
-"""How far a part in the region may reach beyond it, metres."""
+"""Greatest reach of a part in the region beyond it, metres."""
 MOST_RAISED = 0.4
 """Share of the region's pixels that a part may cover: 15 cm of 34 cm, squared, are 20 %."""
 ALONE = 0.2
@@ -25,7 +25,7 @@ MIN_PIXELS = 5
 QUIET = 0.0003
 """Deviation of the heights above which an image is noisy, metres; one stored in 0.1 mm has up to 0.03."""
 _PLAUSIBLE_DEPTH = 20.0
-"""Metres; a camera above a table is never that far away, a depth in millimetres always is."""
+"""Greatest plausible depth, metres: a depth in millimetres always exceeds it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class FoundPart:
     Attributes:
         depth: (h, w) metres, NaN where invalid.
         mask: (h, w) bool.
-        points_base: (3, h, w) x, y, z of what every pixel sees, base frame, metres, NaN where invalid.
+        points_base: (3, h, w) x, y, z of the surface at every pixel, base frame, metres, NaN where invalid.
         heights: (h, w) above the measured table, metres, NaN where invalid; of a noisy image the median
             of 3 x 3 pixels, twice.
         table_offset: Measured height of the table relative to ``table_z``, metres; 0 in an exact image.

@@ -14,7 +14,7 @@ A part of your own: python -m mskgrasp.plan --part my_bracket.stl"""
 
 
 def main() -> int:
-    """Parses, plans, reports."""
+    """Parse, plan, report."""
     with ctrl_c_deferred():
         from mskgrasp.plan.config import PlanConfig
         from mskgrasp.plan.run import describe, plan_grasp

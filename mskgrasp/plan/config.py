@@ -25,8 +25,8 @@ class PlanConfig(Config):
     part: str | None = None
     """Place this part (a name, a folder or a CAD file) on the table first; the cell needs a feeder."""
     unit: Unit | None = None
-    """Of a CAD file's coordinates, where the format does not say; mm if not given."""
+    """Unit of a CAD file's coordinates, where the format states none; mm if not given."""
     seed: int = Field(default=0, ge=0)
     """Determines the candidates, and the place of --part."""
     planner: PlannerConfig = PlannerConfig()
-    """How the grasp is chosen."""
+    """Settings of the choice of the grasp."""

@@ -35,7 +35,7 @@ def describe(plan: GraspPlan) -> str:
 
 
 def plan_grasp(config: PlanConfig) -> GraspPlan:
-    """Plans one grasp of the part on the cell's table and writes plan.json and plan.png.
+    """Plan one grasp of the part on the cell's table and write plan.json and plan.png.
 
     Raises:
         MskgraspError: The cell, the part or the model cannot be used, or no grasp was found.

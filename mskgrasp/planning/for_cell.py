@@ -47,7 +47,7 @@ def present(cell: Cell, part: str, seed: int) -> None:
 def part_name(text: str, unit: Unit | None = None) -> str:
     """Resolve a user's name, folder or CAD file to a part's name or folder; a CAD file is imported first.
 
-    The name of a shipped example stands for that file where the current folder has no such file.
+    The name of a shipped example refers to that file where the current folder has no such file.
 
     Raises:
         BadPart: The file cannot be imported as one part.

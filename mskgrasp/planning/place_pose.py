@@ -22,7 +22,7 @@ class Target:
     """Target position and rotation of a part.
 
     Attributes:
-        x: Of the part's centre, base frame, metres.
+        x: x of the part's centre, base frame, metres.
         y: The same.
         theta: Rotation of the part about the vertical from its initial pose, radians.
     """
@@ -42,10 +42,10 @@ def place_pose(
     part rotated by phi - theta + dtheta from its initial pose; both are solved for p and phi.
 
     Args:
-        grasp: At which the part was grasped, base frame.
+        grasp: Grasp of the part, base frame.
         displacement: (4,) of the centre, in the grasp frame; zeros place without correction.
         centre_base: (3,) the part's centre before the grasp, base frame, metres.
-        target: Of the part's centre.
+        target: Target of the part's centre.
         table_z: Height of the table, metres.
 
     Returns:

@@ -18,7 +18,7 @@ from mskgrasp.planning.scoring import Scene
 
 _STEP = 0.002
 _LEAST_STD = np.array([0.0005, 0.0005, 0.0005, 0.01])
-"""Metres and radians: the elite may be a single grasp."""
+"""Least standard deviations, metres and radians: the elite may be a single grasp."""
 
 
 def fingers_free(scene: Scene, grasps: np.ndarray) -> np.ndarray:

@@ -12,11 +12,11 @@ from mskgrasp.runtime.console_table import print_table, report_console
 
 
 def print_sections(sections: Sequence[Section], console: Console | None = None) -> None:
-    """Prints the text and the tables of the sections that are not for the page only.
+    """Print the text and the tables of the sections that are not for the page only.
 
     Args:
         sections: In their order; one without text and tables is left out.
-        console: Where to; None: `report_console`.
+        console: Console to print on; None: `report_console`.
     """
     console = console or report_console()
     for section in sections:

@@ -91,7 +91,7 @@ def draw_jaw(
 
 
 def _arrow(axes: Axes, start: np.ndarray, shift: np.ndarray, width: float = 1.8, head: float = 11) -> None:
-    # An annotation, because its head keeps its size on paper whatever the length.
+    # An annotation, because its head keeps its size on paper at any length.
     axes.annotate(
         "",
         xy=tuple(start + shift),
@@ -128,7 +128,7 @@ def draw_plan(
     measured: np.ndarray | None = None,
     note: str = "",
 ) -> None:
-    """Draws a plan: the part, candidates by quality, the best few, the chosen grasp and the expected shift.
+    """Draw a plan: the part, candidates by quality, the best few, the chosen grasp and the expected shift.
 
     Left, the base frame from above, right, the grasp frame; both in millimetres and to scale.
 
@@ -261,7 +261,7 @@ def _draw_shift(axes: Axes, start: np.ndarray, shift: np.ndarray, covariance: np
 def _outline(
     axes: Axes, heights: np.ndarray, origin: np.ndarray, side: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[float]]:
-    """Draws the part's outline; returns x and y (mm), the height of each pixel and the outline's height."""
+    """Draw the part's outline; return x and y (mm), the height of each pixel and the outline's height."""
     n = heights.shape[0]
     pixel = (np.arange(n) - (n - 1) / 2) * (side * _MM / n)
     x, y = np.meshgrid(origin[0] + pixel, origin[1] - pixel)
@@ -320,7 +320,7 @@ def _inset(
 def draw_contact_sheet(
     rows: Sequence[tuple[Attempts, ShardInfo, int]], path: Path, *, title: str = "Grasp attempts"
 ) -> None:
-    """Draws attempts from above: the hand, and the displacement of a held part.
+    """Draw attempts from above: the hand, and the displacement of a held part.
 
     Args:
         rows: Attempts, their shard's information, and the row to draw.

@@ -23,13 +23,13 @@ _KINDS = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 def write_html(
     path: Path, *, title: str, conclusion: str, sections: Sequence[Section], command: str | None = None
 ) -> None:
-    """Writes a report as one file, with the date and the command under the conclusion.
+    """Write a report as one file, with the date and the command under the conclusion.
 
     Titles, texts and cells are text, never markup.
 
     Args:
         path: The file, ``report.html``.
-        title: Of the report.
+        title: Title of the report.
         conclusion: Its result in one sentence.
         sections: In their order; empty ones are left out.
         command: The command that made it; None: that of this process.

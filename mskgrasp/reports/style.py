@@ -37,7 +37,7 @@ def saved_figure(path: Path, width: float, height: float) -> Iterator[Figure]:
     """A figure in the shared style, saved when the block ends without an error.
 
     Args:
-        path: Of the picture; its suffix chooses the format.
+        path: Path of the picture; its suffix chooses the format.
         width: Inches.
         height: Inches.
     """

@@ -13,7 +13,7 @@ from mskgrasp.runtime.ctrl_c import repeat_dropped_ctrl_c
 
 
 def make_folder(path: Path) -> None:
-    """Makes an output folder.
+    """Make an output folder.
 
     Raises:
         UsageError: A file is in the way, or the place is not writable.
@@ -28,14 +28,14 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def explain_os_error(error: OSError) -> str:
-    """Explains an error in one line with the path and the remedy."""
+    """Explain an error in one line with the path and the remedy."""
     place = f": {error.filename}" if error.filename else ""
     remedy = "free some space, what is finished is kept" if error.errno in _FULL else "choose another path"
     return f"{error.strerror or error}{place}; {remedy}"
 
 
 def run(program: str, main: Callable[[], int | None]) -> None:
-    """Runs a program's ``main`` and ends the process: 0, 1 failure, 2 usage, 130 Ctrl-C.
+    """Run a program's ``main`` and end the process: 0, 1 failure, 2 usage, 130 Ctrl-C.
 
     An error that a user can repair becomes one line on standard error; anything else is a defect and
     keeps its traceback.

@@ -39,7 +39,7 @@ class Table:
 
     Attributes:
         header: (k,) names of the columns; all empty: no header is shown.
-        rows: Of k cells each: text, numbers, `Link` or None.
+        rows: Rows of k cells each: text, numbers, `Link` or None.
         caption: Shown above it; empty: none.
         total: The last row sums up the others.
 
@@ -76,11 +76,11 @@ def report_console() -> Console:
 
 
 def print_table(table: Table, console: Console | None = None) -> None:
-    """Prints one table without its caption; `rich.text.Text` in a cell keeps its style.
+    """Print one table without its caption; `rich.text.Text` in a cell keeps its style.
 
     Args:
         table: The table.
-        console: Where to; None: `report_console`.
+        console: Console to print on; None: `report_console`.
     """
     console = console or report_console()
     shown = _console_table(table)

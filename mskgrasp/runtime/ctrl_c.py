@@ -13,7 +13,7 @@ from typing import Any
 
 @contextmanager
 def ctrl_c_deferred() -> Iterator[None]:
-    """Ctrl-C takes effect at the end of the block.
+    """Defer the effect of Ctrl-C to the end of the block.
 
     For imports: a library whose import is interrupted may swallow the exception, and continue without what
     it was importing.

@@ -1,4 +1,4 @@
-"""Executors: what does jobs for a worker pool, and the events by which it reports on them."""
+"""Interface of executors, which do the jobs of a worker pool and report on them by events."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from typing import Any, Protocol, TypeVar
 from mskgrasp.core.errors import MskgraspError
 
 MAX_TRIES = 3
-"""How many processes may die of a job."""
+"""Greatest number of processes that may die with a job."""
 MAX_NODES = 10
-"""How many nodes of a cluster may be lost with a job, which is hardly the job's fault."""
+"""Greatest number of cluster nodes that may be lost with a job, which is rarely the job's fault."""
 
 Settings = TypeVar("Settings")
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 WorkerContext = Callable[[Settings], AbstractContextManager[Callable[[Job], Iterator[Result]]]]
-"""Sets up what a worker needs, a cell and a planner, and gives the function that does a job."""
+"""Context that sets up a worker, such as its cell and planner, and gives the function that does a job."""
 
 
 class WorkerFailed(MskgraspError):
@@ -27,7 +27,7 @@ class WorkerFailed(MskgraspError):
 
 
 class Loss(enum.Enum):
-    """What was lost together with a job, and how many of them one job may cost."""
+    """Kind of machine or process lost with a job; the value is the greatest number that one job may cost."""
 
     PROCESS = MAX_TRIES
     NODE = MAX_NODES
@@ -63,18 +63,18 @@ class Died:
 
 
 class Executor(Protocol):
-    """Workers that do one job each at a time; it neither retries nor names anything."""
+    """Group of workers that do one job each at a time; retries and names are left to the pool."""
 
     def n_slots(self) -> int:
-        """How many jobs it accepts at once; may change with time."""
+        """Number of jobs that it accepts at once; may change with time."""
         ...
 
     def submit(self, number: int, job: Any) -> None:
-        """Starts a job; `events` refer to it by its number."""
+        """Start a job; `events` refer to it by its number."""
         ...
 
     def events(self) -> Iterator[Delivered | Completed | Died]:
-        """Waits for a moment, and yields what has happened; nothing is submitted meanwhile.
+        """Wait for a moment, and yield what has happened; nothing is submitted meanwhile.
 
         Raises:
             WorkerFailed: A job failed for a reason that trying again does not remove.
@@ -82,5 +82,5 @@ class Executor(Protocol):
         ...
 
     def close(self) -> None:
-        """Ends all jobs and the executor's own processes."""
+        """End all jobs and the executor's own processes."""
         ...

@@ -26,7 +26,7 @@ class _Worker:
     process: Any
     connection: Connection
     number: int | None = None
-    """Of its job."""
+    """Number of its job; None while it is idle."""
 
 
 class LocalExecutor:
@@ -35,7 +35,7 @@ class LocalExecutor:
     Args:
         context: See `worker_pool.Work`, as for the others.
         settings: Argument of `context`.
-        n_workers: How many processes.
+        n_workers: Greatest number of processes.
         lost_by: Errors with which a process counts as dead.
     """
 
@@ -54,11 +54,11 @@ class LocalExecutor:
         self._workers: list[_Worker] = []
 
     def n_slots(self) -> int:
-        """As many as there may be processes."""
+        """Greatest number of processes."""
         return self._n_workers
 
     def submit(self, number: int, job: Any) -> None:
-        """Sends a job to an idle process, or to a new one."""
+        """Send a job to an idle process, or to a new one."""
         idle = next((worker for worker in self._workers if worker.number is None), None)
         worker = idle or self._start()
         worker.number = number
@@ -68,7 +68,7 @@ class LocalExecutor:
             pass  # it has just died; reading from it reports that
 
     def events(self) -> Iterator[Delivered | Completed | Died]:
-        """Waits up to a second for a message of any process.
+        """Wait up to a second for a message of any process.
 
         Raises:
             WorkerFailed: A process reports an error.
@@ -93,7 +93,7 @@ class LocalExecutor:
                 yield Died(number, pid, reason=value)
 
     def close(self) -> None:
-        """Ends all processes."""
+        """End all processes."""
         _end(self._workers)
         self._workers.clear()
 
@@ -133,7 +133,7 @@ def _serve(
     settings: Any,
     lost_by: tuple[type[Exception], ...],
 ) -> None:
-    """A worker process: receives jobs one by one and sends their results."""
+    """Serve in a worker process: receive jobs one by one and send their results."""
     ignore_ctrl_c()
     leave_with_parent()
     try:

@@ -24,10 +24,10 @@ def parse_arguments(
     also_legal: Sequence[str] = (),
     **settings: Any,
 ) -> Any:
-    """Parses arguments into an instance of a type.
+    """Parse arguments into an instance of a type.
 
     Args:
-        kind: What tyro makes: a configuration, or a union of subcommands.
+        kind: Type that tyro makes: a configuration, or a union of subcommands.
         arguments: The command line without the program's name.
         prog: The command that starts the program.
         options_of: Type whose fields are suggested for an unknown option; ``kind`` by default.

@@ -32,12 +32,12 @@ def parse(
     default_config: Path | None = None,
     argv: Sequence[str] | None = None,
 ) -> ConfigT:
-    """Builds a program's configuration from defaults, ``--config FILE`` and the other options, in this order.
+    """Build a program's configuration from defaults, ``--config FILE`` and the other options, in this order.
 
     Args:
         model: The pydantic model; each of its fields becomes an option, its docstrings the help.
         prog: The command that starts the program, for ``--help``.
-        description: What the program does, for ``--help``.
+        description: Purpose of the program, for ``--help``.
         default_config: The YAML file used where the user gives no ``--config``.
         argv: The arguments; the process's own by default.
 
@@ -49,7 +49,7 @@ def parse(
     path = path or default_config
     default = read_config(model, path) if path is not None else None
     note = f" Settings come from --config FILE (default: {default_config}); options override it."
-    # Without a file there may be required options: tyro asks for them.
+    # Without a file there may be required options: tyro demands them.
     known: dict[str, Any] = {} if default is None else {"default": default}
     description += note if default_config else ""
     parsed = parse_arguments(
@@ -62,7 +62,7 @@ def parse(
 def parse_command(
     commands: Mapping[str, type[CommandT]], *, prog: str, description: str, argv: Sequence[str] | None = None
 ) -> CommandT:
-    """Reads a command and its options.
+    """Read a command and its options.
 
     Args:
         commands: Dataclasses by the command's name; each field is an option, the docstrings are the help.
@@ -85,7 +85,7 @@ def parse_command(
 
 
 def _take_config_option(arguments: list[str]) -> tuple[list[str], Path | None]:
-    """Splits ``--config FILE`` off: tyro takes its defaults, which the file holds, before it parses."""
+    """Split ``--config FILE`` off: tyro takes its defaults, which the file holds, before it parses."""
     option = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     option.add_argument("--config", type=Path)
     try:
@@ -100,7 +100,7 @@ _registry = ConstructorRegistry()
 
 @_registry.struct_rule
 def _without_validation(info: StructTypeInfo) -> StructConstructorSpec | None:
-    """Has tyro fill models without validating them: it would print pydantic's errors in its own words."""
+    """Have tyro fill models without validating them: it would print pydantic's errors in its own words."""
     if _registry in info.markers or not (isinstance(info.type, type) and issubclass(info.type, BaseModel)):
         return None
     # The marker ends the recursion: tyro's own rule gives the fields.

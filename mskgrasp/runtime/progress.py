@@ -45,7 +45,7 @@ def progress(
 
     Args:
         items: Iterated over by the bar; None: the caller calls ``update``.
-        unit: What is counted, singular.
+        unit: Name of the counted unit, singular.
         total: Number of units, those done before included; None: the length of ``items``.
         done: Units that an earlier run finished; the bar starts there.
         title: Text before the bar.
@@ -71,11 +71,11 @@ def progress(
 
 
 def advance_to(bar: Bar, done: int, total: int) -> None:
-    """Moves a bar to ``done`` of ``total``, which may only now be known."""
+    """Move a bar to ``done`` of ``total``, which may only now be known."""
     bar.total = total
     bar.update(done - bar.n)
 
 
 def note(message: str, stream: TextIO | None = None) -> None:
-    """Writes a line above any bar, to standard error or the given stream."""
+    """Write a line above any bar, to standard error or the given stream."""
     Bar.write(message, file=sys.stderr if stream is None else stream)

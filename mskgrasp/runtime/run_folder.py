@@ -31,7 +31,7 @@ def opened_run(
     scene_version: int,
     may_change: Collection[str],
 ) -> Iterator[None]:
-    """Opens the folder of a run, locked until the end of the block.
+    """Open the folder of a run, locked until the end of the block.
 
     The folder is new, or of a run that was started with the same settings, inputs and scenes.
 
@@ -39,7 +39,7 @@ def opened_run(
         config: Settings of the run.
         out: The folder.
         inputs: Digests of the files and parts that the results depend on, by their names in messages.
-        scene_version: Version of the formula that draws the scenes from the seed; a folder without one has 1.
+        scene_version: Version of the formula that draws the scenes from the seed; 1 for a folder without one.
         may_change: Names of settings that may differ when a run is resumed.
 
     Raises:
@@ -110,18 +110,18 @@ def file_digest(path: Path) -> str:
 
 
 def append_trial(path: Path, values: Mapping[str, Any]) -> None:
-    """Appends a line to a file of trials; NaN is refused, since JSON has none."""
+    """Append a line to a file of trials; NaN is refused, since JSON has none."""
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(values, allow_nan=False) + "\n")
 
 
 def rewrite_trials(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
-    """Replaces a file of trials atomically."""
+    """Replace a file of trials atomically."""
     write_whole(path, "".join(json.dumps(one, allow_nan=False) + "\n" for one in lines).encode())
 
 
 def read_trials(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
-    """Reads the stored trials in order; removes an incomplete last line, which a killed run leaves.
+    """Read the stored trials in order; remove an incomplete last line, which a killed run leaves.
 
     Raises:
         BadDataset: A line of the file is not a trial.

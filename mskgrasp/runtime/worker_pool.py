@@ -1,4 +1,4 @@
-"""Jobs distributed over worker processes, with retries and one stream of events, whatever executes them.
+"""Jobs distributed over worker processes by any executor, with retries and one stream of events.
 
 A worker that dies takes nothing with it: the results it has not delivered are computed by a fresh one.
 """
@@ -66,7 +66,7 @@ class JobLost(Generic[Job]):
 
 @dataclass(frozen=True)
 class Work(Generic[Settings, Job, Result]):
-    """What every worker does, and what becomes of a job whose worker dies."""
+    """Set-up of a pool's workers, names of its jobs, and retries of a job whose worker dies."""
 
     context: WorkerContext[Settings, Job, Result]
     """A function of a module; a spawned process imports it."""
@@ -75,19 +75,19 @@ class Work(Generic[Settings, Job, Result]):
     name: Callable[[Job], str] = str
     """The job's name in messages."""
     rest: Callable[[Job, int], Job | None] = unless_delivered
-    """What remains of a job after so many results, when its worker has died; None: nothing.
+    """Remainder of a job for a new worker, given the number of delivered results; None: nothing remains.
 
-    A job of several results needs another than the default.
+    A job of several results needs another function than the default.
     """
     remedy: str = REMEDY
-    """What the user can do about a job that cost too many workers."""
+    """Remedy in the message about a job that cost too many workers."""
     lost_by: tuple[type[Exception], ...] = ()
     """Errors that a fresh process may be free of: a worker that raises one counts as dead."""
 
 
 @dataclass
 class _Running:
-    """A job on its way, and what it has cost so far."""
+    """A running job, and the processes and nodes that it has cost so far."""
 
     job: Any
     n_results: int = 0
@@ -102,13 +102,13 @@ def run_jobs(
     rest: Callable[[Job, int], Job | None] = whole,
     remedy: str = REMEDY,
 ) -> Generator[JobResult[Job, Any] | JobDone[Job] | JobLost[Job], None, None]:
-    """Does jobs on an executor, and closes it at the end; closing the iterator stops all jobs.
+    """Run jobs on an executor, and close it at the end; closing the iterator stops all jobs.
 
-    Which worker does which job is left to chance: a job's results must depend on the job alone.
+    Jobs go to the workers in no fixed order: a job's results must depend on the job alone.
 
     Args:
         jobs: In the order in which they are started; pickled, as are their results.
-        executor: Does them.
+        executor: Executor of the jobs.
         name: See `Work`.
         rest: See `Work`.
         remedy: See `Work`.
@@ -155,8 +155,8 @@ def results(
 ) -> Generator[Result, None, None]:
     """Results of jobs done by processes of this machine, with a line on stderr where a process was lost.
 
-    With one worker, or one job, the jobs are done in this process, and whatever they raise is raised here,
-    unless `apart` asks for processes of their own.
+    With one worker, or one job, the jobs are done in this process, and any error is raised here,
+    unless `apart` requests separate processes.
     """
     if not jobs:
         return

@@ -1,4 +1,4 @@
-"""Set-up of worker processes: one core each, no Ctrl-C, no life beyond that of their parent."""
+"""Set-up of worker processes: one core each, no Ctrl-C, an end with their parent."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
 @contextmanager
 def one_thread_a_process() -> Iterator[None]:
-    """Limits numerical libraries to one thread in processes started meanwhile: one process a core is best."""
+    """Limit numerical libraries to one thread in processes started meanwhile: one process a core is best."""
     before = os.environ.get("OMP_NUM_THREADS")
     os.environ["OMP_NUM_THREADS"] = "1"
     try:
@@ -32,7 +32,7 @@ def one_thread_a_process() -> Iterator[None]:
 
 @contextmanager
 def out_of_reach_of_ctrl_c() -> Iterator[None]:
-    """Keeps Ctrl-C from processes started in the block; this process receives it at the end of the block.
+    """Keep Ctrl-C from processes started in the block; this process receives it at the end of the block.
 
     A terminal sends it to all of them, but which work ends is this process's decision. They inherit a
     blocked signal until they ignore it themselves, by `ignore_ctrl_c`: until then they import, and would
@@ -49,13 +49,13 @@ def out_of_reach_of_ctrl_c() -> Iterator[None]:
 
 
 def ignore_ctrl_c() -> None:
-    """Makes this worker process, and what it starts, ignore Ctrl-C."""
+    """Make this worker process, and what it starts, ignore Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def leave_with_parent() -> None:
-    """Ends this process soon after its parent has ended, for whatever reason."""
+    """End this process soon after its parent has ended, for whatever reason."""
     # Not getppid() alone: the parent may have died while this process started.
     born_of = multiprocessing.parent_process()
     parent = os.getppid() if born_of is None else born_of.pid
@@ -69,7 +69,7 @@ def leave_with_parent() -> None:
 
 
 def use_one_core() -> None:
-    """Limits torch and the software renderer to one thread each in this process."""
+    """Limit torch and the software renderer to one thread each in this process."""
     os.environ.setdefault("LP_NUM_THREADS", "1")
     os.environ["OMP_NUM_THREADS"] = "1"  # torch reads it when it is loaded
     if "torch" in sys.modules:

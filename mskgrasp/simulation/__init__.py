@@ -1,1 +1,1 @@
-"""Shards of simulated grasp attempts, their description, and the versions of what makes them."""
+"""Shards of simulated grasp attempts, their description, and the versions that determine them."""

@@ -29,7 +29,7 @@ FIELDS = (
     "pose_base_obj", "pose_tcp_obj_before", "pose_tcp_obj_after",
 )  # fmt: skip
 MOST_REDRAWS = 4
-"""An attempt whose part was not at rest is drawn again so often at most."""
+"""Greatest number of times that an attempt whose part was not at rest is drawn again."""
 
 
 class Simulator:
@@ -42,7 +42,7 @@ class Simulator:
         self._env: gymnasium.Env | None = None
 
     def load(self, folder: str) -> GraspDisplacementEnv:
-        """Builds a fresh scene with the part, free of state that earlier shards left in PhysX."""
+        """Build a fresh scene with the part, free of state that earlier shards left in PhysX."""
         if self._env is None:
             self._env = gymnasium.make(
                 "GraspDisplacement-v1",
@@ -64,15 +64,15 @@ class Simulator:
         return env
 
     def write(self, task: ShardTask, dataset: Path) -> Iterator[int]:
-        """Makes a shard and writes it into a dataset's folder; yields as `run`."""
+        """Make a shard and write it into a dataset's folder; yield as `run`."""
         attempts, info = yield from self.run(task)
         write_shard(shard_path(dataset, task.part, task.index), attempts, info)
 
     def run(self, task: ShardTask) -> Generator[int, None, tuple[Attempts, ShardInfo]]:
-        """Makes the attempts of a shard and returns them.
+        """Make the attempts of a shard and return them.
 
         Yields:
-            After each 1 for a success, 0 for a failure and -1 for a discarded one.
+            1 after each success, 0 after a failure and -1 after a discarded attempt.
         """
         env = self.load(task.folder)
         part = env.parts[0]
@@ -115,7 +115,7 @@ class Simulator:
         return attempts, info
 
     def close(self) -> None:
-        """Frees the simulation."""
+        """Free the simulation."""
         if self._env is not None:
             self._env.close()
 
@@ -123,7 +123,7 @@ class Simulator:
 def _try(
     env: GraspDisplacementEnv, task: ShardTask, attempt: int, draw: int
 ) -> tuple[dict[str, np.ndarray], str]:
-    """One attempt as a row of the shard, and why it cannot be one; empty where it can."""
+    """One attempt as a row of the shard, and the reason why it is not one; empty where it is."""
     depth, grasp = draw_attempt(env, task.part, task.seed, attempt, draw)
     if grasp is None:
         return {}, "part_not_seen"
@@ -135,14 +135,14 @@ def _try(
 def draw_attempt(
     env: GraspDisplacementEnv, part: str, seed: int, attempt: int, draw: int = 0
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Places the part as determined by seed and attempt number, takes a depth image and draws a grasp.
+    """Place the part as determined by seed and attempt number, take a depth image and draw a grasp.
 
     Args:
         env: Holds the part.
-        part: Its name.
-        seed: Of the run.
+        part: Name of the part.
+        seed: Seed of the run.
         attempt: Number of the attempt among those of the part.
-        draw: How often the attempt was drawn before, with a part that was not at rest.
+        draw: Number of times that the attempt was drawn before, with a part that was not at rest.
 
     Returns:
         The depth image (h, w), uint16 in 0.1 mm, and the grasp (1, 4), float32, base frame; None where the
@@ -165,7 +165,7 @@ def draw_attempt(
 
 
 def discard_reason(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> str:
-    """Why an attempt is no label; empty where it is one."""
+    """Reason why an attempt is not a label; empty where it is one."""
     if not bool(outcome["executable"][0]):
         return "unreachable"
     if not bool(outcome["settled"][0]):

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class ShardTask:
-    """Which attempts to make: `n` of them on a part, from number `first` on.
+    """Attempts to make: `n` of them on a part, from number `first` on.
 
     Attributes:
         part: The part's name.
         folder: The part's folder.
-        index: Of the shard among those of the part.
+        index: Number of the shard among those of the part.
         first: Number of the first attempt.
         n: Number of attempts.
-        seed: Of the run; with the part's name and an attempt's number it determines the attempt.
+        seed: Seed of the run; with the part's name and an attempt's number it determines the attempt.
     """
 
     part: str

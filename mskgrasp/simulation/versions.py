@@ -1,4 +1,4 @@
-"""Versions of what makes simulated data: the simulation's own, and those of its libraries."""
+"""Versions of the simulation and of the libraries that simulated data depend on."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _FIRST_SIMULATION = "38dc7f58aea7bdfa"
 
 
 def versions() -> dict[str, str]:
-    """Versions of what makes the data."""
+    """Versions of the simulation and of the libraries that the data depend on."""
     packages = ("sapien", "mani_skill", "torch", "numpy")
     found = {name: importlib.metadata.version(name) for name in packages}
     return dict(
@@ -27,7 +27,7 @@ def versions() -> dict[str, str]:
 
 
 def other_versions(found: dict[str, str]) -> str:
-    """How versions differ from those of this machine, in words; empty where they do not."""
+    """Differences of versions from those of this machine, in words; empty where there are none."""
     own = versions()
     if found.get("simulation") == _FIRST_SIMULATION:
         found = found | {"simulation": "1"}

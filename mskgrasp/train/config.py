@@ -25,6 +25,6 @@ class TrainConfig(LearningConfig):
     out: Path | None = None
     """The model's folder. A run that was interrupted resumes when it is started again in the same way."""
     epochs: int | None = Field(default=None, ge=1)
-    """Of each network, in place of gqn.epochs and gdn.epochs."""
+    """Epochs of each network, in place of gqn.epochs and gdn.epochs."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """auto: a CUDA device where there is one."""

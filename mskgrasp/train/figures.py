@@ -29,12 +29,12 @@ _MM = 1e3
 
 
 def draw_uncertainty(models: Models, samples: Samples, rows: torch.Tensor, path: Path) -> None:
-    """Draws reliability, coverage, sparsification and error over deviation on some rows.
+    """Draw reliability, coverage, sparsification and error over deviation on some rows.
 
     Args:
         models: Networks that predict a variance.
         samples: The dataset.
-        rows: Of held-out parts, successes among them.
+        rows: Rows of held-out parts, successes among them.
         path: The picture, PNG.
     """
     held = rows[samples.success[rows]]
@@ -103,7 +103,7 @@ def _error_over_deviation(axes: Axes, shift: np.ndarray, turn: np.ndarray, varia
 
 
 def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Path) -> None:
-    """Draws losses and validation metrics by epoch, beside trivial predictors.
+    """Draw losses and validation metrics by epoch, beside trivial predictors.
 
     Args:
         history: One row an epoch, as `mskgrasp.learning.trainer.train` returns them.

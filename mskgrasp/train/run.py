@@ -57,7 +57,7 @@ class _ProgressBar(Reporter):
         note(f"{self._name} {row['epoch']:3d}/{self._epochs}  {_line(row)}", sys.stdout)
 
     def close(self) -> None:
-        """Ends the bar."""
+        """End the bar."""
         if self._bar is not None:
             self._bar.close()
 

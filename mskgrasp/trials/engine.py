@@ -48,7 +48,7 @@ class PlannedGrasp:
         frame: The part at rest before the grasp.
         plan: None where no grasp was found.
         reason: Name of the error where no grasp was found; else empty.
-        no_tape: Why the part carries no tape although tape measures; else empty.
+        no_tape: Reason why the part carries no tape although tape measures; else empty.
     """
 
     frame: RgbdFrame
@@ -62,7 +62,7 @@ class ExecutedGrasp:
     """Outcome of an executed grasp.
 
     Attributes:
-        reason: Why the part was not lifted and held; empty where it was.
+        reason: Reason why the part was not lifted and held; empty where it was.
         result: Measurements of the arm; None where it refused the grasp before moving.
         before: ``T_base_obj`` before the grasp; None without a tracker.
         displacement: (4,) object displacement; None where the grasp failed or without a tracker.
@@ -77,7 +77,7 @@ class ExecutedGrasp:
 
     @property
     def aborted(self) -> str:
-        """Why the arm was stopped and must be recovered; empty where it was not."""
+        """Reason why the arm was stopped and must be recovered; empty where it was not."""
         return "" if self.result is None else self.result.aborted or ""
 
     def displacement_of_centre(self, plan: GraspPlan) -> np.ndarray | None:

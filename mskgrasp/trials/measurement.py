@@ -26,7 +26,7 @@ class TrialRecord:
         plan: None where no grasp was found.
         after: The part put down again, where it was captured to measure tape.
         in_hand: The hand still holds the part.
-        aborted: Why the arm was stopped and must be recovered; empty where it was not.
+        aborted: Reason why the arm was stopped and must be recovered; empty where it was not.
     """
 
     trial: Trial

@@ -37,7 +37,7 @@ class Trial:
         seed: Seed of the scene: determines the part's placement and the candidates.
         success: The part was lifted and held, judged by the gap of the fingers and, with a tracker, by the
             part's rise; contact and penetration are not measured.
-        reason: Why not; empty where it was.
+        reason: Reason why it was not; empty where it was.
         grasp: (4,) the executed grasp; None, as the plan's other values, where no grasp was found.
         quality: Predicted probability of success.
         point_base: (3,) the point of the part before the grasp whose displacement is predicted and measured,
@@ -52,7 +52,7 @@ class Trial:
         family: Family of the part.
         policy: Policy of the planner.
         chosen_by: Label of the model whose variances chose the grasp; empty for the run's own model.
-        unmeasured: Why a success was not measured; empty where it was.
+        unmeasured: Reason why a success was not measured; empty where it was.
         true: (4,) where markers measure, the displacement by the tracker; None without one.
         pose_base_obj: (7,) x y z qw qx qy qz of the part before the grasp; None without a tracker.
         predictions: Predictions of the compared models for this grasp, by label.

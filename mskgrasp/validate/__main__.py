@@ -14,7 +14,7 @@ Writes validate.json and validate.png; ends with 1 if a check fails or the equiv
 
 
 def main() -> int:
-    """Parses, checks, reports."""
+    """Parse, check, report."""
     with ctrl_c_deferred():
         from mskgrasp.core.shipped import config_file
         from mskgrasp.runtime.options import parse

@@ -1,6 +1,6 @@
 """A part with another density, other hulls or another resting pose.
 
-What labels owe to the model of a part, beside what they owe to the model of the hand.
+Outcomes with such parts show how much labels depend on the model of a part.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FILLED_MM = {"bores open": 0.0, "bores filled": 1e3}
 """Exact pieces, in which bores of plates up to this radius are filled, mm."""
 HULLS = ("exact", *JOINED_MM, *FILLED_MM)
 MAX_LEAN = 0.1
-"""Greatest swing between a start and the resting pose that takes its place, rad."""
+"""Greatest swing between a start and the resting pose that replaces it, rad."""
 
 
 def altered_part(part: Part, folder: Path, *, density: float = 1.0, hulls: str = "") -> Part:
@@ -36,8 +36,8 @@ def altered_part(part: Part, folder: Path, *, density: float = 1.0, hulls: str =
 
     Args:
         part: The original.
-        folder: Where the copy is kept.
-        density: Of the copy, by that of the original.
+        folder: Folder for the copy.
+        density: Density of the copy divided by that of the original.
         hulls: One of `HULLS`; empty: those of the original. A part without a recipe has its own hulls as
             exact pieces.
 
@@ -61,9 +61,9 @@ def altered_part(part: Part, folder: Path, *, density: float = 1.0, hulls: str =
 
 
 def resting_start(start: np.ndarray, rests: Pose) -> np.ndarray:
-    """A start (7,) moved into the resting pose that it leans from least, turned as it is about the vertical.
+    """A start (7,) changed to the nearest resting pose; its turn about the vertical is kept.
 
-    Where the nearest resting pose is more than `MAX_LEAN` away the start is returned as it is.
+    Where the nearest resting pose is more than `MAX_LEAN` away the start is returned unchanged.
 
     Args:
         start: ``T_base_obj`` on the table.

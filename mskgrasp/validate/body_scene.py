@@ -1,4 +1,4 @@
-"""Plain bodies in the very scene that makes the labels: same hand, same table, same settings."""
+"""Plain bodies in the scene that makes the labels: same hand, same table, same settings."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from tasks.scene.frames import base_pose
 ALOFT = 0.25
 """Height at which the hand holds bodies that must not meet the table, m."""
 GRAVITY = 9.81
-"""m/s^2."""
+"""Acceleration of gravity, m/s^2."""
 BLOCK = (0.04, 0.02, 0.03)
 """Edges of the block of most experiments, m."""
 
 
 class Workshop:
-    """Makes part folders of plain bodies.
+    """Maker of part folders of plain bodies.
 
     Args:
-        folder: Where they are kept.
+        folder: Folder for the parts.
     """
 
     def __init__(self, folder: Path):
@@ -101,7 +101,7 @@ class BodyScene:
         self.physics = physics
 
     def close(self) -> None:
-        """Frees the simulation."""
+        """Free the simulation."""
         self._env.close()
 
     def place(
@@ -112,7 +112,7 @@ class BodyScene:
         *,
         fresh: bool = True,
     ) -> None:
-        """Places the part at rest at a pose in the base frame, metres, with the arm at home."""
+        """Place the part at rest at a pose in the base frame, metres, with the arm at home."""
         quat = np.array([1.0, 0, 0, 0]) if quat_wxyz is None else quat_wxyz
         pose = np.array([[*position, *quat]])
         scene = dict(parts=[str(part.folder)], reconfigure=True) if fresh else {}
@@ -137,13 +137,13 @@ class BodyScene:
         return Pose(position=pose.position[0].double().numpy(), quat_wxyz=pose.quat_wxyz[0].double().numpy())
 
     def step(self, seconds: float) -> float:
-        """Advances the simulation; returns the time that it advanced, s."""
+        """Advance the simulation; return the time that it advanced, s."""
         n = self.env.motion.n_steps(seconds)
         self.env.motion.step(n)
         return n / self.env.motion.rate_hz
 
     def push(self, force: list[float], seconds: float) -> float:
-        """Advances the simulation with a constant force (x, y, z), N, on the part's centre of mass."""
+        """Advance the simulation with a constant force (x, y, z), N, on the part's centre of mass."""
         n = self.env.motion.n_steps(seconds)
         for _ in range(n):
             body = self.body
@@ -152,17 +152,17 @@ class BodyScene:
         return n / self.env.motion.rate_hz
 
     def twist(self, torque: list[float], seconds: float) -> None:
-        """Advances the simulation with a constant torque (x, y, z) on the part, N m."""
+        """Advance the simulation with a constant torque (x, y, z) on the part, N m."""
         for _ in range(self.env.motion.n_steps(seconds)):
             self.body.add_force_torque([0.0, 0.0, 0.0], torque)
             self.env.motion.step(1)
 
     def pinch(self, part: Part, along: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
-        """Closes the hand aloft on a weightless part, then gives the part its weight.
+        """Close the raised hand on a weightless part, then give the part its weight.
 
         Args:
-            part: What is held; its axes are those of the base.
-            along: Where its centroid is, seen from the point between the pads, base frame, metres.
+            part: Part to hold; its axes are those of the base.
+            along: Position of its centroid relative to the point between the pads, base frame, metres.
         """
         x, y = self.env.region_centre
         self.place(part, (x + along[0], y + along[1], ALOFT + along[2]))
@@ -175,7 +175,7 @@ class BodyScene:
     def grasp(
         self, part: Part, position: tuple[float, float, float], turn: float = 0.0, *, fresh: bool = True
     ) -> dict[str, np.ndarray]:
-        """Places the part at a pose (turned about z) and grasps the middle of the region at 20 mm."""
+        """Place the part at a pose (turned about z) and grasps the middle of the region at 20 mm."""
         self.place(part, position, np.array([np.cos(turn / 2), 0, 0, np.sin(turn / 2)]), fresh=fresh)
         x, y = self.env.region_centre
         outcome = self.env.attempt.run(torch.tensor([[x, y, 0.02, 0.0]]))

@@ -11,11 +11,11 @@ class Check:
     """One number that the simulation must reproduce.
 
     Attributes:
-        name: What is checked.
-        formula: Where the expected value comes from.
-        unit: Of the three numbers.
-        expected: By the formula.
-        measured: In the simulation.
+        name: Name of the checked quantity.
+        formula: Formula of the expected value.
+        unit: Unit of the values.
+        expected: Value by the formula.
+        measured: Value in the simulation.
         low: Least value that passes.
         high: Greatest value that passes.
     """
@@ -34,7 +34,7 @@ class Check:
         return bool(self.low <= self.measured <= self.high)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Convert to plain values for JSON."""
         return asdict(self) | {"passed": self.passed}
 
 

@@ -16,7 +16,7 @@ EXPERIMENTS = (holding_limit, torsion, wedge, free_fall, sliding, rolling, toppl
 
 
 def run_checks(physics: Physics, report: Callable[[Check], None]) -> list[Check]:
-    """Runs all checks under some settings, and calls ``report`` with each when it is done."""
+    """Run all checks under some settings, and call ``report`` with each when it is done."""
     with tempfile.TemporaryDirectory(prefix="mskgrasp-validate-") as scratch:
         workshop = Workshop(Path(scratch))
         scene = BodyScene(physics, workshop.block())

@@ -25,7 +25,7 @@ class Comparison:
         turn_median: Median difference of the displacements' turns, rad.
         turn_p90: Its 90th percentile, rad.
         bias: Largest mean difference of dx, dy, dz over grasps that succeeded under both, m, without the
-            tenth that differs most either way: what is wrong on the whole, not grasp by grasp.
+            tenth that differs most either way: the systematic error.
         cpu_ms: Processor time of a grasp, ms.
         n: Grasps whose part was at rest under both.
         n_both: Grasps that succeeded under both.
@@ -43,7 +43,7 @@ class Comparison:
     n_both: int
 
     def as_dict(self) -> dict[str, float | None]:
-        """For JSON, which knows no NaN: what is unknown is None."""
+        """Convert to plain values for JSON; unknown values are None, since JSON has no NaN."""
         return {key: value if np.isfinite(value) else None for key, value in asdict(self).items()}
 
     @classmethod

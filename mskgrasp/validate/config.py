@@ -1,4 +1,4 @@
-"""Configuration of a validation: settings under test, parts, references and what is varied."""
+"""Configuration of a validation: settings under test, parts, references and variants."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from mskgrasp.validate.altered_part import HULLS
 Engine = Literal["sapien", "mujoco"]
 
 SHIFT = 1e-5
-"""By how much the starts of a floor are moved, m: less than any camera or arm could resolve."""
+"""Shift of the starts of a floor, m: less than any camera or arm could resolve."""
 CELL_SHIFT = 1e-4
-"""The same for engines that are compared, m: what a Panda repeats (ISO 9283, by its data sheet)."""
+"""The same for engines that are compared, m: the repeatability of a Panda (ISO 9283, data sheet)."""
 ROUNDING = 1e-7
 """The same for the floor of rounding, m: ten float32 numbers at 0.1 m are that far apart."""
 FINGER_MASS = 0.015
-"""Of a finger of the Panda without its motor, kg."""
+"""Mass of a finger of the Panda without its motor, kg."""
 
 NOMINAL, MOVED, NOTHING_SKIPPED = (
     "production",
@@ -40,15 +40,15 @@ RESTS = ("hulls", "mesh")
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """One way to simulate.
+    """Settings of one simulation of the grasps.
 
     Attributes:
-        name: For tables and files.
-        physics: Its values.
-        n: Grasps of each part that are tried.
-        shift: By how much the parts' starts are moved on the table, m: 0 but for the floors.
-        density: Of the parts, by their own.
-        hulls: Of the parts, one of `mskgrasp.validate.altered_part.HULLS`; empty: their own.
+        name: Name in tables and files.
+        physics: Settings of the physics.
+        n: Number of grasps of each part that are tried.
+        shift: Shift of the parts' starts on the table, m; 0 except for the floors.
+        density: Density of the parts divided by their own.
+        hulls: Hulls of the parts, one of `mskgrasp.validate.altered_part.HULLS`; empty: their own.
         rest: The parts start in the resting poses of their "hulls" or of their "mesh".
         ranges: Physics settings drawn for each grasp, uniformly between two bounds.
         engine: Simulator of the attempts.
@@ -80,17 +80,17 @@ class Reference(Config):
 
     @property
     def name(self) -> str:
-        """For tables."""
+        """Name in tables."""
         return setting_name(self.rate_hz, self.position_iterations)
 
 
 class Margins(Config):
-    """Differences that count as none, stated before anything is measured."""
+    """Differences that count as zero, fixed before anything is measured."""
 
     displacement: float = Field(default=2.5e-4, gt=0)
-    """Of the median distance between displacements, beyond that of the reference's floor, m."""
+    """Margin of the median distance between displacements, beyond that of the reference's floor, m."""
     success: float = Field(default=0.02, gt=0)
-    """Of the success rate."""
+    """Margin of the success rate."""
 
 
 class ValidateConfig(Config):
@@ -105,26 +105,26 @@ class ValidateConfig(Config):
     variant_grasps_per_part: int = Field(default=8, ge=1)
     """Grasps of each part that are tried under each variant."""
     seed: int = Field(default=0, ge=0)
-    """The starts and grasps follow from it."""
+    """Determines the starts and grasps."""
     workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
     """Processes; 0: one for each core."""
     references: Annotated[tuple[Reference, ...], tyro.conf.Suppress] = (
         Reference(rate_hz=2000, position_iterations=100, grasps_per_part=20, floor_grasps_per_part=8),
         Reference(rate_hz=4000, position_iterations=100, grasps_per_part=4, floor_grasps_per_part=4),
     )
-    """What production is compared with, each with floors of its own. The first is the yardstick of the grid,
-    the others tell how far it has converged itself."""
+    """References that production is compared with, each with its own floors. The grid is compared with the
+    first; the others show how far the first has converged."""
     margins: Annotated[Margins, tyro.conf.Suppress] = Margins()
-    """Of the tests of equivalence."""
+    """Margins of the tests of equivalence."""
     rates_hz: tuple[int, ...] = (250, 500, 1000)
     """Simulation rates of the grid from which production's setting is chosen."""
     iterations: tuple[int, ...] = (15, 25, 50)
     """Solver iterations of the grid."""
     variants: Annotated[dict[str, dict[str, dict[str, Value]]], tyro.conf.Suppress] = {}
-    """What is varied, by a group and a label for the table: values of physics settings, ``density`` (a
+    """Variants, by a group and a label for the table: values of physics settings, ``density`` (a
     factor), ``hulls`` or ``rest`` (mesh). Each is compared with production on the same grasps."""
     ranges: Annotated[dict[str, tuple[float, float]], tyro.conf.Suppress] = {}
-    """Physics settings of the hand and the table that are not known better: drawn together, uniformly, for
+    """Physics settings of the hand and the table that are uncertain: drawn together, uniformly, for
     each grasp, they give the error of a label. The fingers' damping stays critical."""
     engine: Engine = "sapien"
     """mujoco: compare the settings under test with a second engine, and nothing else; needs ``[mujoco]``."""

@@ -31,7 +31,7 @@ MOST_SHIFT = (0.5e-3, 3e-3)
 
 
 def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
-    """Compares outcomes of both engines part by part; 0 if they agree as they should, 1 otherwise.
+    """Compare outcomes of both engines part by part; 0 if they agree within the bounds, 1 otherwise.
 
     Raises:
         DriverMissing: MuJoCo is not installed.
@@ -70,7 +70,7 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
 
 
 def sections(record: dict[str, Any]) -> list[Section]:
-    """Differences in words and by part, those that disagree most first, from what ``engines.json`` holds."""
+    """Differences in words and by part, those that disagree most first, read from ``engines.json``."""
     found = [
         f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN"
         for ours, theirs, count in record["disagreements"]
@@ -82,7 +82,7 @@ def sections(record: dict[str, Any]) -> list[Section]:
 
 
 def complaints(found: Comparison) -> list[str]:
-    """Where two engines differ by more than they may."""
+    """Differences between two engines that exceed their bounds, in words."""
     said = []
     if found.agreement < LEAST_AGREEMENT:
         said.append(f"S agrees in {found.agreement:.1%}, at least {LEAST_AGREEMENT:.0%} is needed")
@@ -96,7 +96,7 @@ def complaints(found: Comparison) -> list[str]:
 
 
 def disagreements(ours: Outcomes, theirs: Outcomes) -> list[tuple[tuple[str, str], int]]:
-    """How often S differs, by outcome here and there; most frequent first."""
+    """Number of grasps whose S differs, by outcome in each engine; most frequent first."""
     differ = np.flatnonzero(ours.success != theirs.success)
     names = [(FAILURES[int(ours.failure[i])], FAILURES[int(theirs.failure[i])]) for i in differ]
     said = [(a.replace("none", "held"), b.replace("none", "held")) for a, b in names]

@@ -3,7 +3,7 @@
 A setting is equivalent to another if both one-sided hypotheses, that it differs by at least the margin
 upwards or downwards, are rejected at 5 %: the 90 % interval of the difference lies within the margins
 (Schuirmann, J. Pharmacokinetics and Biopharmaceutics 15, 1987). Grasps of one part are not independent of
-each other: parts are what is drawn.
+each other: parts are the sampling units.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ class Equivalence:
 
     @property
     def excess(self) -> float:
-        """By how much the interval reaches beyond the margin; negative where it lies within."""
+        """Distance by which the interval exceeds the margin; negative where it lies within."""
         worst = max(self.high, -self.low)
         return worst - self.margin if math.isfinite(worst) else math.inf
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON, which knows no NaN: what is unknown is None."""
+        """Convert to plain values for JSON; unknown values are None, since JSON has no NaN."""
         values = asdict(self) | {"excess": self.excess}
         known = {key: value if math.isfinite(value) else None for key, value in values.items()}
         return known | {"passed": self.passed}
@@ -62,7 +62,7 @@ class Equivalence:
 def median_excess(
     found: np.ndarray, floor: np.ndarray, part: np.ndarray, margin: float, replicates: int = REPLICATES
 ) -> Equivalence:
-    """How much farther the median of paired distances is than that of the floor's.
+    """Excess of the median of paired distances over that of the floor's distances.
 
     The interval is that of the percentile bootstrap over parts.
 
@@ -71,7 +71,7 @@ def median_excess(
         floor: (n,) the same between the reference with its start moved and the reference.
         part: (n,) part of each grasp.
         margin: In the unit of the distances.
-        replicates: Of the bootstrap.
+        replicates: Number of replicates of the bootstrap.
     """
     names, which = np.unique(part, return_inverse=True)
     if len(names) < 2:
@@ -99,7 +99,7 @@ def mean_difference(difference: np.ndarray, part: np.ndarray, margin: float) -> 
     Args:
         difference: (n,) success under a setting minus success under the reference.
         part: (n,) part of each grasp.
-        margin: As a share.
+        margin: Margin of the success rate, as a share.
     """
     names, which = np.unique(part, return_inverse=True)
     n, k = len(difference), len(names)

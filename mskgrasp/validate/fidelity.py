@@ -23,12 +23,12 @@ class Fidelity:
     """Errors of a part in the engine.
 
     Attributes:
-        part: Its name.
+        part: Name of the part.
         hulls: Number of cooked shapes.
         surface_p95: Distance of hulls and mesh that 95 % of both surfaces keep, m.
         volume_ratio: Volume of the hulls by that of the mesh.
-        mass_error: Of the engine's mass against density times the mesh's volume, as a share.
-        inertia_error: The worst principal inertia against the mesh's, as a share.
+        mass_error: Relative error of the engine's mass against density times the mesh's volume.
+        inertia_error: Greatest relative error of a principal inertia against the mesh's.
     """
 
     part: str
@@ -49,12 +49,12 @@ class Fidelity:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Convert to plain values for JSON."""
         return asdict(self) | {"passed": self.passed}
 
 
 def check_parts(scene: BodyScene, parts: Sequence[Part], report: Callable[[], None]) -> list[Fidelity]:
-    """Loads every part into the engine and compares it with its mesh."""
+    """Load every part into the engine and compare it with its mesh."""
     found = []
     for part in parts:
         scene.place(part, (*scene.env.region_centre, 0.5))

@@ -13,7 +13,7 @@ from mskgrasp.reports.style import saved_figure
 
 
 def draw(path: Path, record: dict[str, Any]) -> Path:
-    """Draws what a record holds: without comparisons the closed-form errors alone."""
+    """Draw what a record holds: without comparisons the closed-form errors alone."""
     checks, compared = record["closed_form"], "grid" in record
     rows = max(len(checks), len(record.get("sensitivity", ())))
     with saved_figure(path, 17 if compared else 8.5, 0.24 * rows + 1.6) as figure:

@@ -33,7 +33,7 @@ class Judged:
     Attributes:
         setting: Name.
         reference: Name.
-        origin: What the difference contains.
+        origin: Sources of the difference, in words.
         found: Differences grasp by grasp.
         displacement: Median distance beyond that of the reference's floor, m; None for a floor.
         success: Difference of the success rates; None for a floor.
@@ -52,7 +52,7 @@ class Judged:
         return all(test is not None and test.passed for test in (self.displacement, self.success))
 
     def complaints(self) -> list[str]:
-        """Which margins are not kept, and by how much."""
+        """Margins that are exceeded and by how much, in words."""
         said = []
         for what, test, scale, unit in (
             ("median displacement beyond the floor", self.displacement, 1e3, "mm"),
@@ -73,7 +73,7 @@ class Judged:
         return said
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Convert to plain values for JSON."""
         tests = {"displacement": self.displacement, "success": self.success}
         return {
             "setting": self.setting,
@@ -88,7 +88,7 @@ class Judged:
 def judge(
     outcomes: Mapping[str, Outcomes], setting: str, reference: str, n: int, margins: Margins, origin: str = ""
 ) -> Judged:
-    """Compares the first n grasps of each part under a setting and a reference.
+    """Compare the first n grasps of each part under a setting and a reference.
 
     Displacements are compared where the reference's floor was simulated, too.
     """
@@ -172,7 +172,7 @@ class Varied:
     """A variant against production.
 
     Attributes:
-        group: What is varied.
+        group: Quantity that is varied.
         label: Its value.
         found: Differences grasp by grasp.
         parts: Number of parts compared; those that the variant does not change are left out.
@@ -184,7 +184,7 @@ class Varied:
     parts: int
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Convert to plain values for JSON."""
         return {"group": self.group, "label": self.label, "parts": self.parts, **self.found.as_dict()}
 
 
@@ -204,7 +204,7 @@ def sensitivity(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> lis
 
 
 def label_error(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> dict[str, Any] | None:
-    """Differences to production where all that is not known better is drawn together; None without ranges."""
+    """Differences from production with all uncertain settings drawn together; None without ranges."""
     if not config.ranges:
         return None
     n = config.n_variants
@@ -242,12 +242,12 @@ class DiscardSummary:
     dropped: dict[str, int]
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Convert to plain values for JSON."""
         return asdict(self)
 
 
 def summarise_discards(outcomes: Outcomes) -> DiscardSummary:
-    """Counts the physically impossible outcomes and the worst values of the others."""
+    """Count the physically impossible outcomes and the worst values of the others."""
     way = np.linalg.norm(outcomes.displacement[:, :3], axis=1)
     reasons = {
         "unsettled": ~outcomes.settled,

@@ -18,7 +18,7 @@ from tasks.attempt.outcome import MAX_PENETRATION
 PAD = (0.0175, 0.0185)
 """Length and height of a finger pad of the Panda, m."""
 PAD_BELOW = 0.009
-"""How far a pad reaches below the TCP, m."""
+"""Reach of a pad below the TCP, m."""
 BAR = (0.15, 0.01, 0.01)
 """Edges of the bar that is held across its middle, m."""
 SLUGGISH = 5.0
@@ -30,12 +30,12 @@ MIRRORED = 12
 
 
 def holding_limit(scene: BodyScene, workshop: Workshop) -> Iterator[Check]:
-    """A block held aloft: the weaker the grip, the sooner it slips."""
+    """A block held above the table: the weaker the grip, the sooner it slips."""
     mu = scene.physics.friction_pad_part
     block = workshop.box("heavy", BLOCK, 2 * mu * scene.physics.finger_force / GRAVITY)
 
     def height(load: float, seconds: float) -> tuple[float, float]:
-        """Time since the grip was weakened, s, and way that the block has slipped by then, m."""
+        """Time since the grip was weakened, s, and distance that the block has slipped by then, m."""
         scene.pinch(block)
         before = scene.pose_in_hand().position[2]
         scene.env.agent.set_finger_force(block.mass * GRAVITY / (2 * mu * load))
@@ -134,7 +134,7 @@ def _squeezed_out(scene: BodyScene, workshop: Workshop, angle: float) -> bool:
 
 
 def centring(scene: BodyScene, workshop: Workshop) -> Iterator[Check]:
-    """A block off centre, and one that lies turned, end as the pads want them."""
+    """A block off centre, and one that lies turned, end aligned with the pads."""
     block = workshop.block()
     x, y = scene.env.region_centre
     z = BLOCK[2] / 2

@@ -31,7 +31,7 @@ def try_grasp(part: Part, pose: np.ndarray, grasp: np.ndarray, physics: Physics)
     """One attempt: descend, close, lift, hold, judge.
 
     Args:
-        part: Its folder is read.
+        part: The part, read from its folder.
         pose: (7,) ``T_base_obj`` at the start.
         grasp: (4,) x, y, z, theta, base frame.
         physics: Speeds, times and forces; both engines share them.
@@ -104,7 +104,7 @@ def try_grasps(
 
 
 def _move(simulation: Simulation, grasp: np.ndarray, start: float, goal: float, speed: float) -> bool:
-    """Moves between heights over a grasp; False where the hand met something."""
+    """Move between heights over a grasp; False where the hand met something."""
     distance = abs(goal - start)
     if distance == 0:
         return True

@@ -39,7 +39,7 @@ class Outcomes:
     Attributes:
         success: (n,) bool.
         failure: (n,) index into `mskgrasp.core.grasp.FAILURES`.
-        settled: (n,) bool, the part was at rest before anything touched it; the rest of the others means
+        settled: (n,) bool, the part was at rest before anything touched it; otherwise the other values mean
             nothing.
         displacement: (n, 4) object displacement, NaN where not successful.
         tilt: (n,) rad.
@@ -88,10 +88,10 @@ class Drawn:
 def draw_grasps(
     folders: Sequence[Path], n: int, seed: int, out: Path, workers: int, report: Callable[[int], None]
 ) -> list[Drawn]:
-    """Draws n starts and grasps of each part as the collector does; those that were drawn before are kept.
+    """Draw n starts and grasps of each part as the collector does; those that were drawn before are kept.
 
     Raises:
-        BadPart: The camera sees one in none of its poses.
+        BadPart: The camera sees a part in none of its poses.
         WorkerFailed: Processes died again and again.
     """
     drawn = []
@@ -112,13 +112,13 @@ def run_settings(
     workers: int,
     report: Callable[[int], None],
 ) -> dict[str, Outcomes]:
-    """Tries the drawn grasps under every setting; outcomes stored in ``out`` are read.
+    """Try the drawn grasps under every setting; outcomes stored in ``out`` are read.
 
     Args:
         settings: Tried in parallel with the parts.
         drawn: The grasps.
         altered: For settings with altered parts the folder of each by the part's name; others are left out.
-        out: Where outcomes are kept.
+        out: Folder of the stored outcomes.
         workers: Processes.
         report: Called with the number of grasps that were tried.
 
@@ -141,7 +141,7 @@ def run_settings(
 
 @dataclass(frozen=True, kw_only=True)
 class _Trial:
-    """The grasps of one part under one setting; `folder` is that of the part as it is simulated."""
+    """The grasps of one part under one setting; `folder` is that of the simulated part."""
 
     setting: Setting
     drawn: Drawn
@@ -164,7 +164,7 @@ def _trials(
 def _in_parallel(
     function: Callable[..., int], jobs: Sequence[tuple], workers: int, report: Callable[[int], None]
 ) -> None:
-    # In processes of their own even with one worker: every job loads its own scenes.
+    # In separate processes even with one worker: every job loads its own scenes.
     work = Work(_caller, function, name=lambda job: Path(job[-1]).name)
     for tried in results(work, jobs, workers, apart=True):
         report(tried)

@@ -39,7 +39,7 @@ from mskgrasp.validate.tables import sections
 
 
 def validate(config: ValidateConfig) -> int:
-    """Runs a validation; 0 if all checks pass, 1 otherwise.
+    """Run a validation; 0 if all checks pass, 1 otherwise.
 
     Raises:
         DriverMissing: A second engine is to be compared and is not installed.
@@ -77,7 +77,7 @@ def validate(config: ValidateConfig) -> int:
 
 
 def findings(config: ValidateConfig, outcomes: dict[str, Outcomes]) -> dict[str, Any]:
-    """What is stored of the outcomes under all settings."""
+    """Results to store, computed from the outcomes under all settings."""
     judged = grid(config, outcomes)
     setting, shown = choose(judged)
     own = next(one for one in judged if one.setting == config.production)

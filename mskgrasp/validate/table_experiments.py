@@ -16,9 +16,9 @@ from mskgrasp.validate.body_scene import BLOCK, GRAVITY, BodyScene, Workshop, tu
 from mskgrasp.validate.check import Check, near, within
 
 FACETS = 16
-"""Sides of a prism that stands for a cylinder: two rings of as many corners are the 32 of a hull."""
+"""Sides of a prism that represents a cylinder: two rings of as many corners are the 32 of a hull."""
 RADIUS, ROLLED = 0.015, 0.0177
-"""Of the cylinder, and its distance from the centre, m."""
+"""Radius of the cylinder, and its distance from the centre, m."""
 TOWER = (0.02, 0.02, 0.04)
 """Edges of the prism that topples, m."""
 

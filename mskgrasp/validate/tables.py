@@ -89,7 +89,7 @@ def _grid(record: Record) -> Section:
 
 
 def choice_text(record: Record) -> str:
-    """Which setting follows from the tests of equivalence, and what keeps production from passing."""
+    """Setting chosen by the tests of equivalence, and the reasons why production does not pass."""
     choice, margins = record["choice"], record["settings"]["margins"]
     within = f"{1e3 * margins['displacement']:g} mm and {1e2 * margins['success']:g} points of S"
     if choice["shown"]:

@@ -54,11 +54,11 @@ ARRIVAL_S = 0.024
 LOST_MARGIN = 0.02
 """A part is lost where it is lower in the hand than a success allows by more than this, m."""
 PARKED = (0.45, 0.0, 0.35, 0.0)
-"""Where a hand waits whose grasp cannot be executed, clear of every part: x, y, z, theta, base frame."""
+"""Pose of a hand whose grasp cannot be executed, clear of every part: x, y, z, theta, base frame."""
 
 
 class Attempt:
-    """Executes grasps and measures the motion of the parts.
+    """Execution of grasps, and measurement of the motion of the parts.
 
     Args:
         agent: The Panda of n sub-scenes.
@@ -91,7 +91,7 @@ class Attempt:
         motion.watch = self._speed.update
 
     def run(self, commanded: Tensor, executed: Tensor | None = None) -> dict[str, Tensor]:
-        """Executes one grasp in every sub-scene; all of them wait for the slowest.
+        """Execute one grasp in every sub-scene; all of them wait for the slowest.
 
         Args:
             commanded: (n, 4) x, y, z, theta, base frame.
@@ -116,7 +116,7 @@ class Attempt:
         lifted = _raised(grasp, physics.lift_height)
         executable = can_execute(xp.stack([grasp, start, lifted])).all(0)
         if not bool(executable.all()):
-            # To the others a hand that stays parked looks like one whose pads have nothing between them.
+            # For the others a parked hand counts as one whose pads have nothing between them.
             parked = xp.broadcast_to(self._arrays.of(np.array(PARKED, np.float32)), grasp.shape)
             grasp, start, lifted = (
                 xp.where(executable[:, None], one, parked) for one in (grasp, start, lifted)
@@ -227,7 +227,7 @@ class Attempt:
         return first - self._arrays.xp.floor((first - reach - AHEAD) / step) * step
 
     def _wait_for_rest(self, parts: Array) -> None:
-        """Waits until parts (n,) that nothing holds are at rest: the pose of a falling part is arbitrary."""
+        """Wait until parts (n,) that nothing holds are at rest: the pose of a falling part is arbitrary."""
         if not bool(parts.any()):
             return
         motion = self._motion
@@ -241,10 +241,10 @@ class Attempt:
                 before = now
 
     def _lift(self, grasp: Array, lifted: Array, lifting: Array) -> Array:
-        """Lifts and holds; ends early where no part is left in its hand.
+        """Lift and hold; end early where no part is left in its hand.
 
         Args:
-            grasp: (n, 4) where the fingers closed.
+            grasp: (n, 4) x, y, z, theta at which the fingers closed, base frame.
             lifted: (n, 4) the same, at the end of the lift.
             lifting: (n,) bool, hands that hold a part; the others stay where they are.
 
@@ -284,7 +284,7 @@ class Attempt:
         return deepest
 
     def _observe(self, lifting: Array, penetration: Array) -> _InHand:
-        """Measures what hangs in the hands, in the last part of the hold."""
+        """Measure the parts in the hands, in the last part of the hold."""
         xp = self._arrays.xp
         if bool(lifting.any()):
             speed = self.relative_speed()

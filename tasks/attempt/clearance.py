@@ -1,6 +1,6 @@
 """Clearance between the open hand and a part: motions in free air need no simulation.
 
-A descent beside the part and the first stretch of closing fingers change nothing where they meet nothing, so
+A descent beside the part and the first stretch of closing fingers have no effect where they meet nothing, so
 that they need not be simulated. Both follow from the part's hulls, exactly in the plane and
 conservatively in height.
 """

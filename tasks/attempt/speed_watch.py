@@ -25,12 +25,12 @@ class SpeedWatch:
         self.start(0.0)
 
     def start(self, seconds: float) -> None:
-        """Resets the speeds; ``seconds`` is the simulated time."""
+        """Reset the speeds; ``seconds`` is the simulated time."""
         self._last, self._seconds = self._position(), seconds
         self._fastest: Array = 0.0 if self._entity else self._arrays.full(len(self._last), 0.0)
 
     def update(self, seconds: float) -> None:
-        """Compares the poses with the last ones."""
+        """Compare the poses with the last ones."""
         now, passed = self._position(), seconds - self._seconds
         self._seconds, last, self._last = seconds, self._last, now
         if passed <= 0:

@@ -83,7 +83,7 @@ class HandContacts:
 
         Returns:
             force: (n, 2) force between the part and each finger, N.
-            penetration: (n,) how deep a finger and the part overlap, metres; NaN on the GPU.
+            penetration: (n,) depth of overlap of a finger and the part, metres; NaN on the GPU.
         """
         if self._gpu:
             forces = [
@@ -102,7 +102,7 @@ class HandContacts:
         return self._arrays.of(forces.astype(np.float32)), self._arrays.full(1, deepest)
 
     def penetration(self) -> Array:
-        """(n,) how deep a finger and the part overlap, metres; NaN on the GPU."""
+        """(n,) depth of overlap of a finger and the part, metres; NaN on the GPU."""
         if self._gpu:
             return self._arrays.full(self._scene.num_envs, math.nan)
         separations = [point.separation for _, points in self._finger_points() for point in points]

@@ -25,11 +25,11 @@ STILL_FINGER = 2e-3
 """A finger slower than this, m/s, has stopped. Speeds are differences of positions: PhysX's
 TGS solver reports the velocity of a pressed joint with the drive's impulse still in it."""
 PEAK_ACCELERATION = 1.5
-"""Of the hand on straight lines, m/s^2: the drives then overshoot by less than 0.4 mm."""
+"""Peak acceleration of the hand on straight lines, m/s^2: the drives then overshoot by less than 0.4 mm."""
 FINGER_TIMEOUT_S = 0.5
 """Time for which fingers that do not come to rest (the part slides through them) are waited for, s."""
 FINGER_MASS = 0.015
-"""Of a finger of the Panda without its motor, kg."""
+"""Mass of a finger of the Panda without its motor, kg."""
 CHECK_S = 0.02
 """Time between two checks of closing fingers, and of the part's speed, s. Fingers that press and did not move
 for this long have closed."""
@@ -54,13 +54,13 @@ def finger_lag(physics: Physics) -> float:
 
 
 class PandaMotion:
-    """Writes drive targets and advances the simulation.
+    """Motions by drive targets, which advance the simulation.
 
     Args:
         scene: The scene of all n sub-scenes.
         agent: The Panda in them.
         physics: Rates, finger speed and force.
-        friction: Of the part on the table, where the engine has none.
+        friction: Friction of the part on the table, where the engine has none.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class PandaMotion:
 
     @contextmanager
     def coarsely(self, rate_hz: int | None = None) -> Iterator[None]:
-        """Simulates with a coarse rate while the context lasts, by default that of the physics settings."""
+        """Simulate with a coarse rate while the context lasts, by default that of the physics settings."""
         fine = self.rate_hz
         self._set_rate(min(fine, rate_hz or self._physics.coarse_rate_hz))
         try:
@@ -126,7 +126,7 @@ class PandaMotion:
         return self.fingers().sum(-1)
 
     def place(self, q: Array, width: Array | None = None) -> None:
-        """Sets the arm to joints (n, 7) at once, at rest, fingers open by ``width`` (n,) metres or wholly."""
+        """Set the arm to joints (n, 7) at once, at rest, fingers open by ``width`` (n,) metres or fully."""
         xp, arrays = self.arrays.xp, self.arrays
         opening = arrays.full(self.n, MAX_OPENING) if width is None else arrays.of(width)
         fingers = xp.astype(opening, xp.float32) / 2
@@ -170,7 +170,7 @@ class PandaMotion:
             self._drive_fingers(float(self.finger_target[0]))
 
     def run_fingers(self, hands: Array) -> None:
-        """Gives the fingers of some hands (n,) the stationary speed and lag of a ramp.
+        """Give the fingers of some hands (n,) the stationary speed and lag of a ramp.
 
         A step has one target, which pulls a finger through its first half and brakes it through the second:
         where steps meet it is slower than in the mean, by the mean over a step of what the pull has added.
@@ -196,7 +196,7 @@ class PandaMotion:
             drive.set_drive_target(target)
 
     def step(self, n_steps: int = 1) -> None:
-        """Advances the simulation with the targets as they are."""
+        """Advance the simulation with the targets as they are."""
         if self.gpu:
             self._scene.px.gpu_apply_articulation_target_position()
             self._scene.px.gpu_apply_articulation_target_velocity()
@@ -219,7 +219,7 @@ class PandaMotion:
             self.watch(self.seconds)
 
     def arrive(self, frozen: Array) -> None:
-        """Puts arms that have come to a stop, but for the frozen ones (n,), exactly at their targets.
+        """Put arms that have come to a stop, but for the frozen ones (n,), exactly at their targets.
 
         The drives leave an arm some tens of micrometres short, the more the finer the steps: a joint turns
         in float32, and what a slow one turns in one iteration is rounded away. The real controller integrates
@@ -252,7 +252,7 @@ class PandaMotion:
         check_every: int = 4,
         frozen: Array | None = None,
     ) -> bool:
-        """Follows joint targets, one a simulation step.
+        """Follow joint targets, one a simulation step.
 
         Args:
             path: (steps, n, 7) radians, at the end of each step; it begins where the arms were sent before.
@@ -306,12 +306,12 @@ class PandaMotion:
         check: Callable[[], bool] | None = None,
         frozen: Array | None = None,
     ) -> bool:
-        """Ramps the fingers' targets to ``target`` (metres from the middle) and waits until they stop.
+        """Ramp the fingers' targets to ``target`` (metres from the middle) and wait until they stop.
 
         A target inside the part keeps pressing with the drive's force limit.
 
         Args:
-            target: Of each finger, negative to press.
+            target: Target of each finger, metres from the middle, negative to press.
             force: The drives' force limit, N; that of the physics settings by default.
             check: Called every few steps; True ends the motion, the fingers stay where they are.
             frozen: (n,) bool, hands whose fingers do not move.

@@ -22,12 +22,12 @@ from mskgrasp.core.panda_kinematics import HOME
 from mskgrasp.core.settings import REGION, Physics
 
 ARM_TORQUE_LIMIT = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
-"""N m; Franka Emika Panda datasheet."""
+"""Greatest torques of the joints, N m; Franka Emika Panda datasheet."""
 ARM_STIFFNESS = np.full(7, 1e4)
-"""N m/rad. The real controller knows the arm's inertia and follows a path to a tenth of a millimetre; these
-drives do not know it and need this stiffness to overshoot by less than 0.4 mm at the end of a descent."""
+"""Stiffness of the drives, N m/rad. The real controller knows the arm's inertia and follows a path to 0.1 mm;
+these drives do not, and need this stiffness to overshoot by less than 0.4 mm at the end of a descent."""
 ARM_DAMPING = np.array([250.0, 250.0, 220.0, 200.0, 80.0, 80.0, 60.0])
-"""N m s/rad; about critical for the inertia that each joint sees in the workspace."""
+"""Damping of the drives, N m s/rad; about critical for the inertia that each joint sees in the workspace."""
 FINGER_LINKS = ("panda_leftfinger", "panda_rightfinger")
 HAND_LINKS = ("panda_hand", *FINGER_LINKS)
 BARE_FRAMES = ("panda_link8", "panda_leftfinger_pad", "panda_rightfinger_pad")
@@ -54,7 +54,7 @@ class GraspController(BaseController):
         """The drives are set by `GraspPanda.set_drives` for every mode."""
 
     def set_action(self, action: torch.Tensor) -> None:
-        """Takes no part in stepping: `tasks.grasp_displacement` runs the whole attempt."""
+        """Do nothing: `tasks.grasp_displacement` runs the whole attempt."""
 
 
 @dataclass
@@ -134,7 +134,7 @@ class GraspPanda(Panda):
         self.set_drives()
 
     def set_drives(self) -> None:
-        """Gives arm and fingers the drives of the physics settings."""
+        """Give arm and fingers the drives of the physics settings."""
         for i, joint in enumerate(self.arm_joints):
             joint.set_drive_properties(
                 float(ARM_STIFFNESS[i]), float(ARM_DAMPING[i]), float(ARM_TORQUE_LIMIT[i]), mode="force"
@@ -143,14 +143,14 @@ class GraspPanda(Panda):
         self.set_finger_force(self.physics.finger_force)
 
     def set_finger_force(self, force: float) -> None:
-        """Limits the force of each pad, N."""
+        """Limit the force of each pad, N."""
         for joint in self.finger_joints:
             joint.set_drive_properties(
                 self.physics.finger_stiffness, self.physics.finger_damping, force, mode="force"
             )
 
     def set_pad_friction(self, coefficient: float) -> None:
-        """Sets the effective coefficient between pads and part."""
+        """Set the effective coefficient between pads and part."""
         material = 2 * coefficient  # as in `urdf_config`
         for name in FINGER_LINKS:
             for link in self.robot.links_map[name]._objs:
@@ -164,7 +164,7 @@ class GraspPanda(Panda):
         return np.array([*HOME, MAX_OPENING / 2, MAX_OPENING / 2], dtype=np.float32)
 
     def show(self, visible: bool) -> None:
-        """Shows or hides the robot in rendered images; the overhead image is taken before the arm enters."""
+        """Show or hide the robot in rendered images; the overhead image is taken before the arm enters."""
         for body in self._render_bodies:
             body.visibility = 1.0 if visible else 0.0
 
@@ -176,7 +176,7 @@ class GraspPanda(Panda):
 
 
 def drop_bare_frames(builder: ArticulationBuilder) -> None:
-    """Removes `BARE_FRAMES`; what hangs on one of them hangs on its parent then."""
+    """Remove `BARE_FRAMES`; their child links become those of their parents."""
     links = builder.link_builders
     for bare in [link for link in links if link.name in BARE_FRAMES]:
         joint = bare.joint_record

@@ -23,7 +23,7 @@ class Reflex:
     while nothing is near the hand.
 
     Args:
-        contacts: Of the hand.
+        contacts: Contacts of the hand.
         motion: Gives the rate, which must not change.
         holding: Whether a part in the hand counts as one with it.
     """
@@ -45,7 +45,7 @@ class Reflex:
 
     @property
     def full(self) -> bool:
-        """Whether the window holds as many samples as it is long; the mean takes the others as zero."""
+        """Whether the window is full of samples; the mean takes missing ones as zero."""
         return len(self._loads) == self._n or not self._near
 
     def force(self) -> Array:

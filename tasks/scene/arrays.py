@@ -1,7 +1,7 @@
 """Arrays of the kind that a simulation computes with: numpy or torch.
 
 On the CPU, where there is one sub-scene, PhysX hands out numpy arrays, and an operation on so few numbers
-takes numpy a third of the time that it takes torch. On a GPU everything is a tensor. What is written with
+takes numpy a third of the time that it takes torch. On a GPU everything is a tensor. Code written with
 `Arrays` and the operators common to both runs on either.
 """
 
@@ -21,10 +21,10 @@ from mskgrasp.core.geometry import Array
 
 @dataclass(frozen=True)
 class Arrays:
-    """Makes arrays of one kind.
+    """Factory of arrays of one kind, numpy or torch.
 
     Attributes:
-        device: Of tensors; None for numpy arrays.
+        device: Device of tensors; None for numpy arrays.
     """
 
     device: torch.device | None

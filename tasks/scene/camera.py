@@ -32,7 +32,7 @@ def camera_config(overhead: Overhead, centre_xy: tuple[float, float]) -> CameraC
 
 
 def without_reflection_table(camera: Camera) -> None:
-    """Gives a camera an empty table of how glossy surfaces reflect an environment, of which there is none.
+    """Give a camera an empty table of the reflections of an environment, since there is no environment map.
 
     SAPIEN otherwise computes that table before the first picture of every process: 11 s on a software
     renderer, for a term that no environment map makes zero. Images stay the same to the bit.

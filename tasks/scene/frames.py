@@ -13,7 +13,7 @@ from mskgrasp.core.geometry import Array, Pose
 from tasks.scene.arrays import Arrays, arrays_for
 
 BASE_IN_WORLD = (-0.615, 0.0, 0.0)
-"""Where ManiSkill's tabletop tasks put the Panda; the table's top is at z = 0 of the world."""
+"""Position of the Panda in ManiSkill's tabletop tasks, metres; the table's top is at z = 0 of the world."""
 _OFFSET = np.array(BASE_IN_WORLD, np.float32)
 
 

@@ -14,18 +14,18 @@ from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import Part
 
 LEAST_KEPT = 2e-3
-"""Share of the hulls' volume that cooking may lose: corners that hardly stand out are dropped."""
+"""Share of the hulls' volume that cooking may lose: corners that protrude very little are dropped."""
 
 STEEL_GREY = (0.55, 0.57, 0.6, 1.0)
 
 
 def build_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: float = 0.0) -> Actor:
-    """Loads a part into one sub-scene.
+    """Load a part into one sub-scene.
 
     Args:
         scene: All sub-scenes.
-        part: Its folder is read.
-        scene_index: Of the sub-scene.
+        part: The part, read from its folder.
+        scene_index: Index of the sub-scene.
         friction: Coefficient of its material; the effective one is the mean with the other body's.
 
     Raises:
@@ -44,7 +44,7 @@ def build_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: fl
 
 
 def add_hulls(builder: sapien.ActorBuilder, part: Part, friction: float = 0.0) -> None:
-    """Gives a body the part's hulls, mass and inertia.
+    """Give a body the part's hulls, mass and inertia.
 
     The hulls are stored in millimetres and scaled, because PhysX drops hull vertices that lie closer
     than 0.7 of its length unit's thousandth; mass and inertia come from the mesh, because PhysX would
@@ -60,7 +60,7 @@ def add_hulls(builder: sapien.ActorBuilder, part: Part, friction: float = 0.0) -
 
 
 def _check_cooked(part: Part, body: PhysxRigidDynamicComponent | None) -> None:
-    """Refuses a body that differs from the part: PhysX silently drops hulls and corners, and clamps."""
+    """Refuse a body that differs from the part: PhysX silently drops hulls and corners, and clamps."""
     shapes = body.collision_shapes if body is not None else []
     volume = sum(ConvexHull(shape.vertices * shape.scale).volume for shape in shapes)
     if len(shapes) != part.n_hulls or not np.isclose(volume, part.hulls_volume, rtol=LEAST_KEPT):

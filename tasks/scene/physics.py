@@ -7,7 +7,7 @@ from mani_skill.utils.structs.types import GPUMemoryConfig, SceneConfig, SimConf
 from mskgrasp.core.settings import Physics
 
 MOST_HULLS = 48
-"""Of a part; as `mskgrasp.parts.solids.decompose.MOST_HULLS`, whose module loads the decomposition."""
+"""Hulls of a part; as `mskgrasp.parts.solids.decompose.MOST_HULLS`, whose module loads the decomposition."""
 
 CONTACTS_A_HULL = 64
 """Contact points that PhysX on a GPU may need room for, a hull: at most table, both pads and palm touch it at
@@ -24,7 +24,7 @@ def gpu_memory(n_hulls: int) -> GPUMemoryConfig:
     usual = GPUMemoryConfig()
     contacts = max(usual.max_rigid_contact_count, _power_of_two(CONTACTS_A_HULL * n_hulls))
     patches = max(usual.max_rigid_patch_count, _power_of_two(PATCHES_A_HULL * n_hulls))
-    # The stack holds what is found of a pair before it is written down: 128 bytes a point.
+    # The stack holds the points of a pair before they are written out: 128 bytes a point.
     stack = max(usual.collision_stack_size, 128 * contacts)
     return GPUMemoryConfig(
         max_rigid_contact_count=contacts, max_rigid_patch_count=patches, collision_stack_size=stack
@@ -36,7 +36,7 @@ def _power_of_two(count: int) -> int:
 
 
 def _control_freq(rate_hz: int) -> int:
-    """20 Hz, as in ManiSkill's own tasks, or what is next below it that divides the rate."""
+    """20 Hz, as in ManiSkill's own tasks, or the next lower frequency that divides the rate."""
     return next(hz for hz in range(20, 0, -1) if rate_hz % hz == 0)
 
 

@@ -17,16 +17,16 @@ from tasks.scene.part_actor import add_hulls
 STILL_S = 0.1
 """A part that stays within `STILL_DISTANCE` and `STILL_ANGLE` for this time stands, s."""
 STILL_DISTANCE = 2e-5
-"""m; a fifth of what a Panda repeats."""
+"""Greatest motion of a part at rest, m; a fifth of a Panda's repeatability."""
 STILL_ANGLE = 5e-4
-"""rad."""
+"""Greatest rotation of a part at rest, rad."""
 SETTLE_TIMEOUT_S = 1.5
 """A part that still moves after this time does not stand, s: a slow topple takes 0.5 s."""
 MAX_LEAN = 0.1
 """Greatest swing between a resting pose of the mesh and the pose in which the engine holds the hulls, rad. A
 part that swings farther has toppled into another of its resting poses."""
 TABLE_HALF_SIZE = (0.5, 0.5, 0.02)
-"""m; as thick as the task's table."""
+"""Half the sizes of the table, m; as thick as the task's table."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,13 +45,13 @@ class StandingPoses:
 
 
 def standing_poses(part: Part, physics: Physics) -> StandingPoses:
-    """Settle every resting pose of a part, in a scene of its own.
+    """Settle every resting pose of a part, in a separate scene.
 
     The mesh decides a part's resting poses, the engine simulates its hulls. These may lean by a degree, or
     lack the edge on which the mesh stands.
 
     Args:
-        part: Its resting poses are tried one by one.
+        part: The part whose resting poses are tried one by one.
         physics: Rate and friction; the engine's other settings are those in force.
 
     Raises:

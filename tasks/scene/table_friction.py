@@ -36,7 +36,7 @@ class TableFriction:
     Args:
         system: Engine of the scene.
         body: The part.
-        table: Its top is horizontal.
+        table: The table, with a horizontal top.
         coefficient: Coulomb's, mu.
     """
 
@@ -56,13 +56,13 @@ class TableFriction:
         self.reset()
 
     def reset(self) -> None:
-        """Forgets the last step, as after the part was put elsewhere: the next step is without friction."""
+        """Forget the last step, as after the part was put elsewhere: the next step is without friction."""
         self._with_friction: np.ndarray | None = None
         """Velocity (6,) that the part would have now if nothing but friction had changed it."""
         self._timestep = self._system.timestep
 
     def apply(self) -> None:
-        """Applies the friction of the next step; to be called before each."""
+        """Apply the friction of the next step; to be called before each."""
         body, step = self._body, self._system.timestep
         ratio, self._timestep = step / self._timestep, step
         now = np.concatenate([body.linear_velocity, body.angular_velocity]).astype(np.float64)

@@ -51,7 +51,7 @@ class ExecutionNoise(Config):
         return self.camera_position_std > 0 or self.camera_angle_std > 0
 
     def draw(self, rng: np.random.RandomState) -> ExecutionError:
-        """Draws the errors of one attempt.
+        """Draw the errors of one attempt.
 
         Every quantity is drawn whether it is on or off, so that switching one on leaves the others unchanged.
         """

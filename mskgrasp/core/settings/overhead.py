@@ -25,7 +25,7 @@ class Overhead(Config):
         return np.array([[self.focal_px, 0, centre], [0, self.focal_px, centre], [0, 0, 1.0]])
 
     def check_sees(self, region: tuple[float, float, float, float]) -> None:
-        """Checks that the image shows all of a region.
+        """Check that the image shows all of a region.
 
         Raises:
             ValueError: The region is empty or larger than the part of the table that the camera sees.

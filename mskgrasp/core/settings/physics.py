@@ -1,6 +1,6 @@
 """Physics settings of the simulated cell.
 
-The reason for a default stands beside it; the measurements are in docs/results/physics_settings.md.
+The reason for a default is given with it; the measurements are in docs/results/physics_settings.md.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Physics(Config):
     and, by its maker, with no less than 30 N (libfranka issue 111)."""
     finger_stiffness: float = Field(default=8000.0, gt=0)
     """Drive stiffness of a finger, N/m; with the force limit and the speed it decides how soon a stopped pad
-    reaches its full force: 62 ms. What the hand takes is not published. With 16 kN/m pads on a thin sheet
+    reaches its full force: 62 ms. The hand's own value is not published. With 16 kN/m pads on a thin sheet
     begin to oscillate in steps of 4 ms, up to many times the force limit."""
     finger_damping: float = Field(default=100.0, ge=0)
     """Drive damping of a finger, N s/m: critical, with the armature."""
@@ -61,11 +61,11 @@ class Physics(Config):
     lift_speed: float = Field(default=0.25, gt=0)
     """Peak speed of the straight lift, m/s."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
-    """How far a part is lifted, m."""
+    """Height by which a part is lifted, m."""
     hold_s: float = Field(default=HOLD_S, ge=HOLD_S)
-    """How long the lifted part is held before it is judged, s."""
+    """Time for which the lifted part is held before it is judged, s."""
     settle_s: float = Field(default=0.02, ge=0)
-    """How long a part may settle on the table before it is grasped, s; it starts in a pose in which the
+    """Time in which a part may settle on the table before it is grasped, s; it starts in a pose in which the
     engine has held it at rest."""
     approach_clearance: float = Field(default=0.01, gt=0, le=0.1)
     """Height of the pads over the part's top at which the straight descent begins, m."""

@@ -29,9 +29,9 @@ class Check:
     """Read all of a dataset and report each shard that is bad, missing or foreign, with the reason.
 
     Checks: files that are truncated or damaged, types and shapes, values that contradict each other or
-    cannot be (a success that moved over 5 cm, depths beyond the table, a grasp outside the region), shards
-    that are missing or there twice, parts and settings that differ between shards. Nothing is changed.
-    Exit code 1 if anything is bad. Delete what is bad and collect again: only that is made.
+    are impossible (a success that moved over 5 cm, depths beyond the table, a grasp outside the region),
+    shards that are missing or duplicated, parts and settings that differ between shards. Nothing is changed.
+    Exit code 1 if anything is bad. Delete bad files and collect again: only those are made.
 
     Example: python -m mskgrasp.dataset check data/demo
     """

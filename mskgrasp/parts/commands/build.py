@@ -35,7 +35,7 @@ class Build:
 
 
 def run_build(command: Build) -> int:
-    """Builds the parts and updates the index; returns the exit code."""
+    """Build the parts and update the index; return the exit code."""
     if command.catalogue and command.names:
         raise UsageError(
             f"--catalogue builds all parts, {command.names[0]!r} among them: give one or the other"

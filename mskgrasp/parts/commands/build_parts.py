@@ -19,9 +19,9 @@ class BuildResult:
     """Outcome for one part.
 
     Attributes:
-        name: Of the part.
-        entry: Of the part in the index; None where it could not be built.
-        reason: Why it could not be built.
+        name: Name of the part.
+        entry: Entry of the part in the index; None where it could not be built.
+        reason: Reason why it could not be built; empty where it was.
         seconds: Time it took; 0 where it was up to date.
     """
 
@@ -32,10 +32,10 @@ class BuildResult:
 
 
 def build_parts(names: Sequence[str], before: Index, workers: int) -> Generator[BuildResult]:
-    """Builds parts and yields their results as they finish; close the iterator to stop early.
+    """Build parts and yield their results as they finish; close the iterator to stop early.
 
     Args:
-        names: Of built-in parts.
+        names: Names of built-in parts.
         before: The previous index: parts that it left out are not tried again while their recipe is the same.
         workers: Processes.
 

@@ -19,7 +19,7 @@ COMMANDS = {"build": Build, "import": Import, "list": List, "show": Show, "sheet
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs one command; returns the exit code."""
+    """Run one command; return the exit code."""
     command = parse_command(
         COMMANDS,
         prog=PROG,

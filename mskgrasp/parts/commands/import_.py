@@ -68,7 +68,7 @@ class _Row:
 
 
 def run_import(command: Import) -> int:
-    """Imports the files one by one; returns the exit code: 0, or 1 where a file was refused.
+    """Import the files one by one; return the exit code: 0, or 1 where a file was refused.
 
     Raises:
         UsageError: There is nothing to import, or the options contradict each other.
@@ -108,7 +108,7 @@ def run_import(command: Import) -> int:
 
 
 def _import_all(command: Import, files: Sequence[Path], rows: list[_Row]) -> None:
-    """Imports the files; adds a row for each."""
+    """Import the files; add a row for each."""
     from mskgrasp.parts.importing.import_file import import_file, legal_name
 
     taken: dict[str, Path] = {}
@@ -140,7 +140,7 @@ def _import_all(command: Import, files: Sequence[Path], rows: list[_Row]) -> Non
 
 
 def _check_name(taken: dict[str, Path], path: Path, replaced: list[str], name: str) -> None:
-    """Refuses the name of a part that an earlier file was imported as; notes one of an older part."""
+    """Refuse the name of a part that an earlier file was imported as; note one of an older part."""
     if name in taken:
         raise BadPart(f"{path} would replace the part {name!r} of {taken[name]}: import it with --name")
     if (store.parts_folder() / name).is_dir():

@@ -33,7 +33,7 @@ class List:
 
 
 def run_list(command: List) -> int:
-    """Prints a table, with the number of parts in the last line."""
+    """Print a table, with the number of parts in the last line."""
     if command.csv is not None:
         write_csv(_built_index(), command.csv)
         print(command.csv)
@@ -62,7 +62,7 @@ def run_list(command: List) -> int:
 
 
 def write_csv(index: Index, path: Path) -> None:
-    """Writes the catalogue as CSV, one row for each part, sorted by name."""
+    """Write the catalogue as CSV, one row for each part, sorted by name."""
     columns = (
         "name", "family", "source", "licence", "split", "group", "longest_axis_mm", "edge_1_mm", "edge_2_mm",
         "edge_3_mm", "volume_cm3", "mass_g", "hulls", "hull_error_p95_mm", "hull_error_largest_mm",

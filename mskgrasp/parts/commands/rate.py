@@ -29,7 +29,7 @@ class Rate:
 
 
 def run_rate(command: Rate) -> int:
-    """Rates the parts; prints families and an estimate for the parts without grasps.
+    """Rate the parts; print families and an estimate for the parts without grasps.
 
     Raises:
         UsageError: The bounds are not shares in increasing order.
@@ -51,7 +51,7 @@ def run_rate(command: Rate) -> int:
 
 
 def _report(index: Index, low: float, high: float) -> None:
-    """Prints the rated families, and the number of parts between the bounds."""
+    """Print the rated families, and the number of parts between the bounds."""
     from mskgrasp.dataset.rating import passing
 
     families: dict[str, list[Entry]] = defaultdict(list)

@@ -43,7 +43,7 @@ class Sheet:
 
 
 def run_show(command: Show) -> int:
-    """Writes the picture of a part."""
+    """Write the picture of a part."""
     # Matplotlib takes a second to load; the other commands do not need it.
     from mskgrasp.parts.figures.picture import draw_part
 
@@ -56,7 +56,7 @@ def run_show(command: Show) -> int:
 
 
 def run_sheet(command: Sheet) -> int:
-    """Writes the contact sheet."""
+    """Write the contact sheet."""
     from mskgrasp.parts.figures.sheet import draw_sheet
 
     _check(command.out)

@@ -32,7 +32,7 @@ class RestingClass:
 
 
 def draw_part(part: Part, out: Path) -> None:
-    """Writes the picture of a part; the suffix of ``out`` chooses the format (png, svg, pdf)."""
+    """Write the picture of a part; the suffix of ``out`` chooses the format (png, svg, pdf)."""
     mesh = trimesh.load_mesh(part.mesh_path, process=False)
     record = store.read_record(part.folder)
     figure = Figure(figsize=(12.8, 7.2), dpi=_DPI, facecolor="white")

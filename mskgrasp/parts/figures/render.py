@@ -1,6 +1,6 @@
 """Software renderer for pictures of parts: orthographic, z-buffered, no GPU.
 
-A renderer of our own, 0.5 to 1.3 s a picture: matplotlib's Poly3DCollection (0.05 s) sorts triangles, not
+Our own renderer, 0.5 to 1.3 s a picture: matplotlib's Poly3DCollection (0.05 s) sorts triangles, not
 pixels, and draws a bracket's far wall over its near one; PyVista (0.2 s) draws as well, but adds 580 MB of
 packages.
 """
@@ -40,12 +40,12 @@ def render(
     """A picture (height, width, 3) in 0..1 of bodies seen from outside, filling the frame, white behind.
 
     Args:
-        bodies: What to draw.
+        bodies: Bodies to draw.
         width: Pixels.
         height: Pixels.
         table: Whether to draw a table at z = 0, fading out, with the bodies' shadow.
         azimuth: Direction of the viewer about z, degrees.
-        elevation: Of the viewer above the table, degrees.
+        elevation: Elevation of the viewer above the table, degrees.
     """
     w, h = width * SUPERSAMPLING, height * SUPERSAMPLING
     view = _view(np.radians(azimuth), np.radians(elevation))
@@ -95,7 +95,7 @@ def _draw(
     normal: np.ndarray,
     owner: np.ndarray,
 ) -> None:
-    """Draws triangles (n, 3, 3) given in pixels and depth into the buffers."""
+    """Draw triangles (n, 3, 3) given in pixels and depth into the buffers."""
     h, w = depth.shape
     for (a, b, c), corner_normals in zip(triangles, normals, strict=True):
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

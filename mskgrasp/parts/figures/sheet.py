@@ -32,7 +32,7 @@ _MATERIALS = (
 
 
 def draw_sheet(index: Index, out: Path, parts: int, report_progress: Callable[[int, int], None]) -> None:
-    """Draws parts of every family, in the order of the families' names.
+    """Draw parts of every family, in the order of the families' names.
 
     Args:
         index: The catalogue.

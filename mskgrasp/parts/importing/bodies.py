@@ -34,7 +34,7 @@ class RepairedBodies:
 
 
 def repair_bodies(objects: Sequence[Surface], *, bodies: Bodies) -> RepairedBodies:
-    """Makes closed bodies from the objects of a file.
+    """Make closed bodies from the objects of a file.
 
     Args:
         objects: As separated in the file (an STL is one object), millimetres.
@@ -70,7 +70,7 @@ def repair_bodies(objects: Sequence[Surface], *, bodies: Bodies) -> RepairedBodi
 
 
 def _closed(objects: Sequence[Surface]) -> tuple[list[Surface], Repairs]:
-    """Each object closed by itself or, where one is open (faces coloured one by one), all of them as one."""
+    """Each object closed separately or, where one is open (faces coloured one by one), all of them as one."""
     try:
         results = [close_surface(item) for item in objects]
     except BadPart:
@@ -123,7 +123,7 @@ def _inward(surface: Surface, piece: np.ndarray) -> np.ndarray:
 
 
 def _enclosing(parts: Sequence[Surface], volumes: np.ndarray) -> list[list[int]]:
-    """For each shell the larger shells that enclose it."""
+    """Indices of the larger shells that enclose each shell."""
     low = np.array([part.triangles.min(axis=(0, 1)) for part in parts])
     high = np.array([part.triangles.max(axis=(0, 1)) for part in parts])
     result = []

@@ -40,7 +40,7 @@ class Imported:
     Attributes:
         parts: One, or with ``bodies="split"`` one for each body.
         unchanged: The parts folder had them already, from the same file with the same options.
-        unit: Of the file's coordinates; empty where the file was not read.
+        unit: Unit of the file's coordinates; empty where the file was not read.
         notes: Repairs and remarks, one sentence each.
     """
 
@@ -61,13 +61,13 @@ def import_file(
     bodies: Bodies = "one",
     check_name: Callable[[str], None] = lambda name: None,
 ) -> Imported:
-    """Imports a file as a part, replacing an imported part of the same name.
+    """Import a file as a part, replacing an imported part of the same name.
 
     Args:
         path: STL, OBJ, PLY, GLB, 3MF or STEP.
         name: The part's name; by default the file's, made legal.
         family: Kind of part.
-        unit: Of the file's coordinates; None takes what the format says, and mm where it says nothing.
+        unit: Unit of the file's coordinates; None: that of the format, or mm where it states none.
         density: kg/m^3.
         licence: SPDX identifier of the mesh's licence.
         bodies: Whether several bodies are refused, split into parts ``NAME-1``, ``NAME-2``, ... by
@@ -125,7 +125,7 @@ def import_part(path: Path, **options: object) -> Part:
 
 
 def check_density(density: float) -> None:
-    """Checks that a density is plausible.
+    """Check that a density is plausible.
 
     Raises:
         BadPart: No solid has this density.

@@ -47,7 +47,7 @@ class MeshFile:
 
     Attributes:
         objects: As separated in the file, millimetres; an STL, OBJ or PLY is one object.
-        unit: Of the file's coordinates, stated or assumed.
+        unit: Unit of the file's coordinates, stated or assumed.
         notes: Remarks for the user.
     """
 
@@ -92,7 +92,7 @@ def read_mesh(path: Path, content: bytes, unit: Unit | None) -> MeshFile:
     Args:
         path: Its suffix determines the format.
         content: Its bytes.
-        unit: Of the coordinates; None takes that of the format, or mm where the format has none.
+        unit: Unit of the coordinates; None: that of the format, or mm where it states none.
 
     Raises:
         BadPart: The content is damaged, has no triangles, states another unit, or has an impossible size.

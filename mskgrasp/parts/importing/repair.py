@@ -54,7 +54,7 @@ def count_of(number: int, thing: str) -> str:
 
 
 def close_surface(surface: Surface) -> tuple[Surface, Repairs]:
-    """Makes a surface whose faces join edge to edge from one that may repeat vertices and faces.
+    """Make a surface whose faces join edge to edge from one that may repeat vertices and faces.
 
     Raises:
         BadPart: It is flat or open; the message starts with "is" and names no file.
@@ -87,7 +87,7 @@ def close_surface(surface: Surface) -> tuple[Surface, Repairs]:
 
 
 def wind_consistently(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
-    """Winds neighbouring faces of a closed surface the same way.
+    """Wind neighbouring faces of a closed surface the same way.
 
     Returns:
         The surface; (m,) the piece of each face (pieces share no edge); (m,) whether it was turned.

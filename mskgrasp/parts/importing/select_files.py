@@ -27,7 +27,7 @@ class Selected:
 
 
 def select_files(arguments: Sequence[Path]) -> Selected:
-    """Resolves files, folders (their files, not their subfolders') and quoted patterns (``**`` descends).
+    """Resolve files, folders (their files, not their subfolders') and quoted patterns (``**`` descends).
 
     A file may be a link where the user names it; in a folder or pattern a link out of it is refused, since
     the user has not named its target.

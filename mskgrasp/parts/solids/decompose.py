@@ -89,7 +89,7 @@ def fewest_hulls(
     """Exact pieces joined where that changes little.
 
     Args:
-        mesh_mm: What the pieces represent.
+        mesh_mm: Mesh that the pieces represent, millimetres.
         hulls: Corners (n, 3) of each.
         most_p95: 95 % of the surface stay within this distance, mm; the bounds of the volume and of the
             largest distance are in proportion.

@@ -70,7 +70,7 @@ class HullFit:
 
 
 def mass_properties(mesh_mm: trimesh.Trimesh, density: float) -> MassProperties:
-    """Integrates over a watertight mesh in millimetres; density in kg/m^3."""
+    """Integrate over a watertight mesh in millimetres; density in kg/m^3."""
     # In millimetres and scaled afterwards: in metres the integrals of small parts fall below tolerances.
     found = trimesh.triangles.mass_properties(mesh_mm.triangles, density=1.0, skip_inertia=False)
     inertia = np.asarray(found.inertia, dtype=float) * density * 1e-15
@@ -111,7 +111,7 @@ def longest_axis(mesh: trimesh.Trimesh) -> float:
 
 
 def hull_fit(mesh_mm: trimesh.Trimesh, hulls_mm: Sequence[np.ndarray]) -> HullFit:
-    """Compares the surface of the union of the hulls with that of the mesh."""
+    """Compare the surface of the union of the hulls with that of the mesh."""
     return MeshSurface(mesh_mm).fit(hulls_mm)
 
 
@@ -119,7 +119,7 @@ class MeshSurface:
     """A mesh prepared for comparison with several sets of hulls."""
 
     def __init__(self, mesh_mm: trimesh.Trimesh) -> None:
-        """Refines the surface and builds its search tree."""
+        """Refine the surface and build its search tree."""
         # Copies: manifold3d takes neither a read-only array nor a view with strides.
         body = Manifold(Mesh64(np.array(mesh_mm.vertices, np.float64), np.array(mesh_mm.faces, np.uint64)))
         self._step = float(np.max(mesh_mm.extents)) / 40
@@ -128,7 +128,7 @@ class MeshSurface:
         self._samples, self._areas = _samples(self._surface.triangles)
 
     def fit(self, hulls_mm: Sequence[np.ndarray]) -> HullFit:
-        """Compares the surface of the union of the hulls with that of the mesh."""
+        """Compare the surface of the union of the hulls with that of the mesh."""
         return self._fit(_Union(hulls_mm, self._step))
 
     def fit_within(

@@ -26,15 +26,15 @@ def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[
     """The pieces, each with as much of the neighbours that it touches as leaves their union unchanged.
 
     A contact pushes along the shortest way out of a piece. Where two pieces meet at a face, that way leads
-    through this face for a corner of a pad that presses beside it: sideways, as if the part had a step there.
+    through this face for a corner of a pad that presses near it: sideways, as if the part had a step there.
 
     Args:
         hulls: Corners (n, 3) of each piece, mm.
         reach_mm: Depth of the overlap, mm.
 
     Returns:
-        As many pieces in the same order. What would fill a concave side, need too many corners, or make a
-        piece more slender than PhysX accepts, is left out.
+        As many pieces in the same order. An extension that fills a concave side, needs too many corners,
+        or makes a piece more slender than PhysX accepts, is left out.
     """
     pieces = [np.asarray(points, dtype=float) for points in hulls]
     bodies = [Manifold.hull_points(points) for points in pieces]
@@ -57,7 +57,7 @@ def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[
 def _extended(
     points: np.ndarray, own: np.ndarray, other: np.ndarray, body: Manifold, union: Manifold, reach_mm: float
 ) -> np.ndarray:
-    """Points (n, 3) and those corners of a neighbour's slice next to the piece that leave the union as is."""
+    """Points (n, 3) and those corners of a neighbour's adjacent slice that keep the union unchanged."""
     plane = _plane_between(own, other)
     if plane is None:
         return points

@@ -27,7 +27,7 @@ def convex_polygons(region: Any, most_corners: int = _MOST_CORNERS) -> list[np.n
 
     Args:
         region: A polygon, or several, with or without holes.
-        most_corners: Of one piece; 16 give a prism of 32 corners.
+        most_corners: Greatest number of one piece; 16 give a prism of 32 corners.
     """
     triangles = [
         np.asarray(shapely.get_coordinates(triangle))[:-1]
@@ -81,7 +81,7 @@ def turned_pieces(profile: Sequence[tuple[float, float]], detail_mm: float) -> l
 
 
 def split_by(points: np.ndarray, cutter: np.ndarray) -> list[np.ndarray]:
-    """The convex pieces of what is left of one convex body when another is cut out of it."""
+    """The convex pieces that are left when one convex body is cut out of another."""
     low, high = points.min(axis=0), points.max(axis=0)
     if (cutter.min(axis=0) > high).any() or (cutter.max(axis=0) < low).any():
         return [points]
@@ -101,7 +101,7 @@ def split_by(points: np.ndarray, cutter: np.ndarray) -> list[np.ndarray]:
 
 
 def merge_hulls(hulls: Sequence[np.ndarray], slack: float = 0.002) -> list[np.ndarray]:
-    """Joins pieces that make a nearly convex body together, those that add the least volume first.
+    """Join pieces that make a nearly convex body together, those that add the least volume first.
 
     Args:
         hulls: Corner points (n, 3) of each piece.
@@ -165,7 +165,7 @@ def _frusta(section: Any) -> tuple[Any | None, list[np.ndarray]]:
 
 
 def _convex_runs(slabs: list[tuple[float, float, float, float]]) -> list[list[tuple[float, float]]]:
-    """Runs of (z, radius) along the axis that turn into convex bodies."""
+    """Run of (z, radius) along the axis that turn into convex bodies."""
     runs: list[list[tuple[float, float]]] = []
     for z0, r0, z1, r1 in slabs:
         if runs and abs(runs[-1][-1][0] - z0) < 1e-5 and abs(runs[-1][-1][1] - r0) < 1e-5:
@@ -286,7 +286,7 @@ def _hidden_sectors(polygon: np.ndarray, section: Any) -> int:
 
 
 def _inner_corners(polygon: np.ndarray) -> np.ndarray:
-    """Which corners of a convex half section face the axis."""
+    """(n,) bool: whether each corner of a convex half section faces the axis."""
     shape = shapely.Polygon(polygon)
     inner = []
     for r, z in polygon:

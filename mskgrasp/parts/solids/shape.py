@@ -33,7 +33,7 @@ _SLIVER_MM = 0.05
 
 @contextmanager
 def bores_filled_to(radius_mm: float) -> Iterator[None]:
-    """Fills bores of plates up to another radius than ``FILLED_BORE_MM`` within the context."""
+    """Fill bores of plates up to another radius than ``FILLED_BORE_MM`` within the context."""
     token = _FILLED_OVERRIDE.set(radius_mm)
     try:
         yield

@@ -16,7 +16,7 @@ MANY_TRIANGLES = 50_000
 MOST_TRIANGLES_LEFT = 200_000
 
 TOLERANCES_MM = (0.01, 0.02, 0.04)
-"""Of single edge collapses, tried in turn; the resulting distance is measured."""
+"""Tolerances of single edge collapses, tried in turn; the resulting distance is measured."""
 
 MOST_MOVED_MM = 0.05
 """Largest distance between the surfaces; common CAD tessellations are about as far from the true one."""
@@ -26,7 +26,7 @@ COLLISION_TOLERANCES_MM = (0.01, 0.02, 0.05, 0.1, 0.2)
 """Convex decomposition takes time for each triangle, and its pieces deviate by tenths of a millimetre."""
 
 _FINE = 1 / 400
-"""Of the part's length: the coarsest tolerance for small parts."""
+"""Coarsest tolerance for small parts, as a share of the part's length."""
 
 _SAMPLES = 40_000
 

@@ -87,7 +87,7 @@ def rod(radius: float, z0: float, z1: float, multiple: int = 4) -> list[np.ndarr
     """A cylinder about z as one prism, or as two halves where one would be too coarse.
 
     Args:
-        radius: Of the true cylinder.
+        radius: Radius of the true cylinder.
         z0: Lower end.
         z1: Upper end.
         multiple: The number of sides is a multiple of it (6 to agree with a hexagon).
@@ -178,7 +178,7 @@ def few_corners(points: np.ndarray, most: int = MAX_HULL_VERTICES) -> np.ndarray
 
 
 def _distance_off_plane(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
-    """How far points lie from the plane through nearly coplanar ones."""
+    """Distance (n,) of points from the plane through nearly coplanar ones."""
     centre = flat.mean(axis=0)
     normal = np.linalg.svd(flat - centre)[2][-1]
     return np.abs((points - centre) @ normal)
@@ -220,7 +220,7 @@ def drill(radius: float, start: Sequence[float], axis: str, length: float) -> Ma
 
 
 def solid(body: Manifold, hulls: Iterable[np.ndarray]) -> Solid:
-    """Pairs a body with its convex pieces."""
+    """Pair a body with its convex pieces."""
     data = body.to_mesh64()
     mesh = trimesh.Trimesh(
         np.asarray(data.vert_properties)[:, :3], np.asarray(data.tri_verts), process=False, validate=False

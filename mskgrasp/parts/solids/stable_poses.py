@@ -4,7 +4,7 @@ The quasi-static model of Goldberg et al., "Part pose statistics" (1999): a part
 random orientation lands on the facet of its convex hull that lies below its centre of mass, and rolls over
 an edge onto the next facet wherever the centre of mass projects outside the facet it stands on.
 
-An implementation of our own: `trimesh.poses.compute_stable_poses` gives the same poses and probabilities
+Our own implementation: `trimesh.poses.compute_stable_poses` gives the same poses and probabilities
 for 22 of the 25 starter parts, but has no margin: socket_screw_m10x60 would rest in a quarter of its drops
 on facets whose border is 0.015 mm from the centre's projection, where a touch tips it.
 """

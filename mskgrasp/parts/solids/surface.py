@@ -11,7 +11,7 @@ from manifold3d import Error, Manifold, Mesh64
 from mskgrasp.core.errors import BadPart
 
 _MOST_CHANGE = 1e-4
-"""Of the volume: manifold3d removes slivers silently, and with them folds that are not slivers."""
+"""Greatest change of the volume, as a share: manifold3d silently removes slivers, and folds with them."""
 
 
 @dataclass(frozen=True, kw_only=True)

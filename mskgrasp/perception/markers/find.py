@@ -24,7 +24,7 @@ SIZE_TOLERANCE = 0.1
 LEAST_FILL = 0.9
 """Least share of its smallest rectangle that a square fills; a disc fills 0.79."""
 REGION_MARGIN = 0.05
-"""How far a part in the region may reach beyond it, metres."""
+"""Greatest reach of a part in the region beyond it, metres."""
 _STEP = 3
 _NAMES = ("larger", "smaller")
 
@@ -92,7 +92,7 @@ def find_markers(
         if len(measured) < LEAST_DEPTHS:
             raise MarkersNotFound(
                 f"no depth: on the {_NAMES[i]} square {len(measured)} depths are valid, at least "
-                f"{LEAST_DEPTHS} are needed; use larger squares or matt tape, or tell the squares' heights"
+                f"{LEAST_DEPTHS} are needed; use larger squares or matt tape, or give the squares' heights"
             )
         depths.append(float(np.median(measured)))
     return Markers(

@@ -14,7 +14,7 @@ DISTANCE_CHANGE = 0.001
 SIDE_CHANGE = 0.0006
 """Greatest change of a square's side, metres; more means that it is covered or tilted."""
 HEIGHT_CHANGE = 0.004
-"""Greatest change of a square's height, metres; a Kinect errs by 1 mm."""
+"""Greatest change of a square's height, metres; the error of a Kinect is 1 mm."""
 
 
 PAD_PLAY = 0.002

@@ -16,7 +16,7 @@ class RegisteredFrame:
     """Colour and depth of one frame.
 
     Args:
-        frame: Its fine colour is used where it has one.
+        frame: The frame; its fine colour is used where it has one.
         table_z: Height of the table, base frame, metres.
 
     Attributes:

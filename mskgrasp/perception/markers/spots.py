@@ -18,7 +18,7 @@ class Spot:
     Attributes:
         centre: (2,) column and row of its centroid, pixels; the centre of a pixel has integer coordinates.
         sides: (2,) the longer and the shorter one of the rectangle with its second moments, pixels.
-        side: Of the square with its area, pixels.
+        side: Side of the square with its area, pixels.
         fill: Share of its smallest rectangle that it fills: 1 for a square, 0.79 for a disc; 0 if it is too
             large to be measured.
         inside: (k, 2) columns and rows of its pixels; none if it is too large.

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from mskgrasp.parts.solids.surface import Surface
 
 MOST_TRIANGLES = 10_000_000
-"""Of a whole file: repairing it takes about 5 GB of memory."""
+"""Greatest number in a whole file: repairing it takes about 5 GB of memory."""
 
 
 class Unreadable(Exception):

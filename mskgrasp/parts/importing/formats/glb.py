@@ -19,7 +19,7 @@ _MOST_INSTANCES = 10_000
 
 
 def load_glb(content: bytes) -> Loaded:
-    """Reads all meshes of a GLB, each instance placed by its nodes; metres by the standard.
+    """Read all meshes of a GLB, each instance placed by its nodes; metres by the standard.
 
     Raises:
         Unreadable: It is damaged, compressed, or keeps its geometry in other files.

@@ -1,6 +1,6 @@
 """Wavefront OBJ: vertices and faces; materials and everything else are ignored.
 
-A reader of our own: trimesh's counts negative indices from the last vertex of the file, not from the last one
+Our own reader: trimesh's counts negative indices from the last vertex of the file, not from the last one
 read, cuts concave polygons into fans that fold over themselves, and drops a mesh with a damaged vertex line
 without an error.
 """
@@ -15,7 +15,7 @@ from mskgrasp.parts.solids.surface import Surface
 
 
 def load_obj(content: bytes) -> Loaded:
-    """Reads an OBJ; its unit is unknown. Polygons are triangulated.
+    """Read an OBJ; its unit is unknown. Polygons are triangulated.
 
     Raises:
         Unreadable: A line is damaged, or there are no vertices.

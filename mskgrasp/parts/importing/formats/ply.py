@@ -13,7 +13,7 @@ from mskgrasp.parts.solids.surface import Surface
 
 
 def load_ply(content: bytes) -> Loaded:
-    """Reads a PLY; its unit is unknown.
+    """Read a PLY; its unit is unknown.
 
     Raises:
         Unreadable: It is damaged or holds only points.

@@ -35,7 +35,7 @@ _UNITS = {b"MILLI": ("mm", 1.0), b"CENTI": ("cm", 10.0), b"MICRO": ("micrometre"
 
 
 def load_step(content: bytes) -> Loaded:
-    """Reads the solids of a STEP file, in the unit that the file states.
+    """Read the solids of a STEP file, in the unit that the file states.
 
     Raises:
         Unreadable: It is damaged, has no solids, or cascadio is not installed.

@@ -1,7 +1,7 @@
 """STL, binary and text.
 
-A reader of our own: of sound files trimesh's gives the same triangles, but it reads as much of a text as is
-there where the text is cut off, refuses text with CR line ends, with a facet on one line or with a solid
+Our own reader: for intact files trimesh's gives the same triangles, but it accepts text that
+is cut off, refuses text with CR line ends, with a facet on one line or with a solid
 called ``vertex...``, and takes a binary file by its exact length alone.
 """
 
@@ -22,7 +22,7 @@ _COARSEST = 1e-5
 
 
 def load_stl(content: bytes) -> Loaded:
-    """Reads an STL; its unit is unknown.
+    """Read an STL; its unit is unknown.
 
     Raises:
         Unreadable: It is other text, cut off, or too far from its origin.

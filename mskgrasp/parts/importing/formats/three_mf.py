@@ -1,6 +1,6 @@
 """3MF: a zip of XML, by the 3MF core specification 1.3 and its production extension.
 
-A reader of our own: trimesh's unpacks the whole archive (1.1 GB of memory for a file of 0.4 MB), merges
+Our own reader: trimesh's unpacks the whole archive (1.1 GB of memory for a file of 0.4 MB), merges
 objects of several model files that share an id, takes supports for the part, drops references to missing
 objects without an error, and checks neither a DTD nor required extensions.
 """
@@ -84,7 +84,7 @@ class _Model:
 
 
 def load_3mf(content: bytes) -> Loaded:
-    """Reads the build items of a 3MF, each instance in its place, in the unit that the file states.
+    """Read the build items of a 3MF, each instance in its place, in the unit that the file states.
 
     Raises:
         Unreadable: It is damaged, unpacks to more than 1 GiB, or is not made of triangles.

@@ -37,7 +37,7 @@ def lengths(row: Row) -> dict[str, float]:
 
 
 def needs_cad(make: Callable[..., Any]) -> Callable[..., Any]:
-    """Wraps a maker: silences the libraries' warnings, and names the extra where they are missing.
+    """Wrap a maker: silence the libraries' warnings, and name the extra where they are missing.
 
     Raises:
         BadPart: build123d or bd_warehouse is not installed, or could not draw the part.
@@ -65,7 +65,7 @@ def needs_cad(make: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def mesh_of(shape: Any) -> trimesh.Trimesh:
-    """Tessellates a shape that was not tessellated before: OpenCASCADE would return its earlier facets.
+    """Tessellate a shape that was not tessellated before: OpenCASCADE would return its earlier facets.
 
     Raises:
         BadPart: The facets do not close.

@@ -22,7 +22,7 @@ def turned_hulls(mesh: trimesh.Trimesh, *, filled: bool = False) -> list[np.ndar
     """Pieces of a body of revolution about z; bolt holes, slots and sockets off the axis are filled.
 
     Args:
-        mesh: Of the shape.
+        mesh: Mesh of the shape, millimetres.
         filled: Fills what is hollow about the axis, too: the socket of a screw.
     """
     section = half_section(mesh)
@@ -44,7 +44,7 @@ def extruded_hulls(
     """Pieces of an outline extruded along z, by its section at half height.
 
     Args:
-        mesh: Of the shape.
+        mesh: Mesh of the shape, millimetres.
         filled_mm: Radius of the largest holes that are filled.
         detail_mm: Finer corners of the outline are left out.
         slack: Share of the volume that joining pieces may add.

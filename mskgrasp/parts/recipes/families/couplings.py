@@ -18,7 +18,7 @@ SLOT = 2.0
 
 
 def recipes() -> Iterator[Recipe]:
-    """The built-in couplings and clamp collars; none of them follows a standard's every dimension."""
+    """The built-in couplings and clamp collars; none follows a standard in every dimension."""
     for file_name, name, make, density, source in (
         ("sleeve_coupling.csv", "sleeve_coupling_{D}x{d}x{L}", sleeve_coupling, STEEL, OWN),
         ("clamp_coupling.csv", "clamp_coupling_{D}x{d}x{L}", clamp_coupling, ALUMINIUM, OWN),
@@ -183,7 +183,7 @@ def two_piece_collar(size: dict[str, float]) -> s.Solid:
     holes = _clamp_screws(outer, bore, screw, np.array([width / 2]))
     holes += [hole.rotate((0.0, 0.0, 180.0)) for hole in holes]
     body = tube(outer, bore, 0, width).drilled(gap, *holes)
-    # The bolts fill their holes to the bottom: a void inside would be a body of its own.
+    # The bolts fill their holes to the bottom: a void inside would be a separate body.
     x = (outer + bore) / 2
     reach = np.sqrt(outer**2 - x**2) + 1
     bolt = sh.tool(s.drill(screw / 2 + 0.1, (x, -0.5 * reach, width / 2), "y", 1.25 * reach))

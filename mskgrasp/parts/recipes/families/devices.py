@@ -11,13 +11,13 @@ from mskgrasp.parts.solids import shape as h
 from mskgrasp.parts.solids import solid as s
 
 MOTOR = 3900.0
-"""kg/m^3 of a stepper motor's envelope: a NEMA 17 motor of 40 mm then has its usual mass of 0.28 kg."""
+"""Density of a stepper motor's envelope, kg/m^3: a NEMA 17 motor of 40 mm then has its usual 0.28 kg."""
 
 COIL = 5500.0
-"""kg/m^3 of iron, copper and air in a coil's frame."""
+"""Mean density of iron, copper and air in a coil's frame, kg/m^3."""
 
 ENCAPSULATED = 1600.0
-"""kg/m^3 of a moulded housing with contacts in it."""
+"""Mean density of a moulded housing with contacts in it, kg/m^3."""
 
 
 def recipes() -> Iterator[Recipe]:

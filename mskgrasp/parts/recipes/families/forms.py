@@ -90,11 +90,11 @@ def bent_rod(radius: float, *steps: Step, end_radius: float | None = None, chamf
     """A round rod in the xy-plane from the origin, along +x at first.
 
     Args:
-        radius: Of the rod.
+        radius: Radius of the rod.
         steps: Straight lengths, and bends as (radius of the centre line, degrees); a bend to the left is
             positive.
-        end_radius: Of the rod's far end, if it tapers.
-        chamfer: Of both ends.
+        end_radius: Radius of the rod's far end, if it tapers.
+        chamfer: Chamfer of both ends.
     """
     taper = radius if end_radius is None else end_radius
     fine = _stations(steps, lambda bend: _FINE_STEP, balanced=False)

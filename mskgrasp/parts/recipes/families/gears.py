@@ -19,7 +19,7 @@ ADDENDUM, DEDENDUM, FILLET = 1.0, 1.25, 0.38  # in modules, ISO 53 profile A
 SOURCE = "ISO 54, ISO 53 profile A"
 
 MOST_TWIST = np.radians(24)
-"""Of one hull of a helical tooth; a hull between two outlines turned by it stays within 0.7 mm."""
+"""Greatest twist of one hull of a helical tooth, radians; the hull then stays within 0.7 mm of it."""
 
 
 def recipes() -> Iterator[Recipe]:
@@ -147,7 +147,7 @@ def helical_gear(size: dict[str, float]) -> s.Solid:
 
 
 def root_radius(size: dict[str, float]) -> float:
-    """Of the root circle."""
+    """Radius of the root circle."""
     helix = np.radians(size.get("helix_deg", 0.0))
     return float(size["m_mm"] * (size["teeth"] / np.cos(helix) / 2 - DEDENDUM))
 

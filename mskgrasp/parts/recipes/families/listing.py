@@ -22,7 +22,7 @@ def one_per_row(
     """A recipe for every row of a table.
 
     Args:
-        file_name: Of the table.
+        file_name: File name of the table.
         name: Format string over the columns without their ``_mm``; a decimal point becomes a p.
         make: Makes a solid of a row.
         source: The standard, or another origin of the dimensions.

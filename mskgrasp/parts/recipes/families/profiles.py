@@ -82,7 +82,7 @@ def lipped_channel(size: dict[str, float]) -> s.Solid:
 
 
 def angle_profile(size: dict[str, float]) -> s.Solid:
-    """An L-profile with legs of its own thickness."""
+    """An L-profile with legs of equal thickness."""
     a, b, t = size["a_mm"], size["b_mm"], size["t_mm"]
     return _finished(o.along_x([(0, 0), (a, 0), (a, t), (t, t), (t, b), (0, b)], 0, size["l_mm"]))
 

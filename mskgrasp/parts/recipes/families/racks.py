@@ -88,7 +88,7 @@ def bevel_gear(size: dict[str, float]) -> s.Solid:
     shrink = 1 - size["face_mm"] / distance
 
     def place(height: float, share: float) -> tuple[float, float]:
-        """Radius and z of what is ``height`` over the pitch cone, on the back cone or nearer the apex."""
+        """Radius and z of a point ``height`` over the pitch cone, on the back cone or nearer the apex."""
         r, z = pitch + height * np.cos(cone), height * np.sin(cone)
         return float(share * r), float(apex + share * (z - apex))
 

@@ -13,7 +13,7 @@ from mskgrasp.parts.solids import shape as sh
 from mskgrasp.parts.solids import solid as s
 
 BEARING = 5300.0
-"""kg/m^3 of the solid ring: a 6204 then has its catalogue mass of 0.106 kg with hollow raceways."""
+"""Density of the solid ring, kg/m^3: a 6204 then has its catalogue mass of 0.106 kg with hollow raceways."""
 
 
 def recipes() -> Iterator[Recipe]:

@@ -14,7 +14,7 @@ from mskgrasp.parts.solids import shape as sh
 from mskgrasp.parts.solids import solid as s
 
 CHAMFER = 1.0
-"""Of both ends, 45 degrees."""
+"""Chamfer of both ends, at 45 degrees."""
 
 
 def recipes() -> Iterator[Recipe]:
