@@ -25,8 +25,9 @@ if TYPE_CHECKING:
     from mskgrasp.learning.grasp_models import Models, load_models
     from mskgrasp.parts.load import load_part
     from mskgrasp.parts.part import Part
+    from mskgrasp.planning.config import PlannerConfig
     from mskgrasp.planning.place_pose import Target, place_pose
-    from mskgrasp.planning.planner import GraspPlan, Planner, PlannerConfig
+    from mskgrasp.planning.planner import GraspPlan, Planner
 
 __version__ = "0.1.0"
 
@@ -45,8 +46,9 @@ _HOMES = {
     "mskgrasp.learning.grasp_models": ("Models", "load_models"),
     "mskgrasp.parts.load": ("load_part",),
     "mskgrasp.parts.part": ("Part",),
+    "mskgrasp.planning.config": ("PlannerConfig",),
     "mskgrasp.planning.place_pose": ("Target", "place_pose"),
-    "mskgrasp.planning.planner": ("GraspPlan", "Planner", "PlannerConfig"),
+    "mskgrasp.planning.planner": ("GraspPlan", "Planner"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -12,7 +12,7 @@ import numpy as np
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.learning.grasp_models import DESCRIPTION, Models, load_models
-from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.run_inputs import model_digests
 from mskgrasp.trials.predictors import (
     LOWESS,
@@ -106,7 +106,7 @@ def load_compared(
         models: Folder of the run's own model.
         lowess_data: Dataset from whose grasps of the same part LOWESS predicts; None: no LOWESS.
         parts: Names of the parts.
-        chunk_size: As in `mskgrasp.planning.planner.PlannerConfig`.
+        chunk_size: As in `mskgrasp.planning.config.PlannerConfig`.
 
     Raises:
         BadModel, BadDataset: A folder cannot be used.

@@ -11,8 +11,8 @@ from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.palletize.pallet_slots import Slot, parse_target, read_slots
 from mskgrasp.palletize.placement_records import Correction
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import SIMULATED_CELL
-from mskgrasp.planning.planner import PlannerConfig
 
 
 class PalletizeConfig(Config):

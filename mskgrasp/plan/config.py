@@ -9,8 +9,8 @@ from pydantic import Field
 from mskgrasp.core.config import Config
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts.importing.mesh_files import Unit
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import SIMULATED_CELL
-from mskgrasp.planning.planner import PlannerConfig
 
 
 class PlanConfig(Config):

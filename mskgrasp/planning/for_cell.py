@@ -11,7 +11,8 @@ from hal.errors import HalError
 from mskgrasp.core.shipped import config_file, example_file
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts.importing.mesh_files import Unit
-from mskgrasp.planning.planner import Planner, PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.planner import Planner
 
 SIMULATED_CELL = config_file("cells/sapien.yaml")
 

@@ -9,8 +9,8 @@ import tyro
 from pydantic import Field
 
 from mskgrasp.core.shipped import config_file
+from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.network_config import NetworkConfig, PatchNetworkConfig
-from mskgrasp.learning.trainer import LearningConfig
 
 DEFAULT_CONFIG = config_file("train/default.yaml")
 

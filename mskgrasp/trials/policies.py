@@ -75,7 +75,7 @@ class Chooser:
     Attributes:
         candidates: Source of candidates and qualities.
         predictor: Predicts displacements, and the variances of the policy ``low_variance``.
-        policy: As in `mskgrasp.planning.planner.PlannerConfig`.
+        policy: As in `mskgrasp.planning.config.PlannerConfig`.
         part: Name of the part on the table.
         tracker: Source of its pose for a predictor that needs it; None: no pose.
     """

@@ -14,8 +14,9 @@ from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
-from mskgrasp.planning.planner import Planner, PlannerConfig
+from mskgrasp.planning.planner import Planner
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.trials.engine import TrialEngine, connected_engine
 from mskgrasp.trials.lowess import Lowess

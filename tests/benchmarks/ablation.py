@@ -19,9 +19,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mskgrasp.core.config import read_config
+from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.samples import Samples, read_samples
-from mskgrasp.learning.trainer import LearningConfig, Sides, split, train
+from mskgrasp.learning.trainer import Sides, split, train
 from mskgrasp.runtime.progress import progress
 
 REPOSITORY = Path(__file__).parents[2]

@@ -22,12 +22,13 @@ from rich.table import Table
 from hal import RgbdFrame, open_cell
 from mskgrasp.core.config import read_config
 from mskgrasp.core.settings import REGION, TABLE_Z
+from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models, load_models
 from mskgrasp.learning.network_config import Normalisation
-from mskgrasp.learning.trainer import LearningConfig
 from mskgrasp.parts import starter_names
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import present
-from mskgrasp.planning.planner import Planner, PlannerConfig
+from mskgrasp.planning.planner import Planner
 from mskgrasp.runtime.progress import progress
 
 REPOSITORY = Path(__file__).parents[2]

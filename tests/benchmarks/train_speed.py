@@ -18,9 +18,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mskgrasp.core.config import read_config
+from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import build_models
 from mskgrasp.learning.samples import Samples
-from mskgrasp.learning.trainer import LearningConfig, Stage, describe, split
+from mskgrasp.learning.trainer import Stage, describe, split
 from mskgrasp.runtime.progress import progress
 
 REPOSITORY = Path(__file__).parents[2]

@@ -17,7 +17,7 @@ from mskgrasp.evaluate.experiments import (
     with_predictions,
 )
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
-from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.trials.predictors import LOWESS, NetworkPredictor
 from mskgrasp.trials.trial_files import trial_file, write_trial
 from tests.evaluate.made_trials import trial

@@ -19,7 +19,7 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.evaluate.config import EvaluateConfig
 from mskgrasp.evaluate.run import evaluate
 from mskgrasp.learning.grasp_models import PRETRAINED
-from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file

@@ -18,7 +18,8 @@ from hal.arm import POSITION_TOLERANCE, ROTATION_TOLERANCE, Arm
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import MAX_OPENING, pose_base_tcp
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
-from mskgrasp.planning.planner import Planner, PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.planner import Planner
 from tests.hal.franka.robots import franky_sim, write_cell
 from tests.hal_contract.conftest import CELLS
 

@@ -2,9 +2,9 @@
 
 import torch
 
+from mskgrasp.learning.config import LearningConfig, StageConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models
 from mskgrasp.learning.network_config import HandNetworkConfig, Normalisation, PatchNetworkConfig
-from mskgrasp.learning.trainer import LearningConfig, StageConfig
 
 SMALL = PatchNetworkConfig(
     patch_pixels=32, channels=4, trunk_width=16, action_width=8, head_width=8, dropout=0.5

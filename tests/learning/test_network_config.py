@@ -3,8 +3,8 @@ from pydantic import ValidationError
 
 from mskgrasp.core.config import check_config
 from mskgrasp.core.errors import BadConfig
+from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.network_config import HandNetworkConfig, Normalisation, PatchNetworkConfig
-from mskgrasp.learning.trainer import LearningConfig
 
 
 def test_a_file_chooses_the_architecture_by_its_name():

@@ -11,27 +11,14 @@ from safetensors.torch import save_file
 
 from mskgrasp.core import metrics
 from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.learning.config import StageConfig
 from mskgrasp.learning.grasp_models import Calibration, Models, build_models, load_models, save_model
 from mskgrasp.learning.held_out import calibrate, predict_grasp_displacement
-from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.samples import read_samples
-from mskgrasp.learning.trainer import (
-    LearningConfig,
-    Reporter,
-    Stage,
-    StageConfig,
-    TrainingDiverged,
-    describe,
-    split,
-)
+from mskgrasp.learning.trainer import Reporter, Stage, TrainingDiverged, describe, split
 from mskgrasp.learning.trainer import train as learn
 from tests import synthetic
 from tests.learning.small import HAND, PATCH, SHORT
-
-
-def test_views_that_the_network_never_learned_are_refused():
-    with pytest.raises(ValueError, match="needs symmetric: true"):
-        LearningConfig(symmetric=False, network=PatchNetworkConfig(symmetric_views=True))
 
 
 def test_validation_never_sees_a_part_of_training(samples):
@@ -142,9 +129,7 @@ def test_a_loss_that_is_no_number_stops_the_run_in_one_line(samples, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-def test_turned_samples_need_pictures_that_turn(dataset):
-    with pytest.raises(ValueError, match="symmetric"):
-        LearningConfig(network=PatchNetworkConfig(image="object"), symmetric=True)
+def test_a_picture_of_the_whole_part_is_that_of_the_samples(dataset):
     network = PATCH.network.model_copy(update={"image": "object"})
     samples = read_samples(dataset, network)
     assert samples.object_patches.shape == samples.patches.shape

@@ -15,8 +15,8 @@ from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.palletize.figures import pallet_image
 from mskgrasp.palletize.pallet_slots import Slot
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
-from mskgrasp.planning.planner import PlannerConfig
 from mskgrasp.trials.engine import TrialEngine
 
 PART = "t_nut_m16x18"

@@ -21,7 +21,7 @@ from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.palletize.__main__ import main
 from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.run import SCENE_VERSION, palletize
-from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.runtime.run_folder import INPUTS
 from tests.browser import Page
 from tests.hal.test_operator import REAL

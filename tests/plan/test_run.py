@@ -13,7 +13,7 @@ from mskgrasp.core.errors import BadConfig, UnknownPart
 from mskgrasp.parts import find_part
 from mskgrasp.plan.config import PlanConfig
 from mskgrasp.plan.run import describe, plan_grasp
-from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
 from tests.figures import picture
 from tests.planning.hand_made import FRAME, planner
 

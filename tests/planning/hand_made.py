@@ -2,10 +2,8 @@ import torch
 
 from mskgrasp.learning.grasp_models import ModelMeta, build_models
 from mskgrasp.learning.network_config import Normalisation, PatchNetworkConfig
-from mskgrasp.planning.planner import (
-    Planner,
-    PlannerConfig,
-)
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.planner import Planner
 from tests import synthetic
 from tests.synthetic import REGION, Box
 

@@ -11,8 +11,8 @@ from hal.errors import HalError
 from mskgrasp.core.errors import BadPart
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts import find_part
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import SIMULATED_CELL, make_planner, part_name, present
-from mskgrasp.planning.planner import PlannerConfig
 
 
 def test_a_planner_samples_over_the_cells_own_table():

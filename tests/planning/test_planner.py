@@ -8,12 +8,8 @@ import torch
 from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.perception.part_detection import view_part
-from mskgrasp.planning.planner import (
-    PlannerConfig,
-    select,
-    shortlist,
-    variance_score,
-)
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.planner import select, shortlist, variance_score
 from mskgrasp.planning.refine import fingers_free
 from mskgrasp.planning.scoring import Scene
 from mskgrasp.reports.grasp_figures import draw_plan

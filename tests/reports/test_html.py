@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.reports.html import write_html
 from mskgrasp.reports.section import Figure, Section, settings_section
 from mskgrasp.runtime.console_table import Link, Table

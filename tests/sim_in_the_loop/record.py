@@ -10,7 +10,8 @@ import torch
 from hal import open_cell
 from hal.operator import Operator
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
-from mskgrasp.planning.planner import Planner, PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.planner import Planner
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.measurement import finish, run_trial
 from mskgrasp.trials.trial import Trial

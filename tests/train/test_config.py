@@ -1,9 +1,7 @@
 import pytest
 
+from mskgrasp.learning.config import StageConfig
 from mskgrasp.learning.network_config import PatchNetworkConfig
-from mskgrasp.learning.trainer import (
-    StageConfig,
-)
 from mskgrasp.runtime.options import parse
 from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
 

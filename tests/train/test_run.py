@@ -8,10 +8,8 @@ import torch
 from mskgrasp.core.config import read_config
 from mskgrasp.core.errors import UsageError
 from mskgrasp.dataset import shard_path, write_shard
+from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import load_models
-from mskgrasp.learning.trainer import (
-    LearningConfig,
-)
 from mskgrasp.train import run as train
 from mskgrasp.train.config import TrainConfig
 from tests import synthetic

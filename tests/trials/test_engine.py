@@ -15,7 +15,7 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.shipped import config_file
-from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.trials.engine import ExecutedGrasp, TrialEngine, connected_engine
 from tests.hal.replay.toy import toy_cell
 from tests.planning.hand_made import FRAME, planner

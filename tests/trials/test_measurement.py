@@ -9,7 +9,7 @@ import pytest
 
 from hal.operator import Operator
 from mskgrasp.core.grasp import MAX_OPENING
-from mskgrasp.planning.planner import PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.trials.engine import PlannedGrasp, TrialEngine
 from mskgrasp.trials.measurement import finish, run_trial, safe_opening
 from tests.planning.hand_made import FRAME, planner

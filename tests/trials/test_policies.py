@@ -11,7 +11,8 @@ import pytest
 from hal.camera import RgbdFrame
 from mskgrasp.core.errors import NoGraspFound
 from mskgrasp.core.geometry import Pose
-from mskgrasp.planning.planner import Planner, PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.planner import Planner
 from mskgrasp.trials.policies import Candidates, Chooser, RepeatedPlanner
 from mskgrasp.trials.predictors import NetworkPredictor, PartObservation
 from tests.planning.hand_made import FRAME, planner

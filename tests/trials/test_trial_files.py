@@ -13,7 +13,8 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.evaluate.replay_trial import draw_trial, find_trial
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
-from mskgrasp.planning.planner import GraspPlan, Planner, PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.planner import GraspPlan, Planner
 from mskgrasp.runtime.run_folder import TRIALS, append_trial, read_trials
 from mskgrasp.trials.trial import Prediction, Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file, write_trial

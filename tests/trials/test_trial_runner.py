@@ -20,8 +20,8 @@ from hal.operator import Operator
 from mskgrasp.core.errors import UsageError
 from mskgrasp.evaluate.experiments import scenes
 from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import SIMULATED_CELL
-from mskgrasp.planning.planner import PlannerConfig
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.predictors import fit_lowess
 from mskgrasp.trials.trial_files import read_trial, trial_file

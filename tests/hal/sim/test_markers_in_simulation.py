@@ -19,7 +19,8 @@ from mskgrasp.core.panda_kinematics import top_down
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.parts import find_part
 from mskgrasp.perception.markers import planar_displacement
-from mskgrasp.planning.planner import Planner, PlannerConfig
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.planner import Planner
 from mskgrasp.trials import measurement
 from mskgrasp.trials.engine import PlannedGrasp, TrialEngine
 from tests.hal.sim.marked_parts import (

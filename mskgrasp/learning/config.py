@@ -1,0 +1,61 @@
+"""Settings of training."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from mskgrasp.core.config import Config
+from mskgrasp.learning.network_config import NetworkConfig, PatchNetworkConfig
+
+
+class StageConfig(Config):
+    """Optimisation of one network."""
+
+    optimiser: Literal["adam", "rmsprop"] = "adam"
+    learning_rate: float = Field(default=1e-3, gt=0.0)
+    decay: float = Field(default=0.0, ge=0.0)
+    """Keras's decay: step k uses learning_rate / (1 + decay * k)."""
+    schedule: Literal["constant", "cosine"] = "cosine"
+    """cosine: the rate falls to zero at the end, after a linear rise over the first 5 % of the steps."""
+    epochs: int = Field(default=15, ge=1)
+    batch_size: int = Field(default=32, ge=1)
+
+
+class LearningConfig(Config):
+    """Settings of training; the same settings, data and device type give the same model."""
+
+    seed: int = Field(default=0, ge=0)
+    sides: Literal["name", "catalogue"] = "name"
+    """How parts are split: by a hash of their name, or as the catalogue says (near-duplicates on one side,
+    and test parts beside those of validation)."""
+    validation_fraction: float = Field(default=0.2, gt=0.0, lt=1.0)
+    """Share of the parts that training never sees, where they are split by name."""
+    calibrate: bool = True
+    """Correct quality and variances on the validation parts, at the end."""
+    success_range: tuple[float, float] = (0.0, 1.0)
+    """Parts whose success rate of random grasps lies outside are excluded (paper: 0.05 to 0.40)."""
+    network: NetworkConfig = PatchNetworkConfig()
+    noise_std: float = Field(default=0.003, ge=0.0)
+    """Noise on each pixel of a training patch, metres."""
+    symmetric: bool = True
+    """Half of the samples are rotated by half a turn, half are mirrored: the physics is symmetric."""
+    mixed_precision: bool = False
+    """The image branch trains in bfloat16, the rest in float32: faster on a CPU with AMX."""
+    beta: float = Field(default=0.0, ge=0.0, le=1.0)
+    """0: the paper's likelihood; 0.5: beta-NLL."""
+    keep_best: bool = True
+    """Keep the epoch of lowest validation loss instead of the last."""
+    gqn: StageConfig = StageConfig()
+    gdn: StageConfig = StageConfig()
+
+    @model_validator(mode="after")
+    def _check(self) -> LearningConfig:
+        if self.symmetric and self.network.sees_object:
+            raise ValueError(
+                "symmetric: true needs patches that are rotated with the grasp; with image: object none are"
+            )
+        if self.network.symmetric_views and not self.symmetric:
+            raise ValueError("network.symmetric_views needs symmetric: true, which trains on these views")
+        return self
