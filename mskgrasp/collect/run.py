@@ -24,7 +24,7 @@ from mskgrasp.core.files import LOCK, exclusive_lock
 from mskgrasp.core.shipped import config_file
 from mskgrasp.dataset import read_shard, shard_path
 from mskgrasp.parts import Part, chosen_names, find_part
-from mskgrasp.parts.catalogue import ratings, read_index, spread
+from mskgrasp.parts.catalogue import ratings, read_index, representative_entries
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 from mskgrasp.runtime.options import parse
@@ -83,7 +83,7 @@ def sampled(names: list[str], count: int) -> list[str]:
     unknown = [name for name in names if name not in index.parts]
     if unknown:
         raise UsageError(f"--sample: {unknown[0]!r} is not in the catalogue; sample of its sets or its parts")
-    return [entry.name for entry in spread((index.parts[name] for name in names), count)]
+    return [entry.name for entry in representative_entries((index.parts[name] for name in names), count)]
 
 
 def _collect(config: CollectConfig, parts: list[Part]) -> None:

@@ -80,7 +80,7 @@ def build_part(name: str) -> Part:
 
 def is_built(name: str) -> bool:
     """Whether the parts folder has a part, undamaged and built by the current recipe."""
-    return store.recipe_hash(store.parts_folder() / name) == recipe_hash(name)
+    return store.stored_recipe_hash(store.parts_folder() / name) == recipe_hash(name)
 
 
 def find_part(name_or_folder: str | Path) -> Part:
@@ -125,7 +125,7 @@ def recipe_hash(name: str) -> str:
         SCHEMA_VERSION,
         stamp("part", PART_VERSION),
         stamp(".".join(module.split(".")[-2:]), recipe.version),
-        cad.versions() if module.startswith(cad.__name__) else "",
+        cad.library_versions() if module.startswith(cad.__name__) else "",
         recipe.name,
         recipe.family,
         recipe.source,

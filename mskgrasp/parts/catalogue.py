@@ -287,7 +287,7 @@ def chosen_names(words: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def spread(entries: Iterable[Entry], count: int) -> list[Entry]:
+def representative_entries(entries: Iterable[Entry], count: int) -> list[Entry]:
     """About ``count`` parts: of each family in proportion to the root of its size, evenly by volume."""
     families: dict[str, list[Entry]] = defaultdict(list)
     for entry in entries:

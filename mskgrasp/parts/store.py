@@ -152,7 +152,7 @@ def read_part(folder: Path | str) -> Part:
     return part
 
 
-def recipe_hash(folder: Path) -> str | None:
+def stored_recipe_hash(folder: Path) -> str | None:
     """Hash of the recipe that made a folder's part; None where there is no undamaged part."""
     try:
         read_part(folder)
@@ -177,7 +177,7 @@ def _replace_folder(temporary: Path, final: Path, recipe: str) -> None:
         except OSError as error:
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
                 raise
-        if recipe_hash(final) == recipe:
+        if stored_recipe_hash(final) == recipe:
             return
         old = temporary.with_name(temporary.name + "-old")
         try:

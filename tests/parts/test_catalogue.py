@@ -21,8 +21,8 @@ from mskgrasp.parts.catalogue import (
     near_duplicates,
     ratings,
     read_index,
+    representative_entries,
     split_of,
-    spread,
     with_ratings,
     write_index,
 )
@@ -175,10 +175,10 @@ def test_recipes_have_legal_distinct_names_and_a_licence():
 
 def test_a_sample_has_some_of_every_family_spread_over_its_sizes():
     entries = [*bars("bar", list(range(30, 150, 2))), *bars("rail", [50, 60]), *bars("rod", [90])]
-    chosen = spread(entries, 12)
+    chosen = representative_entries(entries, 12)
     families = [part.family for part in chosen]
     assert {family: families.count(family) for family in set(families)} == {"bar": 9, "rail": 2, "rod": 1}
     lengths = [part.longest_axis for part in chosen if part.family == "bar"]
     assert max(np.diff(lengths)) < 0.02 and lengths == sorted(lengths)
-    assert spread(entries, 10_000) == sorted(entries, key=lambda e: (e.family, e.volume))
-    assert spread([], 5) == []
+    assert representative_entries(entries, 10_000) == sorted(entries, key=lambda e: (e.family, e.volume))
+    assert representative_entries([], 5) == []

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from mskgrasp.core.geometry import quat_to_matrix
 from mskgrasp.core.palette import INK, SLATE
 from mskgrasp.parts import store
-from mskgrasp.parts.catalogue import Entry, Index, spread
+from mskgrasp.parts.catalogue import Entry, Index, representative_entries
 from mskgrasp.parts.figures.render import Body, render
 from mskgrasp.parts.part import Part
 
@@ -40,7 +40,7 @@ def draw_sheet(index: Index, out: Path, parts: int, report_progress: Callable[[i
         parts: Approximate number to draw.
         report_progress: Called with the number drawn and the number to draw.
     """
-    chosen = spread(index.parts.values(), parts)
+    chosen = representative_entries(index.parts.values(), parts)
     rows = -(-len(chosen) // _COLUMNS)
     width, height = _COLUMNS * _TILE[0], rows * _TILE[1] + 0.62
     figure = Figure(figsize=(width, height), dpi=_DPI, facecolor="white")

@@ -14,7 +14,7 @@ from mskgrasp.core.errors import BadPart
 from mskgrasp.parts.importing.repair import Repairs, close_surface, count_of, wind_consistently
 from mskgrasp.parts.importing.winding import miscounted_fraction, winding_number
 from mskgrasp.parts.solids.simplify import decimate
-from mskgrasp.parts.solids.surface import Surface, manifold_of, surface_of, together
+from mskgrasp.parts.solids.surface import Surface, joined_surfaces, manifold_of, surface_of
 
 MOST_BODIES = 500
 """More indicate lettering, a lattice or scan debris instead of a part."""
@@ -76,7 +76,7 @@ def _closed(objects: Sequence[Surface]) -> tuple[list[Surface], Repairs]:
     except BadPart:
         if len(objects) == 1:
             raise
-        results = [close_surface(together(objects))]
+        results = [close_surface(joined_surfaces(objects))]
     return [surface for surface, _ in results], sum((repairs for _, repairs in results), Repairs())
 
 
@@ -154,7 +154,7 @@ def _with_cavities(shells: list[Manifold]) -> list[Manifold]:
                 "repair and export it again"
             )
         held[min(hosts, key=lambda i: volumes[i])].append(index)
-    return [manifold_of(together([surfaces[i] for i in members])) for members in held.values()]
+    return [manifold_of(joined_surfaces([surfaces[i] for i in members])) for members in held.values()]
 
 
 def _joined(solids: list[Manifold]) -> list[Manifold]:

@@ -160,7 +160,7 @@ def _check_available(name: str, check_name: Callable[[str], None]) -> None:
 
 def _known(name: str, recipe_hash: str) -> Part | None:
     folder = store.parts_folder() / name
-    return store.read_part(folder) if store.recipe_hash(folder) == recipe_hash else None
+    return store.read_part(folder) if store.stored_recipe_hash(folder) == recipe_hash else None
 
 
 def _make(

@@ -67,7 +67,7 @@ def surface_of(body: Manifold) -> Surface:
     )
 
 
-def together(surfaces: Sequence[Surface]) -> Surface:
+def joined_surfaces(surfaces: Sequence[Surface]) -> Surface:
     """Several surfaces as one."""
     start = np.cumsum([0, *(len(item.vertices) for item in surfaces)])
     return Surface(
