@@ -60,8 +60,8 @@ class PartSummary:
     kept: bool
 
 
-def summarise(folder: Path, part_filter: PartFilter) -> list[PartSummary]:
-    """Read a dataset and summarise each part."""
+def summarise_parts(folder: Path, part_filter: PartFilter) -> list[PartSummary]:
+    """Reads a dataset and summarises each part."""
     parts: dict[str, list[tuple[Columns, ShardInfo]]] = {}
     for path in list_shards(folder):
         # Without the images: those of a large dataset do not fit into memory.
@@ -101,8 +101,8 @@ def _median(values: np.ndarray) -> float | None:
     return float(np.median(values)) if len(values) else None
 
 
-def print_table(summaries: list[PartSummary], console: Console | None = None) -> None:
-    """Print a row for each part and a total."""
+def print_summary(summaries: list[PartSummary], console: Console | None = None) -> None:
+    """Prints a row for each part and a total."""
     rows = [
         (
             row.part,

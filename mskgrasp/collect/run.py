@@ -100,10 +100,10 @@ def _collect(config: CollectConfig, parts: list[Part]) -> None:
     if missing:
         _simulate(config, missing, parts, done)
     with ctrl_c_deferred():  # takes seconds
-        from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary
+        from mskgrasp.collect.report import draw_summary, print_summary, summarise_parts, write_summary
 
-    summaries = summarise(config.out, config.part_filter)
-    print_table(summaries)
+    summaries = summarise_parts(config.out, config.part_filter)
+    print_summary(summaries)
     write_summary(summaries, config.out)
     print(f"wrote {config.out / 'summary.json'} and {draw_summary(config.out, config.seed)}")
 

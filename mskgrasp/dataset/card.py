@@ -15,7 +15,7 @@ from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.dataset.label_error import read_label_error
 from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
 
-Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
+CardTable = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, headers, rows."""
 
 
@@ -140,7 +140,7 @@ def _median_and_tail(values: np.ndarray) -> tuple[float, float] | None:
     return float(median), float(tail)
 
 
-def tables(card: Card) -> list[Table]:
+def tables(card: Card) -> list[CardTable]:
     """Title, headers and rows of each table of the card."""
     n, won = card.attempts, card.successes
     facts = [

@@ -37,7 +37,7 @@ class Fault:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report:
+class CheckResult:
     """Result of a check.
 
     Attributes:
@@ -61,7 +61,7 @@ class _Shard:
     grasps: str  # digest
 
 
-def check_dataset(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = iter) -> Report:
+def check_dataset(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = iter) -> CheckResult:
     """Read all of a dataset and report every fault; change nothing.
 
     Args:
@@ -99,7 +99,7 @@ def check_dataset(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]
         faults.append(Fault(path=folder / "shards", reason="holds no shard; collect some"))
     faults.sort(key=lambda fault: fault.path.name)
     n = sum(shard.n for shard in shards)
-    return Report(n_shards=len(shards), n_attempts=n, faults=tuple(faults), notes=tuple(notes))
+    return CheckResult(n_shards=len(shards), n_attempts=n, faults=tuple(faults), notes=tuple(notes))
 
 
 def require_dataset(folder: Path) -> None:

@@ -90,7 +90,7 @@ class DisplacementSummary:
     paper: dict[str, dict[Policy, PaperErrors | None]]
 
 
-def compare(trials: Sequence[Trial], predictors: Mapping[str, Predictor]) -> DisplacementSummary:
+def compare_models(trials: Sequence[Trial], predictors: Mapping[str, Predictor]) -> DisplacementSummary:
     """Compute the errors of each model's predictions under each policy, on known and on novel parts."""
     best = [trial for trial in trials if not trial.chosen_by]
     models, policies = {}, {POLICY_NAMES["quality"]: TrialStatistics.of(best)}

@@ -77,7 +77,7 @@ def draw_success(summary: SuccessSummary, path: Path) -> None:
         right.set_xlim(left=0, right=max([1, *reasons.values()]) * 1.1)
 
 
-def draw_errors(trials: Sequence[Trial], path: Path) -> None:
+def draw_displacements(trials: Sequence[Trial], path: Path) -> None:
     """Draw measured over predicted displacements of the successes, with predicted standard deviations."""
     measured = [trial for trial in trials if trial.measured is not None]
     predicted = np.array([trial.predicted for trial in measured]).reshape(-1, 4)

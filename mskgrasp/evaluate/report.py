@@ -70,7 +70,7 @@ class Report:
         )
 
 
-def sections(report: Report, folder: Path) -> list[Section]:
+def report_sections(report: Report, folder: Path) -> list[Section]:
     """Make the sections of a report from its results and the figures in the run's folder."""
     summary = report.summary
     is_success = isinstance(summary, SuccessSummary)
@@ -112,7 +112,7 @@ def conclusion(summary: SuccessSummary | DisplacementSummary) -> str:
 
 def print_report(report: Report, folder: Path, console: Console | None = None) -> None:
     """Print the sections that fit a console."""
-    print_sections(sections(report, folder), console)
+    print_sections(report_sections(report, folder), console)
 
 
 def _success(summary: SuccessSummary, folder: Path) -> list[Section]:

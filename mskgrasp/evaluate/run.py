@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mskgrasp.core.errors import BadModel, UsageError
 from mskgrasp.core.files import write_whole
-from mskgrasp.evaluate.comparison import compare
+from mskgrasp.evaluate.comparison import compare_models
 from mskgrasp.evaluate.config import EvaluateConfig, Experiment
 from mskgrasp.evaluate.experiments import (
     Compared,
@@ -19,10 +19,10 @@ from mskgrasp.evaluate.experiments import (
     scenes,
     with_predictions,
 )
-from mskgrasp.evaluate.figures import draw_comparison, draw_errors, draw_success
+from mskgrasp.evaluate.figures import draw_comparison, draw_displacements, draw_success
 from mskgrasp.evaluate.replay_trial import describe_trial, draw_trial, find_trial, outcome_text
-from mskgrasp.evaluate.report import TITLES, Report, conclusion, sections
-from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise, worst_trials
+from mskgrasp.evaluate.report import TITLES, Report, conclusion, report_sections
+from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise_trials, worst_trials
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.run_inputs import model_digests, part_digests
@@ -157,7 +157,7 @@ def _report(
     config: EvaluateConfig, cell: CellFile, compared: Compared | None, trials: Sequence[Trial]
 ) -> Report:
     """Write the report and its pictures."""
-    summary = summarise(trials) if compared is None else compare(trials, compared.predictors)
+    summary = summarise_trials(trials) if compared is None else compare_models(trials, compared.predictors)
     worst = worst_trials(trials) if compared is None else largest_errors(trials)
     settings = config.model_dump(mode="json", exclude={"replay"}) | dict(
         parts=sorted({trial.part for trial in trials}),
@@ -176,14 +176,14 @@ def _report(
         draw_trial(config.out, trial, config.out / _picture(trial))
     if isinstance(summary, SuccessSummary):
         draw_success(summary, config.out / "success.png")
-        draw_errors(trials, config.out / "errors.png")
+        draw_displacements(trials, config.out / "errors.png")
     else:
         draw_comparison(summary, config.out / "displacement.png")
     text = json.dumps(report.to_json(), indent=1, allow_nan=False)
     write_whole(config.out / "report.json", (text + "\n").encode())
     write_html(
         config.out / "report.html", title=TITLES[config.experiment], conclusion=conclusion(summary),
-        sections=sections(report, config.out),
+        sections=report_sections(report, config.out),
     )  # fmt: skip
     return report
 

@@ -139,7 +139,7 @@ class SuccessSummary:
     paper: dict[str, float]
 
 
-def summarise(trials: Sequence[Trial]) -> SuccessSummary:
+def summarise_trials(trials: Sequence[Trial]) -> SuccessSummary:
     """Summarise the trials of a success experiment."""
     return SuccessSummary(
         overall=TrialStatistics.of(trials),

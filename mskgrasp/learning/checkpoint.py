@@ -84,7 +84,9 @@ def optimiser_tensors(optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
     return {f"{index}/{name}": value for index, values in state.items() for name, value in values.items()}
 
 
-def restore(checkpoint: Checkpoint, networks: dict[str, nn.Module], optimiser: torch.optim.Optimizer) -> None:
+def restore_checkpoint(
+    checkpoint: Checkpoint, networks: dict[str, nn.Module], optimiser: torch.optim.Optimizer
+) -> None:
     """Restore a checkpoint's weights and optimiser state, in place.
 
     Raises:

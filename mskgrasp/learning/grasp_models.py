@@ -33,7 +33,7 @@ _FORMER_FIELDS = {
 """Fields of the other architecture, listed when one class described both."""
 
 
-class Calibration(Config):
+class ModelCalibration(Config):
     """Corrections measured on held-out parts; the defaults change nothing."""
 
     quality_slope: float = Field(default=1.0, gt=0.0)
@@ -49,7 +49,7 @@ class ModelMeta(Config):
     schema_version: int = SCHEMA_VERSION
     network: NetworkConfig
     normalisation: Normalisation
-    calibration: Calibration = Calibration()
+    calibration: ModelCalibration = ModelCalibration()
     training: dict[str, Any] = {}
     metrics: dict[str, Any] = {}
 

@@ -14,7 +14,7 @@ from mskgrasp.core import metrics
 from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import to_object_displacement
-from mskgrasp.learning.grasp_models import Calibration, Models
+from mskgrasp.learning.grasp_models import ModelCalibration, Models
 from mskgrasp.learning.samples import Samples
 
 _CHUNK = 64
@@ -76,7 +76,7 @@ def centroid_displacement(
     return to_object_displacement(mean, origin_grasp), np.diagonal(covariance, axis1=-2, axis2=-1)
 
 
-def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> Calibration:
+def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> ModelCalibration:
     """Fit the corrections that make probabilities and 90 % intervals correct on these rows.
 
     The quality's log odds are stretched and shifted (Platt 1999); each variance is scaled by
@@ -92,7 +92,7 @@ def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> Calibrati
         target = samples.grasp_displacement[held].double().numpy()
         quantile = np.quantile(np.abs(metrics.standardised_error(mean, variance, target)), 0.9, axis=0)
         scale = tuple(np.maximum((quantile / norm.ppf(0.95)) ** 2, 1e-6))
-    return Calibration(quality_slope=slope, quality_offset=offset, variance_scale=scale)
+    return ModelCalibration(quality_slope=slope, quality_offset=offset, variance_scale=scale)
 
 
 def _platt(odds: np.ndarray, success: np.ndarray) -> tuple[float, float]:

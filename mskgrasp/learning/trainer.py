@@ -19,7 +19,7 @@ from mskgrasp.learning.checkpoint import (
     Checkpoint,
     optimiser_tensors,
     read_checkpoint,
-    restore,
+    restore_checkpoint,
     write_checkpoint,
 )
 from mskgrasp.learning.config import LearningConfig
@@ -87,7 +87,7 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
     return Sides(training=rows[0], validation=rows[1], test=rows[2])
 
 
-def describe(samples: Samples, training_rows: Tensor, config: LearningConfig) -> ModelMeta:
+def describe_networks(samples: Samples, training_rows: Tensor, config: LearningConfig) -> ModelMeta:
     """Describe the networks, with the normalisation measured on the training parts."""
     success = samples.success[training_rows]
     target = samples.grasp_displacement[training_rows[success]].double()
@@ -291,7 +291,7 @@ def train(
     """
     reporter = reporter or Reporter()
     sides = sides or split(samples, config)
-    meta = describe(samples, sides.training, config)
+    meta = describe_networks(samples, sides.training, config)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         models = build_models(meta)
@@ -315,7 +315,7 @@ def train(
         best: dict[str, Tensor] = {}
         done = 0
         if saved is not None and saved.stage == name:
-            restore(saved, networks, stage.optimiser)
+            restore_checkpoint(saved, networks, stage.optimiser)
             best, done = saved.best, saved.epoch
         elif name == "gdn":
             models.gdn.start_from(models.gqn)

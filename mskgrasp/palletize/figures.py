@@ -37,10 +37,10 @@ def draw_placement(maps: HeightMaps, placement: Placement, path: Path) -> None:
         left.set(title="before, with the grasp", xlabel="mm along base x", ylabel="mm along base y")
         _show_after(right, maps)
         right.set(title=f"after, {TITLES[placement.correction]}", xlabel="mm from the target, along base x")
-        figure.suptitle(f"{placement.part}: {outcome_text(placement)}", x=0.01, ha="left", fontsize=11)
+        figure.suptitle(f"{placement.part}: {placement_text(placement)}", x=0.01, ha="left", fontsize=11)
 
 
-def outcome_text(placement: Placement) -> str:
+def placement_text(placement: Placement) -> str:
     """Describe the outcome of a placement."""
     if not placement.placed:
         return f"not placed ({placement.reason})"
@@ -90,7 +90,7 @@ def _outline(axes: Axes, maps: HeightMaps, turn: float, colour: str, line: str) 
     )  # fmt: skip
 
 
-def draw_comparison(
+def draw_corrections(
     rows: Sequence[tuple[Placement, dict[Correction, HeightMaps], Group]], path: Path
 ) -> None:
     """Draw a row for each part: before the grasp, then placed under each correction, targets in green.
@@ -107,7 +107,7 @@ def draw_comparison(
             line[0].set_ylabel(first.part, fontsize=8)
             for axes, name in zip(line[1:], names, strict=True):
                 _show_after(axes, maps[name])
-                axes.set_xlabel(outcome_text(placements[name]), fontsize=9, color=COLOURS[name])
+                axes.set_xlabel(placement_text(placements[name]), fontsize=9, color=COLOURS[name])
             for axes in line:
                 axes.set(xticks=[], yticks=[])
                 axes.spines[:].set_visible(False)

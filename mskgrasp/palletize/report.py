@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from rich.console import Console
 
 from mskgrasp.core.files import write_whole
-from mskgrasp.palletize.figures import draw_comparison, draw_errors, draw_pallets, outcome_text
+from mskgrasp.palletize.figures import draw_corrections, draw_errors, draw_pallets, placement_text
 from mskgrasp.palletize.height_maps import read_height_maps
 from mskgrasp.palletize.pallet_slots import Slot
 from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
@@ -176,7 +176,7 @@ def _examples(out: Path, placements: Sequence[Placement]) -> Section:
         rows.append((next(iter(group.values())), maps, group))
     if not rows:
         return Section(title="Examples")
-    draw_comparison(rows, out / "placed.png")
+    draw_corrections(rows, out / "placed.png")
     caption = (
         "The first compared placement of each part: the part with the grasp, and the part as placed. Green: "
         "target, the longer arm along the part's longer side, and the part's outline at the target"
@@ -213,7 +213,7 @@ def _worst(out: Path, placements: Sequence[Placement]) -> Section:
             ]
         )  # fmt: skip
         path = out / "placements" / f"{one.name}.png"
-        figures.append(Figure(path=path, caption=f"{one.name}: {outcome_text(one)}", name=one.name))
+        figures.append(Figure(path=path, caption=f"{one.name}: {placement_text(one)}", name=one.name))
     header = (
         "part",
         "trial",

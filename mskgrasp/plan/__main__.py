@@ -17,10 +17,10 @@ def main() -> int:
     """Parse, plan, report."""
     with ctrl_c_deferred():
         from mskgrasp.plan.config import PlanConfig
-        from mskgrasp.plan.run import describe, plan_grasp
+        from mskgrasp.plan.run import plan_grasp, plan_text
         from mskgrasp.runtime.options import parse
     config = parse(PlanConfig, prog="python -m mskgrasp.plan", description=DESCRIPTION)
-    print(describe(plan_grasp(config)))
+    print(plan_text(plan_grasp(config)))
     print(f"wrote {config.out / 'plan.json'} and {config.out / 'plan.png'}")
     return 0
 

@@ -14,7 +14,7 @@ from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.runtime.cli import make_folder
 
 
-def describe(plan: GraspPlan) -> str:
+def plan_text(plan: GraspPlan) -> str:
     """The plan in words, with units."""
     x, y, z, theta = plan.grasp.as_vector()
     mean, std = plan.displacement, plan.displacement_std

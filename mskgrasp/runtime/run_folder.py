@@ -15,7 +15,7 @@ from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import LOCK, exclusive_lock, write_whole
 from mskgrasp.runtime.cli import make_folder
 
-Record = TypeVar("Record")
+RecordT = TypeVar("RecordT")
 SETTINGS = "config.yaml"
 INPUTS = "inputs.json"
 TRIALS = "trials.jsonl"
@@ -120,8 +120,8 @@ def rewrite_trials(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
     write_whole(path, "".join(json.dumps(one, allow_nan=False) + "\n" for one in lines).encode())
 
 
-def read_trials(path: Path, make: Callable[[dict[str, Any]], Record]) -> list[Record]:
-    """Read the stored trials in order; remove an incomplete last line, which a killed run leaves.
+def read_trials(path: Path, make: Callable[[dict[str, Any]], RecordT]) -> list[RecordT]:
+    """Reads the stored trials in order; removes an incomplete last line, which a killed run leaves.
 
     Raises:
         BadDataset: A line of the file is not a trial.

@@ -53,7 +53,7 @@ class Comparison:
         return cls(**known)
 
 
-def compare(outcomes: Outcomes, reference: Outcomes) -> Comparison:
+def compare_outcomes(outcomes: Outcomes, reference: Outcomes) -> Comparison:
     """One setting against another, grasp by grasp; both hold the same grasps."""
     settled = outcomes.settled & reference.settled
     both = settled & outcomes.success & reference.success

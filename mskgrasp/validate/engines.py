@@ -20,7 +20,7 @@ from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.section import Section, Table
 from mskgrasp.runtime.progress import Bar, progress
 from mskgrasp.simulation.versions import versions
-from mskgrasp.validate.compare import Comparison, compare
+from mskgrasp.validate.compare import Comparison, compare_outcomes
 from mskgrasp.validate.config import SHIFTED, ValidateConfig
 from mskgrasp.validate.outcomes import Outcomes, draw_grasps, run_settings
 
@@ -47,11 +47,12 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
     with progress(total=n * len(settings), title="grasps", unit="grasp", keep=True) as bar:
         found = run_settings(settings, drawn, {}, config.out, workers, _advance(bar))
     sapien, mujoco = found["sapien"], found["mujoco"]
-    rows = {"all": compare(mujoco, sapien)}
+    rows = {"all": compare_outcomes(mujoco, sapien)}
     rows |= {
-        f"{name}{SHIFTED}": compare(found[f"{name}{SHIFTED}"], found[name]) for name in ("sapien", "mujoco")
+        f"{name}{SHIFTED}": compare_outcomes(found[f"{name}{SHIFTED}"], found[name])
+        for name in ("sapien", "mujoco")
     }
-    by_part = {part.name: compare(_of(mujoco, part.name), _of(sapien, part.name)) for part in parts}
+    by_part = {part.name: compare_outcomes(_of(mujoco, part.name), _of(sapien, part.name)) for part in parts}
     differing = disagreements(mujoco, sapien)
     failed = complaints(rows["all"])
     record = {
@@ -61,7 +62,7 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
         "disagreements": [[ours, theirs, count] for (ours, theirs), count in differing],
         "failed": failed,
     }
-    print_sections(sections(record))
+    print_sections(engine_sections(record))
     path = config.out / "engines.json"
     path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     print(f"wrote {path}")
@@ -69,8 +70,8 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
     return 1 if failed else 0
 
 
-def sections(record: dict[str, Any]) -> list[Section]:
-    """Differences in words and by part, those that disagree most first, read from ``engines.json``."""
+def engine_sections(record: dict[str, Any]) -> list[Section]:
+    """Differences in words and by part, those that disagree most first, from what ``engines.json`` holds."""
     found = [
         f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN"
         for ours, theirs, count in record["disagreements"]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mskgrasp.core.grasp import MAX_DISPLACEMENT
-from mskgrasp.validate.compare import Comparison, compare, distances
+from mskgrasp.validate.compare import Comparison, compare_outcomes, distances
 from mskgrasp.validate.config import (
     DRAWN,
     MOVED,
@@ -27,7 +27,7 @@ from tasks.attempt.outcome import MAX_PENETRATION, MAX_SPEED
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judged:
+class SettingComparison:
     """A setting against a reference, and whether it is equivalent.
 
     Attributes:
@@ -85,10 +85,10 @@ class Judged:
         }
 
 
-def judge(
+def compare_with_reference(
     outcomes: Mapping[str, Outcomes], setting: str, reference: str, n: int, margins: Margins, origin: str = ""
-) -> Judged:
-    """Compare the first n grasps of each part under a setting and a reference.
+) -> SettingComparison:
+    """Compares the first n grasps of each part under a setting and a reference.
 
     Displacements are compared where the reference's floor was simulated, too.
     """
@@ -100,17 +100,17 @@ def judge(
     near, middle, moved = (_first(one, n_floor) for one in (own, theirs, tried))
     found, floor = distances(near, middle), distances(moved, middle)
     known = near.settled & middle.settled & moved.settled & np.isfinite(found) & np.isfinite(floor)
-    return Judged(
+    return SettingComparison(
         setting=setting,
         reference=reference,
         origin=origin,
-        found=compare(own, theirs),
+        found=compare_outcomes(own, theirs),
         displacement=median_excess(found[known], floor[known], near.part[known], margins.displacement),
         success=mean_difference(gained[settled], own.part[settled], margins.success),
     )
 
 
-def errors(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> list[Judged]:
+def errors(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> list[SettingComparison]:
     """Differences by origin: chaos, rounding, the steps of the references, those of production."""
     first = config.references[0]
     found = []
@@ -124,28 +124,28 @@ def errors(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> list[Jud
     for reference in config.references[1:]:
         n = min(config.n_of(reference), config.n_of(first))
         origin = "steps and iterations of the reference, and chaos"
-        found.append(judge(outcomes, reference.name, first.name, n, config.margins, origin))
+        found.append(compare_with_reference(outcomes, reference.name, first.name, n, config.margins, origin))
     found.append(_bare(outcomes, MOVED, NOMINAL, "chaos: starts moved by 10 um"))
     found.append(_bare(outcomes, NOTHING_SKIPPED, NOMINAL, "skipped air, and chaos"))
     for reference in config.references:
         origin = "steps, iterations, shortcuts of production, and chaos"
         n = config.n_of(reference)
-        found.append(judge(outcomes, NOMINAL, reference.name, n, config.margins, origin))
+        found.append(compare_with_reference(outcomes, NOMINAL, reference.name, n, config.margins, origin))
     return found
 
 
-def grid(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> list[Judged]:
+def grid(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> list[SettingComparison]:
     """Every setting of the grid against the first reference, cheapest first."""
     first = config.references[0]
     found = []
     for name in config.candidates():
         key = NOMINAL if name == config.production else name
-        own = judge(outcomes, key, first.name, config.n_of(first), config.margins)
+        own = compare_with_reference(outcomes, key, first.name, config.n_of(first), config.margins)
         found.append(replace(own, setting=name))
     return sorted(found, key=lambda one: one.found.cpu_ms)
 
 
-def choose(candidates: list[Judged]) -> tuple[str, bool]:
+def choose(candidates: list[SettingComparison]) -> tuple[str, bool]:
     """The cheapest setting that is equivalent, and True.
 
     Where none is shown to be: False, and the cheapest one whose estimates, if not their intervals, are within
@@ -198,7 +198,7 @@ def sensitivity(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> lis
     for group, label, name in names:
         own = _first(outcomes[name], n)
         parts = set(own.part.tolist())
-        compared = compare(own, nominal.of(parts, n))
+        compared = compare_outcomes(own, nominal.of(parts, n))
         found.append(Varied(group=group, label=label, found=compared, parts=len(parts)))
     return found
 
@@ -208,7 +208,7 @@ def label_error(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> dic
     if not config.ranges:
         return None
     n = config.n_variants
-    found = compare(_first(outcomes[DRAWN], n), _first(outcomes[NOMINAL], n))
+    found = compare_outcomes(_first(outcomes[DRAWN], n), _first(outcomes[NOMINAL], n))
     return {"ranges": {name: list(bounds) for name, bounds in config.ranges.items()}, **found.as_dict()}
 
 
@@ -266,10 +266,10 @@ def summarise_discards(outcomes: Outcomes) -> DiscardSummary:
     )
 
 
-def _bare(outcomes: Mapping[str, Outcomes], setting: str, reference: str, origin: str) -> Judged:
+def _bare(outcomes: Mapping[str, Outcomes], setting: str, reference: str, origin: str) -> SettingComparison:
     n = 1 + int(outcomes[setting].index.max(initial=-1))
-    found = compare(outcomes[setting], _first(outcomes[reference], n))
-    return Judged(setting=setting, reference=reference, origin=origin, found=found)
+    found = compare_outcomes(outcomes[setting], _first(outcomes[reference], n))
+    return SettingComparison(setting=setting, reference=reference, origin=origin, found=found)
 
 
 def _floor_of(reference: str) -> str:

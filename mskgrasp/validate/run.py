@@ -35,7 +35,7 @@ from mskgrasp.validate.findings import (
     summarise_discards,
 )
 from mskgrasp.validate.outcomes import Outcomes, draw_grasps, run_settings
-from mskgrasp.validate.tables import sections
+from mskgrasp.validate.tables import validation_sections
 
 
 def validate(config: ValidateConfig) -> int:
@@ -59,11 +59,11 @@ def validate(config: ValidateConfig) -> int:
         "closed_form": [check.as_dict() for check in checks],
         "parts": [one.as_dict() for one in fidelity],
     }
-    print_sections(sections(record))
+    print_sections(validation_sections(record))
     if config.convergence:
         compared = findings(config, _simulate(config, parts))
         record |= compared
-        print_sections(sections(record)[2:])
+        print_sections(validation_sections(record)[2:])
         failed += [
             f"production, {config.production}: {said}" for said in compared["choice"]["production_fails"]
         ]

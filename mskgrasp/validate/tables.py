@@ -13,7 +13,7 @@ Record = dict[str, Any]
 _DIFFERENCES = ("S agrees", "shift median, mm", "90 %", "turn median, deg", "90 %")
 
 
-def sections(record: Record) -> list[Section]:
+def validation_sections(record: Record) -> list[Section]:
     """All sections of a validation's record."""
     found = [_closed_form(record["closed_form"]), _parts(record["parts"])]
     if "errors" in record:

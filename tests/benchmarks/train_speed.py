@@ -21,7 +21,7 @@ from mskgrasp.core.config import read_config
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import build_models
 from mskgrasp.learning.samples import Samples
-from mskgrasp.learning.trainer import Stage, describe, split
+from mskgrasp.learning.trainer import Stage, describe_networks, split
 from mskgrasp.runtime.progress import progress
 
 REPOSITORY = Path(__file__).parents[2]
@@ -58,7 +58,7 @@ def main() -> None:
 def measure(samples: Samples, config: LearningConfig, device: str, seconds: float) -> dict[str, float]:
     """Samples/s of both networks, and the share of the GQN's time that is not spent on preparing samples."""
     sides = split(samples, config)
-    models = build_models(describe(samples, sides.training, config), device)
+    models = build_models(describe_networks(samples, sides.training, config), device)
     stages = {name: Stage(name, models, samples, sides, config) for name in ("gqn", "gdn")}
     for stage in stages.values():
         stage.network.train()

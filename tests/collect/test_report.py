@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from mskgrasp.collect.config import PartFilter
-from mskgrasp.collect.report import draw_summary, print_table, summarise, write_summary
+from mskgrasp.collect.report import draw_summary, print_summary, summarise_parts, write_summary
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.dataset import Attempts, shard_path, write_shard
 from tests import synthetic
@@ -46,7 +46,7 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_part_is_summed_up_over_its_shards(dataset: Path):
-    a, b = summarise(dataset, PartFilter(min_success=0.1))
+    a, b = summarise_parts(dataset, PartFilter(min_success=0.1))
     assert (a.part, a.attempts, a.successes, a.kept) == ("a", 5, 3, True)
     assert a.median_displacement == pytest.approx(0.005) and a.median_turn == pytest.approx(0.2)
     assert a.median_tilt == pytest.approx(0.02)
@@ -59,7 +59,7 @@ def test_a_part_is_summed_up_over_its_shards(dataset: Path):
 
 def test_the_table_has_a_row_for_each_part_and_the_sums(dataset: Path):
     stream = io.StringIO()
-    print_table(summarise(dataset, PartFilter(max_success=0.5)), Console(file=stream, width=200))
+    print_summary(summarise_parts(dataset, PartFilter(max_success=0.5)), Console(file=stream, width=200))
     lines = [line.split("  ") for line in stream.getvalue().splitlines()]
     cells = {line[0].strip(): [cell.strip() for cell in line[1:] if cell.strip()] for line in lines}
     assert cells["a"] == [
@@ -70,7 +70,7 @@ def test_the_table_has_a_row_for_each_part_and_the_sums(dataset: Path):
 
 
 def test_the_file_holds_the_same_numbers(dataset: Path, tmp_path: Path):
-    summaries = summarise(dataset, PartFilter())
+    summaries = summarise_parts(dataset, PartFilter())
     write_summary(summaries, tmp_path)
     stored = json.loads((tmp_path / "summary.json").read_text())
     assert stored["schema_version"] == 1
@@ -87,5 +87,5 @@ def test_a_picture_is_drawn_of_a_dataset_with_empty_shards_and_shards_of_failure
     )  # fmt: skip
     write_shard(shard_path(tmp_path, "a", 0), failed, synthetic.info("a"))
     write_shard(shard_path(tmp_path, "b", 0), rows(attempts, slice(0, 0)), synthetic.info("b"))
-    assert [row.attempts for row in summarise(tmp_path, PartFilter())] == [2, 0]
+    assert [row.attempts for row in summarise_parts(tmp_path, PartFilter())] == [2, 0]
     assert picture(draw_summary(tmp_path, seed=0)).shape[1] > 500

@@ -38,8 +38,7 @@ from mskgrasp.core.settings import Physics
 from mskgrasp.dataset.label_error import STORED as LABEL_ERROR
 from mskgrasp.dataset.label_error import LabelError
 from mskgrasp.evaluate.comparison import DisplacementSummary
-from mskgrasp.evaluate.report import Report
-from mskgrasp.evaluate.report import sections as evaluation_sections
+from mskgrasp.evaluate.report import Report, report_sections
 from mskgrasp.evaluate.summary import SuccessSummary
 from mskgrasp.learning.model_card import result_rows
 from mskgrasp.palletize.report import result_section
@@ -48,9 +47,8 @@ from mskgrasp.parts.catalogue import SPLITS
 from mskgrasp.parts.commands.rate import Rate
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table, cell_text
-from mskgrasp.validate.engines import sections as engine_sections
-from mskgrasp.validate.tables import label_error_section
-from mskgrasp.validate.tables import sections as validation_sections
+from mskgrasp.validate.engines import engine_sections
+from mskgrasp.validate.tables import label_error_section, validation_sections
 from tests.docs.pages import ROOT
 from tests.sim_in_the_loop.regression import Row, stored_figures
 
@@ -118,7 +116,7 @@ def _sections(report: dict[str, Any] | str) -> list[Section]:
         kind = SuccessSummary if report["experiment"] == "success" else DisplacementSummary
         summary = TypeAdapter(kind).validate_python(report)
         whole = Report(summary=summary, trials={}, worst={}, settings={}, versions={})
-        return evaluation_sections(whole, Path())
+        return report_sections(whole, Path())
     return [result_section(TypeAdapter(PlacementSummary).validate_python(report))]
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mskgrasp.evaluate.comparison import PAPER, compare, figure_names, paper_label
-from mskgrasp.evaluate.report import sections
+from mskgrasp.evaluate.comparison import PAPER, compare_models, figure_names, paper_label
+from mskgrasp.evaluate.report import report_sections
 from mskgrasp.trials.trial import Prediction
 from tests.evaluate.made_trials import Model, report_of, trial
 
@@ -17,7 +17,7 @@ def test_models_are_compared_on_shared_grasps_and_on_their_own():
     expected = {"one": Prediction(mean=[0.0, 0.001, 0.0, -0.1], std=[0.01] * 4)}
     best = [trial(predictions=expected), trial(part="b", predictions=expected, measured=[0.0, 0.0, 0.0, 0.0])]
     chosen = trial(policy="low_variance", chosen_by="one", predicted=[0.0, 0.0039, 0.0, -0.1])
-    summary = compare([*best, chosen], {"one": Model(), "other": Model()})
+    summary = compare_models([*best, chosen], {"one": Model(), "other": Model()})
     one = summary.models["one"]
     assert one.quality.known.translation_rmse == pytest.approx(0.003)
     assert one.quality.novel.translation_rmse == pytest.approx(0.001)
@@ -28,7 +28,7 @@ def test_models_are_compared_on_shared_grasps_and_on_their_own():
     assert summary.models["other"].low_variance is None
     assert summary.models["other"].quality.known.translation_rmse is None
     section = next(
-        s for s in sections(report_of(summary), Path("out")) if s.title == "Displacement in the hand"
+        s for s in report_sections(report_of(summary), Path("out")) if s.title == "Displacement in the hand"
     )
     assert ("one", "high quality", "novel") in [row[:3] for row in section.tables[0].rows]
 

@@ -10,8 +10,8 @@ from matplotlib.patches import Rectangle
 
 from mskgrasp.core.palette import BLUE
 from mskgrasp.evaluate import figures
-from mskgrasp.evaluate.comparison import compare
-from mskgrasp.evaluate.summary import summarise
+from mskgrasp.evaluate.comparison import compare_models
+from mskgrasp.evaluate.summary import summarise_trials
 from mskgrasp.trials.trial import Prediction
 from tests.evaluate.made_trials import Model, trial
 from tests.figures import keep_figures, legend_labels, picture, tick_labels
@@ -24,7 +24,7 @@ def test_parts_are_listed_from_the_worst_with_their_interval_and_reasons(tmp_pat
         trial(part="b", family="bolt", number=k, success=k == 0, reason="" if k == 0 else "missed")
         for k in range(4)
     ]
-    figures.draw_success(summarise([*good, *bad]), tmp_path / "success.png")
+    figures.draw_success(summarise_trials([*good, *bad]), tmp_path / "success.png")
     left, right = kept[0].axes
     assert tick_labels(left) == ["b (1 of 4)", "a (4 of 4)"]
     dots = [line.get_xdata()[0] for line in left.lines if line.get_marker() == "o"]
@@ -39,10 +39,10 @@ def test_parts_are_listed_from_the_worst_with_their_interval_and_reasons(tmp_pat
 def test_of_many_parts_the_worst_40_are_shown_and_families_where_they_are_fewer(tmp_path: Path, monkeypatch):
     kept = keep_figures(figures, monkeypatch)
     many = [trial(part=f"p{k}", family=f"f{k}", success=k != 7) for k in range(45)]
-    figures.draw_success(summarise(many), tmp_path / "a.png")
+    figures.draw_success(summarise_trials(many), tmp_path / "a.png")
     assert len(tick_labels(kept[0].axes[0])) == 40 and tick_labels(kept[0].axes[0])[0] == "p7 (0 of 1)"
     assert kept[0].axes[0].get_title(loc="left") == "Lifted, by part, the worst 40 of 45"
-    figures.draw_success(summarise([trial(part=f"p{k}") for k in range(3)]), tmp_path / "b.png")
+    figures.draw_success(summarise_trials([trial(part=f"p{k}") for k in range(3)]), tmp_path / "b.png")
     assert tick_labels(kept[1].axes[0]) == ["nut (3 of 3)"]
 
 
@@ -51,7 +51,7 @@ def test_measured_displacements_are_drawn_over_the_predicted_ones_in_millimetres
 ):
     kept = keep_figures(figures, monkeypatch)
     unknown = trial(number=1, predicted_std=[np.nan] * 4, measured=[0.003, 0.0, np.nan, 0.1])
-    figures.draw_errors([trial(), unknown, trial(number=2, measured=None)], tmp_path / "errors.png")
+    figures.draw_displacements([trial(), unknown, trial(number=2, measured=None)], tmp_path / "errors.png")
     shift, turn = kept[0].axes
     points = {bars.get_label(): bars.lines[0] for bars in shift.containers}
     assert points["dx"].get_xdata().tolist() == [3, 3] and points["dx"].get_ydata().tolist() == [0, 3]
@@ -68,7 +68,7 @@ def test_a_models_bars_stand_beside_the_papers_at_their_heights(tmp_path: Path, 
     kept = keep_figures(figures, monkeypatch)
     predictions = {"gcip_mv": Prediction(mean=[0.0, 0.001, 0.0, -0.1], std=[0.01] * 4)}
     best = [trial(predictions=predictions), trial(part="b", predictions=predictions)]
-    figures.draw_comparison(compare(best, {"gcip_mv": Model()}), tmp_path / "displacement.png")
+    figures.draw_comparison(compare_models(best, {"gcip_mv": Model()}), tmp_path / "displacement.png")
     axes = kept[0].axes[0]  # translation, known parts, in centimetres
     assert axes.get_title(loc="left") == "Translation RMSE, known parts"
     bars = [bar for bar in axes.patches if isinstance(bar, Rectangle)]

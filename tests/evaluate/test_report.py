@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mskgrasp.evaluate.comparison import compare
-from mskgrasp.evaluate.report import Report, conclusion, interval_text, sections
-from mskgrasp.evaluate.summary import summarise
+from mskgrasp.evaluate.comparison import compare_models
+from mskgrasp.evaluate.report import Report, conclusion, interval_text, report_sections
+from mskgrasp.evaluate.summary import summarise_trials
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Link
 from mskgrasp.trials.trial import Prediction
@@ -18,41 +18,43 @@ from tests.evaluate.made_trials import Model, printed, report_of, trial
 
 
 def by_title(report: Report) -> dict[str, Section]:
-    return {section.title: section for section in sections(report, Path("out"))}
+    return {section.title: section for section in report_sections(report, Path("out"))}
 
 
 def test_the_conclusion_states_success_and_errors_with_their_units():
-    summary = summarise([trial(), trial(number=1, success=False, reason="missed", measured=None)])
+    summary = summarise_trials([trial(), trial(number=1, success=False, reason="missed", measured=None)])
     assert conclusion(summary) == (
         "50.0% of 2 planned grasps lifted the part (95 % interval 9.5% - 90.5%); RMSE of the predicted "
         "displacement in the hand: 5.0 mm and 11.5 deg."
     )
-    assert conclusion(summarise([])) == "No grasp was tried."
-    unmeasured = summarise([trial(measured=None, unmeasured="no tracker: ...")])
+    assert conclusion(summarise_trials([])) == "No grasp was tried."
+    unmeasured = summarise_trials([trial(measured=None, unmeasured="no tracker: ...")])
     assert conclusion(unmeasured).endswith("; no displacement was measured.")
 
 
 def test_the_conclusion_of_a_comparison_names_model_parts_and_policy():
     predictions = {"one": Prediction(mean=[0.0, 0.001, 0.0, -0.1], std=[0.01] * 4)}
     best = [trial(predictions=predictions), trial(part="b", predictions=predictions, measured=[0.0] * 4)]
-    text = conclusion(compare(best, {"one": Model()}))
+    text = conclusion(compare_models(best, {"one": Model()}))
     assert text == (
         "RMSE of one: 3.0 mm and 0.0 deg on known parts (high quality grasps); "
         "1.0 mm and 5.7 deg on novel parts (high quality grasps)."
     )
-    assert conclusion(compare([], {"one": Model()})) == "No displacement was measured."
+    assert conclusion(compare_models([], {"one": Model()})) == "No displacement was measured."
 
 
 def test_families_are_listed_where_they_are_fewer_than_the_parts():
     of_one = [trial(part=name) for name in "abc"]
-    assert [row[0] for row in by_title(report_of(summarise(of_one)))["Families"].tables[0].rows] == ["nut"]
+    assert [row[0] for row in by_title(report_of(summarise_trials(of_one)))["Families"].tables[0].rows] == [
+        "nut"
+    ]
     apart = [trial(part=name, family=name) for name in "abc"]
-    assert "Families" not in by_title(report_of(summarise(apart)))
+    assert "Families" not in by_title(report_of(summarise_trials(apart)))
 
 
 def test_every_part_has_a_row_and_all_together_the_last():
     trials = [trial(part="a"), trial(part="b", success=False, reason="slipped", measured=None)]
-    (table,) = by_title(report_of(summarise(trials)))["Parts"].tables
+    (table,) = by_title(report_of(summarise_trials(trials)))["Parts"].tables
     assert table.total and [row[:2] for row in table.rows] == [
         ("a", "1 of 1"), ("b", "0 of 1"), ("all", "1 of 2"),
     ]  # fmt: skip
@@ -63,31 +65,34 @@ def test_every_part_has_a_row_and_all_together_the_last():
         "-",
         "slipped 1",
     )
-    assert "paper: 94.9% simulated, 86.3% real" in printed(summarise(trials))
+    assert "paper: 94.9% simulated, 86.3% real" in printed(summarise_trials(trials))
 
 
 def test_the_worst_trials_lead_to_their_pictures():
     worst = {"worst/a-000.png": "a-000: lifted, moved far"}
-    report = Report(summary=summarise([trial()]), trials={}, worst=worst, settings={}, versions={})
+    report = Report(summary=summarise_trials([trial()]), trials={}, worst=worst, settings={}, versions={})
     section = by_title(report)["Worst trials"]
     assert section.tables[0].rows == [(Link(text="a-000", to="a-000"), "lifted, moved far")]
     assert [(one.path, one.name) for one in section.figures] == [(Path("out/worst/a-000.png"), "a-000")]
-    assert not by_title(report_of(summarise([trial()])))["Worst trials"]
+    assert not by_title(report_of(summarise_trials([trial()])))["Worst trials"]
 
 
 def test_tape_is_compared_with_the_truth_only_where_there_is_one():
-    assert not by_title(report_of(summarise([trial()])))["Measured by tape, against the truth"]
+    assert not by_title(report_of(summarise_trials([trial()])))["Measured by tape, against the truth"]
     taped = trial(measured=[0.0, 0.004, np.nan, -0.1], true=[0.0, 0.0043, 0.001, -0.1 + np.radians(0.5)])
-    (table,) = by_title(report_of(summarise([taped])))["Measured by tape, against the truth"].tables
+    (table,) = by_title(report_of(summarise_trials([taped])))["Measured by tape, against the truth"].tables
     assert table.rows == [("flat", 1, "0.30 mm", "0.30 mm", "0.50 deg", "0.50 deg")]
 
 
 def test_the_stored_report_is_strict_json_with_trials_in_words():
     taped = trial(measured=[0.0, 0.004, np.nan, -0.1], true=[0.0, 0.0043, 0.001, -0.1])
     report = Report(
-        summary=summarise([taped]), trials={"a-000": "lifted"}, worst={"worst/a-000.png": "a-000: lifted"},
-        settings={"seed": 0}, versions={"simulation": "2"},
-    )  # fmt: skip
+        summary=summarise_trials([taped]),
+        trials={"a-000": "lifted"},
+        worst={"worst/a-000.png": "a-000: lifted"},
+        settings={"seed": 0},
+        versions={"simulation": "2"},
+    )
     stored = json.loads(json.dumps(report.to_json(), allow_nan=False))
     assert stored["experiment"] == "success" and stored["overall"]["successes"] == 1
     assert stored["trials"] == [{"trial": "a-000", "outcome": "lifted"}]

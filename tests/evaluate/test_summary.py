@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mskgrasp.evaluate.comparison import compare
-from mskgrasp.evaluate.figures import draw_comparison, draw_errors, draw_success
-from mskgrasp.evaluate.summary import largest_errors, summarise, worst_trials
+from mskgrasp.evaluate.comparison import compare_models
+from mskgrasp.evaluate.figures import draw_comparison, draw_displacements, draw_success
+from mskgrasp.evaluate.summary import largest_errors, summarise_trials, worst_trials
 from tests.evaluate.made_trials import NOTHING, Model, printed, report_of, trial
 
 
 def test_success_and_errors_follow_their_definitions():
-    summary = summarise([trial(), trial(number=1, success=False, reason="missed", measured=None)])
+    summary = summarise_trials([trial(), trial(number=1, success=False, reason="missed", measured=None)])
     overall = summary.overall
     assert overall.trials == 2 and overall.successes == 1 and overall.success_rate == 0.5
     assert overall.translation_rmse == pytest.approx(0.005)
@@ -28,19 +28,19 @@ def test_intervals_are_over_parts_not_over_grasps():
     """Two parts, one with twice the error: a resample holds either, or both."""
     far = [trial(part="b", number=k, measured=[-0.003, 0.008, 0.0, 0.1]) for k in range(50)]
     near = [trial(number=k, measured=[0.0, 0.004, 0.0, 0.1]) for k in range(50)]
-    interval = summarise(far + near).overall.translation_interval
+    interval = summarise_trials(far + near).overall.translation_interval
     assert interval == pytest.approx((0.005, 0.010))
 
 
 def test_without_a_success_errors_are_absent_not_zero(tmp_path: Path):
     trials = [trial(**NOTHING)]
-    summary = summarise(trials)
+    summary = summarise_trials(trials)
     assert summary.overall.translation_rmse is None and summary.overall.median_planning_s is None
     assert summary.overall.reasons == {"NoPartFound": 1}
     assert "0 of 1" in printed(summary) and " - " in printed(summary) and "nan" not in printed(summary)
     draw_success(summary, tmp_path / "success.png")
-    draw_errors(trials, tmp_path / "errors.png")
-    compared = compare(trials, {"one": Model()})
+    draw_displacements(trials, tmp_path / "errors.png")
+    compared = compare_models(trials, {"one": Model()})
     assert compared.models["one"].quality.known.translation_rmse is None
     assert "nan" not in printed(compared)
     draw_comparison(compared, tmp_path / "displacement.png")
@@ -50,7 +50,7 @@ def test_without_a_success_errors_are_absent_not_zero(tmp_path: Path):
 def test_an_unmeasured_success_is_counted_and_has_no_error():
     unmeasured = trial(number=1, measured=None, unmeasured="one found: the larger square is seen, ...")
     planar = trial(measured=[0.0, 0.004, np.nan, -0.1], true=[0.0, 0.0043, 0.001, -0.1])
-    summary = summarise([planar, unmeasured])
+    summary = summarise_trials([planar, unmeasured])
     assert summary.overall.unmeasured == {"one found": 1}
     assert summary.overall.measured == 1 and summary.overall.successes == 2
     assert summary.overall.translation_rmse == pytest.approx(0.005)
@@ -63,7 +63,7 @@ def test_an_unmeasured_success_is_counted_and_has_no_error():
 def test_tape_errors_of_tilted_parts_are_reported_apart():
     flat = trial(measured=[0.0, 0.004, np.nan, 0.0], true=[0.0, 0.004, 0.0, 0.0])
     tilted = trial(number=1, measured=[0.0, 0.004, np.nan, 0.0], true=[0.006, 0.004, 0.0, 0.0], tilt=0.2)
-    found = summarise([flat, tilted]).tape_against_truth
+    found = summarise_trials([flat, tilted]).tape_against_truth
     assert found is not None and found.flat.trials == found.tilted.trials == 1
     assert found.flat.translation_worst == 0.0
     assert found.tilted.translation_worst == pytest.approx(0.006)

@@ -8,7 +8,7 @@ from mskgrasp.learning.checkpoint import (
     Checkpoint,
     optimiser_tensors,
     read_checkpoint,
-    restore,
+    restore_checkpoint,
     write_checkpoint,
 )
 from tests.learning.small import small_models
@@ -50,7 +50,7 @@ def test_a_restored_optimiser_takes_the_same_next_step(tmp_path):
     assert (saved.fingerprint, saved.samples_version, saved.stage, saved.epoch) == ("abc", 7, "gqn", 3)
     assert saved.history == [{"stage": "gqn", "epoch": 3, "train_loss": 0.5}]
     other, fresh = stepped(seed=1, steps=0)
-    restore(saved, {"gqn": other}, fresh)
+    restore_checkpoint(saved, {"gqn": other}, fresh)
     step(network, optimiser)
     step(other, fresh)
     for one, two in zip(network.parameters(), other.parameters(), strict=True):
@@ -87,5 +87,5 @@ def test_a_checkpoint_of_another_network_is_refused(tmp_path):
     saved = checkpoint_of(network, optimiser)
     wider = small_models(head_width=9).gqn
     with pytest.raises(BadModel, match="does not fit") as caught:
-        restore(saved, {"gqn": wider}, torch.optim.Adam(wider.parameters()))
+        restore_checkpoint(saved, {"gqn": wider}, torch.optim.Adam(wider.parameters()))
     assert "\n" not in str(caught.value)

@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from mskgrasp.learning import held_out
-from mskgrasp.learning.grasp_models import Calibration, Models, build_models
-from mskgrasp.learning.trainer import describe, split
+from mskgrasp.learning.grasp_models import ModelCalibration, Models, build_models
+from mskgrasp.learning.trainer import describe_networks, split
 from tests.learning.small import PATCH
 
 CLOSING = ("x", "y", "theta")
@@ -18,7 +18,7 @@ CLOSING = ("x", "y", "theta")
 
 def constant_models(samples, *, variance_factor: float = 1.0, logit: float = 0.0) -> Models:
     """Networks that predict one mean, one variance and one probability for all grasps."""
-    meta = describe(samples, split(samples, PATCH).training, PATCH)
+    meta = describe_networks(samples, split(samples, PATCH).training, PATCH)
     models = build_models(meta)
     with torch.no_grad():
         for network in (models.gqn, models.gdn):
@@ -36,7 +36,7 @@ def halves(samples):
     return order[::2], order[1::2]
 
 
-def with_calibration(models: Models, found: Calibration) -> Models:
+def with_calibration(models: Models, found: ModelCalibration) -> Models:
     return dataclasses.replace(models, meta=models.meta.model_copy(update={"calibration": found}))
 
 

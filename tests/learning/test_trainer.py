@@ -12,10 +12,10 @@ from safetensors.torch import save_file
 from mskgrasp.core import metrics
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.learning.config import StageConfig
-from mskgrasp.learning.grasp_models import Calibration, Models, build_models, load_models, save_model
+from mskgrasp.learning.grasp_models import ModelCalibration, Models, build_models, load_models, save_model
 from mskgrasp.learning.held_out import calibrate, predict_grasp_displacement
 from mskgrasp.learning.samples import read_samples
-from mskgrasp.learning.trainer import Reporter, Stage, TrainingDiverged, describe, split
+from mskgrasp.learning.trainer import Reporter, Stage, TrainingDiverged, describe_networks, split
 from mskgrasp.learning.trainer import train as learn
 from tests import synthetic
 from tests.learning.small import HAND, PATCH, SHORT
@@ -135,8 +135,9 @@ def test_a_picture_of_the_whole_part_is_that_of_the_samples(dataset):
     assert samples.object_patches.shape == samples.patches.shape
     config = SHORT.model_copy(update={"network": network, "symmetric": False})
     rows = torch.arange(8)
-    stage = Stage("gdn", build_models(describe(samples, split(samples, config).training, config)), samples,
-                  split(samples, config), config)  # fmt: skip
+    sides = split(samples, config)
+    models = build_models(describe_networks(samples, sides.training, config))
+    stage = Stage("gdn", models, samples, sides, config)
     inputs = stage.batch(rows, torch.Generator().manual_seed(0))[0]
     assert inputs.shape == (8, 1, 40, 40)
 
@@ -159,4 +160,6 @@ def test_the_hand_network_learns_what_the_centre_alone_does_not_tell_and_is_cali
 
 
 def uncalibrated(models: Models) -> Models:
-    return dataclasses.replace(models, meta=models.meta.model_copy(update={"calibration": Calibration()}))
+    return dataclasses.replace(
+        models, meta=models.meta.model_copy(update={"calibration": ModelCalibration()})
+    )

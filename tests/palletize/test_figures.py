@@ -76,10 +76,10 @@ def test_in_a_filled_slot_of_known_size_the_top_of_the_part_is_shown_without_par
 
 
 def test_an_outcome_is_described_with_its_errors():
-    assert figures.outcome_text(placement("a", 0, "none", 4.0)) == "4.0 mm, 2.3° off"
-    assert figures.outcome_text(placement("a", 0, "none", None)) == "not placed (missed)"
+    assert figures.placement_text(placement("a", 0, "none", 4.0)) == "4.0 mm, 2.3° off"
+    assert figures.placement_text(placement("a", 0, "none", None)) == "not placed (missed)"
     unmeasured = placement("a", 0, "none", None, placed=True, reason="", unmeasured="no tape")
-    assert figures.outcome_text(unmeasured) == "placed, not measured"
+    assert figures.placement_text(unmeasured) == "placed, not measured"
 
 
 def test_errors_are_distributions_with_their_medians_and_parts_under_both_corrections(tmp_path, monkeypatch):
@@ -133,7 +133,7 @@ def test_parts_stand_in_rows_and_corrections_in_columns(tmp_path: Path, monkeypa
     for group in compared_groups(some())[:2]:
         maps = {"none": bar(), "predicted": lost, "truth": bar()}
         rows.append((group["none"], maps, group))
-    figures.draw_comparison(rows, tmp_path / "placed.png")
+    figures.draw_corrections(rows, tmp_path / "placed.png")
     axes = np.array(kept[0].axes).reshape(2, 4)
     assert [one.get_title(loc="left") for one in axes[0]] == [
         "before", "no correction", "corrected by the prediction", "corrected by the truth",

@@ -12,7 +12,7 @@ import pytest
 from mskgrasp.core.errors import BadConfig, UnknownPart
 from mskgrasp.parts import find_part
 from mskgrasp.plan.config import PlanConfig
-from mskgrasp.plan.run import describe, plan_grasp
+from mskgrasp.plan.run import plan_grasp, plan_text
 from mskgrasp.planning.config import PlannerConfig
 from tests.figures import picture
 from tests.planning.hand_made import FRAME, planner
@@ -36,7 +36,7 @@ def test_a_plan_is_written_with_its_picture_and_a_seed_repeats_it(tmp_path: Path
 
 def test_a_plan_is_described_in_millimetres_and_degrees():
     plan = planner().plan(FRAME, np.random.default_rng(0))
-    text = describe(plan)
+    text = plan_text(plan)
     lines = dict(line.split("  ", 1) for line in text.splitlines())
     x, y, z, theta = (float(value) for value in re.findall(r"-?\d+\.\d+", lines["grasp"]))
     np.testing.assert_allclose([x, y, z], plan.grasp.position, atol=5e-5)

@@ -8,7 +8,7 @@ import torch
 
 from mskgrasp.learning.grasp_models import build_models
 from mskgrasp.learning.samples import read_samples
-from mskgrasp.learning.trainer import describe
+from mskgrasp.learning.trainer import describe_networks
 from mskgrasp.train import figures
 from mskgrasp.train.figures import draw_curves, draw_uncertainty
 from tests.figures import keep_figures, legend_labels, picture
@@ -32,7 +32,7 @@ def test_curves_of_a_run_without_variances_are_drawn(tmp_path):
 def test_uncertainty_of_a_network_is_drawn_against_its_errors(dataset, tmp_path, monkeypatch):
     samples = read_samples(dataset, PATCH.network)
     rows = torch.arange(len(samples))
-    models = build_models(describe(samples, rows, PATCH))
+    models = build_models(describe_networks(samples, rows, PATCH))
     kept = keep_figures(figures, monkeypatch)
     draw_uncertainty(models, samples, rows, tmp_path / "uncertainty.png")
     reliability, coverage, sparsification, deviation = kept[0].axes

@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from mskgrasp.validate.compare import Comparison, compare
+from mskgrasp.validate.compare import Comparison, compare_outcomes
 from tests.validate.made_up import moved, outcomes
 
 
@@ -17,7 +17,7 @@ def test_differences_are_those_that_were_put_in():
     one = before.success.copy()
     one[:10] = ~one[:10]
     after = moved(before, np.array([0.003, 0.0, 0.004, 0.02]))
-    told = compare(
+    told = compare_outcomes(
         dataclasses.replace(
             after, displacement=np.where(one[:, None], after.displacement, np.nan), success=one
         ),
@@ -32,20 +32,22 @@ def test_differences_are_those_that_were_put_in():
 def test_a_turn_over_half_a_circle_is_measured_the_short_way():
     before, after = outcomes(), outcomes()
     before.displacement[:, 3], after.displacement[:, 3] = np.pi - 0.01, -np.pi + 0.01
-    assert compare(after, before).turn_median == pytest.approx(0.02)
+    assert compare_outcomes(after, before).turn_median == pytest.approx(0.02)
 
 
 def test_grasps_whose_part_was_not_at_rest_are_left_out():
     before = outcomes()
     unsettled = np.arange(len(before.success)) < 50
     after = moved(before, np.where(unsettled[:, None], 0.1, 0.0))
-    told = compare(dataclasses.replace(after, settled=~unsettled), before)
+    told = compare_outcomes(dataclasses.replace(after, settled=~unsettled), before)
     assert told.n == len(before.success) - 50 and told.shift_p90 == pytest.approx(0, abs=1e-12)
 
 
 def test_a_comparison_is_read_back_from_what_a_report_stores():
     before = outcomes()
-    nothing = compare(dataclasses.replace(before, success=np.zeros(len(before.success), bool)), before)
+    nothing = compare_outcomes(
+        dataclasses.replace(before, success=np.zeros(len(before.success), bool)), before
+    )
     stored = json.loads(json.dumps(nothing.as_dict()))
     assert stored["shift_median"] is None
     assert repr(Comparison.from_dict(stored)) == repr(nothing)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mskgrasp.validate.__main__ import main
-from mskgrasp.validate.compare import compare
+from mskgrasp.validate.compare import compare_outcomes
 from mskgrasp.validate.config import SHIFTED
 from mskgrasp.validate.engines import complaints, disagreements
 from tests.programs import run_here
@@ -19,12 +19,12 @@ from tests.validate.made_up import outcomes
 def test_engines_that_differ_are_reported_with_the_kinds_of_disagreement():
     one = outcomes()
     one = dataclasses.replace(one, failure=np.where(one.success, 0, 1))
-    assert complaints(compare(one, one)) == []
+    assert complaints(compare_outcomes(one, one)) == []
     success = one.success.copy()
     success[:20] = ~success[:20]
     moved = np.where(success[:, None], np.nan_to_num(one.displacement) + 0.001, np.nan)
     other = dataclasses.replace(one, success=success, displacement=moved, failure=np.where(success, 0, 2))
-    assert [said.split()[0] for said in complaints(compare(other, one))] == ["S", "displacements"]
+    assert [said.split()[0] for said in complaints(compare_outcomes(other, one))] == ["S", "displacements"]
     assert sorted(disagreements(other, one)) == [(("held", "missed"), 10), (("slipped", "held"), 10)]
 
 

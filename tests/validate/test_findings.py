@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from mskgrasp.validate.config import MOVED, NOMINAL, Margins, ValidateConfig, floor_name
-from mskgrasp.validate.findings import choose, judge, label_error, sensitivity, size, summarise_discards
+from mskgrasp.validate.findings import (
+    choose,
+    compare_with_reference,
+    label_error,
+    sensitivity,
+    size,
+    summarise_discards,
+)
 from mskgrasp.validate.outcomes import Outcomes
 from tests.validate.made_up import PARTS, moved, outcomes
 
@@ -22,7 +29,7 @@ def found(per_part: int = 40, **settings: Outcomes) -> dict[str, Outcomes]:
 
 
 def judged(one: Outcomes, name: str = "coarse", cpu_ms: float = 100.0):
-    told = judge(found(**{name: one}), name, REFERENCE, 40, Margins())
+    told = compare_with_reference(found(**{name: one}), name, REFERENCE, 40, Margins())
     return dataclasses.replace(told, found=dataclasses.replace(told.found, cpu_ms=cpu_ms))
 
 
@@ -44,7 +51,7 @@ def test_where_nothing_passes_the_choice_is_by_cost_among_the_likely():
         same, success=lost, displacement=np.where(lost[:, None], same.displacement, np.nan)
     )
     far = moved(same, [1e-3, 0, 0, 0])
-    one = judge(found(likely=likely), "likely", REFERENCE, 8, Margins())
+    one = compare_with_reference(found(likely=likely), "likely", REFERENCE, 8, Margins())
     assert not one.passed and "success rate" in one.complaints()[0]
     assert choose([judged(far, "wrong", 10), one]) == ("likely", False)
     assert choose([judged(far, "wrong", 10)]) == ("wrong", False)

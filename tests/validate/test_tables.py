@@ -10,12 +10,12 @@ from rich.console import Console
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.html import write_html
 from mskgrasp.reports.section import Section
-from mskgrasp.validate.tables import choice_text, label_error_text, sections
+from mskgrasp.validate.tables import choice_text, label_error_text, validation_sections
 from tests.validate.made_record import record
 
 
 def by_title(values: dict) -> dict[str, Section]:
-    return {section.title: section for section in sections(values)}
+    return {section.title: section for section in validation_sections(values)}
 
 
 def test_a_validation_without_comparisons_has_checks_and_parts_alone():
@@ -89,7 +89,9 @@ def test_attempts_that_are_no_labels_are_counted_by_reason():
 
 def test_the_sections_fit_a_console_and_a_page(tmp_path: Path):
     stream = io.StringIO()
-    print_sections(sections(record()), Console(file=stream, width=300))
+    print_sections(validation_sections(record()), Console(file=stream, width=300))
     assert stream.getvalue().count("FAILED") == 1 and "None" not in stream.getvalue()
-    write_html(tmp_path / "page.html", title="Validation", conclusion="x", sections=sections(record()))
+    write_html(
+        tmp_path / "page.html", title="Validation", conclusion="x", sections=validation_sections(record())
+    )
     assert (tmp_path / "page.html").read_text().count("<table") == 6

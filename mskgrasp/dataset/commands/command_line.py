@@ -25,7 +25,7 @@ PROG = "python -m mskgrasp.dataset"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check:
+class CheckCommand:
     """Read all of a dataset and report each shard that is bad, missing or foreign, with the reason.
 
     Checks: files that are truncated or damaged, types and shapes, values that contradict each other or
@@ -41,7 +41,7 @@ class Check:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Info:
+class InfoCommand:
     """Print a dataset's card: attempts, parts, success by family, failures, physics, versions, size.
 
     Example: python -m mskgrasp.dataset info data/demo --markdown > card.md
@@ -54,7 +54,7 @@ class Info:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export:
+class ExportCommand:
     """Write a dataset for other tools: one .npz file, or ManiSkill trajectories (.h5 and .json).
 
     docs/dataset.md has both layouts. An existing file is not overwritten.
@@ -70,7 +70,7 @@ class Export:
     """The file to write, ending in .npz or .h5; with .h5 comes a .json file of the same name."""
 
 
-VERBS = {"check": Check, "info": Info, "export": Export}
+VERBS = {"check": CheckCommand, "info": InfoCommand, "export": ExportCommand}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -82,17 +82,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv=argv,
     )
     match verb:
-        case Check():
+        case CheckCommand():
             return run_check(verb)
-        case Info():
+        case InfoCommand():
             return run_info(verb)
-        case Export():
+        case ExportCommand():
             return run_export(verb)
         case _:
             assert_never(verb)
 
 
-def run_check(verb: Check) -> int:
+def run_check(verb: CheckCommand) -> int:
     """Print a line for each fault, and a last line with their number."""
     report = check_dataset(verb.folder, _with_progress)
     for note in report.notes:
@@ -108,7 +108,7 @@ def run_check(verb: Check) -> int:
     return 0
 
 
-def run_info(verb: Info) -> int:
+def run_info(verb: InfoCommand) -> int:
     """Print the card."""
     require_dataset(verb.folder)
     try:
@@ -127,7 +127,7 @@ def run_info(verb: Info) -> int:
     return 0
 
 
-def run_export(verb: Export) -> int:
+def run_export(verb: ExportCommand) -> int:
     """Write the files and print their names."""
     require_dataset(verb.folder)
     if verb.format == "npz":
