@@ -33,8 +33,8 @@ class Check:
         """Whether the measured value lies within the tolerance."""
         return bool(self.low <= self.measured <= self.high)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Convert to plain values for JSON."""
+    def to_json(self) -> dict[str, Any]:
+        """Convert to plain values."""
         return asdict(self) | {"passed": self.passed}
 
 

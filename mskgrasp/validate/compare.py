@@ -42,13 +42,13 @@ class Comparison:
     n: int
     n_both: int
 
-    def as_dict(self) -> dict[str, float | None]:
-        """Convert to plain values for JSON; unknown values are None, since JSON has no NaN."""
+    def to_json(self) -> dict[str, float | None]:
+        """Convert to plain values; NaN, which JSON does not have, becomes None."""
         return {key: value if np.isfinite(value) else None for key, value in asdict(self).items()}
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Comparison:
-        """The inverse of `as_dict`."""
+    def from_json(cls, values: Mapping[str, Any]) -> Comparison:
+        """The inverse of `to_json`."""
         known: dict[str, Any] = {key: np.nan if value is None else value for key, value in values.items()}
         return cls(**known)
 

@@ -58,7 +58,7 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
     record = {
         "settings": config.model_dump(mode="json"),
         "versions": versions() | {"mujoco": importlib.metadata.version("mujoco")},
-        "engines": {name: one.as_dict() for name, one in (rows | by_part).items()},
+        "engines": {name: one.to_json() for name, one in (rows | by_part).items()},
         "disagreements": [[ours, theirs, count] for (ours, theirs), count in differing],
         "failed": failed,
     }
@@ -76,7 +76,7 @@ def engine_sections(record: dict[str, Any]) -> list[Section]:
         f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN"
         for ours, theirs, count in record["disagreements"]
     ]
-    rows = {name: Comparison.from_dict(one) for name, one in record["engines"].items()}
+    rows = {name: Comparison.from_json(one) for name, one in record["engines"].items()}
     whole = [(name, one) for name, one in rows.items() if name == "all" or name.endswith(SHIFTED)]
     by_part = sorted((item for item in rows.items() if item not in whole), key=lambda item: item[1].agreement)
     return [Section(title="MuJoCo against SAPIEN", text=found, tables=[_table([*whole, *by_part])])]

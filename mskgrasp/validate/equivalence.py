@@ -52,8 +52,8 @@ class Equivalence:
         worst = max(self.high, -self.low)
         return worst - self.margin if math.isfinite(worst) else math.inf
 
-    def as_dict(self) -> dict[str, Any]:
-        """Convert to plain values for JSON; unknown values are None, since JSON has no NaN."""
+    def to_json(self) -> dict[str, Any]:
+        """Convert to plain values; NaN, which JSON does not have, becomes None."""
         values = asdict(self) | {"excess": self.excess}
         known = {key: value if math.isfinite(value) else None for key, value in values.items()}
         return known | {"passed": self.passed}

@@ -48,8 +48,8 @@ class Fidelity:
             and self.inertia_error <= MOST_INERTIA_ERROR
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """Convert to plain values for JSON."""
+    def to_json(self) -> dict[str, Any]:
+        """Convert to plain values."""
         return asdict(self) | {"passed": self.passed}
 
 

@@ -72,15 +72,15 @@ class SettingComparison:
                 )
         return said
 
-    def as_dict(self) -> dict[str, Any]:
-        """Convert to plain values for JSON."""
+    def to_json(self) -> dict[str, Any]:
+        """Convert to plain values."""
         tests = {"displacement": self.displacement, "success": self.success}
         return {
             "setting": self.setting,
             "reference": self.reference,
             "origin": self.origin,
-            **self.found.as_dict(),
-            "equivalence": {name: None if test is None else test.as_dict() for name, test in tests.items()},
+            **self.found.to_json(),
+            "equivalence": {name: None if test is None else test.to_json() for name, test in tests.items()},
             "equivalent": self.passed,
         }
 
@@ -183,9 +183,9 @@ class Varied:
     found: Comparison
     parts: int
 
-    def as_dict(self) -> dict[str, Any]:
-        """Convert to plain values for JSON."""
-        return {"group": self.group, "label": self.label, "parts": self.parts, **self.found.as_dict()}
+    def to_json(self) -> dict[str, Any]:
+        """Convert to plain values."""
+        return {"group": self.group, "label": self.label, "parts": self.parts, **self.found.to_json()}
 
 
 def sensitivity(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> list[Varied]:
@@ -209,7 +209,7 @@ def label_error(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> dic
         return None
     n = config.n_variants
     found = compare_outcomes(_first(outcomes[DRAWN], n), _first(outcomes[NOMINAL], n))
-    return {"ranges": {name: list(bounds) for name, bounds in config.ranges.items()}, **found.as_dict()}
+    return {"ranges": {name: list(bounds) for name, bounds in config.ranges.items()}, **found.to_json()}
 
 
 def size(outcomes: Outcomes) -> dict[str, float]:
@@ -241,8 +241,8 @@ class DiscardSummary:
     displaced: float
     dropped: dict[str, int]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Convert to plain values for JSON."""
+    def to_json(self) -> dict[str, Any]:
+        """Convert to plain values."""
         return asdict(self)
 
 

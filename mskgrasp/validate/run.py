@@ -56,8 +56,8 @@ def validate(config: ValidateConfig) -> int:
     record: dict[str, Any] = {
         "settings": config.model_dump(mode="json"),
         "versions": versions(),
-        "closed_form": [check.as_dict() for check in checks],
-        "parts": [one.as_dict() for one in fidelity],
+        "closed_form": [check.to_json() for check in checks],
+        "parts": [one.to_json() for one in fidelity],
     }
     print_sections(validation_sections(record))
     if config.convergence:
@@ -85,12 +85,12 @@ def findings(config: ValidateConfig, outcomes: dict[str, Outcomes]) -> dict[str,
         "production": config.production,
         "yardstick": config.references[0].name,
         "size": size(outcomes[NOMINAL]),
-        "errors": [one.as_dict() for one in errors(config, outcomes)],
-        "grid": [one.as_dict() for one in judged],
+        "errors": [one.to_json() for one in errors(config, outcomes)],
+        "grid": [one.to_json() for one in judged],
         "choice": {"setting": setting, "shown": shown, "production_fails": own.complaints()},
-        "sensitivity": [one.as_dict() for one in sensitivity(config, outcomes)],
+        "sensitivity": [one.to_json() for one in sensitivity(config, outcomes)],
         "label_error": label_error(config, outcomes),
-        "impossible": summarise_discards(outcomes[NOMINAL]).as_dict(),
+        "impossible": summarise_discards(outcomes[NOMINAL]).to_json(),
     }
 
 

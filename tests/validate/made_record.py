@@ -36,7 +36,7 @@ def record(**changes: Any) -> dict[str, Any]:
         part="nut", hulls=3, surface_p95=2e-4, volume_ratio=1.01, mass_error=1e-6, inertia_error=1e-3
     )
     values = dict(
-        closed_form=[check.as_dict() for check in closed_form], parts=[fine.as_dict()],
+        closed_form=[check.to_json() for check in closed_form], parts=[fine.to_json()],
         settings={"margins": {"displacement": 2.5e-4, "success": 0.02}},
         production="1000 Hz, 50 it", yardstick="2000 Hz, 100 it",
         errors=[dict(difference(), setting="moved", reference="production", origin="chaos")],

@@ -41,7 +41,7 @@ def test_a_margin_lies_to_either_side():
 
 
 def test_a_check_is_stored_with_its_verdict():
-    stored = json.loads(json.dumps(check(1.3).as_dict()))
+    stored = json.loads(json.dumps(check(1.3).to_json()))
     assert stored == dict(
         name="x", formula="y", unit="m", expected=1.0, measured=1.3, low=0.9, high=1.2, passed=False
     )

@@ -48,6 +48,6 @@ def test_a_comparison_is_read_back_from_what_a_report_stores():
     nothing = compare_outcomes(
         dataclasses.replace(before, success=np.zeros(len(before.success), bool)), before
     )
-    stored = json.loads(json.dumps(nothing.as_dict()))
+    stored = json.loads(json.dumps(nothing.to_json()))
     assert stored["shift_median"] is None
-    assert repr(Comparison.from_dict(stored)) == repr(nothing)
+    assert repr(Comparison.from_json(stored)) == repr(nothing)

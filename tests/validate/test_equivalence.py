@@ -96,4 +96,4 @@ def test_few_parts_prove_nothing():
 def test_what_is_unknown_is_null_in_json_and_does_not_pass():
     nothing = median_excess(np.zeros(0), np.zeros(0), np.zeros(0), MARGIN)
     assert not nothing.passed and math.isinf(nothing.excess)
-    assert nothing.as_dict()["estimate"] is None and nothing.as_dict()["excess"] is None
+    assert nothing.to_json()["estimate"] is None and nothing.to_json()["excess"] is None

@@ -42,4 +42,4 @@ def test_a_mass_that_is_not_density_times_volume_is_noticed(scene: BodyScene, wo
 def test_every_error_counts(changes: dict[str, float], passed: bool):
     good = dict(surface_p95=1e-5, volume_ratio=1.0, mass_error=1e-6, inertia_error=1e-3)
     one = Fidelity(part="nut", hulls=3, **(good | changes))
-    assert one.passed is passed and json.loads(json.dumps(one.as_dict()))["passed"] is passed
+    assert one.passed is passed and json.loads(json.dumps(one.to_json()))["passed"] is passed

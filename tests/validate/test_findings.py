@@ -106,4 +106,4 @@ def test_without_successes_in_common_nothing_can_be_said():
     nothing = outcomes(40, success=np.zeros(n, bool), displacement=np.full((n, 4), np.nan))
     told = judged(nothing)
     assert any("no grasps to compare" in said or "parts were compared" in said for said in told.complaints())
-    assert told.as_dict()["shift_median"] is None and not told.passed
+    assert told.to_json()["shift_median"] is None and not told.passed
