@@ -1,12 +1,13 @@
 """Grasps, their frames, and the displacement of a part in the hand.
 
-A grasp is an array (..., 4) of x, y, z in metres and theta in radians, in the base frame, theta in
-[-pi/2, pi/2). At theta = 0 the fingers close along the base's y. Two frames share the point (x, y, z):
+A `Grasp` holds x, y, z in metres and theta in radians, in the base frame, theta in [-pi/2, pi/2). At
+theta = 0 the fingers close along the base's y. Two frames share the point (x, y, z):
 
 * tcp, libfranka's end effector: z points out of the hand (down), y is the closing direction,
 * grasp: z up, turned by theta; displacements are given along its axes.
 
-All functions take numpy arrays and torch tensors and broadcast over leading axes.
+The functions serve inner loops: they take the same four numbers as an array (..., 4), `Grasp.as_vector`, of
+numpy or torch, and broadcast over leading axes.
 """
 
 from __future__ import annotations

@@ -182,6 +182,6 @@ def with_predictions(trial: Trial, run: Path, predictors: Mapping[str, Predictor
     assert plan is not None  # it was measured
     pose = None if trial.pose_base_obj is None else Pose.from_vector(np.array(trial.pose_base_obj))
     observation = PartObservation(part=trial.part, frame=frame, view=plan.view, pose_base_obj=pose)
-    grasp, point = plan.grasp.as_vector(), np.array(trial.point_base)
-    more = {label: predict_one(predictors[label], observation, grasp, point) for label in missing}
+    point = np.array(trial.point_base)
+    more = {label: predict_one(predictors[label], observation, plan.grasp, point) for label in missing}
     return replace(trial, predictions=trial.predictions | more)

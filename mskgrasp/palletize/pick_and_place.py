@@ -197,5 +197,5 @@ class PickAndPlace:
         around: Region = (target.x - _NEAR, target.x + _NEAR, target.y - _NEAR, target.y + _NEAR)
         second = self._engine.find_tape(after, around)
         # A grasp frame with theta 0 has the base's axes.
-        dx, dy, turn = planar_displacement(first, second, np.zeros(4), centre)
+        dx, dy, turn = planar_displacement(first, second, Grasp.from_vector(np.zeros(4)), centre)
         return np.array([dx, dy]), float(turn)

@@ -1,4 +1,8 @@
-"""Planner of grasps with high quality and low displacement variance (paper, section 3.4)."""
+"""Planner of grasps with high quality and low displacement variance (paper, section 3.4).
+
+`Planner` and `GraspPlan` speak of grasps as `Grasp`; the search itself, like `mskgrasp.planning.scoring` and
+`mskgrasp.planning.refine`, works on arrays (n, 4), x y z theta in the base frame.
+"""
 
 from __future__ import annotations
 
@@ -71,23 +75,23 @@ class GraspPlan:
     def of(
         cls,
         view: PartView,
-        candidates: np.ndarray,
+        candidates: Grasp,
         qualities: np.ndarray,
         best: Shortlist,
         chosen: int,
         *,
         seconds: dict[str, float],
     ) -> GraspPlan:
-        """Make the plan of the shortlist's grasp ``chosen``, of candidates (n, 4)."""
+        """Make the plan of the shortlist's grasp ``chosen``, of n candidates."""
         row = best.rows[chosen]
         return cls(
-            grasp=Grasp.from_vector(candidates[row]),
+            grasp=candidates[row],
             quality=float(qualities[row]),
             grasp_displacement=best.mean[chosen],
             grasp_displacement_var=best.variance[chosen],
             score=float(best.scores[chosen]),
             view=view,
-            candidates=Grasp.from_vector(candidates),
+            candidates=candidates,
             qualities=qualities,
             shortlist=best.rows,
             shortlist_scores=best.scores,
@@ -198,7 +202,8 @@ class Planner:
             NoGraspFound: No candidate has the required quality.
         """
         started = time.perf_counter()
-        view, candidates = self.sample(frame, rng)
+        view, drawn = self.sample(frame, rng)
+        candidates = drawn.as_vector()
         scene = Scene.of(frame, view, self.table_z, self.models.device)
         sampled = time.perf_counter()
         found = qualities(self.models, scene, candidates, self.config.chunk_size)
@@ -214,7 +219,7 @@ class Planner:
             "select": selected - scored,
             "total": selected - started,
         }
-        return GraspPlan.of(view, candidates, found, best, chosen, seconds=seconds)
+        return GraspPlan.of(view, Grasp.from_vector(candidates), found, best, chosen, seconds=seconds)
 
     def _shortlist(self, scene: Scene, candidates: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Find the best candidates; with ``check_fingers`` the best whose fingers are free.
@@ -270,8 +275,12 @@ class Planner:
             best = best.joined(self._scored(scene, candidates, rows), found)
         return candidates, found, best
 
-    def sample(self, frame: RgbdFrame, rng: np.random.Generator) -> tuple[PartView, np.ndarray]:
-        """Detect the part and sample candidates (n, 4) over it."""
+    def sample(self, frame: RgbdFrame, rng: np.random.Generator) -> tuple[PartView, Grasp]:
+        """Detect the part and sample ``n_candidates`` grasps over it.
+
+        Raises:
+            NoPartFound: No part is detected.
+        """
         view = view_part(
             frame.depth,
             frame.intrinsics,
@@ -281,7 +290,7 @@ class Planner:
             min_height=self.min_height,
             alone=True,
         )
-        return view, sample_grasps(view, self.config.n_candidates, rng)
+        return view, Grasp.from_vector(sample_grasps(view, self.config.n_candidates, rng))
 
 
 def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:

@@ -1,4 +1,7 @@
-"""Refinements of the planner's search: collision check of the fingers, and sampling near the best grasps."""
+"""Refinements of the planner's search: collision check of the fingers, and sampling near the best grasps.
+
+Grasps are arrays (n, 4), x y z theta in the base frame, as in `mskgrasp.planning.scoring`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Predictions of the networks for many grasps in one image."""
+"""Predictions of the networks for many grasps in one image: the planner's inner loop.
+
+Grasps are arrays (n, 4) here, x y z theta in the base frame: `mskgrasp.core.grasp.Grasp.as_vector`.
+"""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Lowess:
 
         Args:
             pose_base_obj: (n,) poses of the part at rest.
-            grasps: (n, 4) base frame, metres and radians.
+            grasps: (n, 4) x y z theta in the base frame, as a dataset stores them, metres and radians.
             grasp_displacement: (n, 4) axes of the grasp frame, metres and radians.
 
         Raises:

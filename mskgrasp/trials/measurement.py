@@ -122,9 +122,7 @@ def _measure_by_tape(
             raise MarkersNotFound("touched: the hand met something as it retracted") from error
         engine.home()
         after = engine.capture()
-        moved = planar_displacement(
-            before, engine.find_tape(after), plan.grasp.as_vector(), plan.view.centre_base
-        )
+        moved = planar_displacement(before, engine.find_tape(after), plan.grasp, plan.view.centre_base)
         centre_grasp = plan.grasp.T_base_grasp.inverse().apply(plan.view.centre_base)
         check_between_pads(moved, centre_grasp, width)
     except MarkersNotFound as error:

@@ -9,10 +9,27 @@ import numpy as np
 
 from hal.camera import RgbdFrame
 from hal.cell import PartTracker
-from mskgrasp.core.grasp import PartView
+from mskgrasp.core.grasp import Grasp, PartView
 from mskgrasp.planning.planner import GraspPlan, Planner, Shortlist, select, shortlist, variance_score
 from mskgrasp.planning.scoring import Scene, qualities
 from mskgrasp.trials.predictors import PartObservation, Predictor
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScoredGrasps:
+    """Grasps sampled over a part, with their predicted qualities.
+
+    Attributes:
+        view: The detected part.
+        grasps: The n grasps.
+        qualities: (n,) predicted probabilities of success.
+        seconds: Time taken.
+    """
+
+    view: PartView
+    grasps: Grasp
+    qualities: np.ndarray
+    seconds: float
 
 
 class Candidates:
@@ -23,12 +40,10 @@ class Candidates:
 
     def __init__(self, planner: Planner):
         self.planner = planner
-        self._last: tuple[bytes, tuple[PartView, np.ndarray, np.ndarray, float]] | None = None
+        self._last: tuple[bytes, ScoredGrasps] | None = None
 
-    def of(
-        self, frame: RgbdFrame, rng: np.random.Generator
-    ) -> tuple[PartView, np.ndarray, np.ndarray, float]:
-        """Sample candidates: view of the part, candidates (n, 4), qualities (n,), time taken, seconds.
+    def of(self, frame: RgbdFrame, rng: np.random.Generator) -> ScoredGrasps:
+        """Sample candidates and predict their qualities.
 
         Raises:
             NoPartFound: No part is detected.
@@ -36,10 +51,15 @@ class Candidates:
         key = _frame_key(frame, rng)
         if self._last is None or self._last[0] != key:
             planner, started = self.planner, time.perf_counter()
-            view, candidates = planner.sample(frame, rng)
+            view, grasps = planner.sample(frame, rng)
             scene = Scene.of(frame, view, planner.table_z, planner.models.device)
-            found = qualities(planner.models, scene, candidates, planner.config.chunk_size)
-            self._last = key, (view, candidates, found, time.perf_counter() - started)
+            found = qualities(planner.models, scene, grasps.as_vector(), planner.config.chunk_size)
+            self._last = (
+                key,
+                ScoredGrasps(
+                    view=view, grasps=grasps, qualities=found, seconds=time.perf_counter() - started
+                ),
+            )
         return self._last[1]
 
 
@@ -94,14 +114,17 @@ class Chooser:
             NoGraspFound: No candidate has the required quality.
         """
         config = self.candidates.planner.config.model_copy(update={"policy": self.policy})
-        view, candidates, found, scoring_s = self.candidates.of(frame, rng)
+        scored_grasps = self.candidates.of(frame, rng)
+        view, found, scoring_s = scored_grasps.view, scored_grasps.qualities, scored_grasps.seconds
         scored = time.perf_counter()
         rows = shortlist(found, config.top_fraction)
         pose = None if self.tracker is None else self.tracker.part_pose()
         observation = PartObservation(part=self.part, frame=frame, view=view, pose_base_obj=pose)
-        mean, variance = self.predictor.predict(observation, candidates[rows])
-        best = Shortlist(rows, mean, variance, variance_score(mean, variance, candidates[rows], view))
+        best_grasps = scored_grasps.grasps[rows]
+        mean, variance = self.predictor.predict(observation, best_grasps)
+        scores = variance_score(mean, variance, best_grasps.as_vector(), view)
+        best = Shortlist(rows, mean, variance, scores)
         chosen = select(found[rows], best.scores, config)
         selecting_s = time.perf_counter() - scored
         seconds = {"score": scoring_s, "select": selecting_s, "total": scoring_s + selecting_s}
-        return GraspPlan.of(view, candidates, found, best, chosen, seconds=seconds)
+        return GraspPlan.of(view, scored_grasps.grasps, found, best, chosen, seconds=seconds)

@@ -13,7 +13,13 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.errors import NoGraspFound
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import PartView, centre_in_grasp_frame, to_grasp_displacement, to_object_displacement
+from mskgrasp.core.grasp import (
+    Grasp,
+    PartView,
+    centre_in_grasp_frame,
+    to_grasp_displacement,
+    to_object_displacement,
+)
 from mskgrasp.dataset import list_shards, read_columns
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.planning.scoring import Scene, displacements
@@ -53,8 +59,8 @@ class Predictor(Protocol):
         """Whether the model was trained on grasps of this part."""
         ...
 
-    def predict(self, observation: PartObservation, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Predict the grasp displacement of grasps (n, 4), base frame.
+    def predict(self, observation: PartObservation, grasps: Grasp) -> tuple[np.ndarray, np.ndarray]:
+        """Predict the grasp displacement of n grasps.
 
         Returns:
             Mean (n, 4) of the grasp displacement and its variances (n, 4), NaN where it predicts none, both
@@ -79,10 +85,10 @@ class NetworkPredictor:
         """Whether the part is a training part."""
         return part in self.models.meta.training.get("training_parts", ())
 
-    def predict(self, observation: PartObservation, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def predict(self, observation: PartObservation, grasps: Grasp) -> tuple[np.ndarray, np.ndarray]:
         """Predict from the depth image."""
         scene = Scene.of(observation.frame, observation.view, observation.view.table_z, self.models.device)
-        return displacements(self.models, scene, grasps, self.chunk_size)
+        return displacements(self.models, scene, grasps.as_vector(), self.chunk_size)
 
 
 @dataclass(frozen=True)
@@ -96,7 +102,7 @@ class LowessPredictor:
         """Whether there is a fit of the part."""
         return part in self.fits
 
-    def predict(self, observation: PartObservation, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def predict(self, observation: PartObservation, grasps: Grasp) -> tuple[np.ndarray, np.ndarray]:
         """Predict from the part's pose.
 
         Raises:
@@ -110,16 +116,16 @@ class LowessPredictor:
             position=np.tile(np.asarray(pose.position, dtype=np.float64), (n, 1)),
             quat_wxyz=np.tile(np.asarray(pose.quat_wxyz, dtype=np.float64), (n, 1)),
         )
-        return self.fits[observation.part].predict(poses, grasps)
+        return self.fits[observation.part].predict(poses, grasps.as_vector())
 
 
 def predict_one(
-    predictor: Predictor, observation: PartObservation, grasp: np.ndarray, point_base: np.ndarray
+    predictor: Predictor, observation: PartObservation, grasp: Grasp, point_base: np.ndarray
 ) -> Prediction:
-    """Predict the displacement of a part's point (3,), base frame, for one grasp (4,)."""
-    grasp = np.asarray(grasp, dtype=np.float64)
-    mean, variance = predictor.predict(observation, grasp[None])
-    point_grasp = centre_in_grasp_frame(np.asarray(point_base, dtype=np.float64), grasp)
+    """Predict the displacement of a part's point (3,), base frame, for one grasp."""
+    vector = np.asarray(grasp.as_vector(), dtype=np.float64)
+    mean, variance = predictor.predict(observation, Grasp.from_vector(vector[None]))
+    point_grasp = centre_in_grasp_frame(np.asarray(point_base, dtype=np.float64), vector)
     covariance = object_displacement_covariance(mean[0], variance[0], point_grasp)
     return Prediction(
         mean=to_object_displacement(mean[0], point_grasp).tolist(),

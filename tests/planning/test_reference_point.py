@@ -105,6 +105,6 @@ def test_tape_measures_what_is_predicted_of_the_seen_centre(moved: Moved):
         Markers(pixels=np.zeros((2, 2)), points_base=points, sides=sides, contrast=100)
         for points in (on_top, (moved.after @ moved.before.inverse()).apply(on_top))
     )
-    measured = planar_displacement(first, second, plan.grasp.as_vector(), plan.view.centre_base)
+    measured = planar_displacement(first, second, plan.grasp, plan.view.centre_base)
     error = measured - plan.displacement[[0, 1, 3]]
     assert np.abs([*error[:2], wrap_angle(error[2])]).max() < 1e-9

@@ -11,6 +11,7 @@ import pytest
 from hal.camera import RgbdFrame
 from mskgrasp.core.errors import NoGraspFound
 from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import Grasp
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
 from mskgrasp.trials.policies import Candidates, Chooser, RepeatedPlanner
@@ -34,10 +35,10 @@ class LeastAlongX:
     def knows(self, part: str) -> bool:
         return True
 
-    def predict(self, observation: PartObservation, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def predict(self, observation: PartObservation, grasps: Grasp) -> tuple[np.ndarray, np.ndarray]:
         self.asked.append(observation)
         variance = np.zeros((len(grasps), 4))
-        variance[:, 0] = 1e-6 * (grasps[:, 0] - grasps[:, 0].min() + 0.001)
+        variance[:, 0] = 1e-6 * (grasps.position[:, 0] - grasps.position[:, 0].min() + 0.001)
         return np.zeros((len(grasps), 4)), variance
 
 
@@ -80,11 +81,11 @@ def test_candidates_are_drawn_once_for_equal_frames_and_generators():
     candidates = Candidates(planner(CONFIG))
     first = candidates.of(FRAME, rng())
     equal = dataclasses.replace(FRAME, depth=FRAME.depth.copy())
-    assert candidates.of(equal, rng())[1] is first[1]
-    assert candidates.of(FRAME, rng(1))[1] is not first[1]
+    assert candidates.of(equal, rng()).grasps is first.grasps
+    assert candidates.of(FRAME, rng(1)).grasps is not first.grasps
     lower = dataclasses.replace(FRAME, depth=FRAME.depth + np.float32(1e-3))
     second = candidates.of(lower, rng(1))
-    assert candidates.of(lower, rng(1))[1] is second[1]
+    assert candidates.of(lower, rng(1)).grasps is second.grasps
 
 
 def test_an_equal_scene_is_planned_once_and_another_anew():

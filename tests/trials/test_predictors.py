@@ -10,6 +10,7 @@ import pytest
 
 from mskgrasp.core.errors import BadDataset, NoGraspFound
 from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import Grasp
 from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.trials.predictors import (
     LowessPredictor,
@@ -42,13 +43,13 @@ class Constant:
     def knows(self, part: str) -> bool:
         return False
 
-    def predict(self, observation: PartObservation, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def predict(self, observation: PartObservation, grasps: Grasp) -> tuple[np.ndarray, np.ndarray]:
         return np.tile(self.mean, (len(grasps), 1)), np.tile(self.variance, (len(grasps), 1))
 
 
 def test_a_quarter_turn_of_the_hand_moves_a_point_as_worked_out_by_hand():
     """The hand turns by -90 degrees in the part's frame: seen from it the part turns by 90 about the TCP."""
-    grasp = np.array([0.5, 0.1, 0.02, np.pi / 2])  # the grasp frame's x is the base's y
+    grasp = Grasp.from_vector(np.array([0.5, 0.1, 0.02, np.pi / 2]))  # the grasp frame's x is the base's y
     point = np.array([0.5, 0.11, 0.02])  # 10 mm along it
     found = predict_one(Constant((0, 0, 0, -np.pi / 2), (1e-6, 4e-6, 0, 0)), observation(), grasp, point)
     np.testing.assert_allclose(found.mean, [-0.01, 0.01, 0.0, np.pi / 2], atol=1e-12)
@@ -57,10 +58,10 @@ def test_a_quarter_turn_of_the_hand_moves_a_point_as_worked_out_by_hand():
 
 
 def test_an_uncertain_turn_spreads_a_point_by_its_distance():
-    grasp, point = np.array([0.5, 0.0, 0.02, 0.0]), np.array([0.52, 0.0, 0.02])
+    grasp, point = Grasp.from_vector(np.array([0.5, 0.0, 0.02, 0.0])), np.array([0.52, 0.0, 0.02])
     found = predict_one(Constant((0, 0, 0, 0), (0, 0, 0, 0.1**2)), observation(), grasp, point)
     np.testing.assert_allclose(found.std, [0.0, 0.1 * 0.02, 0.0, 0.1], atol=1e-12)
-    at_the_tcp = predict_one(Constant((0, 0, 0, 0), (0, 0, 0, 0.1**2)), observation(), grasp, grasp[:3])
+    at_the_tcp = predict_one(Constant((0, 0, 0, 0), (0, 0, 0, 0.1**2)), observation(), grasp, grasp.position)
     np.testing.assert_allclose(at_the_tcp.std, [0.0, 0.0, 0.0, 0.1], atol=1e-12)
 
 
@@ -70,7 +71,7 @@ def test_a_network_knows_its_training_parts_and_says_whether_it_predicts_varianc
     models.meta.training["training_parts"] = ["nut"]
     network = NetworkPredictor(models, 640)
     assert network.knows("nut") and not network.knows("bolt") and network.has_variance == variance
-    mean, spread = network.predict(observation(), np.array([[0.45, 0.02, 0.015, 0.4]] * 3))
+    mean, spread = network.predict(observation(), Grasp.from_vector(np.array([[0.45, 0.02, 0.015, 0.4]] * 3)))
     np.testing.assert_allclose(mean, np.tile([0.001, 0.002, 0.0, 0.1], (3, 1)), atol=1e-6)
     assert spread.shape == (3, 4) and bool(np.isfinite(spread).all()) == variance
 
@@ -93,7 +94,7 @@ def test_lowess_predicts_a_recorded_grasp_of_a_box_that_closing_centres(data: Pa
     errors, sizes = [], []
     for row in held:
         pose = Pose.from_vector(attempts.pose_base_obj[row].astype(np.float64))
-        grasp = attempts.grasp[row].astype(np.float64)
+        grasp = Grasp.from_vector(attempts.grasp[row].astype(np.float64))
         found = predict_one(lowess, observation("box_0", pose), grasp, pose.position)
         errors.append(abs(found.mean[1] - attempts.displacement[row, 1]))
         sizes.append(abs(attempts.displacement[row, 1]))
@@ -102,7 +103,7 @@ def test_lowess_predicts_a_recorded_grasp_of_a_box_that_closing_centres(data: Pa
 
 def test_lowess_without_a_pose_or_of_an_unknown_part_is_an_error_of_one_line(data: Path):
     lowess = LowessPredictor(fit_lowess(data, ["box_0"])[0])
-    grasps = np.array([[0.45, 0.02, 0.015, 0.4]])
+    grasps = Grasp.from_vector(np.array([[0.45, 0.02, 0.015, 0.4]]))
     for part, pose in (("box_0", None), ("box_1", BOX.T_base_obj)):
         with pytest.raises(
             NoGraspFound, match=f"LOWESS needs the pose of '{part}' and recorded grasps of it"

@@ -6,7 +6,7 @@ import numpy as np
 
 from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.grasp import MAX_OPENING
+from mskgrasp.core.grasp import MAX_OPENING, Grasp
 from mskgrasp.perception.markers.find import Markers
 
 DISTANCE_CHANGE = 0.001
@@ -21,9 +21,7 @@ PAD_PLAY = 0.002
 """Tolerance of a part's motion across the pads, metres: pads and surfaces are not exactly parallel."""
 
 
-def planar_displacement(
-    before: Markers, after: Markers, grasp: np.ndarray, centre_base: np.ndarray
-) -> np.ndarray:
+def planar_displacement(before: Markers, after: Markers, grasp: Grasp, centre_base: np.ndarray) -> np.ndarray:
     """Compute the part's displacement in the hand from its squares before the grasp and after placing.
 
     The hand has placed the part where it grasped it, so that the part moved on the table as it moved in the
@@ -34,7 +32,7 @@ def planar_displacement(
     Args:
         before: The squares with the part at rest, before the grasp.
         after: The squares with the part placed again and the hand gone.
-        grasp: (4,) x, y, z, theta as commanded, base frame.
+        grasp: The grasp as commanded.
         centre_base: (2,) or (3,) the part's origin before, base frame, metres: known, or estimated
             (`mskgrasp.perception.part_detection.view_part`).
 
@@ -51,7 +49,7 @@ def planar_displacement(
     dtheta = np.arctan2(old[0] * new[1] - old[1] * new[0], old @ new)
     from_middle = np.asarray(centre_base, dtype=np.float64)[:2] - first.mean(axis=0)
     moved = second.mean(axis=0) - first.mean(axis=0) + _rotation(dtheta) @ from_middle - from_middle
-    return np.array([*(_rotation(-float(grasp[3])) @ moved), wrap_angle(dtheta)])
+    return np.array([*(_rotation(-float(grasp.theta)) @ moved), wrap_angle(dtheta)])
 
 
 def check_between_pads(displacement: np.ndarray, centre_grasp: np.ndarray, width: float) -> None:

@@ -17,7 +17,7 @@ from hal.sim import SapienCellConfig, sapien_cell
 from hal.sim.world import SapienWorld
 from mskgrasp.core.errors import TapeDoesNotFit
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, wrap_angle
-from mskgrasp.core.grasp import object_displacement, pose_base_tcp
+from mskgrasp.core.grasp import Grasp, object_displacement
 from mskgrasp.core.settings import Tape
 from mskgrasp.perception.markers import Markers, find_markers, planar_displacement
 from tasks.scene.frames import to_world
@@ -41,12 +41,12 @@ class Motion:
 
     poses: tuple[Pose, Pose]
     frames: tuple[RgbdFrame, RgbdFrame]
-    grasp: np.ndarray
+    grasp: Grasp
 
     @property
     def true(self) -> np.ndarray:
         """(3,) dx, dy, dtheta by the definition: poses of the part in the hand."""
-        T_tcp_base = pose_base_tcp(self.grasp).inverse()
+        T_tcp_base = self.grasp.T_base_tcp.inverse()
         displacement, tilt = object_displacement(*(T_tcp_base @ pose for pose in self.poses))
         assert tilt < 1e-3
         return displacement[[0, 1, 3]]
@@ -94,7 +94,7 @@ def random_motion(cell: Cell, resting: Pose, rng: np.random.Generator) -> Motion
         poses.append(place_part(cell, resting, *place))
         frames.append(cell.camera.capture())
     grasp = np.array([*(start[:2] + rng.normal(0, 0.01, 2)), 0.0115, rng.uniform(-np.pi / 2, np.pi / 2)])
-    return Motion(poses=(poses[0], poses[1]), frames=(frames[0], frames[1]), grasp=grasp)
+    return Motion(poses=(poses[0], poses[1]), frames=(frames[0], frames[1]), grasp=Grasp.from_vector(grasp))
 
 
 def small_motion(cell: Cell, resting: Pose) -> Motion:
@@ -104,7 +104,7 @@ def small_motion(cell: Cell, resting: Pose) -> Motion:
         poses.append(place_part(cell, resting, *place))
         frames.append(cell.camera.capture())
     grasp = np.array([0.5, 0.0, 0.0115, 0.2])
-    return Motion(poses=(poses[0], poses[1]), frames=(frames[0], frames[1]), grasp=grasp)
+    return Motion(poses=(poses[0], poses[1]), frames=(frames[0], frames[1]), grasp=Grasp.from_vector(grasp))
 
 
 def noisy(frame: RgbdFrame, rng: np.random.Generator) -> RgbdFrame:

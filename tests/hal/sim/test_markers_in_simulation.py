@@ -14,7 +14,7 @@ from hal.errors import MotionAborted
 from hal.operator import Operator
 from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.geometry import quat_rotate, wrap_half_turn
-from mskgrasp.core.grasp import Grasp, object_displacement, pose_base_tcp
+from mskgrasp.core.grasp import Grasp, object_displacement
 from mskgrasp.core.panda_kinematics import top_down
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.parts import find_part
@@ -65,17 +65,19 @@ def test_a_grasp_that_shifts_and_turns_a_part_is_measured_on_the_table_as_it_was
     lengthwise = quat_rotate(
         resting.quat_wxyz, np.eye(3)[find_part("parallel_key_b20x12x80").extents.argmax()]
     )
-    grasp = np.array([*(resting.position[:2] + [0.004, 0.006]), 0.0115, 0.0])
-    grasp[3] = wrap_half_turn(np.arctan2(lengthwise[1], lengthwise[0]) + 0.25)
+    grasp = Grasp(
+        position=np.array([*(resting.position[:2] + [0.004, 0.006]), 0.0115]),
+        theta=wrap_half_turn(np.arctan2(lengthwise[1], lengthwise[0]) + 0.25),
+    )
     with cell.arm:
         before = find(cell, cell.camera.capture())
-        result = execute_grasp(cell, Grasp.from_vector(grasp))
+        result = execute_grasp(cell, grasp)
         assert result.holding and result.aborted is None
         T_tcp_obj = result.T_base_tcp.inverse() @ world(cell).part_pose()
-        put_down(cell, Grasp.from_vector(grasp), height=0.0)
+        put_down(cell, grasp, height=0.0)
         go_home(cell)
         after = find(cell, cell.camera.capture())
-    true, _ = object_displacement(pose_base_tcp(grasp).inverse() @ resting, T_tcp_obj)
+    true, _ = object_displacement(grasp.T_base_tcp.inverse() @ resting, T_tcp_obj)
     measured = planar_displacement(before, after, grasp, resting.position)
     assert abs(true[3]) > np.radians(10) and np.hypot(*true[:2]) > 2e-3
     assert np.hypot(*(measured[:2] - true[:2])) < 0.5e-3

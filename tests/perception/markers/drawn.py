@@ -9,6 +9,7 @@ import numpy as np
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.geometry import Pose, quat_about_z
+from mskgrasp.core.grasp import Grasp
 from mskgrasp.perception.markers import Markers, find_markers
 from tests.synthetic import INTRINSICS, N_PIXELS, OVERHEAD, REGION, TABLE_Z
 
@@ -28,7 +29,7 @@ SQUARES = ((-0.03, 0.012, 0.012), (0.031, -0.008, 0.008))
 """x, y, side in the part's frame, metres."""
 
 
-GRASP = np.array([0.44, 0.01, 0.0115, 0.4])
+GRASP = Grasp(position=np.array([0.44, 0.01, 0.0115]), theta=np.array(0.4))
 
 
 def at(x: float, y: float, turn: float) -> Pose:

@@ -7,7 +7,7 @@ import pytest
 
 from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.grasp import object_displacement, pose_base_tcp
+from mskgrasp.core.grasp import object_displacement
 from mskgrasp.perception.markers import Markers, check_between_pads, planar_displacement
 from tests.perception.markers.drawn import (
     AFTER,
@@ -26,7 +26,7 @@ from tests.perception.markers.drawn import (
 def test_the_displacement_is_that_of_the_parts_origin_in_the_grasp_frame(before: Markers, turn: float):
     """Against the definition: poses of the part in the hand before and after."""
     pose = at(0.447, 0.004, 0.5 + turn)
-    T_tcp_base = pose_base_tcp(GRASP).inverse()
+    T_tcp_base = GRASP.T_base_tcp.inverse()
     true, _ = object_displacement(T_tcp_base @ BEFORE, T_tcp_base @ pose)
     measured = planar_displacement(before, find(draw(pose)), GRASP, BEFORE.position)
     assert np.abs(measured[:2] - true[:2]).max() < 0.1e-3
