@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mskgrasp import load_models
 from mskgrasp.core.config import read_config
-from mskgrasp.learning.held_out import displacement_errors, predict_grasp_displacement, quality_metrics
+from mskgrasp.learning.held_out import predict_grasp_displacement, prediction_errors, quality_metrics
 from mskgrasp.learning.samples import read_samples
 from mskgrasp.learning.trainer import split
 from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
@@ -27,8 +27,8 @@ def main(data: Path, out: Path, epochs: int) -> None:
         rows = split(samples, config).validation
         quality = quality_metrics(models, samples, rows)
         lifted = rows[samples.success[rows]]
-        errors = displacement_errors(samples, lifted, *predict_grasp_displacement(models, samples, lifted))
-        print(f"{name}  AUROC {quality['auroc']:.3f}  RMSE {errors['translation_rmse'] * 1e3:.2f} mm")
+        errors = prediction_errors(samples, lifted, *predict_grasp_displacement(models, samples, lifted))
+        print(f"{name}  AUROC {quality.auroc:.3f}  RMSE {errors.translation_rmse * 1e3:.2f} mm")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from mskgrasp.core.errors import BadModel
+from mskgrasp.learning.model_metrics import EpochMetrics
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,9 +26,9 @@ class Checkpoint:
         samples_version: Version of the samples made from the data; 1 in files that do not name it.
         stage: Network that is being trained.
         epoch: Epochs of that stage that are finished.
-        history: One row an epoch of all stages so far.
-        weights: Weights of both networks.
-        best: Weights of the stage's network at its lowest validation loss.
+        history: Of all stages so far, epoch by epoch.
+        weights: Of both networks.
+        best: Of the stage's network, where its validation loss was lowest.
         optimiser: State of the stage's optimiser.
     """
 
@@ -35,7 +36,7 @@ class Checkpoint:
     samples_version: int
     stage: str
     epoch: int
-    history: list[dict[str, Any]]
+    history: list[EpochMetrics]
     weights: dict[str, Tensor]
     best: dict[str, Tensor]
     optimiser: dict[str, Tensor]
@@ -51,8 +52,9 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         for group in _GROUPS
         for name, value in getattr(checkpoint, group).items()
     }
-    names = ("fingerprint", "samples_version", "stage", "epoch", "history")
+    names = ("fingerprint", "samples_version", "stage", "epoch")
     progress = {name: getattr(checkpoint, name) for name in names}
+    progress["history"] = [one.to_json() for one in checkpoint.history]
     temporary = path.with_name(path.name + ".tmp")
     save_file(tensors, temporary, metadata={"progress": json.dumps(progress)})
     temporary.chmod(0o644)  # safetensors creates it readable by its owner only
@@ -72,7 +74,8 @@ def read_checkpoint(path: Path) -> Checkpoint:
             for key in file.keys():  # noqa: SIM118 - not a dict
                 group, name = key.split("/", 1)
                 groups[group][name] = file.get_tensor(key)
-        values: dict[str, Any] = progress | groups
+        history = [EpochMetrics(**one) for one in progress["history"]]
+        values: dict[str, Any] = progress | groups | {"history": history}
         return Checkpoint(**values)
     except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
         raise BadModel(f"{path} is damaged ({error}); delete it to train from the beginning") from error

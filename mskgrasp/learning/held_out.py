@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import torch
 from scipy.optimize import minimize
@@ -15,6 +13,14 @@ from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import to_object_displacement
 from mskgrasp.learning.grasp_models import ModelCalibration, Models
+from mskgrasp.learning.model_metrics import (
+    DisplacementMetrics,
+    Interval,
+    ModelMetrics,
+    PredictionErrors,
+    QualityMetrics,
+    UncertaintyMetrics,
+)
 from mskgrasp.learning.samples import Samples
 
 _CHUNK = 64
@@ -108,17 +114,17 @@ def _platt(odds: np.ndarray, success: np.ndarray) -> tuple[float, float]:
     return float(np.exp(found[0])), float(found[1])
 
 
-def report(
+def model_metrics(
     models: Models, samples: Samples, training_rows: torch.Tensor, rows: torch.Tensor
-) -> dict[str, Any]:
+) -> ModelMetrics:
     """Compute all metrics of both networks on some rows."""
-    return {
-        "gqn": quality_metrics(models, samples, rows),
-        "gdn": displacement_metrics(models, samples, training_rows, rows),
-    }
+    return ModelMetrics(
+        gqn=quality_metrics(models, samples, rows),
+        gdn=displacement_metrics(models, samples, training_rows, rows),
+    )
 
 
-def quality_metrics(models: Models, samples: Samples, rows: torch.Tensor) -> dict[str, Any]:
+def quality_metrics(models: Models, samples: Samples, rows: torch.Tensor) -> QualityMetrics:
     """Compute balanced accuracy, AUROC and Brier score of the GQN, and the base rate's Brier score.
 
     A grasp counts as predicted to succeed if its probability exceeds the training data's base rate: with
@@ -133,24 +139,24 @@ def quality_metrics(models: Models, samples: Samples, rows: torch.Tensor) -> dic
         "auroc": lambda v: metrics.auroc(v[:, 0], v[:, 1]),
         "brier": lambda v: metrics.brier(v[:, 0], v[:, 1]),
     }
-    return {
-        "intervals": {
+    return QualityMetrics(
+        intervals={
             name: metrics.bootstrap_interval(each, statistic, repeats=_REPEATS)
             for name, statistic in intervals.items()
         },
-        "reliability": metrics.reliability(probability, success).tolist(),
-        "n": len(success),
-        "base_rate": float(success.mean()),
-        "balanced_accuracy": metrics.balanced_accuracy(probability, success, base_rate),
-        "auroc": metrics.auroc(probability, success),
-        "brier": metrics.brier(probability, success),
-        "brier_of_base_rate": metrics.brier(np.full(len(success), base_rate), success),
-    }
+        reliability=metrics.reliability(probability, success).tolist(),
+        n=len(success),
+        base_rate=float(success.mean()),
+        balanced_accuracy=metrics.balanced_accuracy(probability, success, base_rate),
+        auroc=metrics.auroc(probability, success),
+        brier=metrics.brier(probability, success),
+        brier_of_base_rate=metrics.brier(np.full(len(success), base_rate), success),
+    )
 
 
 def displacement_metrics(
     models: Models, samples: Samples, training_rows: torch.Tensor, rows: torch.Tensor
-) -> dict[str, Any]:
+) -> DisplacementMetrics:
     """Compute errors of the GDN on successful grasps, and of predicting zero and the training mean.
 
     RMSE is over the displacement of the true centroid, likelihood and coverage over the grasp displacement.
@@ -160,36 +166,54 @@ def displacement_metrics(
     mean, variance = predict_grasp_displacement(models, samples, rows)
     training = samples.grasp_displacement[training_rows].double().numpy()
     floor = 1e-12
-    constants = {
-        "zero_displacement": (np.zeros(4), np.maximum((training**2).mean(axis=0), floor)),
-        "training_mean": (training.mean(axis=0), np.maximum(training.var(axis=0), floor)),
-    }
-    report: dict[str, Any] = {"n": len(rows)} | displacement_errors(samples, rows, mean, variance)
-    report |= _uncertainty_metrics(samples, rows, mean, variance)
-    for name, (constant, constant_variance) in constants.items():
-        repeated = np.tile(constant, (len(rows), 1))
-        report[name] = displacement_errors(
-            samples, rows, repeated, np.tile(constant_variance, (len(rows), 1))
+    constants = (
+        (np.zeros(4), np.maximum((training**2).mean(axis=0), floor)),
+        (training.mean(axis=0), np.maximum(training.var(axis=0), floor)),
+    )
+    zero, training_mean = (
+        prediction_errors(
+            samples, rows, np.tile(constant, (len(rows), 1)), np.tile(constant_variance, (len(rows), 1))
         )
-    return report
+        for constant, constant_variance in constants
+    )
+    return DisplacementMetrics(
+        n=len(rows),
+        errors=prediction_errors(samples, rows, mean, variance),
+        intervals=_rmse_intervals(samples, rows, mean, variance),
+        uncertainty=_uncertainty_metrics(samples, rows, mean, variance),
+        zero_displacement=zero,
+        training_mean=training_mean,
+    )
+
+
+def _rmse_intervals(
+    samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
+) -> dict[str, Interval]:
+    """Compute 95 % intervals over parts of the RMSE of translation and rotation."""
+    shift, turn, _ = _centroid_errors(samples, rows, mean, variance)
+    return {
+        f"{name}_rmse": metrics.bootstrap_interval(_by_part(samples, rows, error**2), _root_mean)
+        for name, error in (("translation", shift), ("rotation", turn))
+    }
+
+
+def _centroid_errors(
+    samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute the centroid's errors (n,), metres, and (n,), radians, and their predicted variances (n, 4)."""
+    displacement = samples.displacement[rows].double().numpy()
+    predicted, expected = centroid_displacement(samples, rows, mean, variance)
+    shift = np.linalg.norm(predicted[:, :3] - displacement[:, :3], axis=1)
+    return shift, np.abs(wrap_angle(predicted[:, 3] - displacement[:, 3])), expected
 
 
 def _uncertainty_metrics(
     samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
-) -> dict[str, Any]:
-    """Compute the errors' intervals over parts, and metrics of the predicted variances."""
-    displacement = samples.displacement[rows].double().numpy()
-    predicted, expected = centroid_displacement(samples, rows, mean, variance)
-    shift = np.linalg.norm(predicted[:, :3] - displacement[:, :3], axis=1)
-    turn = np.abs(wrap_angle(predicted[:, 3] - displacement[:, 3]))
-    report: dict[str, Any] = {
-        "intervals": {
-            f"{name}_rmse": metrics.bootstrap_interval(_by_part(samples, rows, error**2), _root_mean)
-            for name, error in (("translation", shift), ("rotation", turn))
-        }
-    }
+) -> UncertaintyMetrics | None:
+    """Compute metrics of the predicted variances; None without variances or rows."""
     if not np.isfinite(variance).all() or not len(rows):
-        return report
+        return None
+    shift, turn, expected = _centroid_errors(samples, rows, mean, variance)
     target = samples.grasp_displacement[rows].double().numpy()
     axes = {
         "crps": metrics.crps(mean, variance, target),
@@ -200,14 +224,14 @@ def _uncertainty_metrics(
         f"coverage_{level}": metrics.coverage(mean, variance, target, level / 100)
         for level in (50, 80, 90, 95)
     }
-    return report | {
-        "axes": {name: dict(zip(AXES, map(float, values), strict=True)) for name, values in axes.items()},
-        "ause_translation": metrics.ause(shift, expected[:, :3].sum(axis=1)),
-        "ause_rotation": metrics.ause(turn, expected[:, 3]),
-        "least_uncertain": {
+    return UncertaintyMetrics(
+        axes={name: dict(zip(AXES, map(float, values), strict=True)) for name, values in axes.items()},
+        ause_translation=metrics.ause(shift, expected[:, :3].sum(axis=1)),
+        ause_rotation=metrics.ause(turn, expected[:, 3]),
+        least_uncertain={
             f"{share:.0%}": _errors_of_least(shift, turn, expected, share) for share in (0.03, 0.1, 0.3)
         },
-    }
+    )
 
 
 def _errors_of_least(shift: np.ndarray, turn: np.ndarray, variance: np.ndarray, share: float) -> list[float]:
@@ -227,18 +251,18 @@ def _by_part(samples: Samples, rows: torch.Tensor, values: np.ndarray) -> list[n
     return [values[part == number] for number in np.unique(part)]
 
 
-def displacement_errors(
+def prediction_errors(
     samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
-) -> dict[str, Any]:
+) -> PredictionErrors:
     """Compute RMSE over the displacement of the true centroid, likelihood and coverage over the grasp's."""
     predicted, _ = centroid_displacement(samples, rows, mean, variance)
     displacement = samples.displacement[rows].double().numpy()
     target = samples.grasp_displacement[rows].double().numpy()
     covered = metrics.coverage(mean, variance, target)
     known = bool(np.isfinite(variance).all())
-    return {
-        "translation_rmse": metrics.translation_rmse(predicted, displacement),
-        "rotation_rmse": metrics.rotation_rmse(predicted, displacement),
-        "nll": metrics.gaussian_nll(mean, variance, target) if known else None,
-        "coverage_90": dict(zip(AXES, covered.tolist(), strict=True)) if known else None,
-    }
+    return PredictionErrors(
+        translation_rmse=metrics.translation_rmse(predicted, displacement),
+        rotation_rmse=metrics.rotation_rmse(predicted, displacement),
+        nll=metrics.gaussian_nll(mean, variance, target) if known else None,
+        coverage_90=dict(zip(AXES, covered.tolist(), strict=True)) if known else None,
+    )

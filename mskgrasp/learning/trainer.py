@@ -7,7 +7,6 @@ import time
 import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -24,6 +23,7 @@ from mskgrasp.learning.checkpoint import (
 )
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models
+from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.network_config import Normalisation
 from mskgrasp.learning.networks import displacement_loss, with_noise
 from mskgrasp.learning.samples import SAMPLES_VERSION, Samples, part_sides
@@ -46,8 +46,8 @@ class Reporter:
     def batch(self, loss: float) -> None:
         """Report the loss of a batch."""
 
-    def epoch(self, history: list[dict[str, Any]]) -> None:
-        """Report a finished and saved epoch, the last row of the history."""
+    def epoch(self, history: list[EpochMetrics]) -> None:
+        """Report a finished and saved epoch, the last of the history."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +164,7 @@ class Stage:
             rate *= min(1.0, (step + 1) / warm) * 0.5 * (1 + math.cos(math.pi * step / total))
         return rate
 
-    def epoch(self, number: int, reporter: Reporter) -> dict[str, Any]:
+    def epoch(self, number: int, reporter: Reporter) -> EpochMetrics:
         """Train one epoch (the GQN on as many failures as successes) and validate."""
         started = time.perf_counter()
         device = self.models.device
@@ -187,8 +187,13 @@ class Stage:
                     )
                 reporter.batch(losses[-1])
             self.network.eval()
-        row = {"stage": self.name, "epoch": number + 1, "train_loss": sum(losses) / len(losses)}
-        return row | self._validate() | {"seconds": round(time.perf_counter() - started, 2)}
+        return EpochMetrics(
+            stage=self.name,
+            epoch=number + 1,
+            train_loss=sum(losses) / len(losses),
+            **self._validate(),
+            seconds=round(time.perf_counter() - started, 2),
+        )
 
     def order(self, generator: torch.Generator) -> Tensor:
         """Draw the rows of an epoch in random order; the GQN sees as many failures as successes."""
@@ -256,9 +261,11 @@ class Stage:
         std = self.models.gdn.target_std.cpu().double()
         target = self.samples.grasp_displacement[rows].double()
         loss = displacement_loss(torch.from_numpy(mean), predicted, target, std)
-        errors = held_out.displacement_errors(self.samples, rows, mean, variance)
-        return {"validation_loss": float(loss)} | {
-            name: errors[name] for name in ("translation_rmse", "rotation_rmse")
+        errors = held_out.prediction_errors(self.samples, rows, mean, variance)
+        return {
+            "validation_loss": float(loss),
+            "translation_rmse": errors.translation_rmse,
+            "rotation_rmse": errors.rotation_rmse,
         }
 
 
@@ -270,7 +277,7 @@ def train(
     device: torch.device | str = "cpu",
     reporter: Reporter | None = None,
     sides: Sides | None = None,
-) -> tuple[Models, list[dict[str, Any]]]:
+) -> tuple[Models, list[EpochMetrics]]:
     """Train both networks, from a checkpoint if there is one.
 
     Args:
@@ -282,7 +289,7 @@ def train(
         sides: Split of the samples; None: according to the settings.
 
     Returns:
-        The networks with their metrics on held-out parts, and one row for each epoch.
+        The networks with their metrics on held-out parts, and those of each epoch.
 
     Raises:
         BadDataset: The data cannot be split, or lack successes or failures.
@@ -307,7 +314,7 @@ def train(
             f"version {SAMPLES_VERSION}; choose another --out or delete it"
         )
 
-    history: list[dict[str, Any]] = list(saved.history) if saved else []
+    history: list[EpochMetrics] = list(saved.history) if saved else []
     for name, network in networks.items():
         if saved is not None and saved.stage == "gdn" and name == "gqn":
             continue
@@ -321,10 +328,10 @@ def train(
             models.gdn.start_from(models.gqn)
         reporter.stage(name, epochs=stage.settings.epochs, batches=stage.batches, done=done * stage.batches)
         for number in range(done, stage.settings.epochs):
-            row = stage.epoch(number, reporter)
-            earlier = [r["validation_loss"] for r in history if r["stage"] == name]
-            history.append(row)
-            if not config.keep_best or row["validation_loss"] <= min(earlier, default=math.inf):
+            found = stage.epoch(number, reporter)
+            earlier = [one.validation_loss for one in history if one.stage == name]
+            history.append(found)
+            if not config.keep_best or found.validation_loss <= min(earlier, default=math.inf):
                 best = {key: value.detach().clone() for key, value in network.state_dict().items()}
             write_checkpoint(
                 checkpoint_path,
@@ -347,7 +354,7 @@ def train(
     if config.calibrate:
         found = held_out.calibrate(models, samples, sides.validation)
         models = replace(models, meta=meta.model_copy(update={"calibration": found}))
-    report = held_out.report(models, samples, sides.training, sides.validation)
+    stored = held_out.model_metrics(models, samples, sides.training, sides.validation).to_json()
     if len(sides.test):
-        report["test"] = held_out.report(models, samples, sides.training, sides.test)
-    return replace(models, meta=models.meta.model_copy(update={"metrics": report})), history
+        stored["test"] = held_out.model_metrics(models, samples, sides.training, sides.test).to_json()
+    return replace(models, meta=models.meta.model_copy(update={"metrics": stored})), history

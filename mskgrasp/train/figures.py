@@ -20,6 +20,7 @@ from mskgrasp.learning.held_out import (
     predict_grasp_displacement,
     predict_quality,
 )
+from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples
 from mskgrasp.reports.style import saved_figure
 
@@ -102,24 +103,24 @@ def _error_over_deviation(axes: Axes, shift: np.ndarray, turn: np.ndarray, varia
     axes.legend()
 
 
-def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Path) -> None:
-    """Draw losses and validation metrics by epoch, beside trivial predictors.
+def draw_curves(history: list[EpochMetrics], report: dict[str, Any], path: Path) -> None:
+    """Draws losses and validation metrics by epoch, beside trivial predictors.
 
     Args:
-        history: One row an epoch, as `mskgrasp.learning.trainer.train` returns them.
-        report: The final metrics, with the trivial predictors' errors.
+        history: Of all epochs, as `mskgrasp.learning.trainer.train` returns them.
+        report: The final metrics as ``metrics.json`` holds them, with the trivial predictors' errors.
         path: The picture, PNG.
     """
     with saved_figure(path, 11.5, 6.0) as figure:
         panels = figure.subplots(2, 3)
         for line, name in zip(panels, ("gqn", "gdn"), strict=True):
-            rows = [row for row in history if row["stage"] == name]
+            rows = [one for one in history if one.stage == name]
             _curve(line[0], rows, "train_loss", "training (with noise and dropout)", FAINT)
             _curve(line[0], rows, "validation_loss", "held-out parts", _COLOURS[0])
             line[0].set(title=f"{name.upper()} loss", xlabel="epoch")
             line[0].legend(fontsize=8)
         gqn, gdn = report["gqn"], report["gdn"]
-        rows = [row for row in history if row["stage"] == "gqn"]
+        rows = [one for one in history if one.stage == "gqn"]
         _curve(panels[0, 1], rows, "auroc", "held-out parts", _COLOURS[0])
         panels[0, 1].axhline(0.5, color=FAINT, lw=1, ls="--", label="chance")
         panels[0, 1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.3, 1.02))
@@ -134,7 +135,7 @@ def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Pat
         panels[0, 2].set(title="Success: Brier score (lower is better)")
         for place, (value, _) in enumerate(bars.values()):
             panels[0, 2].text(place, value, f"{value:.3f}", ha="center", va="bottom")
-        rows = [row for row in history if row["stage"] == "gdn"]
+        rows = [one for one in history if one.stage == "gdn"]
         for axes, key, unit, factor in (
             (panels[1, 1], "translation_rmse", "mm", _MM),
             (panels[1, 2], "rotation_rmse", "degrees", float(np.degrees(1.0))),
@@ -150,8 +151,8 @@ def draw_curves(history: list[dict[str, Any]], report: dict[str, Any], path: Pat
 
 
 def _curve(
-    axes: Axes, rows: list[dict[str, Any]], key: str, label: str, colour: str, factor: float = 1.0
+    axes: Axes, rows: list[EpochMetrics], key: str, label: str, colour: str, factor: float = 1.0
 ) -> None:
-    values = [row[key] * factor for row in rows]
+    values = [getattr(one, key) * factor for one in rows]
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.plot([row["epoch"] for row in rows], values, color=colour, lw=1.8, label=label, marker="o", ms=3)
+    axes.plot([one.epoch for one in rows], values, color=colour, lw=1.8, label=label, marker="o", ms=3)

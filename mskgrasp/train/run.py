@@ -20,6 +20,7 @@ from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import UsageError
 from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, save_model
 from mskgrasp.learning.model_card import model_card
+from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.trainer import Reporter, split, train
 from mskgrasp.runtime import cli
@@ -51,10 +52,10 @@ class _ProgressBar(Reporter):
             self._bar.set_postfix_str(f"loss {loss:.3f}", refresh=False)
             self._bar.update()
 
-    def epoch(self, history: list[dict[str, Any]]) -> None:
-        row = history[-1]
+    def epoch(self, history: list[EpochMetrics]) -> None:
+        last = history[-1]
         _write(self._log, _table(history))
-        note(f"{self._name} {row['epoch']:3d}/{self._epochs}  {_line(row)}", sys.stdout)
+        note(f"{self._name} {last.epoch:3d}/{self._epochs}  {_line(last)}", sys.stdout)
 
     def close(self) -> None:
         """End the bar."""
@@ -62,14 +63,14 @@ class _ProgressBar(Reporter):
             self._bar.close()
 
 
-def _line(row: dict[str, Any]) -> str:
-    shown = [f"loss {row['train_loss']:.3f}", f"validation {row['validation_loss']:.3f}"]
-    if "auroc" in row:
-        shown.append(f"AUROC {row['auroc']:.3f}")
-    else:
-        shown.append(f"RMSE {row['translation_rmse'] * 1e3:.2f} mm")
-        shown.append(f"{math.degrees(row['rotation_rmse']):.2f} deg")
-    return "  ".join([*shown, f"{row['seconds']:.0f} s"])
+def _line(one: EpochMetrics) -> str:
+    shown = [f"loss {one.train_loss:.3f}", f"validation {one.validation_loss:.3f}"]
+    if one.auroc is not None:
+        shown.append(f"AUROC {one.auroc:.3f}")
+    if one.translation_rmse is not None and one.rotation_rmse is not None:
+        shown.append(f"RMSE {one.translation_rmse * 1e3:.2f} mm")
+        shown.append(f"{math.degrees(one.rotation_rmse):.2f} deg")
+    return "  ".join([*shown, f"{one.seconds:.0f} s"])
 
 
 def run(config: TrainConfig) -> int:
@@ -149,12 +150,13 @@ def _read(config: TrainConfig, data: Path) -> Samples:
     return samples.of_parts_between(*config.success_range)
 
 
-def _table(history: list[dict[str, Any]]) -> str:
-    columns = list(dict.fromkeys(key for row in history for key in row if key != "seconds")) + ["seconds"]
+def _table(history: list[EpochMetrics]) -> str:
+    rows = [one.to_json() for one in history]
+    columns = list(dict.fromkeys(key for row in rows for key in row if key != "seconds")) + ["seconds"]
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
-    writer.writerows(history)
+    writer.writerows(rows)
     return text.getvalue()
 
 

@@ -11,6 +11,7 @@ from mskgrasp.learning.checkpoint import (
     restore_checkpoint,
     write_checkpoint,
 )
+from mskgrasp.learning.model_metrics import EpochMetrics
 from tests.learning.small import small_models
 
 
@@ -29,13 +30,17 @@ def step(network, optimiser) -> None:
     optimiser.step()
 
 
+def epoch_metrics(epoch: int) -> EpochMetrics:
+    return EpochMetrics(stage="gqn", epoch=epoch, train_loss=0.5, validation_loss=0.6, auroc=0.7, seconds=1.2)
+
+
 def checkpoint_of(network, optimiser, epoch: int = 3) -> Checkpoint:
     return Checkpoint(
         fingerprint="abc",
         samples_version=7,
         stage="gqn",
         epoch=epoch,
-        history=[{"stage": "gqn", "epoch": epoch, "train_loss": 0.5}],
+        history=[epoch_metrics(epoch)],
         weights={f"gqn.{name}": value for name, value in network.state_dict().items()},
         best=network.state_dict(),
         optimiser=optimiser_tensors(optimiser),
@@ -48,7 +53,7 @@ def test_a_restored_optimiser_takes_the_same_next_step(tmp_path):
     write_checkpoint(path, checkpoint_of(network, optimiser))
     saved = read_checkpoint(path)
     assert (saved.fingerprint, saved.samples_version, saved.stage, saved.epoch) == ("abc", 7, "gqn", 3)
-    assert saved.history == [{"stage": "gqn", "epoch": 3, "train_loss": 0.5}]
+    assert saved.history == [epoch_metrics(3)]
     other, fresh = stepped(seed=1, steps=0)
     restore_checkpoint(saved, {"gqn": other}, fresh)
     step(network, optimiser)

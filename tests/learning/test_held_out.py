@@ -50,8 +50,8 @@ def test_calibrated_intervals_hold_their_share_of_rows_that_they_were_not_scaled
 
     def coverage(models):
         report = held_out.displacement_metrics(models, samples, scaled, others)
-        assert report["n"] > 80
-        return [report["coverage_90"][name] for name in CLOSING]
+        assert report.n > 80
+        return [report.errors.coverage_90[name] for name in CLOSING]
 
     assert all(before[0] <= share <= before[1] for share in coverage(models))
     # Some 100 rows on either side: three standard deviations of the difference are 12 %.
@@ -67,9 +67,7 @@ def test_a_calibrated_quality_agrees_with_the_share_that_succeeds_in_other_rows(
     true = float(samples.success[others].double().mean())
     assert abs(held_out.predict_quality(models, samples, others).mean() - true) > 0.25
     assert held_out.predict_quality(calibrated, samples, others).mean() == pytest.approx(true, abs=0.08)
-    first, second = (
-        held_out.quality_metrics(each, samples, others)["brier"] for each in (models, calibrated)
-    )
+    first, second = (held_out.quality_metrics(each, samples, others).brier for each in (models, calibrated))
     assert second < first - 0.05
 
 
@@ -88,11 +86,12 @@ def test_errors_of_a_constant_prediction_are_those_of_the_constant(samples, halv
         models.gdn.target_mean.copy_(training.mean(dim=0))
     report = held_out.displacement_metrics(models, samples, *halves)
     for name in ("translation_rmse", "rotation_rmse"):
-        assert report[name] == pytest.approx(report["training_mean"][name], rel=1e-5)
-        low, high = report["intervals"][name]
-        assert low < report[name] < high
+        found = getattr(report.errors, name)
+        assert found == pytest.approx(getattr(report.training_mean, name), rel=1e-5)
+        low, high = report.intervals[name]
+        assert low < found < high
     moved = samples.displacement[halves[1][samples.success[halves[1]]]].double().numpy()
-    assert report["zero_displacement"]["translation_rmse"] == pytest.approx(
+    assert report.zero_displacement.translation_rmse == pytest.approx(
         float(np.sqrt((moved[:, :3] ** 2).sum(axis=1).mean()))
     )
 
@@ -100,8 +99,8 @@ def test_errors_of_a_constant_prediction_are_those_of_the_constant(samples, halv
 def test_a_known_motion_has_no_error_and_deviations_of_the_centroid(samples, halves):
     rows = halves[1][samples.success[halves[1]]]
     known = samples.grasp_displacement[rows].double().numpy()
-    errors = held_out.displacement_errors(samples, rows, known, np.full_like(known, 1e-6))
-    assert errors["translation_rmse"] < 1e-6 and errors["rotation_rmse"] < 1e-6
+    errors = held_out.prediction_errors(samples, rows, known, np.full_like(known, 1e-6))
+    assert errors.translation_rmse < 1e-6 and errors.rotation_rmse < 1e-6
     turns = np.tile([0.0, 0.0, 0.0, 1e-4], (len(rows), 1))
     _, variance = held_out.centroid_displacement(samples, rows, np.zeros_like(turns), turns)
     x, y, _ = samples.origin_grasp[rows].double().numpy().T
@@ -113,7 +112,7 @@ def test_a_constant_quality_ranks_nothing_and_has_the_brier_score_worked_out_by_
     report = held_out.quality_metrics(constant_models(samples), samples, rows)
     share = float(samples.success[rows].double().mean())
     rate = constant_models(samples).meta.normalisation.base_rate
-    assert report["auroc"] == pytest.approx(0.5) and report["base_rate"] == pytest.approx(share)
+    assert report.auroc == pytest.approx(0.5) and report.base_rate == pytest.approx(share)
     by_hand = share * (1 - rate) ** 2 + (1 - share) * rate**2
-    assert report["brier"] == pytest.approx(by_hand, rel=1e-5)
-    assert report["brier_of_base_rate"] == pytest.approx(by_hand)
+    assert report.brier == pytest.approx(by_hand, rel=1e-5)
+    assert report.brier_of_base_rate == pytest.approx(by_hand)

@@ -60,7 +60,7 @@ def test_a_stopped_run_goes_on_to_the_same_weights(samples, tmp_path, after):
             torch.equal(a, b)
             for a, b in zip(one.state_dict().values(), other.state_dict().values(), strict=True)
         )
-    assert [row["train_loss"] for row in again] == [row["train_loss"] for row in history]
+    assert [one.train_loss for one in again] == [one.train_loss for one in history]
 
 
 def test_the_seed_decides_the_weights_and_the_global_generator_is_left_alone(samples, tmp_path):
@@ -112,7 +112,7 @@ def test_what_learned_in_mixed_precision_is_as_good_and_predicts_in_float32(data
         samples, config.model_copy(update={"mixed_precision": True}), checkpoint_path=tmp_path / "mixed"
     )
     assert all(value.dtype == torch.float32 for value in mixed.gdn.state_dict().values())
-    losses = np.array([[row["validation_loss"] for row in rows] for rows in (history, again)])
+    losses = np.array([[one.validation_loss for one in run] for run in (history, again)])
     assert 0 < np.abs(losses[0] - losses[1]).max() < 0.1 * np.abs(losses[0]).max()
     rows = torch.arange(20)
     assert mixed.gdn.features.mixed_precision and not plain.gdn.features.mixed_precision

@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from mskgrasp.learning.grasp_models import build_models
+from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import read_samples
 from mskgrasp.learning.trainer import describe_networks
 from mskgrasp.train import figures
@@ -18,8 +19,8 @@ from tests.learning.small import PATCH
 def test_curves_of_a_run_without_variances_are_drawn(tmp_path):
     trivial = {"translation_rmse": 0.01, "rotation_rmse": 0.2}
     history = [
-        {"stage": "gqn", "epoch": 1, "train_loss": 0.6, "validation_loss": 0.5, "auroc": 0.8},
-        {"stage": "gdn", "epoch": 1, "train_loss": 4.0, "validation_loss": 3.0} | trivial,
+        EpochMetrics(stage="gqn", epoch=1, train_loss=0.6, validation_loss=0.5, auroc=0.8, seconds=1.0),
+        EpochMetrics(stage="gdn", epoch=1, train_loss=4.0, validation_loss=3.0, **trivial, seconds=1.0),
     ]
     report = {
         "gqn": {"brier": 0.1, "brier_of_base_rate": 0.2},
