@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from mskgrasp.core.grasp import MAX_DISPLACEMENT
 from mskgrasp.validate.compare import Comparison, compare_outcomes, distances
 from mskgrasp.validate.config import (
     DRAWN,
@@ -23,7 +22,6 @@ from mskgrasp.validate.config import (
 )
 from mskgrasp.validate.equivalence import LEAST_PARTS, Equivalence, mean_difference, median_excess
 from mskgrasp.validate.outcomes import Outcomes
-from tasks.attempt.outcome import MAX_PENETRATION, MAX_SPEED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,67 +201,76 @@ def sensitivity(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> lis
     return found
 
 
-def label_error(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> dict[str, Any] | None:
-    """Differences from production with all uncertain settings drawn together; None without ranges."""
+@dataclass(frozen=True, kw_only=True)
+class DrawnComparison:
+    """Hand and table drawn from their ranges, against production.
+
+    Attributes:
+        ranges: Least and greatest value of each setting drawn.
+        found: Differences grasp by grasp.
+    """
+
+    ranges: dict[str, tuple[float, float]]
+    found: Comparison
+
+    def to_json(self) -> dict[str, Any]:
+        """Convert to plain values."""
+        return {
+            "ranges": {name: list(bounds) for name, bounds in self.ranges.items()},
+            **self.found.to_json(),
+        }
+
+
+def label_error(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> DrawnComparison | None:
+    """Differences to production where all that is not known better is drawn together; None without ranges."""
     if not config.ranges:
         return None
     n = config.n_variants
     found = compare_outcomes(_first(outcomes[DRAWN], n), _first(outcomes[NOMINAL], n))
-    return {"ranges": {name: list(bounds) for name, bounds in config.ranges.items()}, **found.to_json()}
-
-
-def size(outcomes: Outcomes) -> dict[str, float]:
-    """Size of the displacements themselves: medians and 90th percentiles, m and rad, and the success rate."""
-    held = outcomes.displacement[outcomes.success & outcomes.settled]
-    way, turn = np.linalg.norm(held[:, :3], axis=1), np.abs(held[:, 3])
-    found = {"n": len(outcomes.success), "success_rate": float(outcomes.success[outcomes.settled].mean())}
-    for name, values in (("shift", way), ("turn", turn)):
-        for share, title in ((50, "median"), (90, "p90")):
-            found[f"{name}_{title}"] = float(np.percentile(values, share)) if len(values) else 0.0
-    return found
+    return DrawnComparison(ranges=dict(config.ranges), found=found)
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiscardSummary:
-    """Worst values among the labels of the setting under test, and how many attempts the collector drops.
+class DisplacementSize:
+    """Size of the displacements themselves, and the success rate.
 
     Attributes:
-        attempts: Number of attempts.
-        penetration: Deepest overlap of finger and part in the kept attempts, m.
-        fastest: Greatest speed of a part in the kept attempts, m/s.
-        displaced: Largest displacement of a kept success, m.
-        dropped: Number of attempts by reason.
+        n: Number of attempts.
+        success_rate: Of those whose part was at rest.
+        shift_median: Median length of the translations, m.
+        shift_p90: Its 90th percentile, m.
+        turn_median: Median turn, rad.
+        turn_p90: Its 90th percentile, rad.
     """
 
-    attempts: int
-    penetration: float
-    fastest: float
-    displaced: float
-    dropped: dict[str, int]
+    n: int
+    success_rate: float
+    shift_median: float
+    shift_p90: float
+    turn_median: float
+    turn_p90: float
 
     def to_json(self) -> dict[str, Any]:
         """Convert to plain values."""
         return asdict(self)
 
 
-def summarise_discards(outcomes: Outcomes) -> DiscardSummary:
-    """Count the physically impossible outcomes and the worst values of the others."""
-    way = np.linalg.norm(outcomes.displacement[:, :3], axis=1)
-    reasons = {
-        "unsettled": ~outcomes.settled,
-        "penetrated": outcomes.penetration > MAX_PENETRATION,
-        "too_fast": outcomes.fastest > MAX_SPEED,
-        "moved_too_far": outcomes.success & (way > MAX_DISPLACEMENT),
-        "not_finite": outcomes.success & ~np.isfinite(outcomes.displacement).all(axis=1),
-    }
-    kept = ~np.any(list(reasons.values()), axis=0)
-    return DiscardSummary(
-        attempts=len(kept),
-        penetration=float(outcomes.penetration[kept].max(initial=0.0)),
-        fastest=float(outcomes.fastest[kept].max(initial=0.0)),
-        displaced=float(way[kept & outcomes.success].max(initial=0.0)),
-        dropped={name: int(which.sum()) for name, which in reasons.items()},
+def size(outcomes: Outcomes) -> DisplacementSize:
+    """Measure the displacements of the successes; without any they are 0."""
+    held = outcomes.displacement[outcomes.success & outcomes.settled]
+    shift, turn = np.linalg.norm(held[:, :3], axis=1), np.abs(held[:, 3])
+    return DisplacementSize(
+        n=len(outcomes.success),
+        success_rate=float(outcomes.success[outcomes.settled].mean()),
+        shift_median=_percentile(shift, 50),
+        shift_p90=_percentile(shift, 90),
+        turn_median=_percentile(turn, 50),
+        turn_p90=_percentile(turn, 90),
     )
+
+
+def _percentile(values: np.ndarray, share: float) -> float:
+    return float(np.percentile(values, share)) if len(values) else 0.0
 
 
 def _bare(outcomes: Mapping[str, Outcomes], setting: str, reference: str, origin: str) -> SettingComparison:

@@ -21,19 +21,11 @@ from mskgrasp.validate.altered_part import altered_part
 from mskgrasp.validate.body_scene import BodyScene
 from mskgrasp.validate.check import Check
 from mskgrasp.validate.closed_form import run_checks
-from mskgrasp.validate.config import NOMINAL, Setting, ValidateConfig
+from mskgrasp.validate.config import Setting, ValidateConfig
+from mskgrasp.validate.convergence import measure_convergence
 from mskgrasp.validate.engines import compare_engines
 from mskgrasp.validate.fidelity import Fidelity, check_parts
 from mskgrasp.validate.figure import draw
-from mskgrasp.validate.findings import (
-    choose,
-    errors,
-    grid,
-    label_error,
-    sensitivity,
-    size,
-    summarise_discards,
-)
 from mskgrasp.validate.outcomes import Outcomes, draw_grasps, run_settings
 from mskgrasp.validate.tables import validation_sections
 
@@ -61,12 +53,10 @@ def validate(config: ValidateConfig) -> int:
     }
     print_sections(validation_sections(record))
     if config.convergence:
-        compared = findings(config, _simulate(config, parts))
-        record |= compared
+        found = measure_convergence(config, _simulate(config, parts))
+        record |= found.to_json()
         print_sections(validation_sections(record)[2:])
-        failed += [
-            f"production, {config.production}: {said}" for said in compared["choice"]["production_fails"]
-        ]
+        failed += [f"production, {config.production}: {said}" for said in found.choice.production_fails]
     record["failed"] = failed
     stored = config.out / "validate.json"
     stored.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
@@ -74,24 +64,6 @@ def validate(config: ValidateConfig) -> int:
     print(f"wrote {stored} and {picture}")
     print(f"{len(failed)} of the checks failed: {'; '.join(failed)}" if failed else "all checks passed")
     return 1 if failed else 0
-
-
-def findings(config: ValidateConfig, outcomes: dict[str, Outcomes]) -> dict[str, Any]:
-    """Results to store, computed from the outcomes under all settings."""
-    judged = grid(config, outcomes)
-    setting, shown = choose(judged)
-    own = next(one for one in judged if one.setting == config.production)
-    return {
-        "production": config.production,
-        "yardstick": config.references[0].name,
-        "size": size(outcomes[NOMINAL]),
-        "errors": [one.to_json() for one in errors(config, outcomes)],
-        "grid": [one.to_json() for one in judged],
-        "choice": {"setting": setting, "shown": shown, "production_fails": own.complaints()},
-        "sensitivity": [one.to_json() for one in sensitivity(config, outcomes)],
-        "label_error": label_error(config, outcomes),
-        "impossible": summarise_discards(outcomes[NOMINAL]).to_json(),
-    }
 
 
 def _closed_form(config: ValidateConfig) -> list[Check]:
