@@ -7,8 +7,16 @@ import sys
 
 import numpy as np
 
-from mskgrasp import Planner, PlannerConfig, execute_grasp, load_models, load_part, open_cell
-from mskgrasp.core.shipped import config_file, example_file
+from mskgrasp import (
+    Planner,
+    PlannerConfig,
+    config_file,
+    example_file,
+    execute_grasp,
+    load_models,
+    load_part,
+    open_cell,
+)
 
 
 def main(cad_file: str) -> None:

@@ -13,14 +13,16 @@ Names are imported when they are first used: ``import mskgrasp`` alone loads nei
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mskgrasp.core.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from hal import Arm, Camera, Cell, RgbdFrame, Workspace, execute_grasp, open_cell
     from mskgrasp.core.errors import MskgraspError
     from mskgrasp.core.geometry import Pose
     from mskgrasp.core.grasp import Grasp, PartView
+    from mskgrasp.core.shipped import config_file, example_file
     from mskgrasp.dataset import Attempts, Dataset, ShardInfo, open_dataset
     from mskgrasp.learning.grasp_models import Models, load_models
     from mskgrasp.parts.load import load_part
@@ -34,7 +36,8 @@ __version__ = "0.1.0"
 __all__ = [
     "Arm", "Attempts", "Camera", "Cell", "Dataset", "Grasp", "GraspPlan", "Models", "MskgraspError", "Part",
     "PartView", "Planner", "PlannerConfig", "Pose", "RgbdFrame", "ShardInfo", "Target", "Workspace",
-    "execute_grasp", "load_models", "load_part", "open_cell", "open_dataset", "place_pose",
+    "config_file", "example_file", "execute_grasp", "load_models", "load_part", "open_cell", "open_dataset",
+    "place_pose",
 ]  # fmt: skip
 
 _HOMES = {
@@ -42,6 +45,7 @@ _HOMES = {
     "mskgrasp.core.errors": ("MskgraspError",),
     "mskgrasp.core.geometry": ("Pose",),
     "mskgrasp.core.grasp": ("Grasp", "PartView"),
+    "mskgrasp.core.shipped": ("config_file", "example_file"),
     "mskgrasp.dataset": ("Attempts", "Dataset", "ShardInfo", "open_dataset"),
     "mskgrasp.learning.grasp_models": ("Models", "load_models"),
     "mskgrasp.parts.load": ("load_part",),
@@ -50,16 +54,4 @@ _HOMES = {
     "mskgrasp.planning.place_pose": ("Target", "place_pose"),
     "mskgrasp.planning.planner": ("GraspPlan", "Planner"),
 }
-_HOME = {name: module for module, names in _HOMES.items() for name in names}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+__getattr__, __dir__ = lazy_names(__name__, _HOMES)

@@ -114,7 +114,7 @@ def _platt(odds: np.ndarray, success: np.ndarray) -> tuple[float, float]:
     return float(np.exp(found[0])), float(found[1])
 
 
-def model_metrics(
+def measure_models(
     models: Models, samples: Samples, training_rows: torch.Tensor, rows: torch.Tensor
 ) -> ModelMetrics:
     """Compute all metrics of both networks on some rows."""

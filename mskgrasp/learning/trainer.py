@@ -354,7 +354,7 @@ def train(
     if config.calibrate:
         found = held_out.calibrate(models, samples, sides.validation)
         models = replace(models, meta=meta.model_copy(update={"calibration": found}))
-    stored = held_out.model_metrics(models, samples, sides.training, sides.validation).to_json()
+    stored = held_out.measure_models(models, samples, sides.training, sides.validation).to_json()
     if len(sides.test):
-        stored["test"] = held_out.model_metrics(models, samples, sides.training, sides.test).to_json()
+        stored["test"] = held_out.measure_models(models, samples, sides.training, sides.test).to_json()
     return replace(models, meta=models.meta.model_copy(update={"metrics": stored})), history

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 from pydantic import Field
 
+from mskgrasp.core.config import check_config, read_config
 from mskgrasp.core.shipped import config_file
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.network_config import NetworkConfig, PatchNetworkConfig
@@ -28,3 +29,13 @@ class TrainConfig(LearningConfig):
     """Epochs of each network, in place of gqn.epochs and gdn.epochs."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """auto: a CUDA device where there is one."""
+
+
+def default_config(**changes: Any) -> TrainConfig:
+    """Read the shipped settings, ``configs/train/default.yaml``, with some of them changed.
+
+    Raises:
+        BadConfig: A change names no setting, or has an illegal value.
+    """
+    settings = read_config(TrainConfig, DEFAULT_CONFIG).model_dump()
+    return check_config(TrainConfig, settings | changes, "default_config")

@@ -73,7 +73,7 @@ def _line(one: EpochMetrics) -> str:
     return "  ".join([*shown, f"{one.seconds:.0f} s"])
 
 
-def run(config: TrainConfig) -> int:
+def run_training(config: TrainConfig) -> int:
     """Train, and write the model, its metrics, the log and the figures into ``config.out``."""
     if config.epochs is not None:
         gqn, gdn = (stage.model_copy(update={"epochs": config.epochs}) for stage in (config.gqn, config.gdn))
@@ -190,7 +190,7 @@ def _summarise(console: Console, report: dict[str, Any], out: Path) -> None:
 
 def main() -> int:
     """Read the command line and run."""
-    return run(
+    return run_training(
         parse(
             TrainConfig,
             prog="python -m mskgrasp.train",

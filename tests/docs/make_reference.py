@@ -52,7 +52,11 @@ def _exported(tree: ast.Module) -> list[str]:
 
 def _summary_of(name: str, file: Path) -> str:
     """First sentence of a name's docstring, wherever the file has it from."""
-    body = _parse(file).body
+    body = [
+        node
+        for top in _parse(file).body
+        for node in (top.body if isinstance(top, ast.If) else [top])  # what `if TYPE_CHECKING:` imports
+    ]
     for number, node in enumerate(body):
         if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name == name:
             return _first(ast.get_docstring(node))

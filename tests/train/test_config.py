@@ -1,9 +1,18 @@
 import pytest
 
+from mskgrasp.core.errors import BadConfig
 from mskgrasp.learning.config import StageConfig
 from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.runtime.options import parse
-from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
+from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig, default_config
+
+
+def test_the_default_settings_are_those_of_the_program_but_for_the_changes():
+    shipped = parse(TrainConfig, prog="train", description="", default_config=DEFAULT_CONFIG, argv=[])
+    assert default_config() == shipped
+    assert default_config(epochs=3) == shipped.model_copy(update={"epochs": 3})
+    with pytest.raises(BadConfig, match="epoch"):
+        default_config(epoch=3)
 
 
 @pytest.mark.parametrize("name", ["default", "pretrained", "paper", "paper_quick"])

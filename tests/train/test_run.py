@@ -23,20 +23,20 @@ def program(config: LearningConfig, **changes) -> TrainConfig:
 
 def test_one_number_of_epochs_stands_for_both_networks_and_is_what_a_stopped_run_needs(dataset, tmp_path):
     out = tmp_path / "model"
-    assert train.run(program(SHORT, data=dataset, out=out, epochs=1)) == 0
+    assert train.run_training(program(SHORT, data=dataset, out=out, epochs=1)) == 0
     with open(out / "log.csv") as file:
         assert [row["stage"] for row in csv.DictReader(file)] == ["gqn", "gdn"]
     kept = read_config(TrainConfig, out / "config.yaml")
     assert kept.gqn.epochs == kept.gdn.epochs == 1
-    assert train.run(program(SHORT, data=dataset, out=out, epochs=1)) == 0
+    assert train.run_training(program(SHORT, data=dataset, out=out, epochs=1)) == 0
     with pytest.raises(UsageError, match="gdn"):
-        train.run(program(SHORT, data=dataset, out=out))
+        train.run_training(program(SHORT, data=dataset, out=out))
 
 
 def test_a_small_dataset_is_learned_and_every_file_of_a_model_is_written(dataset, tmp_path):
     out = tmp_path / "model"
     config = PATCH.model_copy(update={"validation_fraction": 0.4})  # one part alone has no interval
-    assert train.run(program(config, data=dataset, out=out)) == 0
+    assert train.run_training(program(config, data=dataset, out=out)) == 0
     report = json.loads((out / "metrics.json").read_text())
     gqn, gdn = report["gqn"], report["gdn"]
     assert gqn["auroc"] > 0.85
@@ -69,9 +69,9 @@ def test_a_small_dataset_is_learned_and_every_file_of_a_model_is_written(dataset
         "config.yaml",
     }
     # Started again, there is nothing to do; with other settings, the folder is taken.
-    assert train.run(program(config, data=dataset, out=out)) == 0
+    assert train.run_training(program(config, data=dataset, out=out)) == 0
     with pytest.raises(UsageError, match=r"other settings \(seed\)"):
-        train.run(program(config, data=dataset, out=out, seed=1))
+        train.run_training(program(config, data=dataset, out=out, seed=1))
 
 
 def test_mistakes_on_the_command_line_are_one_line_each(tmp_path, dataset):

@@ -1,0 +1,60 @@
+"""An arm of your own, in a cell with the camera of own_camera.py: ``python examples/own_arm.py``."""
+
+import time
+
+import numpy as np
+from own_camera import REGION, BlockCamera, plan_grasp
+
+from hal import Arm, ArmLimits, ArmState, Cell, GraspOutcome, Workspace
+from mskgrasp import Pose, execute_grasp
+
+HOME = np.array([0.3, 0.3, 0.5, 0.0, 1.0, 0.0, 0.0])
+JOINTS = dict(joint_lower=np.full(7, -2.0), joint_upper=np.full(7, 2.0))
+BOX = dict(box_lower=-np.ones(3), box_upper=np.ones(3), table_z=0.0)
+TABLE = Workspace(table_z=0.0, region=REGION, home=HOME, min_height=0.002, lift_height=0.1, grasp_force=30)
+
+
+class Gantry(Arm):
+    """Is anywhere at once; its seven "joints" are the pose itself, x y z qw qx qy qz."""
+
+    pose, width = HOME, 0.08
+
+    # A real arm opens its driver, lets go of it, brakes, acknowledges errors, and holds still.
+    def connect(self): ...
+    def close(self): ...
+    def _halt(self): ...
+    def _recover(self): ...
+    def _wait(self, seconds): ...
+
+    def _connected(self):
+        return True
+
+    def _reachable(self, T_base_tcp):
+        return True
+
+    def _forward(self, joints):
+        return Pose.from_vector(joints)
+
+    def _state(self):
+        here = dict(joints=self.pose, T_base_tcp=Pose.from_vector(self.pose), gripper_width=self.width)
+        return ArmState(**here, timestamp_s=time.monotonic())
+
+    def _move_to_joints(self, joints, speed):
+        self.pose = joints
+
+    def _move_to_pose(self, T_base_tcp, speed):
+        self.pose = T_base_tcp.as_vector()
+
+    def _move_gripper(self, width):
+        self.width = width
+
+    def _grasp(self, force):
+        self.width = 0.03
+        return GraspOutcome(width=self.width, holding=True)
+
+
+if __name__ == "__main__":
+    arm = Gantry(ArmLimits(**JOINTS, **BOX, max_force=70.0))
+    with Cell(camera=BlockCamera(), arm=arm, workspace=TABLE).connected() as cell:
+        result = execute_grasp(cell, plan_grasp(cell.camera.capture()).grasp)
+    print("holding" if result.holding else "not holding")
