@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hal import Cell
+from hal.cell import Cell
 from hal.errors import MotionAborted
 from hal.execute import PUT_DOWN, above_grasp, let_go
 from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing, wrap_angle

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,20 @@ def test_the_architecture_names_every_room():
         init.parent for package in ("mskgrasp", "hal") for init in (ROOT / package).glob("*/__init__.py")
     ]
     assert not [str(room) for room in rooms if f"`{room.parent.name}.{room.name}`" not in page]
+
+
+def test_every_package_and_every_module_of_a_package_that_is_split_stands_in_a_layer():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
+    named = {name for layer in layers for name in re.split(r"[ |:]+", layer)}
+    split = {name.rpartition(".")[0] for name in named} - {""}
+    for package in split:
+        folder = ROOT / package.replace(".", "/")
+        paths = [
+            path for path in folder.iterdir() if path.suffix == ".py" or (path / "__init__.py").is_file()
+        ]
+        modules = {f"{package}.{path.stem}" for path in paths if not path.stem.startswith("__")}
+        assert modules - named - split == set(), "in no layer"
 
 
 @pytest.mark.parametrize("package", TESTED_BY_NAME)

@@ -1,5 +1,7 @@
 import dataclasses
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -155,6 +157,15 @@ def test_refinement_finds_better_grasps_within_the_parts_box(policy):
     assert (refined.candidates.position[:, 2] >= 0.0105 - 1e-9).all()
     assert (np.abs(refined.candidates.theta) <= np.pi / 2).all()
     assert (np.diff(refined.qualities[refined.shortlist]) <= 0).all()
+
+
+def test_planning_on_a_real_cell_loads_no_simulator():
+    code = (
+        "import sys\n"
+        "for name in ('sapien', 'mani_skill', 'mujoco'): sys.modules[name] = None\n"
+        "from mskgrasp.planning import for_cell, place_pose, planner, refine, run_inputs, scoring"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_two_parts_are_refused():
