@@ -61,7 +61,7 @@ class PartSummary:
 
 
 def summarise_parts(folder: Path, part_filter: PartFilter) -> list[PartSummary]:
-    """Reads a dataset and summarises each part."""
+    """Read a dataset and summarise each part."""
     parts: dict[str, list[tuple[Columns, ShardInfo]]] = {}
     for path in list_shards(folder):
         # Without the images: those of a large dataset do not fit into memory.
@@ -102,7 +102,7 @@ def _median(values: np.ndarray) -> float | None:
 
 
 def print_summary(summaries: list[PartSummary], console: Console | None = None) -> None:
-    """Prints a row for each part and a total."""
+    """Print a row for each part and a total."""
     rows = [
         (
             row.part,

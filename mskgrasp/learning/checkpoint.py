@@ -26,9 +26,9 @@ class Checkpoint:
         samples_version: Version of the samples made from the data; 1 in files that do not name it.
         stage: Network that is being trained.
         epoch: Epochs of that stage that are finished.
-        history: Of all stages so far, epoch by epoch.
-        weights: Of both networks.
-        best: Of the stage's network, where its validation loss was lowest.
+        history: Metrics of all epochs so far.
+        weights: Weights of both networks.
+        best: Weights of the stage's network at its lowest validation loss.
         optimiser: State of the stage's optimiser.
     """
 

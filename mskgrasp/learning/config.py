@@ -28,7 +28,7 @@ class LearningConfig(Config):
 
     seed: int = Field(default=0, ge=0)
     sides: Literal["name", "catalogue"] = "name"
-    """How parts are split: by a hash of their name, or as the catalogue says (near-duplicates on one side,
+    """Split of the parts: by a hash of their name, or as the catalogue says (near-duplicates on one side,
     and test parts beside those of validation)."""
     validation_fraction: float = Field(default=0.2, gt=0.0, lt=1.0)
     """Share of the parts that training never sees, where they are split by name."""

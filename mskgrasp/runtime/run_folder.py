@@ -121,7 +121,7 @@ def rewrite_trials(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
 
 
 def read_trials(path: Path, make: Callable[[dict[str, Any]], RecordT]) -> list[RecordT]:
-    """Reads the stored trials in order; removes an incomplete last line, which a killed run leaves.
+    """Read the stored trials in order; remove an incomplete last line, which a killed run leaves.
 
     Raises:
         BadDataset: A line of the file is not a trial.

@@ -104,7 +104,7 @@ def _error_over_deviation(axes: Axes, shift: np.ndarray, turn: np.ndarray, varia
 
 
 def draw_curves(history: list[EpochMetrics], report: dict[str, Any], path: Path) -> None:
-    """Draws losses and validation metrics by epoch, beside trivial predictors.
+    """Draw losses and validation metrics by epoch, beside trivial predictors.
 
     Args:
         history: Of all epochs, as `mskgrasp.learning.trainer.train` returns them.

@@ -36,7 +36,7 @@ class DiscardSummary:
 
 
 def summarise_discards(outcomes: Outcomes) -> DiscardSummary:
-    """Counts the physically impossible outcomes and the worst values of the others."""
+    """Count the physically impossible outcomes and the worst values of the others."""
     way = np.linalg.norm(outcomes.displacement[:, :3], axis=1)
     reasons = {
         "unsettled": ~outcomes.settled,

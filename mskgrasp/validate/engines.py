@@ -71,7 +71,7 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
 
 
 def engine_sections(record: dict[str, Any]) -> list[Section]:
-    """Differences in words and by part, those that disagree most first, from what ``engines.json`` holds."""
+    """Differences in words and by part, those that disagree most first, read from ``engines.json``."""
     found = [
         f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN"
         for ours, theirs, count in record["disagreements"]

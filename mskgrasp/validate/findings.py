@@ -86,7 +86,7 @@ class SettingComparison:
 def compare_with_reference(
     outcomes: Mapping[str, Outcomes], setting: str, reference: str, n: int, margins: Margins, origin: str = ""
 ) -> SettingComparison:
-    """Compares the first n grasps of each part under a setting and a reference.
+    """Compare the first n grasps of each part under a setting and a reference.
 
     Displacements are compared where the reference's floor was simulated, too.
     """
@@ -222,7 +222,7 @@ class DrawnComparison:
 
 
 def label_error(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> DrawnComparison | None:
-    """Differences to production where all that is not known better is drawn together; None without ranges."""
+    """Differences from production with all uncertain settings drawn together; None without ranges."""
     if not config.ranges:
         return None
     n = config.n_variants
