@@ -8,19 +8,20 @@ import json
 import math
 import os
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from hal.errors import DriverMissing
 from mskgrasp.core.grasp import FAILURES
+from mskgrasp.core.metrics import bootstrap_interval
 from mskgrasp.parts import Part
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.section import Section, Table
 from mskgrasp.runtime.progress import Bar, progress
 from mskgrasp.simulation.versions import versions
-from mskgrasp.validate.compare import Comparison, compare_outcomes
+from mskgrasp.validate.compare import Comparison, compare_outcomes, distances
 from mskgrasp.validate.config import SHIFTED, ValidateConfig
 from mskgrasp.validate.outcomes import Outcomes, draw_grasps, run_settings
 
@@ -28,6 +29,8 @@ LEAST_AGREEMENT = 0.95
 """Share of random grasps in which S must agree."""
 MOST_SHIFT = (0.5e-3, 3e-3)
 """Greatest difference of displacements, median and 90 %, m."""
+TILTED = math.radians(2.0)
+"""A part that hangs by more than this away from how it lay has tilted."""
 
 
 def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
@@ -60,6 +63,9 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
         "versions": versions() | {"mujoco": importlib.metadata.version("mujoco")},
         "engines": {name: one.to_json() for name, one in (rows | by_part).items()},
         "disagreements": [[ours, theirs, count] for (ours, theirs), count in differing],
+        "lasting": lasting_disagreements(found),
+        "intervals": intervals(mujoco, sapien),
+        "tilted": tilted(mujoco, sapien),
         "failed": failed,
     }
     print_sections(engine_sections(record))
@@ -72,10 +78,21 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
 
 def engine_sections(record: dict[str, Any]) -> list[Section]:
     """Differences in words and by part, those that disagree most first, read from ``engines.json``."""
-    found = [
+    found = [_in_words(record)]
+    found += [
         f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN"
         for ours, theirs, count in record["disagreements"]
     ]
+    found.append(
+        f"In {record['lasting']} of these, S differs in the same way with the starts moved by 0.1 mm, in both"
+        " engines; in the others a start that near changes S in one of them."
+    )
+    tilts = record["tilted"]
+    found.append(
+        f"Of {tilts['n']} grasps that hold in both engines, the part tilts by more than "
+        f"{math.degrees(TILTED):g} degrees in SAPIEN alone in {tilts['sapien']}, in MuJoCo alone in "
+        f"{tilts['mujoco']}, in both in {tilts['both']}."
+    )
     rows = {name: Comparison.from_json(one) for name, one in record["engines"].items()}
     whole = [(name, one) for name, one in rows.items() if name == "all" or name.endswith(SHIFTED)]
     by_part = sorted((item for item in rows.items() if item not in whole), key=lambda item: item[1].agreement)
@@ -96,6 +113,44 @@ def complaints(found: Comparison) -> list[str]:
     return said
 
 
+def intervals(mujoco: Outcomes, sapien: Outcomes) -> dict[str, tuple[float, float]]:
+    """95 % intervals of the figures of all grasps, by the bootstrap over parts.
+
+    Returns:
+        ``agreement`` (a share), ``shift_median`` and ``shift_p90`` (m).
+    """
+    rows = np.stack([mujoco.success == sapien.success, distances(mujoco, sapien)], axis=1)
+    settled = mujoco.settled & sapien.settled
+    by_part = [rows[settled & (sapien.part == part)] for part in np.unique(sapien.part[settled])]
+    figures: dict[str, Callable[[np.ndarray], float]] = {
+        "agreement": lambda drawn: float(drawn[:, 0].mean()),
+        "shift_median": lambda drawn: float(np.nanpercentile(drawn[:, 1], 50)),
+        "shift_p90": lambda drawn: float(np.nanpercentile(drawn[:, 1], 90)),
+    }
+    return {name: bootstrap_interval(by_part, figure) for name, figure in figures.items()}
+
+
+def lasting_disagreements(found: Mapping[str, Outcomes]) -> int:
+    """Number of grasps whose S differs between the engines, and does so with the starts moved, too."""
+    sapien, mujoco = found["sapien"], found["mujoco"]
+    same = sapien.settled & mujoco.settled & (sapien.success != mujoco.success)
+    for name, outcomes in (("sapien", sapien), ("mujoco", mujoco)):
+        same &= found[f"{name}{SHIFTED}"].success == outcomes.success
+    return int(same.sum())
+
+
+def tilted(mujoco: Outcomes, sapien: Outcomes) -> dict[str, int]:
+    """Of the n grasps that hold in both engines, in how many the part tilts in one alone, and in both."""
+    held = mujoco.success & sapien.success
+    here, there = mujoco.tilt[held] > TILTED, sapien.tilt[held] > TILTED
+    return dict(
+        n=int(held.sum()),
+        sapien=int((there & ~here).sum()),
+        mujoco=int((here & ~there).sum()),
+        both=int((here & there).sum()),
+    )
+
+
 def disagreements(ours: Outcomes, theirs: Outcomes) -> list[tuple[tuple[str, str], int]]:
     """Number of grasps whose S differs, by outcome in each engine; most frequent first."""
     differ = np.flatnonzero(ours.success != theirs.success)
@@ -114,6 +169,23 @@ def _advance(bar: Bar) -> Callable[[int], None]:
 def _of(outcomes: Outcomes, part: str) -> Outcomes:
     rows = outcomes.part == part
     return outcomes.rows(rows)
+
+
+def _in_words(record: dict[str, Any]) -> str:
+    everything = Comparison.from_json(record["engines"]["all"])
+    low, high = record["intervals"]["agreement"]
+    shifts = [
+        f"{1e3 * value:.2f} mm ({name}; {1e3 * ends[0]:.2f} .. {1e3 * ends[1]:.2f})"
+        for name, value, ends in (
+            ("median", everything.shift_median, record["intervals"]["shift_median"]),
+            ("90 %", everything.shift_p90, record["intervals"]["shift_p90"]),
+        )
+    ]
+    return (
+        f"S agrees in {everything.agreement:.1%} ({100 * low:.1f} .. {100 * high:.1f}) of {everything.n} "
+        f"grasps; displacements of {everything.n_both} differ by {' and '.join(shifts)}. Intervals: 95 %, "
+        "bootstrap over parts."
+    )
 
 
 def _table(rows: Sequence[tuple[str, Comparison]]) -> Table:
