@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hal.errors import DriverMissing, NotConnected
-from hal.mujoco.settings import MujocoPhysics
+from hal.mujoco.config import MujocoPhysics
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.settings import TABLE_Z, Overhead, Region
 from mskgrasp.parts import Part, find_part

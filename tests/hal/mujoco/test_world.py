@@ -12,7 +12,7 @@ import pytest
 
 from hal.errors import NotConnected
 from hal.mujoco import MujocoCellConfig, mujoco_cell
-from hal.mujoco.cell import READY
+from hal.mujoco.config import READY
 from hal.mujoco.world import MujocoWorld
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import Part
