@@ -4,46 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from hal.cell import Cell, Workspace
-from hal.limits import ArmLimits
+from hal.cell import Cell
 from hal.mujoco.arm import MujocoArm
 from hal.mujoco.camera import MujocoCamera
 from hal.mujoco.config import MujocoCellConfig
 from hal.mujoco.world import MujocoWorld
-from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER
-from mskgrasp.core.settings import TABLE_Z
+from hal.simulated import panda_limits, simulated_cell
 
 
 def mujoco_cell(config: MujocoCellConfig) -> Cell:
-    """Build the simulated cell; nothing is simulated before it is connected."""
-    home = np.array(config.home)
+    """Builds the simulated cell; nothing is simulated before it is connected."""
     world = MujocoWorld(
         physics=config.physics,
         overhead=config.camera,
         region=config.region,
-        home=home,
+        home=np.array(config.home),
         part=config.part,
         seed=config.seed,
     )
-    limits = ArmLimits(
-        joint_lower=np.array(JOINT_LOWER),
-        joint_upper=np.array(JOINT_UPPER),
-        box_lower=np.array([0.25, -0.4, TABLE_Z]),
-        box_upper=np.array([0.75, 0.4, 0.75]),
-        table_z=TABLE_Z,
-        max_force=70.0,
-    )
-    return Cell(
-        camera=MujocoCamera(world, config.noise),
-        arm=MujocoArm(world, limits),
-        workspace=Workspace(
-            table_z=TABLE_Z,
-            region=config.region,
-            home=home,
-            min_height=config.noise.least_height if config.min_height is None else config.min_height,
-            lift_height=config.lift_height,
-            grasp_force=config.grasp_force,
-        ),
-        feeder=world,
-        tracker=world,
-    )
+    camera, arm = MujocoCamera(world, config.noise), MujocoArm(world, panda_limits())
+    return simulated_cell(config, world, camera, arm)

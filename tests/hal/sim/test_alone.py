@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from hal import SensorNoise
+from hal.config import READY
 from hal.sim.alone import sapien_camera
 from hal.sim.camera import SapienCamera
-from hal.sim.config import READY, SapienCameraConfig
+from hal.sim.config import SapienCameraConfig
 from hal.sim.world import SapienWorld
 from mskgrasp.parts import Part
 
