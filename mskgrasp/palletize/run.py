@@ -17,7 +17,7 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
-from mskgrasp.palletize.pallet_slots import Slot, check_reach, check_room
+from mskgrasp.palletize.pallet_slots import Slot, check_room, check_slots_in_reach
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
 from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
 from mskgrasp.palletize.report import write_report
@@ -103,7 +103,7 @@ def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[tuple[Correction
         raise UsageError(f"--workers {config.workers}: {config.cell} is one cell; omit --workers")
     asks = Operator(cell, yes=config.yes).asks
     if kind in (*SIMULATED, "devices"):  # a recording replays queries in its order only
-        check_reach(cell, slots)
+        check_slots_in_reach(cell, slots)
     can: tuple[Correction, ...] = CORRECTIONS if cell.tracker is not None else CORRECTIONS[:2]
     wanted = tuple(dict.fromkeys(config.corrections)) or can
     if not set(wanted) <= set(can):
@@ -174,7 +174,7 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
     with connected_engine(
         config.cell, yes=config.yes, picture=config.out / "next.png", tape=config.squares()
     ) as engine:
-        check_reach(engine.cell, config.all_slots())
+        check_slots_in_reach(engine.cell, config.all_slots())
         planner = make_planner(config.models, config.planner, engine.cell)
         worker = PickAndPlace(engine, planner, config.out / "placements")
 
