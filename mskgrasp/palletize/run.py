@@ -70,13 +70,14 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
         HalError: The cell was lost; finished placements are stored.
     """
     models = load_models(config.models)
+    slots = config.all_slots()
+    corrections, asks = _check(config, slots)
+    # Parts come last: those that are missing are built, which takes a while.
     names = part_names(config.parts, models.meta.training, config.n_parts)
     if not names:
         raise UsageError(
             f"--parts {' '.join(config.parts)} names no part; `python -m mskgrasp.parts list` does"
         )
-    slots = config.all_slots()
-    corrections, asks = _check(config, slots)
     pallets = _pallets(config, names, slots, corrections)
     check_room((find_part(task.part), task.slot) for pallet in pallets for task in pallet)
     inputs = inputs_of(config.cell, config.models, names)
