@@ -56,7 +56,7 @@ class WorkspaceConfig(Config):
         return self
 
     def lower(self) -> np.ndarray:
-        """(3,) of the box, m."""
+        """(3,) lower corner of the box, base frame, m."""
         return np.array(self.box_lower if self.box_lower is not None else (0.25, -0.4, self.table_z))
 
 

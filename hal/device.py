@@ -36,14 +36,14 @@ class Device(ABC):
 
 
 class Resource(Protocol):
-    """Simulated world, recording or the like that several devices share."""
+    """Resource that several devices share, such as a simulated world or a recording."""
 
     def open(self) -> None:
-        """Opens it for its first user, and counts the others."""
+        """Open the resource for its first user; count the others."""
         ...
 
     def close(self) -> None:
-        """Releases it after its last user."""
+        """Release the resource after its last user."""
         ...
 
 
@@ -54,13 +54,13 @@ class SharingDevice(Device):
     _open: bool = False
 
     def connect(self) -> None:
-        """Opens the resource unless another device has opened it."""
+        """Open the resource unless another device has opened it."""
         if not self._open:
             self._resource.open()
             self._open = True
 
     def close(self) -> None:
-        """Releases the resource unless another device still uses it; safe to call twice."""
+        """Release the resource unless another device still uses it; safe to call twice."""
         if self._open:
             self._open = False
             self._resource.close()

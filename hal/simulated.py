@@ -35,7 +35,7 @@ JOINT_SPEED = 2.0
 JOINT_ACCELERATION = 5.0
 """Greatest acceleration of a joint, or of the hand's turn, rad/s^2 (Panda datasheet: 7.5 for joint 2)."""
 PEAK_ACCELERATION = 1.5
-"""Of the hand on straight lines, m/s^2, as in simulated attempts (`tasks.robot.motion`)."""
+"""Greatest acceleration of the hand on straight lines, m/s^2, as in `tasks.robot.motion`."""
 TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
 _WAYPOINT_M, _WAYPOINT_RAD = 0.01, 0.05
@@ -47,7 +47,7 @@ class SimulatedWorld(ABC):
 
     Attributes:
         overhead: Settings of the camera.
-        region: Where parts lie, base frame, metres.
+        region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
         home: (7,) joints of the arm while a part is placed, radians.
         part: Part on the table at first: a name or a folder.
         seed: Determines its position and turn.
@@ -71,7 +71,7 @@ class SimulatedWorld(ABC):
         return self.overhead.T_base_camera(((x_min + x_max) / 2, (y_min + y_max) / 2))
 
     def open(self) -> None:
-        """Builds the world for its first user.
+        """Build the world for its first user.
 
         Raises:
             DriverMissing: The simulator is not installed.
@@ -81,7 +81,7 @@ class SimulatedWorld(ABC):
         self._users += 1
 
     def close(self) -> None:
-        """Frees the world after its last user."""
+        """Free the world after its last user."""
         self._users = max(0, self._users - 1)
         if self._users == 0:
             self._free()
@@ -96,7 +96,7 @@ class SimulatedWorld(ABC):
 
     @abstractmethod
     def _build(self) -> None:
-        """Builds the world with its first part, or leaves nothing behind."""
+        """Build the world with its first part, or leave nothing behind."""
 
     @abstractmethod
     def _free(self) -> None: ...
@@ -125,13 +125,13 @@ class SimulatedCamera(SharingDevice, Camera, Generic[WorldT]):
         self._presented = 0
 
     def connect(self) -> None:
-        """Builds the world unless the arm has built it, and restarts the sensor's noise."""
+        """Build the world unless the arm has built it, and restart the sensor's noise."""
         if not self._open:
             self._presented = 0
         super().connect()
 
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
-        """Takes a frame now; ``timeout_s`` is not needed.
+        """Take a frame now; ``timeout_s`` is not needed.
 
         Raises:
             NotConnected: Outside the camera's context.
@@ -164,7 +164,7 @@ class SimulatedCamera(SharingDevice, Camera, Generic[WorldT]):
 
 
 class SimulatedArm(SharingDevice, Arm, Generic[WorldT]):
-    """Moves the Panda of a simulated world; a contact force over the reflex limit ends a motion."""
+    """The Panda of a simulated world; a contact force over the reflex limit ends a motion."""
 
     simulated = True
 
@@ -192,7 +192,7 @@ class SimulatedArm(SharingDevice, Arm, Generic[WorldT]):
         return straight_line(here, T_base_tcp, np.linspace(0, 1, n + 1)[1:]), seconds
 
     def _check_tracked(self, joints: np.ndarray, error: float, T_base_tcp: Pose) -> None:
-        """Refuses a line whose joints (k, 7) miss a waypoint by ``error``, or pass their limits."""
+        """Refuse a line whose joints (k, 7) miss a waypoint by ``error``, or pass their limits."""
         limits = self.limits
         if error > POSE_TOLERANCE or not within_limits(joints, limits.joint_lower, limits.joint_upper):
             raise OutOfWorkspace(

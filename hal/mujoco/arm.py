@@ -17,7 +17,7 @@ from mskgrasp.core.panda_kinematics import forward_pose, track
 
 
 class MujocoArm(SimulatedArm[MujocoWorld]):
-    """Moves the Panda of a `MujocoWorld`; a contact force over the reflex limit ends a motion."""
+    """The Panda of a `MujocoWorld`; a contact force over the reflex limit ends a motion."""
 
     def _state(self) -> ArmState:
         simulation = self._world.simulation

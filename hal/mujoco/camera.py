@@ -19,7 +19,7 @@ _AMBIENT = 0.35
 
 
 class MujocoCamera(SimulatedCamera[MujocoWorld]):
-    """Casts a ray through the centre of every pixel, the arm included."""
+    """Camera that casts a ray through the centre of every pixel; it sees the arm, too."""
 
     serial = "mujoco"
 

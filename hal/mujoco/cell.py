@@ -13,7 +13,7 @@ from hal.simulated import panda_limits, simulated_cell
 
 
 def mujoco_cell(config: MujocoCellConfig) -> Cell:
-    """Builds the simulated cell; nothing is simulated before it is connected."""
+    """Build the simulated cell; nothing is simulated before it is connected."""
     world = MujocoWorld(
         physics=config.physics,
         overhead=config.camera,

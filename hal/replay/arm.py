@@ -19,7 +19,7 @@ from mskgrasp.core.geometry import Pose
 
 
 class ReplayArm(SharingDevice, Arm):
-    """Compares each command with the recorded one and returns the recorded answer, errors included.
+    """Arm that compares each command with the recorded one and returns the recorded answer or error.
 
     A command that differs by more than the tolerances is refused (`NotRecorded`): it is unknown what the
     arm would have done. Limits were checked by the recorded arm; nothing moves here.

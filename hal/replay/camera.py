@@ -13,7 +13,7 @@ from hal.replay.reader import read_recording
 
 
 class ReplayCamera(SharingDevice, Camera):
-    """Delivers the recorded frames one after the other, errors included.
+    """Camera that returns the recorded frames and errors one after the other.
 
     Args:
         config: Recording.

@@ -33,7 +33,7 @@ STOP_CHECK_S = 0.02
 
 
 class SapienArm(SimulatedArm[SapienWorld]):
-    """Moves the Panda of a `SapienWorld`; a contact force over the reflex limit ends a motion."""
+    """The Panda of a `SapienWorld`; a contact force over the reflex limit ends a motion."""
 
     def __init__(self, world: SapienWorld, limits: ArmLimits):
         super().__init__(world, limits)

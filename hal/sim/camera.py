@@ -10,7 +10,7 @@ from tasks.scene.camera import FAR
 
 
 class SapienCamera(SimulatedCamera[SapienWorld]):
-    """Renders the view of a camera over the table, the arm included."""
+    """Rendered camera over the table; it sees the arm, too."""
 
     serial = "sapien"
 

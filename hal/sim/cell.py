@@ -13,7 +13,7 @@ from hal.simulated import panda_limits, simulated_cell
 
 
 def sapien_cell(config: SapienCellConfig) -> Cell:
-    """Builds the simulated cell; nothing is simulated before it is connected."""
+    """Build the simulated cell; nothing is simulated before it is connected."""
     world = SapienWorld(
         physics=config.physics,
         overhead=config.camera,

@@ -200,7 +200,7 @@ def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -
 
 
 def require_model(folder: Path) -> None:
-    """Refuses a folder that holds no model, without reading it.
+    """Refuse a folder that holds no model, without reading it.
 
     Raises:
         MissingModel: A file of a model is missing.

@@ -55,7 +55,7 @@ def write_solid(
     dimensions: dict[str, float],
     recipe_hash: str,
 ) -> Part:
-    """Measures a solid, lets its hulls overlap, moves its centroid to the origin and stores it as a part.
+    """Measure a solid, let its hulls overlap, move its centroid to the origin and store it as a part.
 
     Raises:
         BadPart: Its hulls are too far from its mesh, or PhysX would not take them. The caller names the part.
@@ -109,7 +109,7 @@ def _corners(points: np.ndarray) -> np.ndarray:
 
 
 def _check_fit(fit: HullFit) -> None:
-    """Refuses hulls that deviate too far from the mesh: contacts would be those of another shape."""
+    """Refuse hulls that deviate too far from the mesh: contacts would be those of another shape."""
     least = 1 / MOST_VOLUME_RATIO
     if fit.p95 > MOST_P95_MM or not least <= fit.volume_ratio <= MOST_VOLUME_RATIO:
         raise BadPart(

@@ -26,7 +26,7 @@ def make_folder(path: Path) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Refuses an output folder that cannot be made; makes nothing.
+    """Refuse an output folder that cannot be made; make nothing.
 
     Raises:
         UsageError: A file is in the way, or the place is not writable.

@@ -20,7 +20,7 @@ STEEL_GREY = (0.55, 0.57, 0.6, 1.0)
 
 
 def add_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: float = 0.0) -> Actor:
-    """Loads a part into one sub-scene.
+    """Load a part into one sub-scene.
 
     Args:
         scene: All sub-scenes.

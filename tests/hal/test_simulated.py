@@ -1,4 +1,4 @@
-"""What all simulated cells share: a world that lives as long as a device uses it."""
+"""World, camera and arm of every simulated cell: a world lives as long as a device uses it."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from mskgrasp.planning.place_pose import place
 
 
 def after_every_step(cell: Cell, monkeypatch: pytest.MonkeyPatch, do: Callable[[], object]) -> None:
-    """Calls something after every simulated step of the part that is on the table now."""
+    """Call something after every simulated step of the part that is on the table now."""
     world = cell.feeder
     assert isinstance(world, SapienWorld | MujocoWorld)
     steps = (world.env.motion, "step") if isinstance(world, SapienWorld) else (world.simulation, "_step")
