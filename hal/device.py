@@ -1,10 +1,10 @@
-"""Base class of arms and cameras: context managers that connect and release."""
+"""Base classes of arms and cameras: context managers that connect and release."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
 
 
 class Device(ABC):
@@ -33,3 +33,37 @@ class Device(ABC):
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+class Resource(Protocol):
+    """Resource that several devices share, such as a simulated world or a recording."""
+
+    def open(self) -> None:
+        """Open the resource for its first user; count the others."""
+        ...
+
+    def close(self) -> None:
+        """Release the resource after its last user."""
+        ...
+
+
+class SharingDevice(Device):
+    """A device that uses a resource together with others; a subclass sets the resource."""
+
+    _resource: Resource
+    _open: bool = False
+
+    def connect(self) -> None:
+        """Open the resource unless another device has opened it."""
+        if not self._open:
+            self._resource.open()
+            self._open = True
+
+    def close(self) -> None:
+        """Release the resource unless another device still uses it; safe to call twice."""
+        if self._open:
+            self._open = False
+            self._resource.close()
+
+    def _connected(self) -> bool:
+        return self._open

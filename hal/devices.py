@@ -6,74 +6,21 @@ from pathlib import Path
 from typing import Any, Literal, assert_never, get_args
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from hal.arm import Arm
 from hal.camera import Camera
 from hal.camera_calibration import calibration_path
 from hal.cell import Cell, PartFeeder, Workspace
+from hal.config import DevicesConfig, WorkspaceConfig
 from hal.errors import OutOfWorkspace
 from hal.execute import APPROACH
 from hal.limits import ArmLimits
-from mskgrasp.core.config import Config, check_config
+from mskgrasp.core.config import check_config
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.grasp import lowest_grasp_z, pose_base_tcp
 
 ArmDriver = Literal["franky", "panda_py", "replay"]
 CameraDriver = Literal["kinect2", "replay", "sapien"]
-
-Three = tuple[float, float, float]
-Seven = tuple[float, float, float, float, float, float, float]
-
-
-class WorkspaceConfig(Config):
-    """Table in front of the arm and limits of the TCP."""
-
-    table_z: float = Field(ge=-0.5, le=0.5)
-    """Height of the table in the robot's base frame, m; measure it: touch the table with closed fingers."""
-    region: tuple[float, float, float, float] = (0.38, 0.62, -0.12, 0.12)
-    """x_min, x_max, y_min, y_max where parts lie, base frame, m."""
-    home: Seven = (0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398)
-    """Joints at which the arm is out of the camera's sight, rad."""
-    box_lower: Three | None = None
-    """The TCP stays inside this box, base frame, m; by default 0.25, -0.4 and the table."""
-    box_upper: Three = (0.75, 0.4, 0.75)
-    """The other corner, m."""
-    min_height: float = Field(default=0.006, gt=0)
-    """Points lower than this over the table count as table, m: real tables are not level, cameras drift."""
-    lift_height: float = Field(default=0.1, gt=0, le=0.3)
-    """Height by which a grasped part is lifted, m."""
-    grasp_force: float = Field(default=30.0, gt=0, le=70)
-    """Gripper force, N."""
-
-    @model_validator(mode="after")
-    def _check(self) -> WorkspaceConfig:
-        x_min, x_max, y_min, y_max = self.region
-        if not (x_min < x_max and y_min < y_max):
-            raise ValueError(f"region must be x_min < x_max, y_min < y_max, got {list(self.region)}")
-        lower, upper = self.lower(), np.array(self.box_upper)
-        if not (lower < upper).all():
-            raise ValueError(
-                f"box_lower {lower.tolist()} must be below box_upper {upper.tolist()} in x, y and z"
-            )
-        if not (lower[0] <= x_min and x_max <= upper[0] and lower[1] <= y_min and y_max <= upper[1]):
-            raise ValueError(
-                f"region {list(self.region)} reaches out of the box {lower.tolist()} .. {upper.tolist()}"
-            )
-        return self
-
-    def lower(self) -> np.ndarray:
-        """(3,) lower corner of the box, base frame, m."""
-        return np.array(self.box_lower if self.box_lower is not None else (0.25, -0.4, self.table_z))
-
-
-class DevicesConfig(Config):
-    """Sections of the file; the ``driver`` of ``arm`` and ``camera`` decides how each is checked."""
-
-    type: Literal["devices"]
-    arm: dict[str, Any]
-    camera: dict[str, Any]
-    workspace: WorkspaceConfig
 
 
 def devices_cell(values: dict[str, Any], path: Path) -> Cell:

@@ -1,6 +1,6 @@
 """Errors of arms, cameras and cells; each message names the remedy."""
 
-from mskgrasp.core.errors import MskgraspError
+from mskgrasp.core.errors import MskgraspError, UsageError
 
 
 class HalError(MskgraspError):
@@ -45,6 +45,10 @@ class NeedsRecovery(HalError):
 
 class BadRecording(HalError):
     """A recording is missing, damaged, or made by another version."""
+
+
+class MissingRecording(BadRecording, UsageError):
+    """There is no such recording."""
 
 
 class NotRecorded(HalError):

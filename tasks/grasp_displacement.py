@@ -32,7 +32,7 @@ from tasks.robot.motion import PandaMotion
 from tasks.robot.panda import GraspPanda, panda_for
 from tasks.scene.camera import camera_config, without_reflection_table
 from tasks.scene.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_world
-from tasks.scene.part_actor import build_part
+from tasks.scene.part_actor import add_part
 from tasks.scene.physics import MOST_HULLS, sim_config
 from tasks.scene.standing import StandingPoses, standing_poses
 from tasks.scene.table_friction import TableFriction
@@ -178,7 +178,7 @@ class GraspDisplacementEnv(BaseEnv):
         self._build_table()
         actors = []
         for i, part in enumerate(self.parts):
-            actor = build_part(self.scene, part, i)
+            actor = add_part(self.scene, part, i)
             self.remove_from_state_dict_registry(actor)
             actors.append(actor)
         self.part = Actor.merge(actors, name="part")

@@ -13,8 +13,6 @@ EXTRA = "pip install 'mskgrasp[franka]'"
 _WHEELS: dict[DriverName, str] = {"franky": "franky-control", "panda_py": "panda-python"}
 _NO_ROBOT = ("connection to fci refused", "host not found", "connection error", "network is unreachable")
 _LOST = ("timeout", "connection", "socket", "network", "broken pipe", "reset by peer")
-_ABORTED = ("reflex", "aborted", "preempted", "rejected", "motion", "command", "control", "error")
-
 _NO_TRAJECTORY = "motion planner failed"
 
 

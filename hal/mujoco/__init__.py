@@ -3,9 +3,7 @@
 Needs the extra ``[mujoco]``, which is loaded when a cell is connected.
 """
 
-from hal.mujoco.arm import MujocoArm
-from hal.mujoco.camera import MujocoCamera
-from hal.mujoco.cell import MujocoCellConfig, mujoco_cell
-from hal.mujoco.settings import MujocoPhysics
+from hal.mujoco.cell import mujoco_cell
+from hal.mujoco.config import MujocoCellConfig, MujocoPhysics
 
-__all__ = ["MujocoArm", "MujocoCamera", "MujocoCellConfig", "MujocoPhysics", "mujoco_cell"]
+__all__ = ["MujocoCellConfig", "MujocoPhysics", "mujoco_cell"]

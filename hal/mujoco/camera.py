@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hal.camera import Camera, RgbdFrame
-from hal.errors import NotConnected
 from hal.mujoco.world import MujocoWorld
-from hal.sensor_noise import SensorNoise, add_noise
+from hal.simulated import SimulatedCamera
 
 if TYPE_CHECKING:
     from hal.mujoco.simulation import Simulation
@@ -21,62 +18,16 @@ _AMBIENT = 0.35
 """Brightness of a surface seen edge-on, as a share of one seen from the front: the light is at the camera."""
 
 
-class MujocoCamera(Camera):
-    """Camera that casts a ray through the centre of every pixel; it sees the arm, too.
+class MujocoCamera(SimulatedCamera[MujocoWorld]):
+    """Camera that casts a ray through the centre of every pixel; it sees the arm, too."""
 
-    Args:
-        world: The simulated world.
-        noise: Noise of the sensor; off by default.
-    """
+    serial = "mujoco"
 
-    def __init__(self, world: MujocoWorld, noise: SensorNoise | None = None):
-        self._world = world
-        self._noise = noise or SensorNoise()
-        self._rng = np.random.default_rng(self._noise.seed)
-        self._presented = 0
-        self._open = False
-
-    def connect(self) -> None:
-        """Build the world unless the arm has built it, and restart the sensor's noise."""
-        if not self._open:
-            self._world.open()
-            self._presented = 0
-            self._open = True
-
-    def close(self) -> None:
-        """Free the world unless the arm still uses it."""
-        if self._open:
-            self._open = False
-            self._world.close()
-
-    def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
-        """Take a frame now; ``timeout_s`` is not needed.
-
-        Raises:
-            NotConnected: Outside the camera's context.
-        """
-        if not self._open:
-            raise NotConnected("MujocoCamera is not connected; use it inside its context (with ...)")
-        world = self._world
-        if self._presented != world.presented:
-            # Reset with every part: its image must not depend on the number of parts before.
-            self._presented = world.presented
-            self._rng = np.random.default_rng([self._noise.seed, world.presented_seed])
-        taken = time.monotonic()
-        intrinsics = world.overhead.intrinsics()
-        x_min, x_max, y_min, y_max = world.region
-        pose = world.overhead.T_base_camera(((x_min + x_max) / 2, (y_min + y_max) / 2))
-        rays_camera = _rays(world.overhead.n_pixels, intrinsics)
+    def _render(self) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        world, pose = self._world, self._world.T_base_camera
+        rays_camera = _rays(world.overhead.n_pixels, world.overhead.intrinsics())
         colour, distance = _cast(world.simulation, pose.position, rays_camera @ pose.as_matrix()[:3, :3].T)
-        depth = distance * rays_camera[..., 2]
-        return RgbdFrame(
-            colour=colour,
-            depth=add_noise(depth, intrinsics, self._noise, self._rng),
-            intrinsics=intrinsics,
-            T_base_camera=pose,
-            timestamp_s=taken,
-            serial="mujoco",
-        )
+        return colour, distance * rays_camera[..., 2], None
 
 
 def _rays(n_pixels: int, intrinsics: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hal.mujoco.settings import MujocoPhysics
+from hal.mujoco.config import MujocoPhysics
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.panda_kinematics import (
     DH_A,

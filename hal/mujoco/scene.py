@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 import trimesh
 
+from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.panda import HAND_BODIES, HIDDEN, OTHERS, SEEN, add_panda, stiff
-from hal.mujoco.settings import MujocoPhysics
 from mskgrasp.core.settings import TABLE_Z
 from mskgrasp.parts import Part
 from mskgrasp.parts.hulls import hull_corners

@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 
 from hal.limits import lowest_point
+from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.panda import FINGER_STIFFNESS, FINGERS
 from hal.mujoco.scene import build_model
-from hal.mujoco.settings import MujocoPhysics
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.panda_kinematics import forward_pose

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hal.errors import DriverMissing, NotConnected
-from hal.mujoco.settings import MujocoPhysics
+from hal.mujoco.config import MujocoPhysics
+from hal.simulated import SimulatedWorld
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.settings import TABLE_Z, Overhead, Region
+from mskgrasp.core.settings import TABLE_Z
 from mskgrasp.parts import Part, find_part
 from mskgrasp.parts.hulls import hull_corners
 from mskgrasp.parts.resting_pose import random_resting_pose
@@ -21,39 +23,16 @@ _FALLEN = 0.05
 """A part this far below the table has fallen off it, m."""
 
 
-class MujocoWorld:
+@dataclass(kw_only=True, eq=False)
+class MujocoWorld(SimulatedWorld):
     """Parts on a table under a Panda; built when first connected.
 
-    Args:
+    Attributes:
         physics: Settings of the simulation.
-        overhead: Settings of the camera.
-        region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
-        home: (7,) joints of the arm while a part is placed.
-        part: Part on the table at first.
-        seed: Determines its position and turn.
     """
 
-    def __init__(
-        self,
-        *,
-        physics: MujocoPhysics,
-        overhead: Overhead,
-        region: Region,
-        home: np.ndarray,
-        part: str,
-        seed: int,
-    ):
-        self.physics = physics
-        self.overhead = overhead
-        self.region = region
-        self._home = np.asarray(home, dtype=float)
-        self._first = (part, seed)
-        self._users = 0
-        self._simulation: Simulation | None = None
-        self.presented = 0
-        """Number of parts placed so far."""
-        self.presented_seed = seed
-        """Seed of the last placement."""
+    physics: MujocoPhysics
+    _simulation: Simulation | None = field(default=None, init=False)
 
     @property
     def simulation(self) -> Simulation:
@@ -66,21 +45,12 @@ class MujocoWorld:
             raise NotConnected("the simulated cell is closed; use it inside open_cell(...)")
         return self._simulation
 
-    def open(self) -> None:
-        """Build the world for its first user.
-
-        Raises:
-            DriverMissing: MuJoCo is not installed.
-        """
+    def _build(self) -> None:
         if self._simulation is None:
-            self.present(*self._first)
-        self._users += 1
+            self.present(self.part, self.seed)
 
-    def close(self) -> None:
-        """Free the world after its last user."""
-        self._users = max(0, self._users - 1)
-        if self._users == 0:
-            self._simulation = None
+    def _free(self) -> None:
+        self._simulation = None
 
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
         """Place a part on the table, arm at home, everything at rest.
@@ -106,7 +76,7 @@ class MujocoWorld:
             self.physics,
             [new, *(one for one, _ in staying)],
             [Pose.from_vector(drawn), *(pose for _, pose in staying)],
-            self._home,
+            self.home,
         )
         self.presented, self.presented_seed = self.presented + 1, seed
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hal.arm import STOPPED, Arm, ArmState, GraspOutcome
+from hal.device import SharingDevice
 from hal.errors import NeedsRecovery, NotRecorded, OutOfWorkspace, Stopped
 from hal.replay.config import ReplayArmConfig
 from hal.replay.events import COMMANDS, arm_state, plain
@@ -17,7 +18,7 @@ from mskgrasp.core.errors import MskgraspError
 from mskgrasp.core.geometry import Pose
 
 
-class ReplayArm(Arm):
+class ReplayArm(SharingDevice, Arm):
     """Arm that compares each command with the recorded one and returns the recorded answer or error.
 
     A command that differs by more than the tolerances is refused (`NotRecorded`): it is unknown what the
@@ -35,24 +36,18 @@ class ReplayArm(Arm):
 
     def __init__(self, config: ReplayArmConfig, playback: Playback | None = None):
         calls = [call for call in COMMANDS if call not in ("capture", "present")]
-        self._playback = playback or Playback(read_recording(config.recording), calls, config.tolerances)
+        self._resource = self._playback = playback or Playback(
+            read_recording(config.recording), calls, config.tolerances
+        )
         super().__init__(self._playback.recording.limits)
-        self._open = False
         # The fault is this program's, not the recorded one's: what acknowledges it was not recorded, either.
         self._astray = False
 
     def connect(self) -> None:
         """Go to the beginning of the recording."""
         if not self._open:
-            self._playback.open()
+            super().connect()
             self._acknowledge()
-            self._open = True
-
-    def close(self) -> None:
-        """Release the recording; safe to call twice."""
-        if self._open:
-            self._open = False
-            self._playback.close()
 
     def state(self) -> ArmState:
         """The state that was read at this point, or the last one known; its time is that of this call.
@@ -128,9 +123,6 @@ class ReplayArm(Arm):
     def _acknowledge(self) -> None:
         self._fault, self._astray = None, False
         self._stop.clear()
-
-    def _connected(self) -> bool:
-        return self._open
 
     def _halt(self) -> None:
         """Do nothing: nothing moves."""

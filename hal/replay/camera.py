@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 
 from hal.camera import Camera, RgbdFrame
+from hal.device import SharingDevice
 from hal.errors import NotConnected
 from hal.replay.config import ReplayCameraConfig
 from hal.replay.playback import Playback
 from hal.replay.reader import read_recording
 
 
-class ReplayCamera(Camera):
+class ReplayCamera(SharingDevice, Camera):
     """Camera that returns the recorded frames and errors one after the other.
 
     Args:
@@ -23,22 +24,9 @@ class ReplayCamera(Camera):
     """
 
     def __init__(self, config: ReplayCameraConfig, playback: Playback | None = None):
-        self._playback = playback or Playback(
+        self._resource = self._playback = playback or Playback(
             read_recording(config.recording), ("capture",), loop=config.loop
         )
-        self._open = False
-
-    def connect(self) -> None:
-        """Go to the beginning of the recording."""
-        if not self._open:
-            self._playback.open()
-            self._open = True
-
-    def close(self) -> None:
-        """Release the recording; safe to call twice."""
-        if self._open:
-            self._open = False
-            self._playback.close()
 
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
         """The next recorded frame, at once; its time is that of this call, so that it counts as fresh.

@@ -20,7 +20,6 @@ KIND = "mskgrasp cell recording"
 Command = Literal[
     "capture", "present", "move_to_joints", "move_to_pose", "move_gripper", "grasp", "wait", "recover"
 ]  # fmt: skip
-Query = Literal["state", "check_pose", "part_pose", "stop"]
 COMMANDS: tuple[str, ...] = get_args(Command)
 """Calls that act, in sequence; the calls between them are queries."""
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from hal.camera import RgbdFrame
 from hal.cell import Workspace
-from hal.errors import BadRecording
+from hal.errors import BadRecording, MissingRecording
 from hal.limits import ArmLimits
 from hal.replay.events import KIND, SCHEMA, Event, pose
 
@@ -65,10 +65,11 @@ def read_recording(path: Path) -> Recording:
     """Read a recording except its images.
 
     Raises:
-        BadRecording: The file is missing, damaged, no recording, or of another version.
+        MissingRecording: There is no such file.
+        BadRecording: The file is damaged, no recording, or of another version.
     """
     if not path.is_file():
-        raise BadRecording(f"there is no recording {path}; make one with python -m hal.record")
+        raise MissingRecording(f"there is no recording {path}; make one with python -m hal.record")
     try:
         with h5py.File(path, "r") as file:
             kind, schema = file.attrs.get("kind"), file.attrs.get("schema")

@@ -10,13 +10,35 @@ import numpy as np
 from hal.arm import Arm, ArmState, GraspOutcome
 from hal.camera import Camera, RgbdFrame
 from hal.cell import PartFeeder, PartTracker
+from hal.device import Device, SharingDevice
 from hal.errors import HalError
 from hal.replay.events import plain
 from hal.replay.writer import RecordingWriter
 from mskgrasp.core.geometry import Pose
 
 
-class RecordingCamera(Camera):
+class _Recorded:
+    """A device and the recording of its calls, opened and closed together."""
+
+    def __init__(self, device: Device, writer: RecordingWriter):
+        self._device, self._writer = device, writer
+
+    def open(self) -> None:
+        self._writer.open()
+        try:
+            self._device.connect()
+        except BaseException:
+            self._writer.close()
+            raise
+
+    def close(self) -> None:
+        try:
+            self._device.close()
+        finally:
+            self._writer.close()
+
+
+class RecordingCamera(SharingDevice, Camera):
     """A camera whose frames are recorded.
 
     Args:
@@ -26,27 +48,7 @@ class RecordingCamera(Camera):
 
     def __init__(self, camera: Camera, writer: RecordingWriter):
         self._camera, self._writer = camera, writer
-        self._open = False
-
-    def connect(self) -> None:
-        """Open the recording and the camera."""
-        if not self._open:
-            self._writer.open()
-            try:
-                self._camera.connect()
-            except BaseException:
-                self._writer.close()
-                raise
-            self._open = True
-
-    def close(self) -> None:
-        """Release the camera and the recording; safe to call twice."""
-        if self._open:
-            self._open = False
-            try:
-                self._camera.close()
-            finally:
-                self._writer.close()
+        self._resource = _Recorded(camera, writer)
 
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
         """See `Camera.capture`."""
@@ -55,7 +57,7 @@ class RecordingCamera(Camera):
         )
 
 
-class RecordingArm(Arm):
+class RecordingArm(SharingDevice, Arm):
     """An arm whose commands and answers are recorded.
 
     Args:
@@ -67,27 +69,7 @@ class RecordingArm(Arm):
         super().__init__(arm.limits)
         self.simulated = arm.simulated
         self._arm, self._writer = arm, writer
-        self._open = False
-
-    def connect(self) -> None:
-        """Open the recording and the arm."""
-        if not self._open:
-            self._writer.open()
-            try:
-                self._arm.connect()
-            except BaseException:
-                self._writer.close()
-                raise
-            self._open = True
-
-    def close(self) -> None:
-        """Release the arm and the recording; safe to call twice."""
-        if self._open:
-            self._open = False
-            try:
-                self._arm.close()
-            finally:
-                self._writer.close()
+        self._resource = _Recorded(arm, writer)
 
     def state(self) -> ArmState:
         """See `Arm.state`."""
@@ -135,9 +117,6 @@ class RecordingArm(Arm):
         with contextlib.suppress(HalError):  # an arm that is gone has no state; the command's error says so
             return plain(self._arm.state())
         return None
-
-    def _connected(self) -> bool:
-        return self._open
 
     def _beneath(self, *_: Any, **__: Any) -> Any:
         raise AssertionError("everything is passed on above the backend")

@@ -2,30 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
-from pydantic import Field
 
-from hal.sensor_noise import SensorNoise
 from hal.sim.camera import SapienCamera
+from hal.sim.config import SapienCameraConfig
 from hal.sim.world import SapienWorld
-from mskgrasp.core.config import Config
-from mskgrasp.core.settings import Overhead, Physics, Region
-
-
-class SapienCameraConfig(Config):
-    """A rendered table with a part on it, which the arm does not move."""
-
-    driver: Literal["sapien"]
-    part: str = "hex_nut_m30"
-    """First part on the rendered table: a name or a folder."""
-    seed: int = Field(default=0, ge=0)
-    """Determines the position and turn of the part."""
-    overhead: Overhead = Overhead()
-    """Pose and optics of the camera."""
-    noise: SensorNoise = SensorNoise()
-    """Noise model: off, iid (3 mm) or kinect2; see docs/sensor_noise.md."""
+from mskgrasp.core.settings import Physics, Region
 
 
 def sapien_camera(

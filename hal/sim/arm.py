@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from contextlib import nullcontext
 from itertools import pairwise
@@ -11,30 +10,16 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hal.arm import Arm, ArmState, GraspOutcome
-from hal.errors import MotionAborted, OutOfWorkspace
+from hal.arm import ArmState, GraspOutcome
 from hal.limits import ArmLimits
 from hal.sim.world import SapienWorld
-from mskgrasp.core.geometry import Pose, pose_distance, straight_line
+from hal.simulated import SimulatedArm, contact_fault, joint_motion_s
+from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import MAX_OPENING, MIN_GAP, PAD_REACH
-from mskgrasp.core.minimum_jerk import minimum_jerk_duration, minimum_jerk_steps
-from mskgrasp.core.panda_kinematics import (
-    POSE_TOLERANCE,
-    forward,
-    forward_pose,
-    reachable,
-    track,
-    within_limits,
-)
-from tasks.robot.motion import PEAK_ACCELERATION
+from mskgrasp.core.minimum_jerk import minimum_jerk_steps
+from mskgrasp.core.panda_kinematics import forward, track
 from tasks.robot.reflex import Reflex
 
-JOINT_SPEED = 2.0
-"""Greatest joint speed, rad/s (Panda datasheet: 2.175 rad/s for joints 1 to 4)."""
-JOINT_ACCELERATION = 5.0
-"""Greatest acceleration of a joint, or of the hand's turn, rad/s^2 (Panda datasheet: 7.5 for joint 2)."""
-TURN_SPEED = 1.0
-"""Greatest turning speed of the hand on a straight motion, rad/s."""
 SETTLE_S = 0.15
 """Settling time of the drives at the end of a motion, s."""
 AIR_HZ = 125
@@ -45,34 +30,14 @@ PAD_GAP = 0.004
 """Distance of the pads from a part at which closing fingers leave free air, m: more than their run-up."""
 STOP_CHECK_S = 0.02
 """Time between two checks whether a wait was stopped, s."""
-_WAYPOINT_M = 0.01
 
 
-class SapienArm(Arm):
+class SapienArm(SimulatedArm[SapienWorld]):
     """The Panda of a `SapienWorld`; a contact force over the reflex limit ends a motion."""
 
-    simulated = True
-
     def __init__(self, world: SapienWorld, limits: ArmLimits):
-        super().__init__(limits)
-        self._world = world
-        self._open = False
+        super().__init__(world, limits)
         self._force = 0.0
-
-    def connect(self) -> None:
-        """Build the world unless the camera has built it."""
-        if not self._open:
-            self._world.open()
-            self._open = True
-
-    def close(self) -> None:
-        """Free the world unless the camera still uses it."""
-        if self._open:
-            self._open = False
-            self._world.close()
-
-    def _connected(self) -> bool:
-        return self._open
 
     def _state(self) -> ArmState:
         env = self._world.env
@@ -91,25 +56,15 @@ class SapienArm(Arm):
     def _move_to_joints(self, joints: np.ndarray, speed: float) -> None:
         start = self._target()
         goal = torch.as_tensor(joints, dtype=torch.float64)
-        seconds = minimum_jerk_duration(
-            float((goal - start).abs().max()), speed * JOINT_SPEED, JOINT_ACCELERATION
-        )
+        seconds = joint_motion_s(float((goal - start).abs().max()), speed)
         self._follow(torch.stack([start, goal]), seconds)
 
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
         start = self._target()
         here = Pose.from_matrix(forward(start)[0].numpy())
-        distance, angle = pose_distance(here, T_base_tcp)
-        seconds = max(
-            minimum_jerk_duration(distance, speed, PEAK_ACCELERATION),
-            minimum_jerk_duration(angle, TURN_SPEED, JOINT_ACCELERATION),
-        )
-        n_waypoints = max(2, math.ceil(distance / _WAYPOINT_M), math.ceil(angle / 0.05))
-        line = straight_line(here, T_base_tcp, np.linspace(0, 1, n_waypoints + 1)[1:])
+        line, seconds = self._line(here, T_base_tcp, speed)
         joints, error = track(torch.as_tensor(line.as_matrix()), start)
-        if float(error.max()) > POSE_TOLERANCE or not self._within_limits(joints.numpy()):
-            target = ", ".join(f"{value:.3f}" for value in T_base_tcp.position)
-            raise OutOfWorkspace(f"no straight line from here to TCP ({target}) m within the joint limits")
+        self._check_tracked(joints.numpy(), float(error.max()), T_base_tcp)
         self._follow(torch.cat([start[None], joints]), seconds)
 
     def _follow(self, waypoints: Tensor, seconds: float) -> None:
@@ -156,9 +111,7 @@ class SapienArm(Arm):
             return self._stop.is_set() or force - pressed > limit
 
         if not motion.follow(path[:, None], check=check, check_every=1):
-            raise MotionAborted(
-                f"contact force over {limit:.0f} N: the arm stopped; call recover() when it is safe"
-            )
+            raise contact_fault(limit)
         return pressed
 
     def _pause(self, seconds: float, in_air: bool) -> None:
@@ -201,18 +154,6 @@ class SapienArm(Arm):
             if self._stop.is_set():
                 return
             self._pause(STOP_CHECK_S, in_air)
-
-    def _forward(self, joints: np.ndarray) -> Pose:
-        return forward_pose(joints)
-
-    def _reachable(self, T_base_tcp: Pose) -> bool:
-        return reachable(T_base_tcp, self.limits.joint_lower, self.limits.joint_upper)
-
-    def _within_limits(self, joints: np.ndarray) -> bool:
-        return within_limits(joints, self.limits.joint_lower, self.limits.joint_upper)
-
-    def _halt(self) -> None:
-        """The drives hold their last targets; a motion in progress sees the stop flag."""
 
     def _recover(self) -> None:
         """Nothing to reset in a simulator; the drives restart from the current joints."""

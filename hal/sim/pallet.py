@@ -11,7 +11,7 @@ from mani_skill.utils.structs.actor import Actor
 from mskgrasp.core.settings import TABLE_Z, Region
 from mskgrasp.parts import Part
 from tasks.scene.frames import base_pose
-from tasks.scene.part_actor import build_part
+from tasks.scene.part_actor import add_part
 
 _FALLEN = 0.05
 """A part this far below the table has fallen off it, m."""
@@ -47,6 +47,6 @@ def restore(scene: ManiSkillScene, lying: Lying, pose: sapien.Pose, number: int,
         friction: Coefficient of its material; the effective one is the mean with that of the other body: none
             on the table and on the part presented, twice the effective one on the pads.
     """
-    body = build_part(scene, replace(lying.part, name=f"{lying.part.name}-beside-{number}"), 0, friction)
+    body = add_part(scene, replace(lying.part, name=f"{lying.part.name}-beside-{number}"), 0, friction)
     body.set_pose(pose)
     return Lying(lying.part, body)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+from dataclasses import dataclass, field
 
 import gymnasium
 import numpy as np
@@ -14,9 +15,10 @@ from hal.sim.board import show_board
 from hal.sim.colour import FineColour
 from hal.sim.pallet import Lying, outside, restore
 from hal.sim.tape import stick_tape
+from hal.simulated import SimulatedWorld
 from mskgrasp.core.errors import TapeDoesNotFit
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.settings import TABLE_Z, Overhead, Physics, Region, Tape
+from mskgrasp.core.settings import TABLE_Z, Physics, Tape
 from mskgrasp.parts import find_part
 from mskgrasp.parts.hulls import hull_corners
 from tasks import GraspDisplacementEnv
@@ -25,48 +27,23 @@ from tasks.scene.frames import base_pose
 from tasks.scene.renderer import render_backend
 
 
-class SapienWorld:
+@dataclass(kw_only=True, eq=False)
+class SapienWorld(SimulatedWorld):
     """One sub-scene of ``GraspDisplacement-v1`` on the CPU; built when first connected.
 
-    Args:
+    Attributes:
         physics: Settings of the simulation.
-        overhead: Settings of the camera.
-        region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
-        home: (7,) joints of the arm while a part is placed.
-        part: Part on the table at first.
-        seed: Determines its position and turn.
-        tape: Sizes of the tape squares on top of every part; None: no tape.
-        colour_scale: Above 1, frames hold a fine colour image with this many pixels along one of depth.
+        tape: Squares of tape that are stuck on top of every part; None for none.
+        colour_scale: Above 1, frames also hold a colour image finer than depth by this factor.
     """
 
-    def __init__(
-        self,
-        *,
-        physics: Physics,
-        overhead: Overhead,
-        region: Region,
-        home: np.ndarray,
-        part: str,
-        seed: int,
-        tape: Tape | None = None,
-        colour_scale: int = 1,
-    ):
-        self.physics = physics
-        self.overhead = overhead
-        self.region = region
-        self._home = torch.as_tensor(home, dtype=torch.float64)[None]
-        self._first = (part, seed)
-        self._tape = tape
-        self._colour_scale = colour_scale
-        self._fine_colour: FineColour | None = None
-        self._beside: list[Lying] = []
-        self._hull_corners: dict[str, list[np.ndarray]] = {}
-        self._users = 0
-        self._gym: gymnasium.Env | None = None
-        self.presented = 0
-        """Number of parts placed so far."""
-        self.presented_seed = seed
-        """Seed of the last placement."""
+    physics: Physics
+    tape: Tape | None = None
+    colour_scale: int = 1
+    _fine_colour: FineColour | None = field(default=None, init=False)
+    _beside: list[Lying] = field(default_factory=list, init=False)
+    _hull_corners: dict[str, list[np.ndarray]] = field(default_factory=dict, init=False)
+    _gym: gymnasium.Env | None = field(default=None, init=False)
 
     @property
     def env(self) -> GraspDisplacementEnv:
@@ -81,18 +58,11 @@ class SapienWorld:
         assert isinstance(env, GraspDisplacementEnv)
         return env
 
-    def open(self) -> None:
-        """Build the world for its first user."""
-        if self._gym is None:
-            self._build()
-        self._users += 1
-
     def _build(self) -> None:
         logging.getLogger("mani_skill").setLevel(logging.ERROR)
-        part, seed = self._first
         self._gym = gymnasium.make(
             "GraspDisplacement-v1",
-            parts=[str(find_part(part).folder)],
+            parts=[str(find_part(self.part).folder)],
             obs_mode="none",
             physics=self.physics.model_dump(),
             camera=self.overhead.model_dump(),
@@ -103,16 +73,10 @@ class SapienWorld:
         try:
             # Programs place their own parts: a first part without room for tape must not stop them.
             with contextlib.suppress(TapeDoesNotFit):
-                self.present(part, seed)
+                self.present(self.part, self.seed)
         except BaseException:
             self._free()
             raise
-
-    def close(self) -> None:
-        """Free the world after its last user."""
-        self._users = max(0, self._users - 1)
-        if self._users == 0:
-            self._free()
 
     def _free(self) -> None:
         self._fine_colour = None
@@ -144,18 +108,18 @@ class SapienWorld:
             restore(self.env.scene, lying, pose, number, 2 * self.physics.friction_table_part)
             for number, (lying, pose) in enumerate(staying)
         ]
-        self.env.motion.place(self._home)
+        self.env.motion.place(torch.as_tensor(self.home, dtype=torch.float64)[None])
         self.env.motion.step(self.env.motion.n_steps(self.physics.settle_s))
-        if self._tape is not None:
+        if self.tape is not None:
             entity = self.env.part._objs[0]
-            stick_tape(entity, self.env.parts[0], self.part_pose().quat_wxyz, self._tape)
+            stick_tape(entity, self.env.parts[0], self.part_pose().quat_wxyz, self.tape)
 
     def fine_colour(self) -> np.ndarray | None:
         """Fine colour image of the current scene; None if the settings request none."""
-        if self._colour_scale == 1:
+        if self.colour_scale == 1:
             return None
         if self._fine_colour is None:
-            self._fine_colour = FineColour(self.env, self.overhead, self._colour_scale)
+            self._fine_colour = FineColour(self.env, self.overhead, self.colour_scale)
         return self._fine_colour.capture()
 
     def hold_board(self, image: np.ndarray, size: tuple[float, float], T_tcp_board: Pose) -> None:

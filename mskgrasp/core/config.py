@@ -31,7 +31,10 @@ def read_yaml(path: Path) -> dict[str, Any]:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise BadConfig(f"cannot read configuration {path}: {_reason(error)}") from error
+        raise BadConfig(
+            f"cannot read configuration {path}: {_reason(error)}; name a readable YAML file, such as those "
+            "in configs/"
+        ) from error
     try:
         values = yaml.safe_load(text)
     except yaml.YAMLError as error:

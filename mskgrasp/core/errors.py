@@ -33,8 +33,16 @@ class BadDataset(MskgraspError):
     """A dataset folder or one of its shards is missing, empty, truncated or of another format."""
 
 
+class MissingDataset(BadDataset, UsageError):
+    """There is no dataset in that folder."""
+
+
 class BadModel(MskgraspError):
     """A model folder is missing, damaged, or made for other network inputs."""
+
+
+class MissingModel(BadModel, UsageError):
+    """There is no model in that folder."""
 
 
 class NoPartFound(MskgraspError):

@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.errors import BadDataset, MissingDataset
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES
@@ -40,18 +40,18 @@ def list_shards(folder: Path) -> list[Path]:
     """List the finished shards of a dataset, sorted by name.
 
     Raises:
-        BadDataset: No such folder, or no finished shard in it.
+        MissingDataset: No such folder, or no folder ``shards`` in it.
+        BadDataset: No shard is finished.
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise BadDataset(
+        raise MissingDataset(
             f"no dataset folder {folder}; collect one: python -m mskgrasp.collect --out {folder}"
         )
     paths = sorted(path for path in (folder / "shards").glob("*.h5") if path.is_file())
     if not paths:
-        raise BadDataset(
-            f"no shards/*.h5 in {folder}; collect some: python -m mskgrasp.collect --out {folder}"
-        )
+        kind = BadDataset if (folder / "shards").is_dir() else MissingDataset
+        raise kind(f"no shards/*.h5 in {folder}; collect some: python -m mskgrasp.collect --out {folder}")
     return paths
 
 

@@ -11,8 +11,13 @@ import numpy as np
 
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
+<<<<<<< HEAD
 from mskgrasp.learning.grasp_models import DESCRIPTION, Models, load_models
 from mskgrasp.planning.config import PlannerConfig
+=======
+from mskgrasp.learning.grasp_models import load_models
+from mskgrasp.planning.planner import PlannerConfig
+>>>>>>> w-hal
 from mskgrasp.planning.run_inputs import model_digests
 from mskgrasp.trials.predictors import (
     LOWESS,
@@ -29,20 +34,6 @@ from mskgrasp.trials.trial_runner import TrialTask
 
 # No hyphen: it separates the label from the number in a trial's name.
 _LABEL = re.compile(r"[A-Za-z][A-Za-z0-9_+.]*")
-
-
-def open_model(folder: Path) -> Models:
-    """Load the model of a folder.
-
-    Raises:
-        UsageError: The folder holds no model.
-        BadModel: The model cannot be used.
-    """
-    if not (folder / DESCRIPTION).is_file():
-        raise UsageError(
-            f"no {DESCRIPTION} in {folder}; train a model: python -m mskgrasp.train --out {folder}"
-        )
-    return load_models(folder)
 
 
 def model_folders(compare: Iterable[str], models: Path) -> dict[str, Path]:
@@ -114,7 +105,7 @@ def load_compared(
     """
     folders = model_folders(compare, models)
     predictors: dict[str, Predictor] = {
-        label: NetworkPredictor(open_model(folder), chunk_size) for label, folder in folders.items()
+        label: NetworkPredictor(load_models(folder), chunk_size) for label, folder in folders.items()
     }
     inputs: dict[str, str] = {}
     for label, folder in folders.items():

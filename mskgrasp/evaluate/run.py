@@ -10,19 +10,30 @@ from pathlib import Path
 
 from mskgrasp.core.errors import BadModel, UsageError
 from mskgrasp.core.files import write_whole
+<<<<<<< HEAD
 from mskgrasp.evaluate.comparison import compare_models
+=======
+from mskgrasp.dataset import list_shards
+from mskgrasp.evaluate.comparison import compare
+>>>>>>> w-hal
 from mskgrasp.evaluate.config import EvaluateConfig, Experiment
 from mskgrasp.evaluate.experiments import (
     Compared,
     load_compared,
-    open_model,
+    model_folders,
     scenes,
     with_predictions,
 )
 from mskgrasp.evaluate.figures import draw_comparison, draw_displacements, draw_success
 from mskgrasp.evaluate.replay_trial import describe_trial, draw_trial, find_trial, outcome_text
+<<<<<<< HEAD
 from mskgrasp.evaluate.report import TITLES, Report, conclusion, report_sections
 from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise_trials, worst_trials
+=======
+from mskgrasp.evaluate.report import TITLES, Report, conclusion, sections
+from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise, worst_trials
+from mskgrasp.learning.grasp_models import load_models, require_model
+>>>>>>> w-hal
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.run_inputs import model_digests, part_digests
@@ -63,12 +74,7 @@ def evaluate(config: EvaluateConfig) -> Report:
         MskgraspError: A model, a part or the cell cannot be used.
     """
     _check(config)
-    models = open_model(config.models)
-    words = config.parts or PARTS[config.experiment]
-    sources = part_names(words, models.meta.training, config.n_parts)
-    if not sources:
-        raise UsageError("--parts names no held-out part; name another set or parts")
-    parts = {find_part(source).name: source for source in sources}
+    models = load_models(config.models)
     if config.planner.policy == "low_variance" and not models.meta.network.variance:
         raise BadModel(
             f"{config.models} predicts no variance; use --planner.policy quality, or another model"
@@ -76,6 +82,12 @@ def evaluate(config: EvaluateConfig) -> Report:
     cell = read_cell(config.cell, noise=config.noise, measure=config.measure, tape=config.tape)
     if config.workers > 1 and not cell.simulated:
         raise UsageError(f"--workers {config.workers}: {config.cell} is one cell; omit --workers")
+    # Parts come last: those that are missing are built, which takes a while.
+    words = config.parts or PARTS[config.experiment]
+    sources = part_names(words, models.meta.training, config.n_parts)
+    if not sources:
+        raise UsageError("--parts names no held-out part; name another set or parts")
+    parts = {find_part(source).name: source for source in sources}
     compared = None
     if config.experiment == "displacement":
         chunk = config.planner.chunk_size
@@ -100,6 +112,11 @@ def _check(config: EvaluateConfig) -> None:
             "--experiment displacement gives all models the same candidates; omit --planner.refinements and "
             "--planner.check-fingers"
         )
+    if config.experiment == "displacement":
+        for folder in model_folders(config.compare, config.models).values():
+            require_model(folder)
+    if config.lowess_data is not None:
+        list_shards(config.lowess_data)
 
 
 def _make_trials(

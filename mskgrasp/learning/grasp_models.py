@@ -15,7 +15,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from mskgrasp.core.config import Config
-from mskgrasp.core.errors import BadModel
+from mskgrasp.core.errors import BadModel, MissingModel
 from mskgrasp.learning.network_config import NetworkConfig, Normalisation
 from mskgrasp.learning.networks import GraspDisplacementNetwork, GraspQualityNetwork
 from mskgrasp.learning.symmetry import views
@@ -168,12 +168,11 @@ def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -
     """Read a model folder.
 
     Raises:
-        BadModel: It is missing, damaged or of another schema, or the weights do not fit the description.
+        MissingModel: There is no model in the folder.
+        BadModel: It is damaged or of another schema, or the weights do not fit the description.
     """
     folder = Path(folder)
-    for name in (DESCRIPTION, WEIGHTS):
-        if not (folder / name).is_file():
-            raise BadModel(f"no {name} in {folder}; train a model: python -m mskgrasp.train --out {folder}")
+    require_model(folder)
     meta = _read_meta(folder / DESCRIPTION)
     path = folder / WEIGHTS
     try:
@@ -198,6 +197,19 @@ def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -
     models.gqn.to(device)
     models.gdn.to(device)
     return models
+
+
+def require_model(folder: Path) -> None:
+    """Refuse a folder that holds no model, without reading it.
+
+    Raises:
+        MissingModel: A file of a model is missing.
+    """
+    for name in (DESCRIPTION, WEIGHTS):
+        if not (folder / name).is_file():
+            raise MissingModel(
+                f"no {name} in {folder}; train a model: python -m mskgrasp.train --out {folder}"
+            )
 
 
 def _read_meta(path: Path) -> ModelMeta:

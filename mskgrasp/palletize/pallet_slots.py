@@ -153,7 +153,7 @@ def read_slots(path: Path) -> list[Slot]:
     return slots
 
 
-def check_reach(cell: Cell, slots: Sequence[Slot]) -> None:
+def check_slots_in_reach(cell: Cell, slots: Sequence[Slot]) -> None:
     """Refuse slots at which the arm cannot place a part grasped at every angle, before anything moves.
 
     Raises:

@@ -17,7 +17,7 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
-from mskgrasp.palletize.pallet_slots import Slot, check_reach, check_room
+from mskgrasp.palletize.pallet_slots import Slot, check_room, check_slots_in_reach
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
 from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
 from mskgrasp.palletize.report import write_report
@@ -70,13 +70,14 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
         HalError: The cell was lost; finished placements are stored.
     """
     models = load_models(config.models)
+    slots = config.all_slots()
+    corrections, asks = _check(config, slots)
+    # Parts come last: those that are missing are built, which takes a while.
     names = part_names(config.parts, models.meta.training, config.n_parts)
     if not names:
         raise UsageError(
             f"--parts {' '.join(config.parts)} names no part; `python -m mskgrasp.parts list` does"
         )
-    slots = config.all_slots()
-    corrections, asks = _check(config, slots)
     pallets = _pallets(config, names, slots, corrections)
     check_room((find_part(task.part), task.slot) for pallet in pallets for task in pallet)
     inputs = inputs_of(config.cell, config.models, names)
@@ -103,7 +104,7 @@ def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[tuple[Correction
         raise UsageError(f"--workers {config.workers}: {config.cell} is one cell; omit --workers")
     asks = Operator(cell, yes=config.yes).asks
     if kind in (*SIMULATED, "devices"):  # a recording replays queries in its order only
-        check_reach(cell, slots)
+        check_slots_in_reach(cell, slots)
     can: tuple[Correction, ...] = CORRECTIONS if cell.tracker is not None else CORRECTIONS[:2]
     wanted = tuple(dict.fromkeys(config.corrections)) or can
     if not set(wanted) <= set(can):
@@ -174,7 +175,7 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
     with connected_engine(
         config.cell, yes=config.yes, picture=config.out / "next.png", tape=config.squares()
     ) as engine:
-        check_reach(engine.cell, config.all_slots())
+        check_slots_in_reach(engine.cell, config.all_slots())
         planner = make_planner(config.models, config.planner, engine.cell)
         worker = PickAndPlace(engine, planner, config.out / "placements")
 

@@ -92,7 +92,10 @@ def find_part(name_or_folder: str | Path) -> Part:
     """
     text = str(name_or_folder)
     if text in _recipes():
-        return build_part(text)
+        try:
+            return build_part(text)
+        except BadPart as error:
+            raise BadPart(f"{text}: {error}") from error
     if LEGAL_NAME.fullmatch(text) and (store.parts_folder() / text).is_dir():
         return store.read_part(store.parts_folder() / text)
     if Path(text).is_dir():

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.errors import BadPart, UnknownPart
 from mskgrasp.core.geometry import Pose
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
 
@@ -203,7 +203,8 @@ def _remove_abandoned(root: Path) -> None:
 def _read(folder: Path, name: str) -> bytes:
     path = folder / name
     if not path.is_file():
-        raise BadPart(f"{folder} is not a part folder: {name} is missing; a part has {', '.join(FILES)}")
+        kind = BadPart if (folder / "part.json").is_file() else UnknownPart
+        raise kind(f"{folder} is not a part folder: {name} is missing; a part has {', '.join(FILES)}")
     if not path.resolve().is_relative_to(folder.resolve()):
         raise BadPart(f"{path} leads out of its folder to {path.resolve()}: {_REMEDY}")
     return path.read_bytes()

@@ -55,7 +55,11 @@ def write_solid(
     dimensions: dict[str, float],
     recipe_hash: str,
 ) -> Part:
-    """Measure a solid, let its hulls overlap, move its centroid to the origin and store it as a part."""
+    """Measure a solid, let its hulls overlap, move its centroid to the origin and store it as a part.
+
+    Raises:
+        BadPart: Its hulls are too far from its mesh, or PhysX would not take them. The caller names the part.
+    """
     masses = mass_properties(solid.mesh, density)
     centroid_mm = masses.centroid * 1000
     mesh = trimesh.Trimesh(solid.mesh.vertices - centroid_mm, solid.mesh.faces, process=False)
@@ -63,9 +67,9 @@ def write_solid(
     pieces = [_corners((points - centroid_mm).astype(np.float32)) for points in solid.hulls]
     hulls = [_corners(points.astype(np.float32)) for points in overlapped(pieces)]
     for number, points in enumerate(hulls):
-        _check_hull(name, number, points)
+        _check_hull(number, points)
     fit = hull_fit(mesh, hulls)
-    _check_fit(name, fit)
+    _check_fit(fit)
     resting, probability = stable_poses(np.concatenate(pieces).astype(np.float64))
     record: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
@@ -104,28 +108,28 @@ def _corners(points: np.ndarray) -> np.ndarray:
     return points[np.sort(ConvexHull(points.astype(np.float64)).vertices)]
 
 
-def _check_fit(name: str, fit: HullFit) -> None:
+def _check_fit(fit: HullFit) -> None:
     """Refuse hulls that deviate too far from the mesh: contacts would be those of another shape."""
     least = 1 / MOST_VOLUME_RATIO
     if fit.p95 > MOST_P95_MM or not least <= fit.volume_ratio <= MOST_VOLUME_RATIO:
         raise BadPart(
-            f"{name}: the hulls deviate from the mesh: 95 % of the surface is within {fit.p95:.2f} mm (at "
+            f"the hulls deviate from the mesh: 95 % of the surface is within {fit.p95:.2f} mm (at "
             f"most {MOST_P95_MM} mm), volume ratio {fit.volume_ratio:.2f} ({least:.2f} to "
             f"{MOST_VOLUME_RATIO}): simplify fine detail such as threads, grilles and thin walls"
         )
 
 
-def _check_hull(name: str, number: int, points: np.ndarray) -> None:
+def _check_hull(number: int, points: np.ndarray) -> None:
     faces = len(ConvexHull(points.astype(np.float64)).simplices)
     if len(points) > MAX_HULL_VERTICES or faces > MAX_HULL_FACES:
         raise BadPart(
-            f"{name}: hull {number} has {len(points)} vertices and {faces} faces, "
+            f"hull {number} has {len(points)} vertices and {faces} faces, "
             f"the limits are {MAX_HULL_VERTICES} and {MAX_HULL_FACES}: split it"
         )
     ratio = aspect_ratio(points.astype(np.float64))
     if ratio > MOST_ASPECT_RATIO:
         raise BadPart(
-            f"{name}: hull {number} is {ratio:.0f} times longer than thick, PhysX accepts up to "
+            f"hull {number} is {ratio:.0f} times longer than thick, PhysX accepts up to "
             f"{MOST_ASPECT_RATIO:.0f}: make the part thicker or shorter"
         )
 

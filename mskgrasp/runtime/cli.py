@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import signal
 import sys
 from collections.abc import Callable
@@ -22,6 +23,19 @@ def make_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"cannot make folder {path}: {error.strerror}; choose another --out") from error
+
+
+def check_folder(path: Path) -> None:
+    """Refuse an output folder that cannot be made; make nothing.
+
+    Raises:
+        UsageError: A file is in the way, or the place is not writable.
+    """
+    nearest = next(one for one in (path.absolute(), *path.absolute().parents) if one.exists())
+    if not nearest.is_dir():
+        raise UsageError(f"cannot make folder {path}: {nearest} is a file; choose another --out")
+    if not os.access(nearest, os.W_OK):
+        raise UsageError(f"cannot make folder {path}: {nearest} is not writable; choose another --out")
 
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)

@@ -48,16 +48,19 @@ def altered_part(part: Part, folder: Path, *, density: float = 1.0, hulls: str =
     if len(solid.hulls) > MOST_HULLS:
         raise BadPart(f"{part.name}: {len(solid.hulls)} hulls, at most {MOST_HULLS} are simulated")
     with store.kept_in(folder):
-        return write_solid(
-            solid,
-            name=part.name,
-            family=part.family,
-            source=part.source,
-            licence=part.licence,
-            density=density * part.density,
-            dimensions=part.dimensions,
-            recipe_hash=f"altered: {density} {hulls} {part.content_hash}",
-        )
+        try:
+            return write_solid(
+                solid,
+                name=part.name,
+                family=part.family,
+                source=part.source,
+                licence=part.licence,
+                density=density * part.density,
+                dimensions=part.dimensions,
+                recipe_hash=f"altered: {density} {hulls} {part.content_hash}",
+            )
+        except BadPart as error:
+            raise BadPart(f"{part.name}: {error}") from error
 
 
 def resting_start(start: np.ndarray, rests: Pose) -> np.ndarray:

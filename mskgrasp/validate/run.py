@@ -14,7 +14,7 @@ from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.hulls import hull_corners
 from mskgrasp.reports.console import print_sections
-from mskgrasp.runtime.cli import make_folder
+from mskgrasp.runtime.cli import check_folder, make_folder
 from mskgrasp.runtime.progress import Bar, note, progress
 from mskgrasp.simulation.versions import versions
 from mskgrasp.validate.altered_part import altered_part
@@ -36,6 +36,7 @@ def validate(config: ValidateConfig) -> int:
     Raises:
         DriverMissing: A second engine is to be compared and is not installed.
     """
+    check_folder(config.out)
     names = chosen_names(config.parts or ("starter",))
     parts = [find_part(name) for name in progress(names, title="parts", unit="part")]
     make_folder(config.out)

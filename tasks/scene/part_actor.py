@@ -19,7 +19,7 @@ LEAST_KEPT = 2e-3
 STEEL_GREY = (0.55, 0.57, 0.6, 1.0)
 
 
-def build_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: float = 0.0) -> Actor:
+def add_part(scene: ManiSkillScene, part: Part, scene_index: int, friction: float = 0.0) -> Actor:
     """Load a part into one sub-scene.
 
     Args:

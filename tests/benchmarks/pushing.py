@@ -21,7 +21,7 @@ import sapien
 import trimesh
 from sapien import physx
 
-from hal.mujoco.settings import MujocoPhysics
+from hal.mujoco.config import MujocoPhysics
 from mskgrasp.core.settings import Physics
 from mskgrasp.runtime.console_table import Table
 from tasks.scene.table_friction import TableFriction

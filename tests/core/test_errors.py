@@ -6,8 +6,19 @@ import inspect
 
 import pytest
 
+from hal.errors import BadRecording, MissingRecording
 from mskgrasp.core import errors
-from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, MskgraspError, UnknownPart, UsageError
+from mskgrasp.core.errors import (
+    BadConfig,
+    BadDataset,
+    BadModel,
+    BadPart,
+    MissingDataset,
+    MissingModel,
+    MskgraspError,
+    UnknownPart,
+    UsageError,
+)
 
 ALL = [one for _, one in inspect.getmembers(errors, inspect.isclass)]
 
@@ -16,6 +27,21 @@ ALL = [one for _, one in inspect.getmembers(errors, inspect.isclass)]
 def test_an_error_ends_a_program_with_2_where_the_command_is_wrong_and_with_1_otherwise(error):
     assert issubclass(error, MskgraspError)
     assert error("one line").exit_code == (2 if issubclass(error, UsageError) else 1)
+
+
+@pytest.mark.parametrize(
+    ("error", "base"),
+    [
+        (UnknownPart, BadPart),
+        (MissingDataset, BadDataset),
+        (MissingModel, BadModel),
+        (MissingRecording, BadRecording),
+    ],
+)
+def test_a_name_of_something_that_does_not_exist_is_a_wrong_command(
+    error: type[MskgraspError], base: type[MskgraspError]
+):
+    assert issubclass(error, base) and error("one line").exit_code == 2 and base("one line").exit_code == 1
 
 
 def test_a_part_that_nobody_knows_is_a_bad_part_and_a_wrong_command():

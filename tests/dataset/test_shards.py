@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mskgrasp import dataset
-from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.errors import BadDataset, MissingDataset
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import object_displacement
 from mskgrasp.dataset import (
@@ -100,6 +100,13 @@ def test_shards_are_listed_in_order_without_unfinished_ones(tmp_path, attempts):
 def test_missing_and_empty_folders_are_distinguished(tmp_path):
     assert "no dataset folder" in complaint(lambda: list_shards(tmp_path / "nowhere"))
     assert "no shards" in complaint(lambda: list_shards(tmp_path))
+    for missing in (tmp_path / "nowhere", tmp_path):
+        with pytest.raises(MissingDataset):
+            list_shards(missing)
+    (tmp_path / "shards").mkdir()
+    with pytest.raises(BadDataset, match="no shards") as raised:
+        list_shards(tmp_path)
+    assert raised.value.exit_code == 1
     assert "no shard" in complaint(lambda: read_shard(tmp_path / "shards" / "a-0000.h5"))
 
 

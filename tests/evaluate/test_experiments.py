@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mskgrasp.core.errors import BadModel, UsageError
+from mskgrasp.core.errors import UsageError
 from mskgrasp.evaluate.experiments import (
     load_compared,
     model_folders,
-    open_model,
     scenes,
     with_predictions,
 )
@@ -45,16 +43,6 @@ def test_what_is_no_label_and_folder_is_refused_with_an_example(text: str):
 def test_a_label_is_given_once():
     with pytest.raises(UsageError, match="two models are called 'a'"):
         model_folders(["a=x", "b=y", "a=z"], PRETRAINED)
-
-
-def test_a_folder_without_a_model_or_with_a_damaged_one_is_refused(tmp_path: Path):
-    with pytest.raises(UsageError, match=r"no model.json in .*train a model: python -m mskgrasp.train --out"):
-        open_model(tmp_path)
-    shutil.copytree(PRETRAINED, tmp_path / "model")
-    (tmp_path / "model" / "model.safetensors").write_bytes(b"cut short")
-    with pytest.raises(BadModel) as raised:
-        open_model(tmp_path / "model")
-    assert "\n" not in str(raised.value)
 
 
 def test_trials_of_one_part_and_number_share_a_scene_and_parts_come_in_turn():

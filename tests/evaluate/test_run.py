@@ -15,7 +15,7 @@ import pytest
 
 from hal.operator import StoppedByOperator
 from hal.sim import SapienArm
-from mskgrasp.core.errors import UsageError
+from mskgrasp.core.errors import MskgraspError, UsageError
 from mskgrasp.evaluate.config import EvaluateConfig
 from mskgrasp.evaluate.run import evaluate
 from mskgrasp.learning.grasp_models import PRETRAINED
@@ -195,6 +195,21 @@ def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        (dict(cell=Path("no_cell.yaml")), "no_cell.yaml"),
+        (dict(experiment="displacement", compare=("a=typo",)), "no model.json in typo"),
+        (dict(experiment="displacement", lowess_data=Path("typo")), "no dataset folder typo"),
+    ],
+)
+def test_a_missing_file_is_reported_before_any_part_is_looked_for(
+    changes: dict[str, Any], message: str, tmp_path: Path
+):
+    with pytest.raises(MskgraspError, match=message):
+        evaluate(config(tmp_path / "out", parts=("no_such_part",), **changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
         (dict(models=Path("typo")), "no model.json in typo"),
         (dict(parts=("hex_nut_m3o",)), "hex_nut_m30"),
         (dict(compare=(f"a={PRETRAINED}",)), "--experiment displacement"),
@@ -220,9 +235,7 @@ def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
 def test_unusable_settings_are_refused_in_one_line_and_leave_no_folder(
     changes: dict[str, Any], message: str, tmp_path: Path
 ):
-    from mskgrasp.core.errors import MskgraspError
-
     with pytest.raises(MskgraspError, match=message) as raised:
         evaluate(config(tmp_path / "out", **changes))
-    assert raised.value.exit_code == (1 if "lowess_data" in changes else 2)
+    assert raised.value.exit_code == 2
     assert "\n" not in str(raised.value) and not (tmp_path / "out").exists()

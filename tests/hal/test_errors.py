@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hal import errors
-from hal.errors import HalError, MotionAborted, NeedsRecovery, OutOfWorkspace, Stopped
+from hal.errors import HalError, MissingRecording, MotionAborted, NeedsRecovery, OutOfWorkspace, Stopped
 from mskgrasp.core.errors import MskgraspError, UsageError
 from tests.programs import run_here
 
@@ -13,16 +13,16 @@ KINDS = [kind for kind in vars(errors).values() if isinstance(kind, type) and is
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
-def test_a_program_ends_with_one_line_and_code_1(kind: type[HalError]):
-    """A fault of the cell, not of the command line, whose code is 2."""
+def test_a_program_ends_with_one_line_and_code_1_or_2_if_a_file_does_not_exist(kind: type[HalError]):
+    """A fault of the cell; only a recording that does not exist is one of the command line."""
 
     def main() -> None:
         raise kind("the lamp is out; plug it in")
 
     done = run_here(main)
-    assert (done.returncode, done.stdout) == (1, "")
+    assert (done.returncode, done.stdout) == (2 if kind is MissingRecording else 1, "")
     assert done.stderr == "program: the lamp is out; plug it in\n"
-    assert issubclass(kind, MskgraspError) and not issubclass(kind, UsageError)
+    assert issubclass(kind, MskgraspError) and issubclass(kind, UsageError) == (kind is MissingRecording)
 
 
 def test_a_stop_ends_motions_but_is_no_mere_abort():

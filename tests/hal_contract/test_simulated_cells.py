@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import threading
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -14,6 +15,20 @@ from hal.mujoco.world import MujocoWorld
 from hal.sim.world import SapienWorld
 from mskgrasp.core.grasp import Grasp, pose_base_tcp
 from mskgrasp.planning.place_pose import place
+
+
+def after_every_step(cell: Cell, monkeypatch: pytest.MonkeyPatch, do: Callable[[], object]) -> None:
+    """Call something after every simulated step of the part that is on the table now."""
+    world = cell.feeder
+    assert isinstance(world, SapienWorld | MujocoWorld)
+    steps = (world.env.motion, "step") if isinstance(world, SapienWorld) else (world.simulation, "_step")
+    step = getattr(*steps)
+
+    def step_and_do(*args: object) -> None:
+        step(*args)
+        do()
+
+    monkeypatch.setattr(*steps, step_and_do)
 
 
 @pytest.mark.parametrize("theta", [0.0, 1.2, -1.5])
@@ -28,16 +43,7 @@ def test_a_straight_motion_arrives_to_a_millimetre(cell: Cell, theta: float):
 def test_a_straight_motion_is_straight(cell: Cell, monkeypatch):
     begin, target = cell.arm.state().T_base_tcp.position, pose_base_tcp(np.array([0.5, 0.1, 0.15, 0.0]))
     seen: list[np.ndarray] = []
-    world = cell.feeder
-    assert isinstance(world, SapienWorld | MujocoWorld)
-    moves = (world.env.motion, "step") if isinstance(world, SapienWorld) else (world.simulation, "_step")
-    step = getattr(*moves)
-
-    def watched(*args: object) -> None:
-        step(*args)
-        seen.append(cell.arm.state().T_base_tcp.position)
-
-    monkeypatch.setattr(*moves, watched)
+    after_every_step(cell, monkeypatch, lambda: seen.append(cell.arm.state().T_base_tcp.position))
     cell.arm.grasp(5.0)  # closed fingers might hold something, so that no air is skipped
     cell.arm.move_to_pose(target, speed=0.3)
     way = (target.position - begin) / np.linalg.norm(target.position - begin)
@@ -151,15 +157,25 @@ def test_a_part_that_falls_from_the_hand_does_not_stop_the_arm(cell: Cell):
     go_home(cell)
 
 
-def test_a_stop_is_no_outcome_of_a_grasp(cell: Cell):
+def test_a_stop_is_no_outcome_of_a_grasp(cell: Cell, monkeypatch: pytest.MonkeyPatch):
+    """The arm is stopped in the middle of its descent."""
     assert cell.feeder is not None and cell.tracker is not None
     cell.feeder.present("hex_nut_m30", 0)
     x, y, _ = cell.tracker.part_pose().position
-    timer = threading.Timer(0.1, cell.arm.stop)
-    timer.start()
+    stopped_at: list[float] = []
+
+    def stop_once_low() -> None:
+        height = cell.arm.state().T_base_tcp.position[2]
+        if not stopped_at and height < 0.05:
+            stopped_at.append(height)
+            stopping = threading.Thread(target=cell.arm.stop)
+            stopping.start()
+            stopping.join()
+
+    after_every_step(cell, monkeypatch, stop_once_low)
     with pytest.raises(Stopped):
         execute_grasp(cell, Grasp.from_vector(np.array([x, y, 0.0115, 0.3])))
-    timer.join()
+    assert cell.arm.state().T_base_tcp.position[2] > stopped_at[0] - 0.01
     cell.arm.recover()
     go_home(cell)
 

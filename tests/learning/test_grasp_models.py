@@ -4,7 +4,7 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from mskgrasp.core.errors import BadModel
+from mskgrasp.core.errors import BadModel, MissingModel
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models, save_model
 from mskgrasp.learning.network_config import HandNetworkConfig
 from tests.learning.small import SMALL, small_models
@@ -49,6 +49,10 @@ def test_missing_files_are_reported(tmp_path, folder):
     assert "no model.json" in complaint(tmp_path / "nowhere")
     (folder / "model.safetensors").unlink()
     assert "no model.safetensors" in complaint(folder)
+    with pytest.raises(
+        MissingModel, match=r"no model.safetensors in .*train a model: python -m mskgrasp.train --out"
+    ):
+        load_models(folder)
 
 
 def test_damaged_files_are_reported(folder):

@@ -10,7 +10,7 @@ import pytest
 from hal import cell_from_yaml
 from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.core.geometry import wrap_half_turn
-from mskgrasp.palletize.pallet_slots import Slot, check_reach, check_room, parse_target, read_slots
+from mskgrasp.palletize.pallet_slots import Slot, check_room, check_slots_in_reach, parse_target, read_slots
 from mskgrasp.parts import find_part
 from mskgrasp.perception.footprint import Footprint, usual_footprint
 
@@ -38,13 +38,13 @@ def test_a_turned_slot_needs_another_size():
 def test_the_shipped_grid_is_within_reach_of_its_cell():
     slots = read_slots(GRID)
     assert len(slots) == 6 and len({(slot.x, slot.y) for slot in slots}) == 6
-    check_reach(cell_from_yaml(REPOSITORY / "configs" / "palletize" / "cell.yaml"), slots)
+    check_slots_in_reach(cell_from_yaml(REPOSITORY / "configs" / "palletize" / "cell.yaml"), slots)
 
 
 def test_a_slot_out_of_reach_is_named():
     cell = cell_from_yaml(REPOSITORY / "configs" / "cells" / "sapien.yaml")
     with pytest.raises(UsageError, match=r"slot 2 at \(0.9, 0\) m .*outside the workspace"):
-        check_reach(cell, [parse_target("0.5,0,0"), parse_target("0.9,0,0")])
+        check_slots_in_reach(cell, [parse_target("0.5,0,0"), parse_target("0.9,0,0")])
 
 
 def test_a_slot_smaller_than_a_part_is_named_with_both_sizes():

@@ -107,7 +107,8 @@ def test_a_run_whose_cell_was_lost_is_resumed_and_reported(tmp_path, monkeypatch
         (dict(parts=("no_such_part",)), UsageError, "no_such_part"),
         (dict(models=Path("no/model")), BadModel, "no/model"),
         (dict(slots="small.yaml"), UsageError, rf"slot of 20 x 30 mm is smaller than {PART} \(28 x 28 mm\)"),
-        (dict(slots="none.yaml"), UsageError, "cannot read configuration .*none.yaml"),
+        (dict(slots="none.yaml", parts=("no_such_part",)), UsageError, "cannot read .*none.yaml"),
+        (dict(cell="none.yaml", parts=("no_such_part",)), UsageError, "cannot read .*none.yaml"),
         (dict(cell="real.yaml"), UsageError, "standard input is no terminal"),
         (dict(cell="real.yaml", yes=True, workers=2), UsageError, "--workers 2: .* is one cell"),
         (dict(cell="real.yaml", yes=True, corrections=("truth",)), UsageError, "no tracker; legal: none"),
@@ -120,4 +121,5 @@ def test_an_impossible_run_is_refused_before_anything_moves(tmp_path, monkeypatc
     files = {name: tmp_path / value for name, value in changes.items() if name in ("slots", "cell")}
     with pytest.raises(error, match=message) as caught:
         palletize(config(tmp_path / "out", **(changes | files)))
+    assert caught.value.exit_code == 2
     assert "\n" not in str(caught.value) and not (tmp_path / "out").exists()

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import mskgrasp.parts
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.errors import BadPart, UnknownPart
 from mskgrasp.parts import build_part, find_part, parts_folder, read_part
 
 FILES = ("mesh.ply", "hulls.glb", "part.json")
@@ -126,6 +126,12 @@ def test_an_unknown_name_lists_similar_ones():
     for name in ("..", "", "no/such/place", "Ω"):
         with pytest.raises(BadPart):
             find_part(name)
+
+
+def test_a_folder_that_holds_no_part_is_a_wrong_command(tmp_path):
+    with pytest.raises(UnknownPart, match=r"is not a part folder: .* is missing") as raised:
+        find_part(tmp_path)
+    assert raised.value.exit_code == 2
 
 
 def test_what_a_killed_build_left_is_swept_away_later(own_cache):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import errno
+from pathlib import Path
 
 import pytest
 
 from mskgrasp.core.errors import BadPart, UsageError
-from mskgrasp.runtime.cli import run
+from mskgrasp.runtime.cli import check_folder, run
 
 
 def _raise(error: BaseException) -> None:
@@ -40,3 +41,12 @@ def test_the_exit_code_is_that_of_the_program():
         with pytest.raises(SystemExit) as ended:
             run("program", lambda given=given: given)
         assert ended.value.code == code
+
+
+def test_a_folder_that_cannot_be_made_is_refused_and_none_is_made(tmp_path: Path):
+    (tmp_path / "file").write_text("in the way")
+    check_folder(tmp_path / "new" / "folder")
+    assert not (tmp_path / "new").exists()
+    for path in (tmp_path / "file", tmp_path / "file" / "folder"):
+        with pytest.raises(UsageError, match=r"cannot make folder .*file is a file; choose another --out"):
+            check_folder(path)

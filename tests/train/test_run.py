@@ -85,8 +85,8 @@ def test_mistakes_on_the_command_line_are_one_line_each(tmp_path, dataset):
     cases = [
         ((), 2, "--data is needed"),
         (("--data", dataset), 2, "--out is needed"),
-        (("--data", tmp_path / "no", "--out", out), 1, "no dataset folder"),
-        (("--data", tmp_path, "--out", out), 1, "no shards"),
+        (("--data", tmp_path / "no", "--out", out), 2, "no dataset folder"),
+        (("--data", tmp_path, "--out", out), 2, "no shards"),
         (("--data", dataset, "--out", full), 2, "holds no training run"),
         (("--data", lonely, "--out", out), 1, "one part (box)"),
         (("--config", tmp_path / "no.yaml"), 2, "cannot read configuration"),

@@ -41,6 +41,12 @@ def test_mistakes_are_one_line(tmp_path, arguments, code, message):
     assert not (tmp_path / "out").exists()
 
 
+def test_an_output_folder_that_cannot_be_made_is_reported_before_any_part_is_looked_for(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    done = run_here(main, "--parts", "no_such_part", "--out", str(tmp_path / "file" / "out"))
+    assert done.returncode == 2 and "file is a file; choose another --out" in done.stderr
+
+
 def validate(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "mskgrasp.validate", *arguments]
     return subprocess.run(command, capture_output=True, text=True, cwd=REPOSITORY, timeout=300)

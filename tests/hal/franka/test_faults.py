@@ -253,8 +253,11 @@ def test_a_driver_that_hangs_ends_after_its_program(
         "with cell_from_yaml(__import__('pathlib').Path(sys.argv[1])).arm as arm:\n"
         "    print(arm._link.pid, flush=True)\n"
         "    sys.stdin.readline()\n"
+        "    process, sent = arm._link._process, threading.Event()\n"
+        "    send = process._send\n"
+        "    process._send = lambda *request: (send(*request), sent.set())\n"
         "    threading.Thread(target=lambda: arm._link.ask(sys.argv[2], timeout_s=5), daemon=True).start()\n"
-        "    time.sleep(0.5)\n"
+        "    sent.wait()\n"
         "    print('asked', flush=True)\n"
         "    time.sleep(60)\n"
     )

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from hal.mujoco.cell import READY
-from hal.mujoco.settings import MujocoPhysics
+from hal.config import READY
+from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.simulation import Simulation
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.minimum_jerk import minimum_jerk_steps

@@ -11,8 +11,8 @@ from hal import Cell
 from hal.arm import JOINT_TOLERANCE
 from hal.errors import MotionAborted
 from hal.mujoco import MujocoCellConfig, mujoco_cell
-from hal.mujoco.arm import JOINT_ACCELERATION, JOINT_SPEED, PEAK_ACCELERATION
 from hal.mujoco.world import MujocoWorld
+from hal.simulated import JOINT_ACCELERATION, JOINT_SPEED, PEAK_ACCELERATION
 from mskgrasp.core.grasp import pose_base_tcp
 from mskgrasp.core.panda_kinematics import forward_pose
 

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.panda import FINGER, HAND, LINKS, TORQUE_LIMIT
 from hal.mujoco.scene import build_model
-from hal.mujoco.settings import MujocoPhysics
 from mskgrasp.core.grasp import FINGER_HALF_WIDTH, FINGER_THICKNESS, PAD_REACH, PALM_HEIGHT
 from mskgrasp.core.panda_kinematics import DH_A, DH_ALPHA, DH_D, JOINT_LOWER, JOINT_UPPER, forward
 from mskgrasp.parts import find_part

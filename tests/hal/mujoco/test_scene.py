@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.panda import HAND_BODIES, HIDDEN, SEEN
 from hal.mujoco.scene import build_model
-from hal.mujoco.settings import MujocoPhysics
 from mskgrasp.core.settings import TABLE_Z
 from mskgrasp.parts import Part, find_part
 from tests.hal.mujoco.conftest import MakeBox, held, on_table

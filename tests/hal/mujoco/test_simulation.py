@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hal.mujoco.cell import READY
-from hal.mujoco.settings import MujocoPhysics
+from hal.config import READY
+from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.simulation import Simulation
 from mskgrasp.core.geometry import Pose, pose_distance
 from mskgrasp.core.panda_kinematics import forward_pose, top_down

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hal.config import READY
 from hal.errors import NotConnected
 from hal.mujoco import MujocoCellConfig, mujoco_cell
-from hal.mujoco.cell import READY
 from hal.mujoco.world import MujocoWorld
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import Part

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hal import Cell, cell_from_yaml
-from hal.errors import BadRecording
+from hal.errors import MissingRecording
 from hal.replay import recorded_cell
 from mskgrasp.core.errors import BadConfig
 from tests.hal.replay.program import replayed, run_on
@@ -35,7 +35,7 @@ def test_cell_files_of_recordings_are_checked(recording: Path, tmp_path: Path):
         return cell_from_yaml(tmp_path / "cell.yaml")
 
     assert build(f"type: replay\nrecording: {recording}").feeder is not None
-    with pytest.raises(BadRecording, match="there is no recording"):
+    with pytest.raises(MissingRecording, match="there is no recording"):
         build("type: replay\nrecording: none.h5")
     with pytest.raises(BadConfig, match="unknown key 'loop'"):
         build(f"type: replay\nrecording: {recording}\nloop: true")

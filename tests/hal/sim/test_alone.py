@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from hal import SensorNoise
-from hal.sim.alone import SapienCameraConfig, sapien_camera
+from hal.config import READY
+from hal.sim.alone import sapien_camera
 from hal.sim.camera import SapienCamera
-from hal.sim.cell import READY
+from hal.sim.config import SapienCameraConfig
 from hal.sim.world import SapienWorld
 from mskgrasp.parts import Part
 

@@ -55,7 +55,7 @@ def test_the_program_builds_lists_and_draws(capsys, tmp_path):
         (("list", "--catalogue"), 1),
         (("list", "--family", "washer"), 1),
         (("sheet",), 1),
-        (("rate", "--data", "nowhere"), 1),
+        (("rate", "--data", "nowhere"), 2),
     ],
 )
 def test_mistakes_are_reported_in_one_line(arguments, exit_code):

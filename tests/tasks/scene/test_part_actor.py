@@ -15,7 +15,7 @@ from mskgrasp.core.errors import BadPart
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES, PAD_REACH, pose_base_grasp
 from mskgrasp.parts import find_part
-from tasks.scene.part_actor import build_part
+from tasks.scene.part_actor import add_part
 
 PARTS = ("hex_bolt_m20x50", "hex_nut_m30", "l_bracket_60x40", "parallel_key_a16x10x56", "spur_gear_m3_z17")
 
@@ -104,13 +104,13 @@ def test_a_body_that_is_not_the_part_is_refused(env, boxes, place, changes, mess
     place("light")
     wrong = dataclasses.replace(boxes["light"], name="wrong", **changes)
     with pytest.raises(BadPart, match=f"part 'wrong': .*{message}") as caught:
-        build_part(env.scene, wrong, 0, 0.5)
+        add_part(env.scene, wrong, 0, 0.5)
     assert "\n" not in str(caught.value)
 
 
 def test_the_friction_of_a_part_is_that_of_its_shapes(env, boxes, place):
     place("light")
-    body = build_part(env.scene, dataclasses.replace(boxes["light"], name="rough"), 0, 0.37)
+    body = add_part(env.scene, dataclasses.replace(boxes["light"], name="rough"), 0, 0.37)
     component = body._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
     for shape in component.collision_shapes:
         material = shape.physical_material

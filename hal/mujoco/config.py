@@ -1,4 +1,4 @@
-"""Settings of the MuJoCo cell's physics; importing them does not load the simulator."""
+"""Configuration of the MuJoCo cell and of its physics; importing it does not load the simulator."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from hal.config import SimulatedCellConfig
 from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Physics
 
@@ -59,3 +60,11 @@ class MujocoPhysics(Config):
                 f"got {list(self.contact_impedance)}"
             )
         return self
+
+
+class MujocoCellConfig(SimulatedCellConfig):
+    """Settings of the cell simulated in MuJoCo."""
+
+    type: Literal["mujoco"]
+    physics: MujocoPhysics = MujocoPhysics()
+    """Settings of the physics."""

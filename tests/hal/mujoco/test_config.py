@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hal.mujoco import MujocoCellConfig
-from hal.mujoco.settings import MujocoPhysics
+from hal.mujoco.config import MujocoPhysics
 from mskgrasp.core.config import check_config
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.settings import Physics

@@ -1,0 +1,101 @@
+"""Configurations of a cell of an arm and a camera, and of a simulated cell."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from hal.sensor_noise import SensorNoise
+from mskgrasp.core.config import Config
+from mskgrasp.core.panda_kinematics import top_down
+from mskgrasp.core.settings import REGION, Overhead
+
+Three = tuple[float, float, float]
+Seven = tuple[float, float, float, float, float, float, float]
+
+READY: Seven = (0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398)
+"""The Panda's usual ready pose, radians: the hand is behind the camera's field of view."""
+
+
+class WorkspaceConfig(Config):
+    """Table in front of the arm and limits of the TCP."""
+
+    table_z: float = Field(ge=-0.5, le=0.5)
+    """Height of the table in the robot's base frame, m; measure it: touch the table with closed fingers."""
+    region: tuple[float, float, float, float] = (0.38, 0.62, -0.12, 0.12)
+    """x_min, x_max, y_min, y_max where parts lie, base frame, m."""
+    home: Seven = READY
+    """Joints at which the arm is out of the camera's sight, rad."""
+    box_lower: Three | None = None
+    """The TCP stays inside this box, base frame, m; by default 0.25, -0.4 and the table."""
+    box_upper: Three = (0.75, 0.4, 0.75)
+    """The other corner, m."""
+    min_height: float = Field(default=0.006, gt=0)
+    """Points lower than this over the table count as table, m: real tables are not level, cameras drift."""
+    lift_height: float = Field(default=0.1, gt=0, le=0.3)
+    """Height by which a grasped part is lifted, m."""
+    grasp_force: float = Field(default=30.0, gt=0, le=70)
+    """Gripper force, N."""
+
+    @model_validator(mode="after")
+    def _check(self) -> WorkspaceConfig:
+        x_min, x_max, y_min, y_max = self.region
+        if not (x_min < x_max and y_min < y_max):
+            raise ValueError(f"region must be x_min < x_max, y_min < y_max, got {list(self.region)}")
+        lower, upper = self.lower(), np.array(self.box_upper)
+        if not (lower < upper).all():
+            raise ValueError(
+                f"box_lower {lower.tolist()} must be below box_upper {upper.tolist()} in x, y and z"
+            )
+        if not (lower[0] <= x_min and x_max <= upper[0] and lower[1] <= y_min and y_max <= upper[1]):
+            raise ValueError(
+                f"region {list(self.region)} reaches out of the box {lower.tolist()} .. {upper.tolist()}"
+            )
+        return self
+
+    def lower(self) -> np.ndarray:
+        """(3,) lower corner of the box, base frame, m."""
+        return np.array(self.box_lower if self.box_lower is not None else (0.25, -0.4, self.table_z))
+
+
+class DevicesConfig(Config):
+    """Sections of the file; the ``driver`` of ``arm`` and ``camera`` decides how each is checked."""
+
+    type: Literal["devices"]
+    arm: dict[str, Any]
+    camera: dict[str, Any]
+    workspace: WorkspaceConfig
+
+
+class SimulatedCellConfig(Config):
+    """Settings that the cells of all simulators share."""
+
+    part: str = "hex_nut_m30"
+    """Part on the table when the cell is opened: a name or a folder."""
+    seed: int = Field(default=0, ge=0)
+    """Determines the position and turn of the part."""
+    region: tuple[float, float, float, float] = REGION
+    """x_min, x_max, y_min, y_max where parts lie, base frame, m."""
+    home: Seven = READY
+    """Joints at which the arm is out of the camera's sight, rad."""
+    min_height: float | None = Field(default=None, gt=0)
+    """Points lower than this over the table count as table, m; null: 2 mm, or 3 mm with camera noise."""
+    lift_height: float = Field(default=0.1, gt=0, le=0.3)
+    """Height by which a grasped part is lifted, m."""
+    grasp_force: float = Field(default=30.0, gt=0, le=70)
+    """Gripper force, N."""
+    camera: Overhead = Overhead()
+    """The overhead depth camera."""
+    noise: SensorNoise = SensorNoise()
+    """Noise model of the camera: off, iid (3 mm) or kinect2; see docs/sensor_noise.md."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        self.camera.check_sees(self.region)
+        corners = [(x, y) for x in self.region[:2] for y in self.region[2:]]
+        grasps = np.array([[x, y, z, t] for x, y in corners for z in (0.0105, 0.3) for t in (-1.57, 1.57)])
+        if not top_down(grasps)[1].all():
+            raise ValueError(f"region {list(self.region)} reaches beyond the arm")
+        return self
