@@ -11,13 +11,8 @@ import numpy as np
 
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
-<<<<<<< HEAD
-from mskgrasp.learning.grasp_models import DESCRIPTION, Models, load_models
-from mskgrasp.planning.config import PlannerConfig
-=======
 from mskgrasp.learning.grasp_models import load_models
-from mskgrasp.planning.planner import PlannerConfig
->>>>>>> w-hal
+from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.run_inputs import model_digests
 from mskgrasp.trials.predictors import (
     LOWESS,

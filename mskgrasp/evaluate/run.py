@@ -10,12 +10,8 @@ from pathlib import Path
 
 from mskgrasp.core.errors import BadModel, UsageError
 from mskgrasp.core.files import write_whole
-<<<<<<< HEAD
-from mskgrasp.evaluate.comparison import compare_models
-=======
 from mskgrasp.dataset import list_shards
-from mskgrasp.evaluate.comparison import compare
->>>>>>> w-hal
+from mskgrasp.evaluate.comparison import compare_models
 from mskgrasp.evaluate.config import EvaluateConfig, Experiment
 from mskgrasp.evaluate.experiments import (
     Compared,
@@ -26,14 +22,9 @@ from mskgrasp.evaluate.experiments import (
 )
 from mskgrasp.evaluate.figures import draw_comparison, draw_displacements, draw_success
 from mskgrasp.evaluate.replay_trial import describe_trial, draw_trial, find_trial, outcome_text
-<<<<<<< HEAD
 from mskgrasp.evaluate.report import TITLES, Report, conclusion, report_sections
 from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise_trials, worst_trials
-=======
-from mskgrasp.evaluate.report import TITLES, Report, conclusion, sections
-from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise, worst_trials
 from mskgrasp.learning.grasp_models import load_models, require_model
->>>>>>> w-hal
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.run_inputs import model_digests, part_digests
