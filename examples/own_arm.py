@@ -10,7 +10,7 @@ from mskgrasp import Pose, execute_grasp
 
 HOME = np.array([0.3, 0.3, 0.5, 0.0, 1.0, 0.0, 0.0])
 JOINTS = dict(joint_lower=np.full(7, -2.0), joint_upper=np.full(7, 2.0))
-BOX = dict(box_lower=-np.ones(3), box_upper=np.ones(3), table_z=0.0)
+BOX = dict(box_lower=-np.ones(3), box_upper=np.ones(3))
 TABLE = Workspace(table_z=0.0, region=REGION, home=HOME, min_height=0.002, lift_height=0.1, grasp_force=30)
 
 
@@ -36,8 +36,8 @@ class Gantry(Arm):
         return Pose.from_vector(joints)
 
     def _state(self):
-        here = dict(joints=self.pose, T_base_tcp=Pose.from_vector(self.pose), gripper_width=self.width)
-        return ArmState(**here, timestamp_s=time.monotonic())
+        here, now = Pose.from_vector(self.pose), time.monotonic()
+        return ArmState(joints=self.pose, T_base_tcp=here, gripper_width=self.width, timestamp_s=now)
 
     def _move_to_joints(self, joints, speed):
         self.pose = joints
@@ -49,12 +49,15 @@ class Gantry(Arm):
         self.width = width
 
     def _grasp(self, force):
-        self.width = 0.03
-        return GraspOutcome(width=self.width, holding=True)
+        print(f"fingers close at {self.pose[:3].round(4)} m, quaternion wxyz {self.pose[3:].round(5)}")
+        holding = bool(np.all(np.abs(self.pose[:3] - [0.5, 0, 0.02]) < [0.03, 0.015, 0.02]))  # in the block
+        self.width = 0.03 if holding else 0.0
+        return GraspOutcome(width=self.width, holding=holding)
 
 
 if __name__ == "__main__":
-    arm = Gantry(ArmLimits(**JOINTS, **BOX, max_force=70.0))
+    arm = Gantry(ArmLimits(**JOINTS, **BOX, table_z=0.0, max_force=70.0))
     with Cell(camera=BlockCamera(), arm=arm, workspace=TABLE).connected() as cell:
-        result = execute_grasp(cell, plan_grasp(cell.camera.capture()).grasp)
-    print("holding" if result.holding else "not holding")
+        plan = plan_grasp(cell.camera.capture())
+        result = execute_grasp(cell, plan.grasp)
+    print(plan.summary, "holding" if result.holding else "not holding", sep="\n")
