@@ -10,7 +10,7 @@ from mskgrasp import Pose, execute_grasp
 
 HOME = np.array([0.3, 0.3, 0.5, 0.0, 1.0, 0.0, 0.0])
 JOINTS = dict(joint_lower=np.full(7, -2.0), joint_upper=np.full(7, 2.0))
-BOX = dict(box_lower=-np.ones(3), box_upper=np.ones(3))
+BOX = dict(box_lower=-np.ones(3), box_upper=np.ones(3), table_z=0.0)
 TABLE = Workspace(table_z=0.0, region=REGION, home=HOME, min_height=0.002, lift_height=0.1, grasp_force=30)
 
 
@@ -22,8 +22,9 @@ class Gantry(Arm):
     # A real arm opens its driver, lets go of it, brakes, acknowledges errors, and holds still.
     def connect(self): ...
     def close(self): ...
-    def _halt(self): ...
-    def _recover(self): ...
+
+    _halt = _recover = close
+
     def _wait(self, seconds): ...
 
     def _connected(self):
@@ -36,8 +37,8 @@ class Gantry(Arm):
         return Pose.from_vector(joints)
 
     def _state(self):
-        here, now = Pose.from_vector(self.pose), time.monotonic()
-        return ArmState(joints=self.pose, T_base_tcp=here, gripper_width=self.width, timestamp_s=now)
+        here = dict(joints=self.pose, T_base_tcp=Pose.from_vector(self.pose), gripper_width=self.width)
+        return ArmState(**here, timestamp_s=time.monotonic())
 
     def _move_to_joints(self, joints, speed):
         self.pose = joints
@@ -50,14 +51,11 @@ class Gantry(Arm):
 
     def _grasp(self, force):
         print(f"fingers close at {self.pose[:3].round(4)} m, quaternion wxyz {self.pose[3:].round(5)}")
-        holding = bool(np.all(np.abs(self.pose[:3] - [0.5, 0, 0.02]) < [0.03, 0.015, 0.02]))  # in the block
-        self.width = 0.03 if holding else 0.0
-        return GraspOutcome(width=self.width, holding=holding)
+        return GraspOutcome(width=0.03, holding=True)
 
 
 if __name__ == "__main__":
-    arm = Gantry(ArmLimits(**JOINTS, **BOX, table_z=0.0, max_force=70.0))
+    arm = Gantry(ArmLimits(**JOINTS, **BOX, max_force=70.0))
     with Cell(camera=BlockCamera(), arm=arm, workspace=TABLE).connected() as cell:
-        plan = plan_grasp(cell.camera.capture())
-        result = execute_grasp(cell, plan.grasp)
-    print(plan.summary, "holding" if result.holding else "not holding", sep="\n")
+        result = execute_grasp(cell, plan_grasp(cell.camera.capture()).grasp)
+    print("holding" if result.holding else "not holding")
