@@ -48,7 +48,7 @@ def test_the_same_seed_lays_the_part_at_the_same_place(boxes):
     env.close()
 
 
-def test_laying_begins_the_very_episode_of_a_reset(boxes):
+def test_placing_a_part_begins_the_same_episode_as_a_reset(boxes):
     env = make(boxes, obs_mode="none", noise=dict(arm_position_std=0.001, friction_pad_part=(0.4, 0.5)))
     base = env.unwrapped
     found = []

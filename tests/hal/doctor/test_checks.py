@@ -68,7 +68,7 @@ def test_a_camera_that_cannot_be_there_is_found(position, quat_wxyz, words):
 
 
 class Frames(Camera):
-    """Gives what it is told to."""
+    """Delivers frames with the given time stamps."""
 
     def __init__(self, stamps: list[float]):
         self.stamps = stamps
