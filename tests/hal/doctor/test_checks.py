@@ -1,4 +1,4 @@
-"""What the doctor says, on inputs whose fault is known."""
+"""The doctor's checks on inputs with a known fault."""
 
 from __future__ import annotations
 
