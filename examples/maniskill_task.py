@@ -8,16 +8,18 @@ import sys
 import gymnasium
 import numpy as np
 
-import tasks  # noqa: F401  registers the task
+from tasks import GraspDisplacementEnv  # importing it registers the task
 
 
 def main(part: str, n: int) -> None:
     env = gymnasium.make("GraspDisplacement-v1", parts=[part], obs_mode="none")
+    task = env.unwrapped
+    assert isinstance(task, GraspDisplacementEnv)
     rng = np.random.default_rng(0)
     shifts = []
     for episode in range(n):
         env.reset(seed=episode)
-        x, y, _ = env.unwrapped.part_pose().position[0].tolist()  # base frame, metres
+        x, y, _ = task.part_pose().position[0].tolist()  # base frame, metres
 
         # One action is one grasp: x, y, z, theta; one step is the whole attempt.
         grasp = np.array([x, y, 0.012, 0.0]) + rng.normal(0, [0.004, 0.004, 0, 0.5])

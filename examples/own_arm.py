@@ -49,8 +49,8 @@ class Gantry(Arm):
         self.width = width
 
     def _grasp(self, force):
-        self.width = 0.03
-        return GraspOutcome(width=self.width, holding=True)
+        print(f"fingers close at {self.pose[:3].round(4)} m, quaternion wxyz {self.pose[3:].round(5)}")
+        return GraspOutcome(width=0.03, holding=True)
 
 
 if __name__ == "__main__":

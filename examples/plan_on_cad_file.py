@@ -30,6 +30,7 @@ def main(cad_file: str) -> None:
             table_z=cell.workspace.table_z,
             region=cell.workspace.region,
         )
+        assert cell.feeder is not None  # the simulated cell has one
         cell.feeder.present(str(part.folder), seed=0)
         plan = planner.plan(cell.camera.capture(), np.random.default_rng(0))
         x, y, z = plan.grasp.position

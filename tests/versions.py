@@ -66,7 +66,7 @@ def current() -> dict[str, dict[str, object]]:
 
 
 def changed() -> list[str]:
-    """One line for each number whose code is no longer the one that it stands for."""
+    """One line for each number whose code has changed since."""
     stored = json.loads(STORED.read_text(encoding="utf-8"))
     now = current()
     lines = []

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+from mani_skill.envs.sapien_env import BaseEnv
 from mani_skill.utils.structs.types import GPUMemoryConfig, SceneConfig, SimConfig
 
 from mskgrasp.core.settings import Physics
@@ -38,6 +41,13 @@ def _power_of_two(count: int) -> int:
 def _control_freq(rate_hz: int) -> int:
     """20 Hz, as in ManiSkill's own tasks, or the next lower frequency that divides the rate."""
     return next(hz for hz in range(20, 0, -1) if rate_hz % hz == 0)
+
+
+def set_engine(physics: Physics) -> None:
+    """Puts the engine's settings in force that the task has, for scenes without the task."""
+    # ManiSkill does this for its own scenes, from the configuration alone.
+    config = SimpleNamespace(sim_config=sim_config(physics, MOST_HULLS))
+    BaseEnv._set_scene_config(config)  # type: ignore[arg-type]
 
 
 def sim_config(physics: Physics, n_hulls: int) -> SimConfig:

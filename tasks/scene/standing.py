@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,8 +48,8 @@ class StandingPoses:
 def standing_poses(part: Part, physics: Physics) -> StandingPoses:
     """Settle every resting pose of a part, in a separate scene.
 
-    The mesh decides a part's resting poses, the engine simulates its hulls. These may lean by a degree, or
-    lack the edge on which the mesh stands.
+    A part's resting poses are computed quasi-statically; in the engine its hulls may lean by a degree, or
+    topple from a narrow face.
 
     Args:
         part: The part whose resting poses are tried one by one.
@@ -57,15 +58,9 @@ def standing_poses(part: Part, physics: Physics) -> StandingPoses:
     Raises:
         BadPart: The engine holds none of the resting poses.
     """
-    scene, body = _scene_with(part, physics)
     poses, probability = [], []
-    for which, share in enumerate(part.resting_probability):
-        start = Pose(
-            position=np.array([0.0, 0.0, part.resting.position[which, 2]]),
-            quat_wxyz=part.resting.quat_wxyz[which],
-        )
-        settled = _settle(scene, body, start, physics.rate_hz)
-        if settled is not None and _lean(start, settled) <= MAX_LEAN:
+    for settled, share in zip(settled_poses(part, physics), part.resting_probability, strict=True):
+        if settled is not None:
             poses.append(settled.as_vector())
             probability.append(share)
     if not poses:
@@ -79,6 +74,23 @@ def standing_poses(part: Part, physics: Physics) -> StandingPoses:
         probability=np.array(probability) / kept,
         toppled=float(max(0.0, 1 - kept)),
     )
+
+
+def settled_poses(part: Part, physics: Physics) -> Iterator[Pose | None]:
+    """The pose in which the engine holds each resting pose of a part; None for one that topples.
+
+    Args:
+        part: Its resting poses are tried in their order, in one scene.
+        physics: As in `standing_poses`.
+    """
+    scene, body = _scene_with(part, physics)
+    for which in range(len(part.resting_probability)):
+        start = Pose(
+            position=np.array([0.0, 0.0, part.resting.position[which, 2]]),
+            quat_wxyz=part.resting.quat_wxyz[which],
+        )
+        settled = _settle(scene, body, start, physics.rate_hz)
+        yield settled if settled is not None and _lean(start, settled) <= MAX_LEAN else None
 
 
 def _scene_with(part: Part, physics: Physics) -> tuple[sapien.Scene, PhysxRigidDynamicComponent]:

@@ -1,4 +1,4 @@
-"""What each choice of our network is worth. Run: python -m tests.benchmarks.ablation --help.
+"""Ablations of our network. Run: python -m tests.benchmarks.ablation --help.
 
 Every line trains both networks anew on the same attempts, with one choice of configs/train/default.yaml
 undone, and scores them on the validation parts, which training never saw; test parts are not looked at.

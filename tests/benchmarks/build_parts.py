@@ -1,4 +1,4 @@
-"""How long parts take to make, by family and stage. Run: python -m tests.benchmarks.build_parts --help.
+"""Time to build parts, by family and stage. Run: python -m tests.benchmarks.build_parts --help.
 
 Each chosen part is made from nothing in a cache folder of its own, on one core. Stages: ``draw`` makes the
 exact mesh (and the hulls that the family knows), ``hulls`` decomposes or joins, ``fit`` compares hulls with

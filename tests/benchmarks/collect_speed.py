@@ -1,4 +1,4 @@
-"""How fast grasps are simulated. Run: python -m tests.benchmarks.collect_speed --help.
+"""Rate of simulated grasps. Run: python -m tests.benchmarks.collect_speed --help.
 
 In one run, on one core, with the same parts, starts and grasps, part by part in turn: (a) a ManiSkill loop,
 ``pd_ee_pose`` at 20 Hz with one depth image an attempt, at ManiSkill's default physics and at ours; (b) a raw
@@ -59,7 +59,7 @@ SEED = 0
 MANISKILL = dict(
     rate_hz=100, coarse_rate_hz=100, position_iterations=15, contact_offset=0.02, persistent_manifold=True
 )
-"""What ManiSkill takes where a task says nothing."""
+"""ManiSkill's defaults."""
 
 
 @dataclass

@@ -18,7 +18,7 @@ from mskgrasp.runtime.console_table import Table
 from tests.benchmarks.report import show
 
 NARROW = 0.008
-"""Parts of which a side is less are told apart, metres."""
+"""Parts of which a side is less are reported separately, metres."""
 
 
 def main() -> None:

@@ -1,9 +1,9 @@
 """The least error of any predictor that sees a part only so well: python -m tests.benchmarks.least_error.
 
 A grasp on an edge is a coin toss. Each grasp is simulated several times, the part moved and turned a little
-each time, by less than a camera tells. Who is told the grasp, but not which of these starts it was, errs at
-least by the spread of the displacements: the deviation within a grasp, over all grasps, is the least RMSE of
-any predictor, one that knows the part's hulls, its mass and its friction included.
+each time, by less than a camera resolves. A predictor that knows the grasp, but not which of these starts it
+was, errs at least by the spread of the displacements: the deviation within a grasp, over all grasps, is the
+least RMSE of any predictor, one that knows the part's hulls, its mass and its friction included.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How long planning takes. Run: python -m tests.benchmarks.plan_speed --help.
+"""Time of a plan. Run: python -m tests.benchmarks.plan_speed --help.
 
 In one run, picture by picture in turn, on the same frames of the simulated cell with the same number of
 candidates: our planner and network, and the same planner around the paper's network in plain PyTorch. Timed

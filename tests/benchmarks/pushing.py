@@ -1,4 +1,4 @@
-"""How engines push a flat part: a wall's edge turns a bar on the table, against quasi-static mechanics.
+"""A flat part pushed in the engines: a wall's edge turns a bar on the table, against quasi-static mechanics.
 
 The bar (80 x 20 x 12 mm) lies turned by 23.7 degrees; the left edge of a pad 17.5 mm wide meets it 7 mm from
 its centre and pushes it by 9.1 mm. In both engines it rests on its four corners. Inertia hardly counts:

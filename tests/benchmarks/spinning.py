@@ -30,7 +30,7 @@ TIME_S = 0.25
 _REST = 1e-5
 """Points slower than this, m/s, count as in transition to rest."""
 _ALONG = 0.01
-"""Speed of the body, m/s, above which PhysX lays its first tangential axis along it."""
+"""Speed of the body, m/s, above which PhysX aligns its first tangential axis with it."""
 
 
 def on_paper(

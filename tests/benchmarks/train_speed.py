@@ -1,4 +1,4 @@
-"""How fast networks are trained. Run: python -m tests.benchmarks.train_speed --help.
+"""Rate of training. Run: python -m tests.benchmarks.train_speed --help.
 
 In one run, in turn: steps of our networks and of the paper's, on the same number of samples that lie in
 memory as a dataset's do. A step is everything from the stored samples to the new weights.

@@ -1,4 +1,4 @@
-"""What a cluster's node reports of a shard."""
+"""A shard as a cluster's node reports it."""
 
 from __future__ import annotations
 

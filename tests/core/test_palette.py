@@ -1,4 +1,4 @@
-"""Colours can be read on paper and on a screen, told apart, and are stated in one place."""
+"""Colours can be read on paper and on a screen, distinguished, and are stated in one place."""
 
 from __future__ import annotations
 

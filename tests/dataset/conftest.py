@@ -1,4 +1,4 @@
-"""What tests of datasets share."""
+"""Fixtures of datasets."""
 
 from __future__ import annotations
 

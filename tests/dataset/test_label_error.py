@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mskgrasp.dataset import read_shard, shard_path, write_shard
 from mskgrasp.dataset.card import read_card, tables
 from mskgrasp.dataset.label_error import STORED, LabelError, read_label_error
 from mskgrasp.simulation.versions import SIMULATION_VERSION
@@ -50,9 +51,18 @@ def test_it_is_stated_only_for_the_simulation_it_was_measured_with(
     assert read_label_error(made_by, path).startswith(words)
 
 
-def test_the_card_states_it(tmp_path: Path):
+def test_the_card_states_it_for_data_of_the_simulation_it_was_measured_with(tmp_path: Path):
+    measured = json.loads(STORED.read_text())
     folder = synthetic.write_dataset(tmp_path / "boxes", n_parts=1, n_attempts=5, seed=2)
-    card = read_card(folder)
-    simulations = {names.get("simulation", "unknown") for names, _ in card.versions}
-    _, _, rows = tables(card)[0]
-    assert dict(rows)["error of a label"] == read_label_error(simulations)
+    path = shard_path(folder, "box_0", 0)
+    attempts, info = read_shard(path)
+
+    def stated() -> str:
+        return dict(tables(read_card(folder))[0][2])["error of a label"]
+
+    assert stated() == (
+        f"not known: made by simulation version unknown, measured for {measured['simulation']}"
+    )
+    write_shard(path, attempts, replace(info, versions={"simulation": measured["simulation"]}))
+    assert stated().startswith(f"median {1e3 * measured['shift_median']:.2f} mm, ")
+    assert f"success agrees in {measured['agreement']:.1%} ({measured['n']}" in stated()

@@ -2,27 +2,29 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from mskgrasp.core.errors import BadDataset
-from mskgrasp.dataset import read_shard, shard_path, write_shard
+from mskgrasp.core.palette import FAINT, GREEN
+from mskgrasp.dataset import rating, read_shard, shard_path, write_shard
 from mskgrasp.dataset.rating import draw_ratings, estimate, passing, rate_parts
 from mskgrasp.parts.catalogue import Entry, Index, Rating
+from tests.figures import picture, tick_labels
 from tests.synthetic import write_dataset
 
 
 def bar(name: str, length: float, successes: int | None) -> Entry:
-    rating = None
+    rated = None
     if successes is not None:
-        rating = Rating(
-            attempts=100, successes=successes, interval=(0.0, 1.0), part_hash=name, dataset="data"
-        )
+        rated = Rating(attempts=100, successes=successes, interval=(0.0, 1.0), part_hash=name, dataset="data")
     return Entry(
         name=name, family="bar", source="test", licence="Apache-2.0", longest_axis=length,
         extents=(0.01, 0.02, length), volume=2e-4 * length, mass=0.1, n_hulls=1, hull_error=0.0,
-        hull_error_p95=0.0, hull_volume_ratio=1.0, content_hash=name, recipe_hash="r", rating=rating,
+        hull_error_p95=0.0, hull_volume_ratio=1.0, content_hash=name, recipe_hash="r", rating=rated,
     )  # fmt: skip
 
 
@@ -98,7 +100,30 @@ def test_a_single_rated_part_says_nothing_of_others():
         estimate([bar("a", 0.1, None)], [bar("b", 0.1, 20)], 0.05, 0.40)
 
 
-def test_the_picture_is_written(tmp_path: Path):
-    entries = bars(np.random.default_rng(2), 60, 30)
+def test_the_picture_shows_each_rated_part_green_within_the_bounds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    figures: list[Figure] = []
+
+    class Kept(Figure):
+        def __init__(self, *args: Any, **settings: Any):
+            super().__init__(*args, **settings)
+            figures.append(self)
+
+    monkeypatch.setattr(rating, "Figure", Kept)
+    entries = [bar("low", 0.15, 4), bar("inside", 0.1, 20), bar("high", 0.06, 60), bar("unrated", 0.08, None)]
     index = Index(parts={entry.name: entry for entry in entries}, left_out={})
-    assert draw_ratings(index, (0.05, 0.40), tmp_path / "rating.png").stat().st_size > 10_000
+    picture(draw_ratings(index, (0.05, 0.40), tmp_path / "rating.png"))
+    above, families = figures[0].axes
+    points = {
+        float(line.get_xdata()[0]): (float(line.get_ydata()[0]), line.get_color())
+        for line in above.lines
+        if line.get_marker() == "o"
+    }
+    # Longest axis in mm, success in per cent.
+    expected = {150.0: (4.0, FAINT), 100.0: (20.0, GREEN), 60.0: (60.0, FAINT)}
+    assert sorted(points) == pytest.approx(sorted(expected))
+    for length, (rate, colour) in expected.items():
+        found = points[min(points, key=lambda one: abs(one - length))]
+        assert found[0] == pytest.approx(rate) and found[1] == colour
+    assert tick_labels(families) == ["bar"] and len(families.lines) == 3

@@ -1,6 +1,7 @@
 """Pages of results, rendered from stored reports.
 
-    python -m tests.docs.make_results                   render the blocks of every page (`make results`)
+    python -m tests.docs.make_results                   render the blocks of every page and the table of the
+                                                        README (`make results`)
     python -m tests.docs.make_results --record NAME..   run commands of docs/results/runs.yaml anew, store
                                                         their reports in docs/results/reports, then render
 
@@ -50,11 +51,10 @@ from mskgrasp.runtime.console_table import Table, cell_text
 from mskgrasp.validate.engines import engine_sections
 from mskgrasp.validate.tables import label_error_section, validation_sections
 from tests.docs.pages import ROOT
+from tests.docs.readme_table import README, rendered_readme
+from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored
 from tests.sim_in_the_loop.regression import Row, stored_figures
 
-RESULTS = ROOT / "docs" / "results"
-RUNS = RESULTS / "runs.yaml"
-REPORTS = RESULTS / "reports"
 FACTS = ("command", "split", "n", "intervals", "model", "simulation", "recorded", "machine")
 """Rows of the table above the figures of a run."""
 _BLOCK = re.compile(r"(<!-- run: ([a-z0-9_]+) -->\n).*?(<!-- end -->)", re.S)
@@ -67,10 +67,10 @@ def rendered(page: str) -> str:
 
 def block(name: str) -> str:
     """The table of facts, the tables of figures and the notes of a stored run, as Markdown."""
-    stored = json.loads((REPORTS / f"{name}.json").read_text(encoding="utf-8"))
-    facts = _run(name) | stored["record"]
+    stored = read_stored(name)
+    facts = stored.facts
     lines = ["", "| | |", "|---|---|", *(f"| {fact} | {facts[fact]} |" for fact in FACTS), ""]
-    shown = [one for one in _sections(stored["report"]) if not one.page_only and (one.text or one.tables)]
+    shown = [one for one in _sections(stored.report) if not one.page_only and (one.text or one.tables)]
     for section in shown:
         if section.title and len(shown) > 1:
             lines += [f"### {section.title}", ""]
@@ -83,19 +83,10 @@ def block(name: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _run(name: str) -> dict[str, Any]:
-    """What runs.yaml says of a run, as Markdown; nothing of a report that no command of it makes."""
-    run = read_yaml(RUNS).get(name)
-    return run | dict(command=f"`{run['command']}`") if run else {}
-
-
 def _sections(report: dict[str, Any] | str) -> list[Section]:
     """What is shown of a report, or of the file of the repository that holds it."""
     if isinstance(report, str):
-        path = ROOT / report
-        if path.suffix == ".csv":
-            return [Section(title="", tables=[_rating(path)])]
-        return _sections(json.loads(path.read_text(encoding="utf-8")))
+        return [Section(title="", tables=[_rating(ROOT / report)])]
     if "tables" in report:
         return [
             Section(title=one.get("title", ""), tables=[Table(header=one["header"], rows=one["rows"])])
@@ -222,7 +213,7 @@ def _machine() -> str:
 
 
 def main() -> int:
-    """Records what is asked for, and renders every page."""
+    """Records what is asked for, and renders every page and the README."""
     parser = argparse.ArgumentParser(
         prog="python -m tests.docs.make_results",
         description="Render the pages of results from stored reports.",
@@ -233,9 +224,9 @@ def main() -> int:
     )  # fmt: skip
     for name in parser.parse_args().record:
         record(name)
-    for path in sorted(RESULTS.glob("*.md")):
+    for path in (*sorted(RESULTS.glob("*.md")), README):
         before = path.read_text(encoding="utf-8")
-        after = rendered(before)
+        after = rendered_readme(before) if path == README else rendered(before)
         if after != before:
             path.write_text(after, encoding="utf-8")
             print(f"wrote {path.relative_to(ROOT)}")

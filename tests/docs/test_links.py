@@ -1,4 +1,4 @@
-"""What pages name exists: linked files and headings, modules, files, tests, imports."""
+"""Existence of everything that pages name: linked files and headings, modules, files, tests, imports."""
 
 from __future__ import annotations
 

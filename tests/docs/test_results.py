@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from mskgrasp.core.config import read_yaml
-from tests.docs.make_results import FACTS, REPORTS, RUNS, rendered
+from tests.docs.make_results import FACTS, rendered
 from tests.docs.pages import ROOT, without_code
+from tests.docs.readme_table import HEADER, README, ROWS, rendered_readme, table
+from tests.docs.stored_reports import REPORTS, RUNS, StoredReport, read_stored
 
 RESULTS = sorted(set((ROOT / "docs/results").glob("*.md")) - {ROOT / "docs/results/README.md"})
 NUMBER = r"(?<![\w.])\d+(?: \d{3})*(?:\.\d+)?(?![\w.])"
@@ -47,8 +49,33 @@ def test_the_index_links_every_results_page():
     assert not [page.name for page in RESULTS if f"]({page.name})" not in index]
 
 
-def test_every_figure_of_the_readme_is_on_a_results_page():
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    rows = readme[readme.index("| result |") : readme.index("[All results]")]
-    known = {number for page in RESULTS for number in re.findall(NUMBER, page.read_text(encoding="utf-8"))}
-    assert not [number for number in re.findall(NUMBER, rows) if number not in known]
+def test_the_readme_shows_what_the_stored_reports_say():
+    text = README.read_text(encoding="utf-8")
+    assert rendered_readme(text) == text, "run make results"
+    assert table() in text
+
+
+def test_no_figure_beside_the_table_of_the_readme_is_typed_by_hand():
+    section = README.read_text(encoding="utf-8").split("## Results\n")[1].split("\n## ")[0]
+    words = re.sub(r"<!-- results -->.*?<!-- end -->|\]\(.*?\)", "", section, flags=re.S)
+    assert re.findall(NUMBER, without_code(words)) == ["95"]  # the level of the intervals
+
+
+def test_every_row_of_the_readme_has_split_n_interval_and_command():
+    rows = [line.strip("| ").split(" | ") for line in table().splitlines() if line.startswith("| [")]
+    assert len(rows) >= len(ROWS)
+    for row in rows:
+        assert len(row) == len(HEADER) and all(row), row
+        assert "not printed" not in row[3]
+        assert re.search(r"\d .*\d|^none", row[3]), f"no interval: {row}"
+        assert row[4].startswith("`"), row
+
+
+def test_a_figure_of_a_stored_report_is_the_figure_of_the_readme():
+    by_name = dict(ROWS)
+    stored = read_stored("success")
+    assert isinstance(stored.report, dict)
+    changed = stored.report["overall"] | dict(success_rate=0.123, success_interval=[0.1, 0.2])
+    report = stored.report | dict(overall=changed)
+    (lifted, _) = by_name["success"](StoredReport(name="success", facts=stored.facts, report=report))
+    assert lifted.text.startswith("12.3% lifted") and lifted.interval == "10.0 - 20.0 %"

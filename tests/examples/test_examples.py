@@ -1,5 +1,6 @@
 """Every program in examples/ runs as its docstring says, and stays short enough to read."""
 
+import math
 import os
 import re
 import subprocess
@@ -56,7 +57,17 @@ def test_a_grasp_is_planned_in_what_a_camera_of_ones_own_sees():
 
 
 def test_an_arm_of_ones_own_performs_a_planned_grasp():
-    assert run("own_arm.py") == "holding\n"
+    seen = re.search(r"x ([\d.-]+), y ([\d.-]+), z ([\d.-]+) m, ([\d-]+) degrees", run("own_camera.py"))
+    *planned, degrees = map(float, seen.groups())
+    printed = run("own_arm.py")
+    commanded = re.search(r"^fingers close at \[(.*)\] m, quaternion wxyz \[(.*)\]$", printed, re.MULTILINE)
+    position = [float(number) for number in commanded[1].split()]
+    assert position == pytest.approx(planned, abs=6e-4)
+    # The hand points down, turned by the angle of the plan: Rz(theta) Rx(pi).
+    w, x, y, z = (float(number) for number in commanded[2].split())
+    assert (w, z) == pytest.approx((0, 0), abs=1e-4)
+    assert math.degrees(2 * math.atan2(y, x)) == pytest.approx(degrees, abs=0.6)
+    assert printed.endswith("\nholding\n")
 
 
 def test_the_maniskill_task_runs_in_a_loop():

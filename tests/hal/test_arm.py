@@ -1,4 +1,4 @@
-"""What the base class of all arms sees to by itself, shown on an arm that is where it was sent at once."""
+"""Checks of the base class of arms, tested on an arm that reaches every target at once."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def test_a_stop_ends_motions_but_is_no_mere_abort():
     assert [kind for kind in KINDS if issubclass(kind, MotionAborted)] == [MotionAborted, Stopped]
 
 
-def test_a_refusal_and_a_fault_are_told_apart():
+def test_a_refusal_and_a_fault_are_distinguished():
     """After `OutOfWorkspace` the arm may move, after the others it must be recovered."""
     faults = (MotionAborted, NeedsRecovery)
     assert not issubclass(OutOfWorkspace, faults)

@@ -49,7 +49,7 @@ def test_the_arm_moves_only_after_a_yes(real):
 @pytest.mark.parametrize(
     ("answers", "why"), [("q\n", "stopped by the operator"), ("", "standard input ended")]
 )
-def test_whoever_goes_stops_the_run(real, answers, why):
+def test_an_operator_who_leaves_stops_the_run(real, answers, why):
     asked, _ = operator(real, answers)
     with pytest.raises(StoppedByOperator, match=why):
         asked.may_move(Path("a.png"), "")

@@ -1,4 +1,4 @@
-"""What every arm promises: the simulated ones, both drivers of a Franka arm over the wire, and a replay.
+"""Contract of every arm: the simulated ones, both drivers of a Franka arm over the wire, and a replay.
 
 The arm of a recording knows what happened and nothing else. Each test is therefore first run on the simulated
 arm while it is recorded, which holds that one to the contract, too, and then on what was recorded.

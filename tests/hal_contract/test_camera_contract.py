@@ -1,4 +1,4 @@
-"""What every camera promises."""
+"""Contract of every camera."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def record(arm: Arm, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Any, di
 
 
 def pick_and_place(cell: Cell, planner: Planner) -> np.ndarray:
-    """The program: it knows a cell and a planner, and nothing of what stands behind them."""
+    """The program: it uses a cell and a planner, independent of the backend."""
     assert cell.feeder is not None
     cell.arm.move_to_joints(cell.workspace.home)
     cell.feeder.present(PART, SEED)

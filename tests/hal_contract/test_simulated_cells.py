@@ -1,4 +1,4 @@
-"""What simulated arms do beyond the contract: they meet parts, and the simulator knows the truth."""
+"""Simulated cells beyond the contract: contact with parts, and the true pose."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_several_processes_read_the_same_samples(dataset, image):
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_damaged_shard_is_named_whoever_reads_it(tmp_path, workers):
+def test_a_damaged_shard_is_named_by_any_number_of_readers(tmp_path, workers):
     dataset = synthetic.write_dataset(tmp_path, n_parts=3, n_attempts=20, seed=0)
     bad = sorted((dataset / "shards").glob("*.h5"))[1]
     bad.write_bytes(bad.read_bytes()[:500])

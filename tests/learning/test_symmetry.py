@@ -1,4 +1,4 @@
-"""What a parallel jaw cannot tell apart is told the same."""
+"""Symmetries of a parallel gripper: the same prediction for grasps that are the same."""
 
 from __future__ import annotations
 

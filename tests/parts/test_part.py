@@ -1,4 +1,4 @@
-"""What a part's fields mean, against its files."""
+"""Fields of a part, against its files."""
 
 import numpy as np
 import pytest

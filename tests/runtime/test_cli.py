@@ -1,4 +1,4 @@
-"""How programs end: exit code and one line on standard error."""
+"""Exit code and the line on standard error of a program that ends."""
 
 from __future__ import annotations
 

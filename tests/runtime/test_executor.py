@@ -1,4 +1,4 @@
-"""What every executor promises a worker pool, on the one that runs processes of this machine."""
+"""Contract of an executor, tested on the one that runs processes of this machine."""
 
 from __future__ import annotations
 

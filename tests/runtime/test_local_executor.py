@@ -45,7 +45,7 @@ def test_a_process_that_died_after_its_last_result_has_done_its_job(tmp_path: Pa
     assert events[0] == JobResult((1,), 1) and isinstance(events[1], JobDone) and len(events) == 2
 
 
-def test_whoever_closes_the_iterator_ends_the_workers():
+def test_closing_the_iterator_ends_the_workers():
     with closing(results(Work(bench, 3), list(range(1, 20)), 2)) as found:
         pid = next(value for value in found if value > 3 * 19)
     with pytest.raises(ProcessLookupError):

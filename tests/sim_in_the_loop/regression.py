@@ -19,7 +19,7 @@ from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.metrics import bootstrap_interval
+from mskgrasp.core.metrics import bootstrap_interval, wilson_interval
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.placement_records import Placement
@@ -89,6 +89,23 @@ def read_stored(path: Path = STORED) -> StoredRun:
     if found.schema_version != SCHEMA_VERSION:
         raise BadDataset(f"{path} has schema version {found.schema_version}, legal: {SCHEMA_VERSION}")
     return found
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt((values**2).mean()))
+
+
+def _median(values: np.ndarray) -> float:
+    return float(np.median(values))
+
+
+ERRORS = (
+    ("translation", _rms, "RMSE of the displacement", 1e3, "mm"),
+    ("rotation", _rms, "RMSE of the turn", 180 / math.pi, "deg"),
+    ("placed", _median, "median placement error", 1e3, "mm"),
+    ("placed_plainly", _median, "the same without correction", 1e3, "mm"),
+)
+"""Attribute of `Row`, its statistic over trials, title, scale from SI, and unit of each figure."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,10 +216,10 @@ def compare(stored: Sequence[Row], now: Sequence[Row]) -> list[Difference]:
         raise UsageError("the stored run has none of these trials: store another with --store")
     return [
         _held(pairs),
-        _errors(pairs, "translation", _rms, title="RMSE of the displacement", scale=1e3, unit="mm"),
-        _errors(pairs, "rotation", _rms, title="RMSE of the turn", scale=180 / math.pi, unit="deg"),
-        _errors(pairs, "placed", _median, title="median placement error", scale=1e3, unit="mm"),
-        _errors(pairs, "placed_plainly", _median, title="the same without correction", scale=1e3, unit="mm"),
+        *(
+            _errors(pairs, name, statistic, title=title, scale=scale, unit=unit)
+            for name, statistic, title, scale, unit in ERRORS
+        ),
     ]
 
 
@@ -248,23 +265,70 @@ def _errors(
     )  # fmt: skip
 
 
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt((values**2).mean()))
+@dataclass(frozen=True, kw_only=True)
+class StoredFigure:
+    """A figure of one run and its 95 % interval, in its unit.
+
+    Attributes:
+        title: Of the figure.
+        unit: Of the value.
+        n: Trials that have it.
+        value: In the unit.
+        interval: Wilson's for a share of trials, bootstrapped over parts for the others.
+    """
+
+    title: str
+    unit: str
+    n: int
+    value: float
+    interval: tuple[float, float]
 
 
-def _median(values: np.ndarray) -> float:
-    return float(np.median(values))
+def figures_of(rows: Sequence[Row]) -> list[StoredFigure]:
+    """The figures of a run; those that no trial has are left out."""
+    held = sum(row.held for row in rows)
+    low, high = wilson_interval(held, len(rows))
+    found = [
+        StoredFigure(
+            title="held",
+            unit="%",
+            n=len(rows),
+            value=100 * held / len(rows),
+            interval=(100 * low, 100 * high),
+        )
+    ]
+    for name, statistic, title, scale, unit in ERRORS:
+        by_part: dict[str, list[float]] = {}
+        for row in rows:
+            if (value := getattr(row, name)) is not None:
+                by_part.setdefault(row.part, []).append(scale * value)
+        groups = [np.array(one) for one in by_part.values()]
+        if groups:
+            every = np.concatenate(groups)
+            found.append(
+                StoredFigure(
+                    title=title,
+                    unit=unit,
+                    n=len(every),
+                    value=statistic(every),
+                    interval=bootstrap_interval(groups, statistic),
+                )  # fmt: skip
+            )
+    return found
 
 
 def stored_figures(rows: Sequence[Row]) -> Table:
     """Table of the figures of a run."""
-    figures = [(one, one.stored) for one in compare(rows, rows)]
     return Table(
-        header=("figure", "trials", "value"),
+        header=("figure", "trials", "value", "95 % interval"),
         rows=[
-            (one.title, one.n, f"{value * one.scale:.2f} {one.unit}")
-            for one, value in figures
-            if value is not None
+            (
+                one.title,
+                one.n,
+                f"{one.value:.2f} {one.unit}",
+                f"{one.interval[0]:.2f} - {one.interval[1]:.2f}",
+            )
+            for one in figures_of(rows)
         ],
     )
 

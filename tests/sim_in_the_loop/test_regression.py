@@ -11,7 +11,7 @@ import pytest
 
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.palletize.placement_records import Placement
-from tests.sim_in_the_loop.regression import PARTS, Row, compare, read_stored, rows_of
+from tests.sim_in_the_loop.regression import PARTS, Row, compare, figures_of, read_stored, rows_of
 
 
 def stored() -> list[Row]:
@@ -68,6 +68,29 @@ def test_rows_hold_what_was_predicted_and_measured():
     lost = [placement(name, None, placed=False, measured=None) for name in ("none", "predicted")]
     (row,) = rows_of(lost)
     assert not row.held and row.translation is None
+
+
+def test_a_figure_has_the_interval_over_parts_and_a_lost_trial_has_no_error():
+    def row(part: str, held: bool, error: float | None) -> Row:
+        return Row(
+            part=part,
+            number=0,
+            held=held,
+            translation=error,
+            rotation=error,
+            placed=error,
+            placed_plainly=None,
+        )
+
+    rows = [row("a", True, 0.003), row("a", True, 0.003), row("b", True, 0.004), row("c", False, None)]
+    figures = {one.title: one for one in figures_of(rows)}
+    assert "the same without correction" not in figures
+    held = figures["held"]
+    assert (held.n, held.value) == (4, 75) and held.interval == pytest.approx((30.1, 95.4), abs=0.1)  # Wilson
+    rmse = figures["RMSE of the displacement"]
+    assert rmse.n == 3 and rmse.value == pytest.approx(np.sqrt((9 + 9 + 16) / 3))
+    assert rmse.interval == pytest.approx((3, 4))  # parts are drawn whole: both draws may be a, or b
+    assert figures["median placement error"].value == pytest.approx(3)
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"rows": []}', '{"weights": "a", "rows": [{"part": "b"}]}'])

@@ -17,7 +17,7 @@ def test_a_task_is_the_same_after_a_journey_to_another_process_and_counts_as_a_k
     assert ShardTask(**{**vars(TASK), "first": 201}) != TASK
 
 
-def test_whoever_plans_shards_loads_neither_the_simulator_nor_torch():
+def test_planning_shards_loads_neither_the_simulator_nor_torch():
     """Planning must not cost seconds, and a cluster's head need not have a simulator."""
     program = (
         "import sys, mskgrasp.simulation.shard_task\n"

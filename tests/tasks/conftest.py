@@ -42,7 +42,7 @@ def env(boxes: dict[str, Part]) -> Iterator[GraspDisplacementEnv]:
 
 @pytest.fixture(scope="session")
 def attempt(env: GraspDisplacementEnv, boxes: dict[str, Part]) -> Attempt:
-    """Lays a box (x, y, turn; flat on the table) and grasps it."""
+    """Places a box (x, y, turn; flat on the table) and grasps it."""
 
     def run(grasp: tuple[float, ...], *, part: str = "light", at=(0.5, 0.0), turn=0.0, height=0.015):
         pose = [*at, height, np.cos(turn / 2), 0, 0, np.sin(turn / 2)]
@@ -56,7 +56,7 @@ def attempt(env: GraspDisplacementEnv, boxes: dict[str, Part]) -> Attempt:
 
 @pytest.fixture
 def place(env: GraspDisplacementEnv, boxes: dict[str, Part]) -> Callable[[str], None]:
-    """Lays a box far from the hand, in a fresh scene."""
+    """Places a box far from the hand, in a fresh scene."""
 
     def run(part: str) -> None:
         far = np.array([[0.5, -0.5, 0.015, 1, 0, 0, 0]])

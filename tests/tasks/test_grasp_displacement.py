@@ -48,7 +48,7 @@ def test_the_same_seed_lays_the_part_at_the_same_place(boxes):
     env.close()
 
 
-def test_laying_begins_the_very_episode_of_a_reset(boxes):
+def test_placing_a_part_begins_the_same_episode_as_a_reset(boxes):
     env = make(boxes, obs_mode="none", noise=dict(arm_position_std=0.001, friction_pad_part=(0.4, 0.5)))
     base = env.unwrapped
     found = []
@@ -64,12 +64,25 @@ def test_laying_begins_the_very_episode_of_a_reset(boxes):
 
 
 @pytest.mark.parametrize("mode", ["pd_joint_pos", "pd_ee_delta_pose"])
-def test_the_usual_control_modes_still_work(boxes, mode):
+def test_in_the_usual_control_modes_the_hand_follows_and_nothing_is_lifted(boxes, mode):
     env = make(boxes, obs_mode="state", control_mode=mode)
     env.reset(seed=0)
-    for _ in range(3):
-        _, reward, _, _, info = env.step(env.action_space.sample())
-    assert info["success"].shape == (1,) and float(reward[0]) == 0.0
+    base = env.unwrapped
+    joints = base.agent.robot.get_qpos()[0, :7].clone()
+    start = base.tcp_pose().position[0].clone()
+    if mode == "pd_joint_pos":
+        goal = joints + torch.tensor([0.1, 0, 0, 0, 0, 0, 0])
+        action = torch.cat([goal, torch.ones(1)])
+    else:
+        action = torch.tensor([0, 0, 0.1, 0, 0, 0, 1.0])  # of 0.1 m a step: up by 1 cm
+    for _ in range(10):
+        _, reward, _, _, info = env.step(action.numpy())
+    if mode == "pd_joint_pos":
+        assert float((base.agent.robot.get_qpos()[0, :7] - goal).abs().max()) < 0.01
+    else:
+        moved = base.tcp_pose().position[0] - start
+        assert float(moved[2]) == pytest.approx(0.1, abs=0.02) and float(moved[:2].norm()) < 0.01
+    assert not bool(info["success"][0]) and float(reward[0]) == 0.0
     env.close()
 
 

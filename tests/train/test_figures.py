@@ -16,18 +16,39 @@ from tests.figures import keep_figures, legend_labels, picture
 from tests.learning.small import PATCH
 
 
-def test_curves_of_a_run_without_variances_are_drawn(tmp_path):
-    trivial = {"translation_rmse": 0.01, "rotation_rmse": 0.2}
+def test_curves_of_a_run_without_variances_are_drawn_beside_the_trivial_predictors(tmp_path, monkeypatch):
     history = [
         EpochMetrics(stage="gqn", epoch=1, train_loss=0.6, validation_loss=0.5, auroc=0.8, seconds=1.0),
-        EpochMetrics(stage="gdn", epoch=1, train_loss=4.0, validation_loss=3.0, **trivial, seconds=1.0),
+        EpochMetrics(stage="gqn", epoch=2, train_loss=0.4, validation_loss=0.45, auroc=0.9, seconds=1.0),
+        EpochMetrics(
+            stage="gdn",
+            epoch=1,
+            train_loss=4.0,
+            validation_loss=3.0,
+            translation_rmse=0.01,
+            rotation_rmse=0.2,
+            seconds=1.0,
+        ),  # fmt: skip
     ]
+    zero = {"translation_rmse": 0.012, "rotation_rmse": 0.3}
+    mean = {"translation_rmse": 0.011, "rotation_rmse": 0.25}
     report = {
         "gqn": {"brier": 0.1, "brier_of_base_rate": 0.2},
-        "gdn": trivial | {"zero_displacement": trivial, "training_mean": trivial},
+        "gdn": {"zero_displacement": zero, "training_mean": mean},
     }
+    kept = keep_figures(figures, monkeypatch)
     draw_curves(history, report, tmp_path / "curves.png")
-    assert (tmp_path / "curves.png").stat().st_size > 10_000
+    quality_loss, auroc, brier, loss, translation, rotation = kept[0].axes
+    assert [list(line.get_ydata()) for line in quality_loss.lines] == [[0.6, 0.4], [0.5, 0.45]]
+    assert list(auroc.lines[0].get_xdata()) == [1, 2] and list(auroc.lines[0].get_ydata()) == [0.8, 0.9]
+    assert [bar.get_height() for bar in brier.patches] == [0.1, 0.2]
+    assert [list(line.get_ydata()) for line in loss.lines] == [[4.0], [3.0]]
+    assert legend_labels(translation) == ["held-out parts", "zero displacement", "training mean"]
+    in_mm = [line.get_ydata()[0] for line in translation.lines]
+    assert in_mm == pytest.approx([10, 12, 11])
+    in_degrees = [line.get_ydata()[0] for line in rotation.lines]
+    assert in_degrees == pytest.approx([11.459, 17.189, 14.324], abs=1e-3)
+    picture(tmp_path / "curves.png")
 
 
 def test_uncertainty_of_a_network_is_drawn_against_its_errors(dataset, tmp_path, monkeypatch):

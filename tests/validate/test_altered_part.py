@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from manifold3d import Manifold, OpType
 
 from mskgrasp.core.geometry import Pose, quat_multiply
-from mskgrasp.parts import find_part
+from mskgrasp.parts import Part, find_part
 from mskgrasp.parts.hulls import hull_corners
-from mskgrasp.validate.altered_part import altered_part, mesh_rests, resting_start
+from mskgrasp.validate.altered_part import FILLED_MM, altered_part, mesh_rests, resting_start
 
 
 def test_another_density_scales_mass_and_inertia_alone(tmp_path):
@@ -33,13 +34,18 @@ def test_joining_within_a_larger_distance_leaves_fewer_hulls(tmp_path):
     np.testing.assert_allclose(exact.inertia, part.inertia, rtol=1e-5, atol=1e-12)
 
 
-def test_bores_are_open_or_filled(tmp_path):
-    part = find_part("l_bracket_40x40")
-    volumes = [
-        altered_part(part, tmp_path / str(k), hulls=hulls).hulls_volume
-        for k, hulls in enumerate(("bores open", "bores filled"))
-    ]
-    assert volumes[0] <= volumes[1] and volumes[1] > 0
+def occupied(part: Part) -> float:
+    """Volume of the union of a part's hulls, m^3."""
+    pieces = [Manifold.hull_points(1e3 * corners) for corners in hull_corners(part)]
+    return 1e-9 * Manifold.batch_boolean(pieces, OpType.Add).volume()
+
+
+def test_a_bore_of_a_plate_is_open_or_filled(tmp_path):
+    part = find_part("lifting_lug_104x76")
+    opened, filled = (altered_part(part, tmp_path / name[6:], hulls=name) for name in FILLED_MM)
+    bore = np.pi / 4 * part.dimensions["bore"] ** 2 * part.dimensions["t"]
+    assert occupied(filled) - occupied(opened) == pytest.approx(bore, rel=0.05)  # the bore is a polygon
+    assert filled.n_hulls < opened.n_hulls and filled.mass == pytest.approx(opened.mass)
 
 
 @pytest.mark.parametrize("turn", [-3.0, -1.2, 0.0, 0.4, 2.5])

@@ -1,4 +1,4 @@
-"""What is simulated follows from the configuration."""
+"""Simulated settings that follow from the configuration."""
 
 from __future__ import annotations
 

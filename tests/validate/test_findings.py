@@ -28,8 +28,8 @@ def found(per_part: int = 40, **settings: Outcomes) -> dict[str, Outcomes]:
 
 
 def judged(one: Outcomes, name: str = "coarse", cpu_ms: float = 100.0):
-    told = compare_with_reference(found(**{name: one}), name, REFERENCE, 40, Margins())
-    return dataclasses.replace(told, found=dataclasses.replace(told.found, cpu_ms=cpu_ms))
+    result = compare_with_reference(found(**{name: one}), name, REFERENCE, 40, Margins())
+    return dataclasses.replace(result, found=dataclasses.replace(result.found, cpu_ms=cpu_ms))
 
 
 def test_the_cheapest_equivalent_setting_is_chosen():
@@ -78,11 +78,11 @@ def test_variants_are_compared_with_production_on_the_same_grasps():
     assert (start.group, start.found.n, start.found.shift_p90) == ("start", 4 * PARTS, 0)
     assert (exact.parts, exact.found.n) == (2, 8)
     assert exact.found.shift_median == pytest.approx(2e-3)
-    told = label_error(config, settings)
-    assert told is not None and told.found.shift_median == pytest.approx(1e-3)
-    assert told.found.turn_p90 == pytest.approx(0.1)
-    stored = told.to_json()
-    assert stored["shift_median"] == told.found.shift_median
+    result = label_error(config, settings)
+    assert result is not None and result.found.shift_median == pytest.approx(1e-3)
+    assert result.found.turn_p90 == pytest.approx(0.1)
+    stored = result.to_json()
+    assert stored["shift_median"] == result.found.shift_median
     assert stored["ranges"] == {"finger_force": [20.0, 40.0]}
     own = np.linalg.norm(nominal.displacement[nominal.success, :3], axis=1)
     assert size(nominal).shift_median == pytest.approx(np.median(own))
@@ -91,6 +91,8 @@ def test_variants_are_compared_with_production_on_the_same_grasps():
 def test_without_successes_in_common_nothing_can_be_said():
     n = len(outcomes(40).success)
     nothing = outcomes(40, success=np.zeros(n, bool), displacement=np.full((n, 4), np.nan))
-    told = judged(nothing)
-    assert any("no grasps to compare" in said or "parts were compared" in said for said in told.complaints())
-    assert told.to_json()["shift_median"] is None and not told.passed
+    result = judged(nothing)
+    assert any(
+        "no grasps to compare" in said or "parts were compared" in said for said in result.complaints()
+    )
+    assert result.to_json()["shift_median"] is None and not result.passed

@@ -12,6 +12,7 @@ from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts.builtin import find_part
 from mskgrasp.parts.catalogue import read_index
 from mskgrasp.runtime.progress import advance_to, progress
+from mskgrasp.simulation.resting import Resting, resting_of
 
 PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -19,6 +20,8 @@ PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 @dataclass(frozen=True, kw_only=True)
 class Show:
     """Draw a part: its mesh, its collision hulls moved apart, and its stable poses on a table.
+
+    Prints which resting poses do not stand in the physics engine; attempts leave these out.
 
     Example: python -m mskgrasp.parts show spur_gear_m2_z18 --out gear.png
     """
@@ -52,7 +55,23 @@ def run_show(command: Show) -> int:
     _check(out)
     draw_part(part, out)
     print(out)
+    print(resting_text(resting_of(part)))
     return 0
+
+
+def resting_text(resting: Resting) -> str:
+    """How many resting poses stand in the engine, and which do not, counted from 0 as in part.json."""
+    n = len(resting.stands)
+    fallen = [k for k, stands in enumerate(resting.stands) if not stands]
+    if not fallen:
+        return f"resting poses: all {n} stand in the engine"
+    named = ", ".join(f"pose {k} ({resting.probability[k]:.2%})" for k in fallen)
+    if len(fallen) == n:
+        return f"resting poses: none of {n} stands in the engine, so the part cannot be simulated: {named}"
+    return (
+        f"resting poses: {n - len(fallen)} of {n} stand in the engine; "
+        f"left out, with {resting.toppled:.2%} of the probability: {named}"
+    )
 
 
 def run_sheet(command: Sheet) -> int:

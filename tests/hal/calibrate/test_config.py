@@ -1,4 +1,4 @@
-"""Where the operator says that the board is in the hand."""
+"""Pose of the board in the hand from the operator's settings."""
 
 from __future__ import annotations
 

@@ -64,32 +64,32 @@ def test_pictures_without_depth_on_the_board_are_not_compared(exact: HandEye, pi
 def lines(found: HandEye, pictures: list[Picture], offset: DepthOffset | None) -> dict[str, str]:
     views = [picture.view(BOARD) for picture in pictures]
     before = Pose(position=found.T_base_camera.position + [0.003, 0, 0.004], quat_wxyz=OVERHEAD.quat_wxyz)
-    told = describe(found, views, before, offset)
-    assert all("\n" not in line for line in told)
-    return dict(line.split(maxsplit=1) for line in told)
+    printed = describe(found, views, before, offset)
+    assert all("\n" not in line for line in printed)
+    return dict(line.split(maxsplit=1) for line in printed)
 
 
 def test_the_lines_hold_the_numbers(exact: HandEye, pictures: list[Picture]):
-    told = lines(
+    printed = lines(
         dataclasses.replace(exact, scale=0.97, rms_px=np.array([0.3, 0.4])),
         pictures,
         DepthOffset(metres=0.024, spread=0.001, n_views=9),
     )
-    assert told["camera"].startswith("x 0.5000 m, y 0.0000 m, z 1.0000 m, quaternion wxyz 0.00000 0.70711")
-    assert f"{len(exact.used)} of {len(pictures)} used" in told["pictures"]
-    assert "corners 0.35 px" in told["residuals"]  # sqrt((0.09 + 0.16) / 2)
-    assert told["squares"].startswith("seem -3.00 % larger")
-    assert told["moved"].startswith("by    5.00 mm and 0.000 degrees")  # 3, 0 and 4 mm
-    assert "measured +24.0 mm too far, +- 1.0 mm between pictures" in told["depth"]
-    assert told["depth"].endswith("; add -0.0240 to camera.depth_offset")
+    assert printed["camera"].startswith("x 0.5000 m, y 0.0000 m, z 1.0000 m, quaternion wxyz 0.00000 0.70711")
+    assert f"{len(exact.used)} of {len(pictures)} used" in printed["pictures"]
+    assert "corners 0.35 px" in printed["residuals"]  # sqrt((0.09 + 0.16) / 2)
+    assert printed["squares"].startswith("seem -3.00 % larger")
+    assert printed["moved"].startswith("by    5.00 mm and 0.000 degrees")  # 3, 0 and 4 mm
+    assert "measured +24.0 mm too far, +- 1.0 mm between pictures" in printed["depth"]
+    assert printed["depth"].endswith("; add -0.0240 to camera.depth_offset")
 
 
 @pytest.mark.parametrize(("metres", "spread"), [(0.002, 0.0), (-0.0029, 0.0), (0.01, 0.006)])
 def test_a_depth_error_within_its_spread_or_a_warm_up_has_no_remedy(
     exact: HandEye, pictures: list[Picture], metres: float, spread: float
 ):
-    told = lines(exact, pictures, DepthOffset(metres=metres, spread=spread, n_views=9))
-    assert "depth_offset" not in told["depth"] and f"{1e3 * metres:+.1f} mm" in told["depth"]
+    printed = lines(exact, pictures, DepthOffset(metres=metres, spread=spread, n_views=9))
+    assert "depth_offset" not in printed["depth"] and f"{1e3 * metres:+.1f} mm" in printed["depth"]
 
 
 def test_without_depth_the_report_says_so(exact: HandEye, pictures: list[Picture]):

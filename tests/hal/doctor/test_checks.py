@@ -1,4 +1,4 @@
-"""What the doctor says, on inputs whose fault is known."""
+"""The doctor's checks on inputs with a known fault."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_a_camera_that_cannot_be_there_is_found(position, quat_wxyz, words):
 
 
 class Frames(Camera):
-    """Gives what it is told to."""
+    """Delivers frames with the given time stamps."""
 
     def __init__(self, stamps: list[float]):
         self.stamps = stamps

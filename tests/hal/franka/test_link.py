@@ -42,7 +42,7 @@ def test_a_missing_package_is_reported_with_its_extra(driver: DriverName, tmp_pa
         arm_at(tmp_path, driver, "127.0.0.250").connect()
 
 
-def test_a_driver_that_hangs_is_ended_and_told_even_where_it_reads_no_request(tmp_path: Path):
+def test_a_driver_that_hangs_is_ended_and_reported_even_where_it_reads_no_request(tmp_path: Path):
     with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
         link = arm._link
         assert link is not None

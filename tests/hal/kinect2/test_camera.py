@@ -1,4 +1,4 @@
-"""What is particular to the Kinect v2: its geometry, its corrections, its faults."""
+"""Geometry, corrections and faults of the Kinect v2."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def test_a_capture_without_a_good_frame_says_what_came_instead(
         bench.set()
 
 
-def test_a_camera_that_is_gone_is_told_from_one_that_is_silent(fake: ModuleType, bench: Bench):
+def test_a_camera_that_is_gone_is_distinguished_from_one_that_is_silent(fake: ModuleType, bench: Bench):
     with driver() as opened:
         bench.set(serials=["1"])
         with pytest.raises(CommunicationLost, match=f"camera {SERIAL} is unplugged"):

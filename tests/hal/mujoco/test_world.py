@@ -1,4 +1,4 @@
-"""What lies on the table of the MuJoCo cell."""
+"""Parts on the table of the MuJoCo cell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is read of a recording, and what is refused."""
+"""Reading of recordings, and refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rendered tape: what the pictures say of a part's motion, against where the part was laid."""
+"""Motion of a part measured by rendered tape, against the pose that was set."""
 
 from __future__ import annotations
 

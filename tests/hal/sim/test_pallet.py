@@ -1,4 +1,4 @@
-"""What was put beside the region stays while the next part is laid down, and can be pushed."""
+"""Placed parts beside the region: they stay while the next part is presented, and can be pushed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CONFIG = SapienCellConfig(type="sapien", part="hex_nut_m30")
 
 
 def put(world: SapienWorld, x: float, y: float) -> np.ndarray:
-    """Moves the part that was laid down last, as an arm would; where it is then."""
+    """Moves the part presented last, as an arm would; returns its place."""
     pose = world.part_pose()
     position = np.array([x, y, pose.position[2]])
     world.env.part.set_pose(sapien.Pose(p=to_world(position), q=pose.quat_wxyz))

@@ -1,4 +1,4 @@
-"""Where tape goes on shapes that are simple enough to think about."""
+"""Places of tape squares on simple shapes."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def test_a_world_lives_from_its_first_user_to_its_last(block: Part):
         world.part_pose()
 
 
-def test_a_seed_places_a_part_whatever_lay_there_before(block_world: SapienWorld, block: Part):
+def test_a_seed_places_a_part_independently_of_the_one_before(block_world: SapienWorld, block: Part):
     poses, before = [], block_world.presented
     for part, seed in ((str(block.folder), 4), ("washer_m36", 5), (str(block.folder), 4)):
         block_world.present(part, seed)

@@ -1,4 +1,4 @@
-"""How tests read a file of a user's, from its bytes."""
+"""Reading of a user's file from its bytes."""
 
 from pathlib import Path
 

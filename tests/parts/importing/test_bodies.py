@@ -47,7 +47,7 @@ def test_split_makes_bodies_by_decreasing_volume_and_union_joins_what_overlaps_o
     )
 
 
-def test_bodies_that_touch_along_an_edge_or_a_face_are_told_apart():
+def test_bodies_that_touch_along_an_edge_and_along_a_face_are_distinguished():
     for shift in ((40, 30, 0), (40, 5, 0), (40, 0, 0), (40, 30, 20)):
         split = repair_bodies([soup(box(40, 30, 20), box(40, 30, 20, at=shift))], bodies="split")
         if shift != (40, 0, 0):  # there both faces are drawn by the same triangles or by crossed ones

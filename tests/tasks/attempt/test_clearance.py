@@ -1,4 +1,4 @@
-"""What need not be simulated: read off the hulls, and the same outcome as when it is."""
+"""Clearance of the hand computed from hulls, and the same outcome without simulating the air."""
 
 from __future__ import annotations
 

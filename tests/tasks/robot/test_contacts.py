@@ -74,7 +74,7 @@ def test_the_overlap_of_pads_and_part_is_as_deep_as_they_were_placed(env, place,
     assert (force > 1).all() and force[0, 0] == pytest.approx(force[0, 1], rel=0.2)
 
 
-def test_one_pad_alone_is_told_from_both(env, place):
+def test_one_pad_alone_is_distinguished_from_both(env, place):
     """Off the middle by 1 mm the block reaches into the pad on its side."""
     place("kilo")
     stand(env, 0.02, y=0.0011, width=0.022)

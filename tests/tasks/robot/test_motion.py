@@ -48,7 +48,7 @@ def test_steps_are_coarse_as_long_as_they_are_asked_to_be(env, place):
 
 
 @pytest.mark.parametrize("part", ["feather", "light", "lead"])
-def test_parts_are_lifted_coarsely_and_looked_at_finely(env, attempt, monkeypatch, part):
+def test_parts_are_lifted_coarsely_and_observed_finely(env, attempt, monkeypatch, part):
     found: list[tuple[str, int, float]] = []
     for name in ("step", "move_fingers", "follow"):
         inner = getattr(PandaMotion, name)

@@ -44,7 +44,7 @@ def descend(env, monkeypatch, depth: float, height: float) -> tuple[bool, float]
 
 
 @pytest.mark.parametrize("height", [0.01, 0.0103, 0.0107, 0.0111])
-def test_rate_and_phase_decide_nothing(at_rate, monkeypatch, height):
+def test_the_reflex_depends_neither_on_the_rate_nor_on_the_phase_of_a_step(at_rate, monkeypatch, height):
     """A finger that stops 0.6 mm over the block, grazes it, is sent 0.4 mm into it, or 2 mm."""
     clear, graze, light, deep = (
         descend(at_rate, monkeypatch, depth, height) for depth in (-6e-4, -1e-4, 4e-4, 2e-3)

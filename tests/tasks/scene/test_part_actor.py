@@ -1,4 +1,4 @@
-"""What PhysX holds is the part: hulls, mass, inertia, rest, and room beside it."""
+"""Parts in PhysX: hulls, mass, inertia, rest, and room beside them."""
 
 from __future__ import annotations
 

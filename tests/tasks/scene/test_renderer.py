@@ -42,7 +42,7 @@ def test_the_device_is_one_on_which_sapien_renders_and_finding_it_is_silent():
     assert renderer.render_backend() == found.strip()
 
 
-def test_a_machine_without_a_vulkan_driver_is_told_what_to_install(tmp_path: Path):
+def test_a_machine_without_a_vulkan_driver_gets_the_command_that_installs_one(tmp_path: Path):
     """The loader is shown a driver that is not there: one line, and none of Vulkan's own."""
     nowhere = str(tmp_path / "none.json")
     printed, complaints = backend(VK_ICD_FILENAMES=nowhere, VK_DRIVER_FILES=nowhere)

@@ -1,7 +1,7 @@
 """Stands in for pylibfreenect2 0.1.4 where there is no Kinect: its names, its views, and its crashes.
 
 What the real package does with a segmentation fault happens here, too: the process dies of SIGSEGV. What
-happens is told by a JSON file named in FAKE_KINECT2, read anew at every call: ``serials`` (those connected),
+happens is set by a JSON file named in FAKE_KINECT2, read anew at every call: ``serials`` (those connected),
 ``held`` (those another program uses), ``start_fails``, and ``fault``: "" or one of
 
     stalled   no frame comes any more          late    every frame is on its way for 1 s more

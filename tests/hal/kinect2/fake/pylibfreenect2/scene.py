@@ -1,4 +1,4 @@
-"""What the fake Kinect sees: a table, a block on it, and the camera's own distortion and mirror."""
+"""Scene of the simulated Kinect: a table, a block on it, and the camera's own distortion and mirror."""
 
 from __future__ import annotations
 

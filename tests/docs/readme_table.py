@@ -1,0 +1,260 @@
+"""The README's table of results, each row a function of a stored report.
+
+`make results` writes it between ``<!-- results -->`` and ``<!-- end -->``.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mskgrasp.core.metrics import bootstrap_interval
+from tests.docs.pages import ROOT
+from tests.docs.stored_reports import StoredReport, page_of, read_stored
+from tests.sim_in_the_loop.regression import Row, StoredFigure, figures_of
+
+README = ROOT / "README.md"
+PAPER = dict(balanced_accuracy=0.853, novel_translation=2.4e-3, novel_rotation=math.radians(7.0))
+"""Zhao, Liang and Kroemer (arXiv 1909.02129): accuracy on balanced data; displacement RMSE of novel objects
+in simulation at high quality and low variance, m and rad."""
+HEADER = ("result", "split", "n", "interval", "command")
+_BLOCK = re.compile(r"(<!-- results -->\n).*?(<!-- end -->)", re.S)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadmeRow:
+    """A row, as Markdown; split and n are those of the stored run unless stated.
+
+    Attributes:
+        name: Subject, linked to the results page.
+        text: The figures.
+        interval: Of each figure, in the same order.
+        split: Parts of these figures alone.
+        n: Of these figures alone.
+    """
+
+    name: str
+    text: str
+    interval: str
+    split: str = ""
+    n: str = ""
+
+
+def rendered_readme(text: str) -> str:
+    """The README with the table that the stored reports give."""
+    return _BLOCK.sub(lambda found: found[1] + table() + found[2], text)
+
+
+def table() -> str:
+    """The model and the table, as Markdown."""
+    model = read_stored("shipped_model").facts["model"]
+    lines = [
+        "",
+        f"The model that ships was {model.removeprefix('shipped: ')}.",
+        "",
+        f"| {' | '.join(HEADER)} |",
+        "|" + "---|" * len(HEADER),
+    ]
+    for name, rows in ROWS:
+        stored = read_stored(name)
+        lines += [_line(row, stored) for row in rows(stored)]
+    return "\n".join(lines) + "\n\n"
+
+
+def _line(row: ReadmeRow, stored: StoredReport) -> str:
+    facts = stored.facts
+    first = f"[{row.name}]({page_of(stored.name)}): {row.text}"
+    cells = (first, row.split or facts["split"], row.n or facts["n"], row.interval, facts["command"])
+    return "| " + " | ".join(cells) + " |"
+
+
+def _success(stored: StoredReport) -> list[ReadmeRow]:
+    found = _report(stored)["overall"]
+    return [
+        ReadmeRow(
+            name="best quality",
+            text=f"{found['success_rate']:.1%} lifted "
+            f"(paper in simulation: {_report(stored)['paper']['simulated']:.1%})",
+            interval=_between(found["success_interval"], 100, "%"),
+        ),
+        ReadmeRow(
+            name="best quality",
+            text=f"displacement RMSE {_mm(found['translation_rmse'])}, {_degrees(found['rotation_rmse'])} "
+            f"(predicting zero: {_mm(found['translation_rmse_of_zero'])}, "
+            f"{_degrees(found['rotation_rmse_of_zero'])})",
+            interval=_rmse_intervals(found),
+            n=f"{found['measured']} trials of {found['measured_parts']} parts that were lifted",
+        ),
+    ]
+
+
+def _displacement(stored: StoredReport) -> list[ReadmeRow]:
+    found = _report(stored)["models"]["pretrained"]["low_variance"]["novel"]
+    return [
+        ReadmeRow(
+            name="high quality and low variance",
+            text=f"displacement RMSE {_mm(found['translation_rmse'])}, {_degrees(found['rotation_rmse'])} "
+            f"(paper: {_mm(PAPER['novel_translation'])}, {_degrees(PAPER['novel_rotation'])})",
+            interval=_rmse_intervals(found),
+            split="validation: novel parts, used for early stopping and calibration",
+            n=f"{found['measured']} trials of {found['measured_parts']} parts",
+        )
+    ]
+
+
+def _palletize(stored: StoredReport) -> list[ReadmeRow]:
+    report = _report(stored)
+    corrected, plain = (report["corrections"][name] for name in ("predicted", "none"))
+    return [
+        ReadmeRow(
+            name="placing",
+            text=f"median error {_mm(corrected['median_translation'])} corrected by the prediction, "
+            f"{_mm(plain['median_translation'])} without",
+            interval="; ".join(
+                _between(one["median_translation_interval"], 1e3, "mm") for one in (corrected, plain)
+            ),
+            n=f"{report['compared']} placements of {report['parts_compared']} parts for each correction",
+        )
+    ]
+
+
+def _regression(stored: StoredReport) -> list[ReadmeRow]:
+    figures = figures_of([Row(**row) for row in _report(stored)["rows"]])
+    named = {one.title: one for one in figures}
+    corrected, plain = named["median placement error"], named["the same without correction"]
+
+    def between(one: StoredFigure) -> str:
+        return _between(one.interval, 1, one.unit, digits=2)
+
+    return [
+        ReadmeRow(
+            name="placing, another set",
+            text=f"median error {corrected.value:.2f} {corrected.unit} corrected by the prediction, "
+            f"{plain.value:.2f} {plain.unit} without",
+            interval=f"{between(corrected)}; {between(plain)}",
+        )
+    ]
+
+
+def _shipped_model(stored: StoredReport) -> list[ReadmeRow]:
+    report = _report(stored)["metrics"]["test"]
+    quality, displacement = report["gqn"], report["gdn"]
+    between = displacement["intervals"]
+    return [
+        ReadmeRow(
+            name="random grasps",
+            text=f"quality accuracy on balanced data {quality['balanced_accuracy']:.1%} "
+            f"(paper: {PAPER['balanced_accuracy']:.1%})",
+            interval=_between(quality["intervals"]["balanced_accuracy"], 100, "%"),
+            n=f"{quality['n']} grasps",
+        ),
+        ReadmeRow(
+            name="random grasps",
+            text=f"displacement RMSE {1e3 * displacement['translation_rmse']:.2f} mm, "
+            f"{math.degrees(displacement['rotation_rmse']):.2f} degrees",
+            interval=f"{_between(between['translation_rmse'], 1e3, 'mm', digits=2)}, "
+            f"{_between(between['rotation_rmse'], math.degrees(1), 'degrees', digits=2)}",
+            n=f"{displacement['n']} grasps that lifted the part",
+        ),
+    ]
+
+
+def _validation(stored: StoredReport) -> list[ReadmeRow]:
+    report = _report(stored)
+    (found,) = (
+        one
+        for one in report["errors"]
+        if (one["setting"], one["reference"]) == ("production", report["yardstick"])
+    )
+    shift, success = found["equivalence"]["displacement"], found["equivalence"]["success"]
+    shown = "shown" if found["equivalent"] else "not shown"
+    return [
+        ReadmeRow(
+            name="labels against finer steps",
+            text=f"production against {report['yardstick'].replace(' it', ' iterations')}: "
+            f"median displacement {1e3 * shift['estimate']:.2f} mm beyond that of starts moved by 10 um, "
+            f"success {100 * success['estimate']:+.1f} points; equivalence within "
+            f"{1e3 * shift['margin']:g} mm and {100 * success['margin']:g} points is {shown}",
+            interval=f"90 %: {_between((shift['low'], shift['high']), 1e3, 'mm', digits=2)}, "
+            f"{_between((success['low'], success['high']), 100, 'points')}",
+            n=f"{found['n']} grasps of {success['parts']} parts",
+        )
+    ]
+
+
+def _engines(stored: StoredReport) -> list[ReadmeRow]:
+    engines = _report(stored)["engines"]
+    whole = engines["all"]
+    parts = [one for name, one in engines.items() if name != "all" and "starts moved" not in name]
+    agreed = [np.arange(one["n"]) < round(one["n"] * one["agreement"]) for one in parts]
+    return [
+        ReadmeRow(
+            name="labels against a second engine, MuJoCo",
+            text=f"success agrees in {whole['agreement']:.1%}; where both lift the part, displacement "
+            f"differs by {1e3 * whole['shift_median']:.2f} mm (median; 90th percentile "
+            f"{1e3 * whole['shift_p90']:.1f} mm)",
+            interval=f"{_between(bootstrap_interval(agreed, np.mean), 100, '%')}; none for the percentiles",
+            n=f"{whole['n']} grasps of {len(parts)} parts, {whole['n_both']} lifted in both",
+        )
+    ]
+
+
+def _collect(stored: StoredReport) -> list[ReadmeRow]:
+    cells = _cells(stored)
+    text = f"{cells['grasps/s']} grasps/s (simulation {stored.facts['simulation']})"
+    return [ReadmeRow(name="collecting", text=text, interval=stored.facts["intervals"])]
+
+
+def _plan(stored: StoredReport) -> list[ReadmeRow]:
+    cells = _cells(stored)
+    paper = cells["the paper's"]
+    text = f"{cells['ours']} on an {cells['machine']}; the paper's network {paper}"
+    return [ReadmeRow(name="planning", text=text, interval=stored.facts["intervals"])]
+
+
+def _cells(stored: StoredReport) -> dict[str, str]:
+    """First row of a report's first table, by column."""
+    first = _report(stored)["tables"][0]
+    return dict(zip(first["header"], first["rows"][0], strict=True))
+
+
+def _report(stored: StoredReport) -> dict[str, Any]:
+    assert isinstance(stored.report, dict)
+    return stored.report
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.1f} mm"
+
+
+def _degrees(radians: float) -> str:
+    return f"{math.degrees(radians):.1f} degrees"
+
+
+def _rmse_intervals(found: dict[str, Any]) -> str:
+    translation = _between(found["translation_interval"], 1e3, "mm")
+    return f"{translation}, {_between(found['rotation_interval'], math.degrees(1), 'degrees')}"
+
+
+def _between(ends: Any, scale: float, unit: str, digits: int = 1) -> str:
+    low, high = (f"{scale * end:.{digits}f}" for end in ends)
+    return f"{low} to {high} {unit}" if "-" in low + high else f"{low} - {high} {unit}"
+
+
+ROWS: tuple[tuple[str, Callable[[StoredReport], list[ReadmeRow]]], ...] = (
+    ("success", _success),
+    ("displacement", _displacement),
+    ("palletize", _palletize),
+    ("regression", _regression),
+    ("shipped_model", _shipped_model),
+    ("validation", _validation),
+    ("engines", _engines),
+    ("collect", _collect),
+    ("plan_speed", _plan),
+)
+"""Name of each stored report of the table, and its rows."""

@@ -1,0 +1,48 @@
+"""Stored reports of results, and the facts that each table states of its run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from mskgrasp.core.config import read_yaml
+from tests.docs.pages import ROOT
+
+RESULTS = ROOT / "docs" / "results"
+RUNS = RESULTS / "runs.yaml"
+REPORTS = RESULTS / "reports"
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredReport:
+    """A stored report.
+
+    Attributes:
+        name: Of its file and of its block on a page.
+        facts: Command, split, n, intervals, model, simulation, commit, machine, as Markdown; perhaps notes.
+        report: What the command wrote; the path of a table in the repository where that holds it.
+    """
+
+    name: str
+    facts: dict[str, Any]
+    report: dict[str, Any] | str
+
+
+def read_stored(name: str) -> StoredReport:
+    """Reads a stored report, following a reference to another JSON file of the repository."""
+    values = json.loads((REPORTS / f"{name}.json").read_text(encoding="utf-8"))
+    run = read_yaml(RUNS).get(name)
+    known = run | dict(command=f"`{run['command']}`") if run else {}
+    report = values["report"]
+    if isinstance(report, str) and report.endswith(".json"):
+        report = json.loads((ROOT / report).read_text(encoding="utf-8"))
+    return StoredReport(name=name, facts=known | values["record"], report=report)
+
+
+def page_of(name: str) -> str:
+    """Path from the root of the repository of the page that shows a report."""
+    for page in sorted(RESULTS.glob("*.md")):
+        if f"<!-- run: {name} -->" in page.read_text(encoding="utf-8"):
+            return page.relative_to(ROOT).as_posix()
+    raise ValueError(f"no page of {RESULTS} shows the report '{name}': add <!-- run: {name} --> to one")
