@@ -9,8 +9,8 @@ from hal import Arm, ArmLimits, ArmState, Cell, GraspOutcome, Workspace
 from mskgrasp import Pose, execute_grasp
 
 HOME = np.array([0.3, 0.3, 0.5, 0.0, 1.0, 0.0, 0.0])
-JOINTS = dict(joint_lower=np.full(7, -2.0), joint_upper=np.full(7, 2.0))
-BOX = dict(box_lower=-np.ones(3), box_upper=np.ones(3), table_z=0.0)
+LIMITS = ArmLimits(joint_lower=np.full(7, -2.0), joint_upper=np.full(7, 2.0), box_lower=-np.ones(3),
+                   box_upper=np.ones(3), table_z=0.0, max_force=70.0)  # fmt: skip
 TABLE = Workspace(table_z=0.0, region=REGION, home=HOME, min_height=0.002, lift_height=0.1, grasp_force=30)
 
 
@@ -36,8 +36,8 @@ class Gantry(Arm):
         return Pose.from_vector(joints)
 
     def _state(self):
-        here = dict(joints=self.pose, T_base_tcp=Pose.from_vector(self.pose), gripper_width=self.width)
-        return ArmState(**here, timestamp_s=time.monotonic())
+        here, now = Pose.from_vector(self.pose), time.monotonic()
+        return ArmState(joints=self.pose, T_base_tcp=here, gripper_width=self.width, timestamp_s=now)
 
     def _move_to_joints(self, joints, speed):
         self.pose = joints
@@ -54,7 +54,6 @@ class Gantry(Arm):
 
 
 if __name__ == "__main__":
-    arm = Gantry(ArmLimits(**JOINTS, **BOX, max_force=70.0))
-    with Cell(camera=BlockCamera(), arm=arm, workspace=TABLE).connected() as cell:
+    with Cell(camera=BlockCamera(), arm=Gantry(LIMITS), workspace=TABLE).connected() as cell:
         result = execute_grasp(cell, plan_grasp(cell.camera.capture()).grasp)
     print("holding" if result.holding else "not holding")

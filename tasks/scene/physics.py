@@ -44,7 +44,7 @@ def _control_freq(rate_hz: int) -> int:
 
 
 def set_engine(physics: Physics) -> None:
-    """Puts the engine's settings in force that the task has, for scenes without the task."""
+    """Apply the task's engine settings, for scenes without the task."""
     # ManiSkill does this for its own scenes, from the configuration alone.
     config = SimpleNamespace(sim_config=sim_config(physics, MOST_HULLS))
     BaseEnv._set_scene_config(config)  # type: ignore[arg-type]
