@@ -46,8 +46,10 @@ from mskgrasp.palletize.report import result_section
 from mskgrasp.palletize.summary import PlacementSummary
 from mskgrasp.parts.catalogue import SPLITS
 from mskgrasp.parts.commands.rate import Rate
+from mskgrasp.parts.versions import PART_VERSION
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table, cell_text
+from mskgrasp.simulation.versions import SIMULATION_VERSION
 from mskgrasp.validate.engines import engine_sections
 from mskgrasp.validate.tables import label_error_section, validation_sections
 from tests.docs.pages import ROOT
@@ -153,7 +155,10 @@ def record(name: str) -> None:
     values = dict(
         record=dict(
             n=facts.get("n") or _size(report),
-            simulation=f"{physics.rate_hz} Hz, {physics.position_iterations} iterations",
+            simulation=(
+                f"{physics.rate_hz} Hz, {physics.position_iterations} iterations; simulation version "
+                f"{SIMULATION_VERSION}, parts of version {PART_VERSION}"
+            ),
             recorded=recorded,
             machine=_machine(),
         ),
