@@ -79,3 +79,14 @@ def test_a_figure_of_a_stored_report_is_the_figure_of_the_readme():
     report = stored.report | dict(overall=changed)
     (lifted, _) = by_name["success"](StoredReport(name="success", facts=stored.facts, report=report))
     assert lifted.text.startswith("12.3% lifted") and lifted.interval == "10.0 - 20.0 %"
+
+
+def test_the_readme_states_the_stored_intervals_of_the_comparison_of_engines():
+    whole = dict(agreement=0.9, shift_median=4e-4, shift_p90=3e-3, n=20, n_both=11)
+    report = dict(
+        engines={"all": whole, "sapien, starts moved by 0.1 mm": whole, "nut": whole, "bolt": whole},
+        intervals=dict(agreement=[0.8, 0.95], shift_median=[3e-4, 6e-4], shift_p90=[2e-3, 5e-3]),
+    )
+    (row,) = dict(ROWS)["engines"](StoredReport(name="engines", facts={}, report=report))
+    assert row.interval == "80.0 - 95.0 %; 0.30 - 0.60 mm; 2.00 - 5.00 mm"
+    assert row.n == "20 grasps of 2 parts, 11 lifted in both"
