@@ -135,13 +135,14 @@ def lasting_disagreements(found: Mapping[str, Outcomes]) -> int:
     sapien, mujoco = found["sapien"], found["mujoco"]
     same = sapien.settled & mujoco.settled & (sapien.success != mujoco.success)
     for name, outcomes in (("sapien", sapien), ("mujoco", mujoco)):
-        same &= found[f"{name}{SHIFTED}"].success == outcomes.success
+        moved = found[f"{name}{SHIFTED}"]
+        same &= moved.settled & (moved.success == outcomes.success)
     return int(same.sum())
 
 
 def tilted(mujoco: Outcomes, sapien: Outcomes) -> dict[str, int]:
-    """Of the n grasps that hold in both engines, in how many the part tilts in one alone, and in both."""
-    held = mujoco.success & sapien.success
+    """Number n of grasps that hold in both engines, and of those in which the part tilts, by engine."""
+    held = mujoco.success & sapien.success & mujoco.settled & sapien.settled
     here, there = mujoco.tilt[held] > TILTED, sapien.tilt[held] > TILTED
     return dict(
         n=int(held.sum()),
@@ -153,7 +154,7 @@ def tilted(mujoco: Outcomes, sapien: Outcomes) -> dict[str, int]:
 
 def disagreements(ours: Outcomes, theirs: Outcomes) -> list[tuple[tuple[str, str], int]]:
     """Number of grasps whose S differs, by outcome in each engine; most frequent first."""
-    differ = np.flatnonzero(ours.success != theirs.success)
+    differ = np.flatnonzero((ours.success != theirs.success) & ours.settled & theirs.settled)
     names = [(FAILURES[int(ours.failure[i])], FAILURES[int(theirs.failure[i])]) for i in differ]
     said = [(a.replace("none", "held"), b.replace("none", "held")) for a, b in names]
     return Counter(said).most_common()

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 import coacd
 import numpy as np
 import trimesh
-from manifold3d import Manifold
 from scipy.spatial import ConvexHull
 
 from mskgrasp.core.errors import BadPart
@@ -102,14 +101,6 @@ def fewest_hulls(
         most_largest = max(share * CLOSE_LARGEST_MM, surface.outward_largest(hulls) + 0.01)
     most_ratio = min(MOST_VOLUME_RATIO, 1 + share * (CLOSE_VOLUME_RATIO - 1))
     return tuple(_join(surface, hulls, most_p95, most_ratio, most_largest))
-
-
-def is_manifold(mesh_mm: trimesh.Trimesh) -> bool:
-    """Whether boolean operations accept the mesh: every edge joins two faces."""
-    from manifold3d import Error, Mesh64
-
-    body = Manifold(Mesh64(np.array(mesh_mm.vertices, np.float64), np.array(mesh_mm.faces, np.uint64)))
-    return body.status() == Error.NoError and not body.is_empty()
 
 
 def _cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
