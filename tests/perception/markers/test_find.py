@@ -63,7 +63,7 @@ def test_known_heights_stand_in_for_depth():
     blind = dataclasses.replace(frame, depth=np.full_like(frame.depth, np.nan))
     found = find(blind, heights=(HEIGHT, HEIGHT))
     assert np.abs(found.points_base - centres(BEFORE)).max() < 0.1e-3
-    with pytest.raises(MarkersNotFound, match="no depth: on the larger square 0 depths .* tell the squares'"):
+    with pytest.raises(MarkersNotFound, match="no depth: on the larger square 0 depths .* give the squares'"):
         find(blind)
 
 
