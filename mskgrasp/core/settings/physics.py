@@ -26,7 +26,7 @@ class Physics(Config):
     rest. The first 6 mm of the lift, in which the part leaves the table, and the last 20 ms before the part's
     pose in the hand is measured use ``rate_hz``, as does the simulated cell (`hal.sim`) while its hand holds
     a part or is near one. At 250 Hz parts swing in the hand, by up to 13 degrees more than at 1000 Hz."""
-    position_iterations: int = Field(default=50, ge=4)
+    position_iterations: int = Field(default=25, ge=4)
     """Solver iterations a step; `validate` compares them."""
     contact_offset: float = Field(default=0.001, gt=0, le=0.02)
     """Margin around each shape, m: contacts are made where two margins meet. Of a hand on its way 2 mm are
