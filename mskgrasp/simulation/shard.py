@@ -154,7 +154,7 @@ def _try(
         return {}, "part_not_seen"
     outcome = env.try_grasp(torch.as_tensor(grasp, device=env.device))
     row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
-    row |= dict(depth=depth, grasp=grasp[0], attempt=np.int32(attempt), draw=np.int32(draw))
+    row |= dict(depth=depth, grasp=grasp[0], attempt=np.array(attempt), draw=np.array(draw))
     row |= env.hand_settings()
     return row, discard_reason(outcome, row)
 
