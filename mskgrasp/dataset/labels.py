@@ -156,7 +156,7 @@ def _array(file: h5py.File, name: str) -> np.ndarray:
     link = file.get(name, getlink=True)
     if not isinstance(stored, h5py.Dataset) or not isinstance(link, h5py.HardLink):
         raise ValueError(f"{name} is no array of its own")
-    if stored.external or stored.is_virtual or stored.size > 7 * _MOST_ROWS:
+    if stored.external or stored.is_virtual or (stored.size or 0) > 7 * _MOST_ROWS:
         raise ValueError(f"{name} lies elsewhere, or claims the shape {stored.shape}")
     return np.asarray(stored)
 
