@@ -288,6 +288,16 @@ class GraspDisplacementEnv(BaseEnv):
             true = error.true_camera(self.T_base_camera)
             self._overhead_sensor.camera._render_cameras[0].set_local_pose(sapien_camera_pose(true))
 
+    def hand_settings(self) -> dict[str, np.ndarray]:
+        """Force of each pad, N, and friction of pads and part in the present episode, drawn or as set."""
+        error = self._errors[0]
+        names = ("finger_force", "friction_pad_part")
+        drawn = {name: None if error is None else getattr(error, name) for name in names}
+        return {
+            name: np.array(getattr(self.physics, name) if value is None else value)
+            for name, value in drawn.items()
+        }
+
     # ------------------------------------------------------------------ images and poses
 
     def capture_depth(self) -> Tensor:

@@ -171,6 +171,10 @@ def random_attempts(n: int, size: tuple[float, float, float], rng: np.random.Gen
         pose_base_obj=T_base_obj.as_vector().astype(np.float32),
         pose_tcp_obj_before=before.as_vector().astype(np.float32),
         pose_tcp_obj_after=after.as_vector().astype(np.float32),
+        attempt=np.arange(n, dtype=np.int32),
+        draw=np.zeros(n, np.int32),
+        finger_force=np.full(n, 30.0, np.float32),
+        friction_pad_part=np.full(n, 0.5, np.float32),
     )
 
 

@@ -57,6 +57,8 @@ class CollectConfig(Config):
     """Processes; 0: one per core."""
     cluster: str | None = None
     """Run on a Ray cluster: auto, or host:port of its head. workers then bounds the cores that are used."""
+    labels: tuple[Path, ...] = ()
+    """Files of `mskgrasp.dataset export --format labels`: their shards are rendered, not simulated again."""
     part_filter: PartFilter = PartFilter()
     """Bounds on the size of parts and on how easily they are grasped."""
     physics: Physics = Physics()
@@ -75,9 +77,11 @@ class CollectConfig(Config):
                 raise ValueError(
                     f"physics.{name} is at least {LEAST_RATE_HZ}: labels made with less are wrong"
                 )
+        if self.labels and self.cluster is not None:
+            raise ValueError("labels are rendered by this machine's processes alone: leave cluster out")
         self.camera.check_sees(REGION)
         return self
 
     def identity(self) -> dict:
         """The settings that determine the data: two runs with the same identity make the same arrays."""
-        return self.model_dump(mode="json", exclude={"out", "workers", "cluster"})
+        return self.model_dump(mode="json", exclude={"out", "workers", "cluster", "labels"})

@@ -9,6 +9,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
+
 from mskgrasp.collect.cluster import (
     check_cluster,
     connected,
@@ -22,7 +24,8 @@ from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.core.files import LOCK, exclusive_lock
 from mskgrasp.core.shipped import config_file
-from mskgrasp.dataset import read_shard, shard_path
+from mskgrasp.dataset import ShardInfo, read_shard, shard_path
+from mskgrasp.dataset.labels import read_labels
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.catalogue import ratings, read_index, representative_entries
 from mskgrasp.runtime.cli import make_folder
@@ -31,7 +34,7 @@ from mskgrasp.runtime.options import parse
 from mskgrasp.runtime.progress import note, progress
 from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult
 from mskgrasp.simulation.shard_task import ShardTask
-from mskgrasp.simulation.versions import other_versions
+from mskgrasp.simulation.versions import SIMULATION_VERSION, other_versions
 
 DESCRIPTION = """Simulates random grasps of parts and records what happened.
 
@@ -57,6 +60,9 @@ def collect(config: CollectConfig) -> None:
     """Make the shards that are missing and sum up the dataset."""
     if config.cluster is not None:
         check_cluster(config.cluster)
+    known = read_labels(config.labels)
+    for one in known.values():
+        check_labels(one.info, config)
     # Sets are stored as names of parts: a catalogue that grows must not change an existing dataset.
     names = chosen_names(config.parts or ("starter",))
     if config.sample:
@@ -71,6 +77,29 @@ def collect(config: CollectConfig) -> None:
             if not alone:
                 raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
             _collect(config, [part for _, part in parts])
+
+
+def check_labels(info: ShardInfo, config: CollectConfig) -> None:
+    """Refuse labels of other settings, or of another simulation.
+
+    Raises:
+        BadDataset: They differ.
+    """
+    name = f"labels of shard {info.index} of part '{info.part}'"
+    settings = dict(
+        seed=config.seed,
+        physics=config.physics.model_dump(),
+        noise=config.noise.model_dump(mode="json"),
+        intrinsics=config.camera.intrinsics().tolist(),
+    )
+    changed = [key for key, value in settings.items() if np.asarray(getattr(info, key)).tolist() != value]
+    if changed:
+        raise BadDataset(f"{name} were made with other settings ({', '.join(changed)} differ); use those")
+    if info.versions.get("simulation") != str(SIMULATION_VERSION):
+        raise BadDataset(
+            f"{name} are of simulation version {info.versions.get('simulation')}, not {SIMULATION_VERSION}: "
+            "collect them again"
+        )
 
 
 def sampled(names: list[str], count: int) -> list[str]:

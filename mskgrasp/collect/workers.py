@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 
 from mskgrasp.collect.config import CollectConfig
+from mskgrasp.dataset.labels import read_labels
 from mskgrasp.runtime.local_executor import LocalExecutor
 from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult, run_jobs
 from mskgrasp.simulation.shard_task import ShardTask
@@ -35,4 +36,12 @@ def _shard_maker(config: CollectConfig) -> Iterator[Callable[[ShardTask], Iterat
     from mskgrasp.simulation.shard import Simulator
 
     simulator = Simulator(config.physics, config.camera, config.noise)
-    yield lambda task: simulator.write(task, config.out)
+    known = read_labels(config.labels)
+
+    def make(task: ShardTask) -> Iterator[int]:
+        labels = known.get((task.part, task.index))
+        if labels is None:
+            return simulator.write(task, config.out)
+        return simulator.restore(task, labels, config.out)
+
+    yield make

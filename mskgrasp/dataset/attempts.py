@@ -26,7 +26,7 @@ class Column:
     unit: str
     frame: str
     finite: Literal["all", "successful", "none"]  # which rows must hold finite numbers
-    since: int = 1  # version of the schema; in older shards the column is NaN
+    since: int = 1  # version of the schema; in older shards the column is NaN, or -1 where it is of integers
 
 
 COLUMNS = {
@@ -41,6 +41,10 @@ COLUMNS = {
     "pose_base_obj": Column("float32", (7,), _POSE, "base", "all"),
     "pose_tcp_obj_before": Column("float32", (7,), _POSE, "tcp, commanded", "all"),
     "pose_tcp_obj_after": Column("float32", (7,), _POSE, "tcp, measured", "successful"),
+    "attempt": Column("int32", (), "number among the part's attempts", "-", "all", since=3),
+    "draw": Column("int32", (), "1", "-", "all", since=3),
+    "finger_force": Column("float32", (), "N", "-", "none", since=3),
+    "friction_pad_part": Column("float32", (), "1", "-", "none", since=3),
 }
 
 
@@ -61,6 +65,10 @@ class Attempts:
         pose_base_obj: (n, 7) float32, x y z qw qx qy qz, at rest before the grasp.
         pose_tcp_obj_before: (n, 7) float32, in the commanded TCP.
         pose_tcp_obj_after: (n, 7) float32, in the measured TCP once lifted.
+        attempt: (n,) int32 number among the attempts of the part, discarded ones included; -1 where unknown.
+        draw: (n,) int32 times that its scene was drawn again, because the part was not at rest; likewise.
+        finger_force: (n,) float32 force of each pad, drawn or that of the settings, N; NaN where unknown.
+        friction_pad_part: (n,) float32 coefficient between pads and part, likewise.
     """
 
     depth: np.ndarray
@@ -74,6 +82,10 @@ class Attempts:
     pose_base_obj: np.ndarray
     pose_tcp_obj_before: np.ndarray
     pose_tcp_obj_after: np.ndarray
+    attempt: np.ndarray
+    draw: np.ndarray
+    finger_force: np.ndarray
+    friction_pad_part: np.ndarray
 
     def __len__(self) -> int:
         return len(self.grasp)

@@ -36,7 +36,7 @@ def check_export_path(folder: Path, path: Path, suffix: str) -> list[Path]:
         raise UsageError(f"--out {path} lies among the dataset's shards; choose another folder")
     if path.suffix != suffix:
         raise UsageError(f"--out {path}: this format needs a name that ends in {suffix}")
-    files = [path] if suffix == ".npz" else [path, path.with_suffix(".json")]
+    files = [path, path.with_suffix(".json")] if suffix == ".h5" else [path]
     for file in files:
         if file.exists():
             raise UsageError(

@@ -17,8 +17,9 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.dataset.attempts import COLUMNS, Attempts, ShardInfo, problems, shape_problems
 
-SCHEMA_VERSION = 2
-"""Version 1 had no relative speeds, and stored attempts at parts that were not at rest as failures."""
+SCHEMA_VERSION = 3
+"""Version 1 had no relative speeds, and stored attempts at parts that were not at rest as failures; version 2
+had neither number, force nor friction of each attempt."""
 _FORMAT = "mskgrasp-shard"
 _MOST_BYTES = 2**32
 """Largest plausible array: more than 10,000 images of the largest camera."""
@@ -177,7 +178,8 @@ def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], Sh
 def _array(file: h5py.File, name: str) -> np.ndarray:
     stored = file.get(name)
     if stored is None:  # younger than the file, or _check_header would have refused it
-        return np.full(len(_array(file, "success")), np.nan, COLUMNS[name].dtype)
+        dtype = np.dtype(COLUMNS[name].dtype)
+        return np.full(len(_array(file, "success")), np.nan if dtype.kind == "f" else -1, dtype)
     assert isinstance(stored, h5py.Dataset)  # checked by _check_header
     # The data must be in the shard itself: a foreign file must not make us read other files.
     link = file.get(name, getlink=True)

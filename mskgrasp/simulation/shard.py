@@ -12,11 +12,12 @@ import gymnasium
 import numpy as np
 import torch
 
-from mskgrasp.core.errors import NoPartFound
+from mskgrasp.core.errors import BadDataset, NoPartFound
 from mskgrasp.core.grasp import HAND_GEOMETRY, MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
 from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, u16_to_depth, write_shard
+from mskgrasp.dataset.labels import ShardLabels
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.simulation.shard_task import ShardTask
 from mskgrasp.simulation.versions import versions
@@ -114,6 +115,30 @@ class Simulator:
         )
         return attempts, info
 
+    def restore(self, task: ShardTask, labels: ShardLabels, dataset: Path) -> Iterator[int]:
+        """Write a shard whose labels are known: its scenes are rendered, no grasp is tried; yield as `run`.
+
+        Raises:
+            BadDataset: The labels are not those of this task.
+        """
+        env = self.load(task.folder)
+        columns, info = labels.columns, labels.info
+        numbers = columns["attempt"]
+        within = ((task.first <= numbers) & (numbers < task.first + task.n)).all()
+        if not within or len(numbers) + sum(info.discarded.values()) != task.n or info.seed != task.seed:
+            raise BadDataset(
+                f"the labels of shard {task.index} of part '{task.part}' are not those of attempts "
+                f"{task.first} to {task.first + task.n - 1} of seed {task.seed}: use their settings"
+            )
+        images = np.zeros((len(numbers), self._camera.n_pixels, self._camera.n_pixels), np.uint16)
+        for row, (attempt, draw) in enumerate(zip(numbers.tolist(), columns["draw"].tolist(), strict=True)):
+            images[row] = capture_scene(env, task.part, task.seed, attempt, draw)[0]
+            yield int(columns["success"][row])
+        for _ in range(task.n - len(numbers)):
+            yield -1
+        attempts = Attempts(depth=images, **columns)
+        write_shard(shard_path(dataset, task.part, task.index), attempts, info)
+
     def close(self) -> None:
         """Free the simulation."""
         if self._env is not None:
@@ -129,7 +154,9 @@ def _try(
         return {}, "part_not_seen"
     outcome = env.try_grasp(torch.as_tensor(grasp, device=env.device))
     row = {name: outcome[name][0].cpu().numpy() for name in FIELDS}
-    return dict(row, depth=depth, grasp=grasp[0]), discard_reason(outcome, row)
+    row |= dict(depth=depth, grasp=grasp[0], attempt=np.array(attempt), draw=np.array(draw))
+    row |= env.hand_settings()
+    return row, discard_reason(outcome, row)
 
 
 def draw_attempt(
@@ -148,9 +175,7 @@ def draw_attempt(
         The depth image (h, w), uint16 in 0.1 mm, and the grasp (1, 4), float32, base frame; None where the
         camera does not see the part.
     """
-    episode_seed, grasp_seed = scene_seeds(seed, part, attempt, draw)
-    env.begin_episode(episode_seed)
-    depth = depth_to_u16(env.capture_depth()[0].cpu().numpy())
+    depth, grasp_seed = capture_scene(env, part, seed, attempt, draw)
     try:
         view = view_part(
             u16_to_depth(depth),
@@ -162,6 +187,15 @@ def draw_attempt(
     except NoPartFound:
         return depth, None
     return depth, sample_grasps(view, 1, np.random.default_rng(grasp_seed)).astype(np.float32)
+
+
+def capture_scene(
+    env: GraspDisplacementEnv, part: str, seed: int, attempt: int, draw: int
+) -> tuple[np.ndarray, int]:
+    """Place the part of an attempt; returns its depth image, as `draw_attempt` does, and its grasp's seed."""
+    episode_seed, grasp_seed = scene_seeds(seed, part, attempt, draw)
+    env.begin_episode(episode_seed)
+    return depth_to_u16(env.capture_depth()[0].cpu().numpy()), grasp_seed
 
 
 def discard_reason(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> str:
@@ -197,6 +231,10 @@ def _stack(rows: list[dict[str, np.ndarray]], shape: tuple[int, int]) -> Attempt
         pose_base_obj=np.zeros((0, 7), np.float32),
         pose_tcp_obj_before=np.zeros((0, 7), np.float32),
         pose_tcp_obj_after=np.zeros((0, 7), np.float32),
+        attempt=np.zeros(0, np.int32),
+        draw=np.zeros(0, np.int32),
+        finger_force=np.zeros(0, np.float32),
+        friction_pad_part=np.zeros(0, np.float32),
     )
     if not rows:
         return Attempts(**empty)

@@ -20,8 +20,9 @@ from mskgrasp.collect.run import check_out, is_done, main
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock
 from mskgrasp.dataset import list_shards, read_shard
+from mskgrasp.dataset.labels import export_labels
 from mskgrasp.simulation.shard_task import ShardTask
-from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, command
+from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, collect, command
 from tests.programs import run_here
 
 
@@ -188,3 +189,17 @@ def test_two_collections_do_not_write_into_one_folder(collected, tmp_path):
     assert done.returncode == 2 and "another collection is writing" in done.stderr
     with exclusive_lock(out) as alone:
         assert alone
+
+
+def test_a_dataset_is_made_again_from_its_labels(collected, tmp_path):
+    export_labels(collected, tmp_path / "all.labels")
+    done = collect(tmp_path / "again", "--labels", str(tmp_path / "all.labels"))
+    assert done.returncode == 0, done.stderr
+    for path in list_shards(collected):
+        (one, _), (two, _) = read_shard(path), read_shard(tmp_path / "again" / "shards" / path.name)
+        assert np.array_equal(one.depth, two.depth) and np.array_equal(one.failure, two.failure)
+    other = collect(tmp_path / "other", "--labels", str(tmp_path / "all.labels"), "--seed", "6")
+    assert other.returncode == 1 and "other settings (seed differ)" in other.stderr
+    nowhere = collect(tmp_path / "other", "--labels", str(tmp_path / "none.labels"))
+    assert nowhere.returncode == 2 and "no file of labels" in nowhere.stderr
+    assert not (tmp_path / "other").exists()

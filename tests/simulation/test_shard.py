@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,9 +12,11 @@ import torch
 
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.core.config import read_config
+from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.grasp import MAX_DISPLACEMENT, lowest_grasp_z
-from mskgrasp.core.settings import REGION, TABLE_Z
+from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
 from mskgrasp.dataset import list_shards, read_shard
+from mskgrasp.dataset.labels import export_labels, read_labels
 from mskgrasp.parts import find_part
 from mskgrasp.simulation import shard
 from mskgrasp.simulation.shard import FIELDS, MOST_REDRAWS, Simulator, discard_reason, draw_attempt
@@ -45,6 +48,36 @@ def test_a_shard_has_the_bytes_that_another_process_made(
     attempts, info = read_shard(path)
     assert [one for one in yields if one >= 0] == attempts.success.astype(int).tolist()
     assert yields.count(-1) == sum(info.discarded.values())
+
+
+def test_a_shard_is_made_again_from_its_labels_and_its_seed(
+    simulator: Simulator, collected: Path, tmp_path: Path
+):
+    export_labels(collected, tmp_path / "all.labels")
+    labels = read_labels([tmp_path / "all.labels"])[PART, 1]
+    task = ShardTask(part=PART, folder=str(find_part(PART).folder), index=1, first=3, n=3, seed=5)
+    yields = list(simulator.restore(task, labels, tmp_path))
+    (path,) = list_shards(tmp_path)
+    (attempts, info), (before, info_before) = read_shard(path), read_shard(collected / "shards" / path.name)
+    assert np.array_equal(attempts.depth, before.depth) and np.array_equal(attempts.grasp, before.grasp)
+    assert attempts.displacement == pytest.approx(before.displacement, abs=3e-6, nan_ok=True)
+    assert info.discarded == info_before.discarded and info.versions == info_before.versions
+    assert [one for one in yields if one >= 0] == before.success.astype(int).tolist()
+    with pytest.raises(BadDataset, match="not those of attempts 0 to 2"):
+        list(simulator.restore(dataclasses.replace(task, first=0), labels, tmp_path))
+
+
+def test_force_and_friction_of_each_attempt_are_those_that_were_drawn(tmp_path: Path):
+    noise = ExecutionNoise(finger_force=(30.0, 70.0), friction_pad_part=(0.3, 0.8))
+    drawing = Simulator(Physics(), Overhead(), noise)
+    task = ShardTask(part=PART, folder=str(find_part(PART).folder), index=0, first=0, n=3, seed=5)
+    list(drawing.write(task, tmp_path))
+    drawing.close()
+    attempts, _ = read_shard(list_shards(tmp_path)[0])
+    assert attempts.attempt.tolist() == [0, 1, 2]
+    assert len(set(attempts.finger_force)) == len(set(attempts.friction_pad_part)) == 3
+    assert ((attempts.finger_force > 30) & (attempts.finger_force < 70)).all()
+    assert ((attempts.friction_pad_part > 0.3) & (attempts.friction_pad_part < 0.8)).all()
 
 
 def test_a_shard_without_attempts_can_be_read(simulator: Simulator, tmp_path: Path):

@@ -15,6 +15,7 @@ from mskgrasp.dataset.card import markdown, read_card, tables
 from mskgrasp.dataset.check import check_dataset, require_dataset
 from mskgrasp.dataset.commands.maniskill import export_maniskill
 from mskgrasp.dataset.export import export_npz
+from mskgrasp.dataset.labels import export_labels
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table
@@ -55,19 +56,20 @@ class InfoCommand:
 
 @dataclass(frozen=True, kw_only=True)
 class ExportCommand:
-    """Write a dataset for other tools: one .npz file, or ManiSkill trajectories (.h5 and .json).
+    """Write a dataset for other tools (.npz, or ManiSkill's .h5 and .json), or its labels without images.
 
-    docs/dataset.md has both layouts. An existing file is not overwritten.
+    docs/dataset.md has the layouts. An existing file is not overwritten.
 
     Example: python -m mskgrasp.dataset export data/demo --format maniskill --out out/demo.h5
     """
 
     folder: tyro.conf.Positional[Path]
     """Folder of the dataset."""
-    format: Literal["npz", "maniskill"]
-    """npz: all arrays in one file, for numpy. maniskill: a trajectory an attempt, for ManiSkill's loaders."""
+    format: Literal["npz", "maniskill", "labels"]
+    """npz: all arrays in one file, for numpy. maniskill: a trajectory an attempt, for ManiSkill's loaders.
+    labels: no images; `mskgrasp.collect --labels` renders them and makes the dataset again."""
     out: Path
-    """The file to write, ending in .npz or .h5; with .h5 comes a .json file of the same name."""
+    """The file to write, ending in .npz, .h5 or .labels; with .h5 comes a .json file of the same name."""
 
 
 VERBS = {"check": CheckCommand, "info": InfoCommand, "export": ExportCommand}
@@ -132,6 +134,8 @@ def run_export(verb: ExportCommand) -> int:
     require_dataset(verb.folder)
     if verb.format == "npz":
         n, files = export_npz(verb.folder, verb.out, _with_progress), [verb.out]
+    elif verb.format == "labels":
+        n, files = export_labels(verb.folder, verb.out, _with_progress), [verb.out]
     else:
         n = export_maniskill(verb.folder, verb.out, _with_progress)
         files = [verb.out, verb.out.with_suffix(".json")]

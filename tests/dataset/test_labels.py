@@ -1,0 +1,93 @@
+"""Labels without images: what they round, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.dataset import list_shards, read_shard
+from mskgrasp.dataset.attempts import COLUMNS
+from mskgrasp.dataset.commands.command_line import main
+from mskgrasp.dataset.labels import export_labels, read_labels
+from tests import synthetic
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return synthetic.write_dataset(tmp_path / "boxes", n_parts=2, n_attempts=40, seed=3)
+
+
+def test_labels_are_those_of_the_shards_to_a_micrometre(folder: Path, tmp_path: Path):
+    out = tmp_path / "boxes.labels"
+    assert main(["export", str(folder), "--format", "labels", "--out", str(out)]) == 0
+    found = read_labels([out])
+    assert len(found) == len(list_shards(folder))
+    for path in list_shards(folder):
+        attempts, info = read_shard(path)
+        labels = found[info.part, info.index]
+        for name in (
+            "seed",
+            "physics",
+            "noise",
+            "versions",
+            "discarded",
+            "part_hash",
+            "family",
+            "region",
+            "hand",
+        ):
+            assert getattr(labels.info, name) == getattr(info, name), name
+        assert np.array_equal(labels.info.intrinsics, info.intrinsics)
+        held = attempts.success
+        assert held.any() and not held.all()
+        for name, column in COLUMNS.items():
+            if name == "depth":
+                continue
+            rows = held if column.finite == "successful" else np.ones(len(held), bool)
+            ours, theirs = labels.columns[name], getattr(attempts, name)
+            assert ours.dtype == theirs.dtype and ours.shape == theirs.shape
+            assert ours[rows] == pytest.approx(theirs[rows], abs=3e-6, nan_ok=True), name
+        assert np.isnan(labels.columns["displacement"][~held]).all()
+
+
+def test_labels_are_a_small_part_of_the_dataset(tmp_path: Path):
+    folder = synthetic.write_dataset(tmp_path / "boxes", n_parts=1, n_attempts=400, seed=3)
+    export_labels(folder, tmp_path / "boxes.labels")
+    assert (tmp_path / "boxes.labels").stat().st_size < 400 * 60 + 15_000
+
+
+def test_bad_files_are_refused_by_name(folder: Path, tmp_path: Path):
+    out = tmp_path / "boxes.labels"
+    export_labels(folder, out)
+    with pytest.raises(UsageError, match="exists"):
+        export_labels(folder, out)
+    with pytest.raises(UsageError, match=r"ends in \.labels"):
+        export_labels(folder, tmp_path / "boxes.npz")
+    with pytest.raises(BadDataset, match="again; name each file once"):
+        read_labels([out, out])
+    with pytest.raises(BadDataset, match="no file of labels"):
+        read_labels([tmp_path / "none.labels"])
+    with pytest.raises(BadDataset, match="no file of labels"):
+        read_labels([list_shards(folder)[0]])
+    with h5py.File(out, "r+") as file:
+        del file["grasp"]
+        file["grasp"] = np.zeros((3, 4), np.float32)
+    with pytest.raises(BadDataset, match="do not fit its shards"):
+        read_labels([out])
+    out.write_bytes(out.read_bytes()[:500])
+    with pytest.raises(BadDataset, match=r"boxes\.labels is damaged"):
+        read_labels([out])
+
+
+def test_an_array_in_another_file_is_refused(folder: Path, tmp_path: Path):
+    out = tmp_path / "boxes.labels"
+    export_labels(folder, out)
+    with h5py.File(out, "r+") as file:
+        del file["grasp"]
+        file["grasp"] = h5py.ExternalLink(str(list_shards(folder)[0]), "grasp")
+    with pytest.raises(BadDataset, match="no array of its own"):
+        read_labels([out])
