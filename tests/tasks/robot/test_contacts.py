@@ -49,7 +49,7 @@ def test_what_is_within_the_contact_offset_is_near_before_it_is_felt(env, place)
 def test_a_block_under_a_finger_pushes_the_hand_up_and_the_table_bears_both(env, place):
     """Sent 0.5 mm into the block, 1 kg, the hand presses on it; the table carries that and the weight.
 
-    The stiff hand chatters on the block, and of a contact that opens within a step PhysX reports a part of the
+    The stiff hand chatters on the block. Of a contact that opens within a step PhysX reports a part of the
     impulse: the sum of the forces is too low, by up to 15 % with these settings.
     """
     place("kilo")
