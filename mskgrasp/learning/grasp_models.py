@@ -16,6 +16,8 @@ from torch import Tensor
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadModel, MissingModel
+from mskgrasp.core.grasp import HAND_GEOMETRY
+from mskgrasp.learning.label_source import LabelSource
 from mskgrasp.learning.network_config import NetworkConfig, Normalisation
 from mskgrasp.learning.networks import GraspDisplacementNetwork, GraspQualityNetwork
 from mskgrasp.learning.symmetry import views
@@ -50,6 +52,8 @@ class ModelMeta(Config):
     network: NetworkConfig
     normalisation: Normalisation
     calibration: ModelCalibration = ModelCalibration()
+    labels: tuple[LabelSource, ...] = ()
+    """Simulations that the labels come from; empty: not recorded."""
     training: dict[str, Any] = {}
     metrics: dict[str, Any] = {}
 
@@ -174,6 +178,7 @@ def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -
     folder = Path(folder)
     require_model(folder)
     meta = _read_meta(folder / DESCRIPTION)
+    _check_hand(meta, folder)
     path = folder / WEIGHTS
     try:
         weights = load_file(path)
@@ -226,6 +231,16 @@ def _read_meta(path: Path) -> ModelMeta:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         raise BadModel(f"{path}: '{key}': {first['msg'].lower()}; copy it again or train again") from error
+
+
+def _check_hand(meta: ModelMeta, folder: Path) -> None:
+    for source in meta.labels:
+        other = [name for name, size in source.hand.items() if abs(HAND_GEOMETRY.get(name, 0) - size) > 1e-6]
+        if other:
+            sizes = ", ".join(f"{name} {1e3 * source.hand[name]:.1f} mm" for name in other)
+            raise BadModel(
+                f"the model in {folder} was trained for another hand ({sizes}); train on data of this hand"
+            )
 
 
 def _weights(models: Models) -> dict[str, Tensor]:

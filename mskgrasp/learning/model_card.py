@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from mskgrasp.core.settings import Physics
 from mskgrasp.learning.grasp_models import ModelMeta
+from mskgrasp.learning.label_source import LabelSource
 
 _LIMITS = """\
 - For a Franka Hand with its standard pads (80 mm opening), vertical grasps of a single part on a flat table,
@@ -44,6 +46,7 @@ def model_card(meta: ModelMeta) -> str:
         f"{sides[2]} test parts (held out from both)",
         f"- digest of grasps and outcomes: `{str(known.get('data_fingerprint', ''))[:16]}`",
         "",
+        *(["## Labels", "", *map(_label_lines, meta.labels), ""] if meta.labels else []),
         "## Settings",
         "",
         *(f"- {name}: {_words(settings[name])}" for name in sorted(settings)),
@@ -59,6 +62,22 @@ def model_card(meta: ModelMeta) -> str:
         _LIMITS,
     ]
     return "\n".join(lines)
+
+
+def _label_lines(source: LabelSource) -> str:
+    """Simulation, camera and drawn errors, a line each, and the settings that differ from today's defaults."""
+    usual = Physics().model_dump()
+    other = [f"{name} {value}" for name, value in source.physics.items() if usual.get(name) != value]
+    drawn = [
+        f"{name} {' to '.join(map(str, value)) if isinstance(value, (list, tuple)) else value}"
+        for name, value in sorted(source.noise.items())
+    ]
+    return (
+        f"- simulation version {source.simulation}, fidelity {source.fidelity}, seed {source.seed}\n"
+        f"- camera {source.camera_height:.3f} m above the table\n"
+        f"- physics other than today's: {', '.join(other) or 'none'}\n"
+        f"- errors of the cell: {', '.join(drawn) or 'none'}"
+    )
 
 
 def result_rows(report: dict[str, Any]) -> list[list[tuple[str, ...]]]:

@@ -18,6 +18,7 @@ from torch import Tensor
 from mskgrasp.core.errors import BadDataset, NoPartFound
 from mskgrasp.core.grasp import FAILURES, centre_in_grasp_frame, to_grasp_displacement
 from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard, u16_to_depth
+from mskgrasp.learning.label_source import LabelSource, distinct, source_of
 from mskgrasp.learning.network_config import NetworkConfig
 from mskgrasp.parts.catalogue import Split, read_index
 from mskgrasp.perception.height_patches import crop_patches, height_image
@@ -53,6 +54,7 @@ class Samples:
         skipped: Number of unusable attempts by reason: the planner would find no part in them either, or the
             part was not at rest.
         fingerprint: Hex digest of grasps and outcomes; equal digests mean equal data.
+        sources: Simulations and settings that the labels come from; of a sound dataset there is one.
     """
 
     patches: Tensor
@@ -68,6 +70,7 @@ class Samples:
     parts: tuple[str, ...]
     skipped: dict[str, int]
     fingerprint: str
+    sources: tuple[LabelSource, ...] = ()
 
     def __len__(self) -> int:
         return len(self.success)
@@ -164,12 +167,14 @@ class _Piece:
         raw: Bytes that enter the fingerprint.
         arrays: By the names of the samples' attributes; empty if no attempt shows a part.
         skipped: Number of unusable attempts by reason.
+        source: Where its labels come from.
     """
 
     part: str
     raw: bytes
     arrays: dict[str, np.ndarray]
     skipped: dict[str, int]
+    source: LabelSource
 
 
 @contextlib.contextmanager
@@ -194,6 +199,7 @@ def _reader(
                 raw=b"".join(np.ascontiguousarray(array).tobytes() for array in outcomes),
                 arrays=arrays,
                 skipped=dict(skipped),
+                source=source_of(info),
             ),
         )
 
@@ -223,6 +229,7 @@ def _joined(pieces: list[_Piece], folder: Path, network: NetworkConfig) -> Sampl
         parts=parts,
         skipped=dict(skipped),
         fingerprint=digest,
+        sources=distinct(piece.source for piece in pieces),
     )
 
 

@@ -108,6 +108,7 @@ def describe_networks(samples: Samples, training_rows: Tensor, config: LearningC
             target_std=tuple(std.tolist()),
             base_rate=float(success.double().mean()),
         ),
+        labels=samples.sources,
         training={
             "attempts": len(training_rows),
             "successes": int(success.sum()),

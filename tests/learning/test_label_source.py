@@ -1,0 +1,52 @@
+"""Origin of a model's labels: read from the shards, stored with the model, compared with the hand."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mskgrasp.core.errors import BadModel
+from mskgrasp.core.grasp import HAND_GEOMETRY
+from mskgrasp.dataset import list_shards, read_shard
+from mskgrasp.learning.grasp_models import DESCRIPTION, PRETRAINED, load_models
+from mskgrasp.learning.label_source import distinct, source_of
+from mskgrasp.learning.model_card import model_card
+
+
+def test_the_source_of_collected_labels_is_what_their_shards_say(collected: Path):
+    infos = [read_shard(path)[1] for path in list_shards(collected)]
+    (source,) = distinct(source_of(info) for info in infos)
+    assert source.physics == infos[0].physics and source.hand == HAND_GEOMETRY and source.seed == 5
+    assert source.simulation == infos[0].versions["simulation"] and source.noise == {}
+    assert source.camera_height == pytest.approx(infos[0].T_base_camera.position[2])
+
+
+def described(tmp_path: Path, collected: Path, **hand: float) -> Path:
+    """A copy of the shipped model whose labels are said to be of the collected shards, with another hand."""
+    source = source_of(read_shard(list_shards(collected)[0])[1])
+    values = json.loads((PRETRAINED / DESCRIPTION).read_text())
+    values["labels"] = [source.model_dump() | {"hand": HAND_GEOMETRY | hand}]
+    (tmp_path / DESCRIPTION).write_text(json.dumps(values))
+    (tmp_path / "model.safetensors").symlink_to(PRETRAINED / "model.safetensors")
+    return tmp_path
+
+
+def test_a_model_tells_its_source_and_its_card_shows_what_differs(tmp_path: Path, collected: Path):
+    models = load_models(described(tmp_path, collected))
+    (source,) = models.meta.labels
+    assert source.hand == HAND_GEOMETRY
+    other = source.model_copy(
+        update={"physics": source.physics | {"rate_hz": 500}, "noise": {"finger_force": [30.0, 70.0]}}
+    )
+    card = model_card(models.meta.model_copy(update={"labels": (other,)}))
+    assert "physics other than today's: rate_hz 500\n" in card
+    assert "errors of the cell: finger_force 30.0 x 70.0" not in card
+    assert "errors of the cell: finger_force 30.0 to 70.0" in card
+
+
+def test_a_model_of_another_hand_is_refused(tmp_path: Path, collected: Path):
+    folder = described(tmp_path, collected, max_opening=0.1)
+    with pytest.raises(BadModel, match=r"another hand \(max_opening 100\.0 mm\)"):
+        load_models(folder)
