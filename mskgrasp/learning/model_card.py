@@ -65,7 +65,7 @@ def model_card(meta: ModelMeta) -> str:
 
 
 def _label_lines(source: LabelSource) -> str:
-    """Simulation, camera and drawn errors, a line each, and the settings that differ from today's defaults."""
+    """Simulation, camera, settings that differ from today's defaults, and drawn errors, a line each."""
     usual = Physics().model_dump()
     other = [f"{name} {value}" for name, value in source.physics.items() if usual.get(name) != value]
     drawn = [
