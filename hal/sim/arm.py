@@ -131,6 +131,7 @@ class SapienArm(SimulatedArm[SapienWorld]):
         motion = self._world.env.motion
         free = bool(self._in_air(self._target()[None])[0])
         self._force = 0.0
+        motion.hold(False)
         with motion.coarsely(AIR_HZ) if free else nullcontext():
             motion.move_fingers(width / 2, check=self._stop.is_set)
 
@@ -145,6 +146,7 @@ class SapienArm(SimulatedArm[SapienWorld]):
                 env.motion.move_fingers(reach + PAD_GAP, check=self._stop.is_set)
         self._force = force
         env.motion.move_fingers(-MAX_OPENING / 2, force=force, check=self._stop.is_set)
+        env.motion.hold(True)
         width = self._state().gripper_width
         return GraspOutcome(width=width, holding=width > MIN_GAP)
 

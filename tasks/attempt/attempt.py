@@ -123,6 +123,7 @@ class Attempt:
             )
             free, reach = free | ~executable, xp.where(executable, reach, xp.zeros_like(reach))
         began = motion.seconds
+        motion.hold(False)
         empty = free & (reach == 0)
         # Where their run-up has room, fingers begin near the part instead of closing through free air.
         room = max(self._run_up, AHEAD + physics.finger_speed / motion.rate_hz)
@@ -252,6 +253,7 @@ class Attempt:
             (n,) the deepest overlap seen, m.
         """
         motion, physics, xp = self._motion, self._physics, self._arrays.xp
+        motion.hold(True)
 
         def behind() -> Array:
             return self._hand_pose().position[:, 2] - self._part_pose().position[:, 2]

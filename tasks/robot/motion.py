@@ -53,6 +53,15 @@ def finger_lag(physics: Physics) -> float:
     return physics.finger_speed * physics.finger_damping / physics.finger_stiffness
 
 
+def _mean_share(iterations: int) -> float:
+    """Share of a step by which a target on a path is put back.
+
+    A step holds its target, and its iterations are equal shares of it: aimed at the end of the step, a drive
+    would be ahead of its path, the more the longer a step. Aimed at the mean, it is not.
+    """
+    return (1 - 1 / iterations) / 2
+
+
 class PandaMotion:
     """Motions by drive targets, which advance the simulation.
 
@@ -89,9 +98,7 @@ class PandaMotion:
         """Simulated time, s."""
         self.rate_hz = physics.rate_hz
         """Current rate, simulation steps a second."""
-        # A step holds its target, and its iterations are equal shares of it: aimed at the end of the step,
-        # a drive would be ahead of its path, the more the longer a step. Aimed at the mean, it is not.
-        self._within = (1 - 1 / physics.position_iterations) / 2
+        self._within = _mean_share(physics.position_iterations)
         self._watch_every = self.n_steps(CHECK_S)
         self._unwatched = 0
         self._commanded: Array = None
@@ -114,6 +121,18 @@ class PandaMotion:
         self.rate_hz = rate_hz
         self._watch_every = self.n_steps(CHECK_S)
         self._scene.timestep = 1 / rate_hz
+
+    def hold(self, holding: bool) -> None:
+        """Solve as finely as a part in the hand needs (`Physics.hold_iterations`), or as before its grasp.
+
+        A contact is solved with the most iterations of its bodies. On a GPU they are those of the scene.
+        """
+        if self.gpu:
+            return
+        least = self._physics.position_iterations
+        n = max(least, self._physics.hold_iterations) if holding else least
+        self._articulation.set_solver_position_iterations(n)
+        self._within = _mean_share(n)
 
     def fingers(self) -> Array:
         """(n, 2) measured distances of the fingers from the middle, m."""

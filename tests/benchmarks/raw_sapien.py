@@ -116,6 +116,7 @@ class RawSapien:
     def attempt(self, pose: np.ndarray, grasp: np.ndarray) -> bool:
         """Places the part, takes the image, grasps and lifts; whether the part was lifted."""
         p = self.physics
+        self.robot.set_solver_position_iterations(p.position_iterations)
         self.part.set_pose(sapien.Pose(p=to_world(pose[:3]), q=pose[3:]))
         self.body.set_linear_velocity(np.zeros(3))
         self.body.set_angular_velocity(np.zeros(3))
@@ -201,6 +202,7 @@ class RawSapien:
     def _lift(self, grasp: np.ndarray) -> bool:
         """Whether something is still in the hand at the end; ends early where it is lost."""
         p = self.physics
+        self.robot.set_solver_position_iterations(max(p.position_iterations, p.hold_iterations))
         seconds = minimum_jerk_duration(p.lift_height, p.lift_speed, PEAK_ACCELERATION)
         n = self._n(seconds)
         fine = np.arange(1, n + 1) / n
@@ -275,7 +277,8 @@ class RawSapien:
     def _moving(self, path: np.ndarray) -> list[tuple]:
         """The joints that a path moves, with their places and speeds."""
         speed = np.diff(path, axis=0, prepend=self.targets[None]) * self.rate_hz
-        aims = path - speed * (1 - 1 / self.physics.position_iterations) / 2 / self.rate_hz
+        iterations = self.robot.solver_position_iterations
+        aims = path - speed * (1 - 1 / iterations) / 2 / self.rate_hz
         moving = np.flatnonzero(np.ptp(path, axis=0)).tolist()
         return [(self.joints[j], aims[:, j].tolist(), speed[:, j].tolist()) for j in moving]
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mskgrasp.core.grasp import FAILURES
+from mskgrasp.parts import find_part
 
 MM = 1e-3
 DEG = math.pi / 180
@@ -57,6 +58,17 @@ def test_turning_table_and_hand_together_changes_nothing(attempt):
     outcome = attempt((0.5, 0.0, Z, turn), at=(0.5 - 5 * MM * sin, 5 * MM * cos), turn=turn)
     assert outcome["success"]
     assert outcome["displacement"][1] == pytest.approx(-5 * MM, abs=0.15 * MM)
+
+
+def test_a_pin_held_near_its_end_does_not_swing(env):
+    """Its weight, 53 g, 26 mm from the pads, turns it with 0.014 N m; one point of each pad holds 0.15."""
+    pose = [0.45296192, -0.07274442, 0.00594181, 0.2986161, 0.4179293, -0.5703816, -0.64095896]
+    folder = str(find_part("parallel_pin_12x60").folder)
+    env.reset(seed=0, options=dict(parts=[folder], reconfigure=True, pose_base_obj=np.array([pose])))
+    grasp = np.array([[0.45158386, -0.06337806, 0.01136792, 1.3311471]], dtype=np.float32)
+    info = env.step(grasp)[-1]
+    # With 25 iterations in the lift it swings by 15 degrees.
+    assert info["success"][0] and math.degrees(float(info["tilt"][0])) < 1.5
 
 
 def test_an_empty_grasp_is_missed(attempt):
