@@ -99,8 +99,16 @@ _FIRST_TO_COLLIDE = 4
 """Index of the first link that may come near a part; those before it stay over the table."""
 _ONLY_SEEN = dict(contype=0, conaffinity=0, group=SEEN)
 
-_PALM = ((0.0, -0.002, 0.02), (0.0316, 0.102, 0.046))
-"""Centre and half sizes of the hand's body in its frame: the bounds of the hand's collision mesh."""
+_PALM = (
+    (-0.026, 0.0316, -0.104, 0.094),
+    (0.006, 0.0316, -0.104, 0.094),
+    (0.054, 0.0196, -0.101, 0.1005),
+    (0.061, 0.0178, -0.0985, 0.0985),
+    (0.064, 0.0169, -0.0955, 0.0955),
+    (0.066, 0.0145, -0.093, 0.093),
+)
+"""The hand's body in its frame, from its top down: z, half of its length in x, and its bounds in y. It has
+the shape of the hull of the hand's collision mesh (franka_description), which narrows towards the fingers."""
 _FINGER_BOXES = (
     ((0.0, 0.0185, 0.011), (0.022, 0.015, 0.020), 0.0),
     ((0.0, 0.0068, 0.0022), (0.022, 0.0088, 0.0038), 0.0),
@@ -160,8 +168,12 @@ def add_panda(spec: mujoco.MjSpec, physics: MujocoPhysics) -> None:
         explicitinertial=True,
     )
     _set_inertia(hand, HAND)
-    centre, half = _PALM
-    hand.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=centre, size=half, rgba=_GREY, **_robot_shape(physics))
+    spec.add_mesh(
+        name="palm",
+        uservert=[value for z, x, *ends in _PALM for y in ends for side in (-x, x) for value in (side, y, z)],
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
+    )
+    hand.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="palm", rgba=_GREY, **_robot_shape(physics))
     hand.add_site(name="tcp", pos=[0, 0, TCP_OFFSET])
     for number, (name, side) in enumerate(zip(FINGERS, (1.0, -1.0), strict=True), start=1):
         _add_finger(hand, name, number, side, physics)

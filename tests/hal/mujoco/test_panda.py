@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import mani_skill
 import mujoco
 import numpy as np
 import pytest
+import trimesh
 
 from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.panda import FINGER, HAND, LINKS, TORQUE_LIMIT
@@ -12,6 +16,8 @@ from hal.mujoco.scene import build_model
 from mskgrasp.core.grasp import FINGER_HALF_WIDTH, FINGER_THICKNESS, PAD_REACH, PALM_HEIGHT
 from mskgrasp.core.panda_kinematics import DH_A, DH_ALPHA, DH_D, JOINT_LOWER, JOINT_UPPER, forward
 from mskgrasp.parts import find_part
+
+HAND_MESH = "assets/robots/panda/franka_description/meshes/collision/hand.stl"
 
 
 @pytest.fixture(scope="module")
@@ -89,8 +95,27 @@ def test_no_joint_gets_more_torque_than_the_real_one(model: mujoco.MjModel):
     assert data.qfrc_actuator[:7] == pytest.approx(TORQUE_LIMIT)
 
 
+def test_the_palm_has_the_shape_of_the_hands_collision_mesh(model: mujoco.MjModel):
+    """Where parts may come, below the flange: as long and as wide at every height, to 0.5 mm."""
+    geom = next(i for i in range(model.ngeom) if model.body(model.geom_bodyid[i]).name == "hand")
+    mine = trimesh.convex.convex_hull(_corners(model, geom))
+    published = trimesh.load_mesh(Path(mani_skill.__file__).parent / HAND_MESH).convex_hull
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    hand = data.body("hand")
+    frame = hand.xmat.reshape(3, 3)
+    mine.vertices = (
+        data.geom_xpos[geom] + mine.vertices @ data.geom_xmat[geom].reshape(3, 3).T - hand.xpos
+    ) @ frame
+    for z in (0.01, 0.03, 0.05, 0.06, 0.063, 0.065):
+        ours, theirs = (body.section([0, 0, 1], [0, 0, z]).bounds for body in (mine, published))
+        assert ours[:, 0] == pytest.approx(theirs[:, 0], abs=5e-4)
+        assert ours[1, 1] - ours[0, 1] == pytest.approx(theirs[1, 1] - theirs[0, 1], abs=3e-3)
+    assert mine.bounds[1, 2] == pytest.approx(published.bounds[1, 2], abs=1e-4)
+
+
 def test_the_hand_has_the_outline_that_planning_reckons_with(model: mujoco.MjModel):
-    """Corners of all boxes, hand open, in the tcp frame."""
+    """Corners of all shapes, hand open, in the tcp frame."""
     data = mujoco.MjData(model)
     data.qpos[7:9] = 0.04
     mujoco.mj_forward(model, data)
@@ -98,9 +123,8 @@ def test_the_hand_has_the_outline_that_planning_reckons_with(model: mujoco.MjMod
     corners = {"hand": [], "left_finger": []}
     for i in range(model.ngeom):
         name = model.body(model.geom_bodyid[i]).name
-        if name in corners and model.geom_type[i] == mujoco.mjtGeom.mjGEOM_BOX:
-            signs = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
-            points = data.geom_xpos[i] + (signs * model.geom_size[i]) @ data.geom_xmat[i].reshape(3, 3).T
+        if name in corners:
+            points = data.geom_xpos[i] + _corners(model, i) @ data.geom_xmat[i].reshape(3, 3).T
             corners[name].extend((points - tcp.xpos) @ tcp.xmat.reshape(3, 3))
     palm, finger = np.array(corners["hand"]), np.array(corners["left_finger"])
     assert palm[:, 2].max() == pytest.approx(-PALM_HEIGHT, abs=2e-4)
@@ -108,3 +132,11 @@ def test_the_hand_has_the_outline_that_planning_reckons_with(model: mujoco.MjMod
     assert np.abs(finger[:, 0]).max() == pytest.approx(FINGER_HALF_WIDTH, abs=1e-4)
     assert finger[:, 1].min() == pytest.approx(0.04, abs=1e-4)
     assert finger[:, 1].max() == pytest.approx(0.04 + FINGER_THICKNESS, abs=1e-3)
+
+
+def _corners(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """(k, 3) corners of a box or mesh, in its own frame."""
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
+        return np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T * model.geom_size[geom]
+    mesh = model.mesh(model.geom_dataid[geom])
+    return model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]].astype(float)

@@ -54,9 +54,9 @@ def test_a_sliding_block_stops_after_v_squared_over_two_mu_g(box: MakeBox, frict
     assert np.abs(simulation.data.qvel[9:]).max() < 1e-3
 
 
-def test_a_part_rests_in_the_table_by_less_than_a_hundredth_of_a_millimetre(box: MakeBox):
+def test_a_part_rests_in_the_table_by_less_than_a_fiftieth_of_a_millimetre(box: MakeBox):
     simulation = on_table(box((0.03, 0.02, 0.04), 0.05))
-    assert simulation.part_pose().position[2] == pytest.approx(0.02, abs=0.01 * MM)
+    assert simulation.part_pose().position[2] == pytest.approx(0.02, abs=0.02 * MM)
 
 
 @pytest.mark.parametrize("force", [10.0, 40.0])
