@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hal.camera_calibration import Calibration, write_calibration
+from hal.charuco import Board
 from hal.kinect2 import Kinect2Camera, Kinect2Config
 from mskgrasp.core.geometry import Pose
 
@@ -37,6 +38,15 @@ class Bench:
         self.set()
         self.calibrate()
 
+    def show_board(self, board: Board, T_camera_board: Pose) -> None:
+        """Show a calibration board with a white edge of a centimetre."""
+        margin, path = 0.01, self._control.with_name("board.npy")
+        if not path.is_file():
+            np.save(path, board.image(60, margin))
+        size = [edge + 2 * margin for edge in board.size]
+        held = dict(T=T_camera_board.as_matrix().tolist(), size=size, texture=str(path))
+        self.set(plates=[held])
+
     def set(self, **values: Any) -> None:
         """Tells the fake driver what happens from now on."""
         text = json.dumps({"serials": [SERIAL]} | values)
@@ -60,11 +70,15 @@ class Bench:
         write_calibration(self.calibration, calibration)
 
     def camera(self, **settings: Any) -> Kinect2Camera:
-        """A camera, not connected; quiet about warming up, and patient with a busy machine."""
+        """A camera, not connected; quiet about warming up, and patient with a busy machine.
+
+        What it measures too far is corrected.
+        """
         values: dict[str, Any] = dict(
             driver="kinect2",
             serial=SERIAL,
             calibration=self.calibration,
+            depth_offset=-0.024,
             warm_up_s=0,
             connect_timeout_s=60,
             latency_s=0.4,

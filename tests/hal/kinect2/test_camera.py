@@ -41,12 +41,12 @@ def test_the_image_is_not_mirrored_and_a_pixel_is_where_its_ray_says(bench: Benc
 
 
 def test_depth_is_metres_and_every_kind_of_invalid_is_nan(bench: Bench):
-    with bench.camera(depth_offset=-0.024) as camera:
+    with bench.camera(depth_offset=-0.020) as camera:
         depth = camera.capture().depth
     for corner in (depth[:20, :20], depth[:20, -20:], depth[-20:, :20], depth[-20:, -20:]):
         assert np.isnan(corner).all()
-    assert np.nanmax(depth) == pytest.approx(0.8 - 0.024, abs=1e-6)
-    assert np.nanmin(depth) == pytest.approx(0.75 - 0.024, abs=1e-6)
+    assert np.nanmax(depth) == pytest.approx(0.8 + 0.004, abs=1e-6)
+    assert np.nanmin(depth) == pytest.approx(0.75 + 0.004, abs=1e-6)
 
 
 def test_colour_is_rgb_registered_to_depth_and_no_view_of_the_drivers_memory(bench: Bench):

@@ -9,6 +9,9 @@ happens is set by a JSON file named in FAKE_KINECT2, read anew at every call: ``
     dark      no pixel is valid                 slow    one frame in 20 s
     hung      waiting never ends                crash   the driver dies while waiting
     refused   stop() never returns
+
+What is seen is set there, too: ``plates`` (`scene.Plate`; a block by default), ``depth_error_mm``, and
+``noise_mm`` of depth.
 """
 
 from __future__ import annotations
@@ -41,7 +44,8 @@ class FrameType(IntEnum):
 
 def _control() -> dict[str, Any]:
     values = json.loads(Path(os.environ["FAKE_KINECT2"]).read_text(encoding="utf-8"))
-    return {"serials": [], "held": [], "start_fails": False, "fault": ""} | values
+    seen = {"plates": [scene.BLOCK_PLATE], "depth_error_mm": scene.DEPTH_ERROR_MM, "noise_mm": 0.0}
+    return {"serials": [], "held": [], "start_fails": False, "fault": ""} | seen | values
 
 
 def _crash() -> NoReturn:
@@ -170,7 +174,8 @@ class SyncMultiFrameListener:
             time.sleep(max(0.0, min(next_s, deadline, time.monotonic() + 0.05) - time.monotonic()))
         self._taken = number
         frames = frame_map or FrameMap()
-        fault = _control()["fault"]
+        control = _control()
+        fault, plates = control["fault"], json.dumps(control["plates"])
         ticks = _FIRST_TICKS + (0 if fault == "frozen" else round(number / 30 / 0.125e-3))
         for kind in (FrameType.Color, FrameType.Ir, FrameType.Depth):
             if not self._types & kind:
@@ -179,10 +184,12 @@ class SyncMultiFrameListener:
             older = 4000 if fault == "skewed" and kind == FrameType.Color else 0
             frame._ticks, frame._number = (ticks - older) % 2**32, number
             if kind == FrameType.Color:
-                frame._data = scene.colour_bgrx().copy().view(np.uint32)[..., 0]
+                frame._data = scene.colour_bgrx(plates).copy().view(np.uint32)[..., 0]
+            elif kind == FrameType.Ir:
+                frame._data = scene.raw_infrared(plates).copy().view(np.uint32)
             else:
-                depth = scene.raw_depth_mm() * (0 if fault == "dark" else 1)
-                frame._data = depth.copy().view(np.uint32)
+                depth = scene.raw_depth_mm(plates, control["depth_error_mm"], control["noise_mm"], number)
+                frame._data = (depth * np.float32(fault != "dark")).view(np.uint32)
             frames._frames[kind] = frame
         return frames
 
@@ -291,6 +298,9 @@ class Freenect2Device:
 
     def startStreams(self, rgb, depth):
         self._pointer()
+        plates = json.dumps(_control()["plates"])
+        for draw in (scene.colour_bgrx, scene.raw_infrared, scene.true_depth):
+            draw(plates)  # so that the first frame is not late
         if not _control()["start_fails"] and not self._gone():
             self._started_s = time.monotonic()
 
