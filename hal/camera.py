@@ -25,6 +25,8 @@ class RgbdFrame:
         serial: Serial number of the camera.
         fine_colour: (k h, k w, 3) uint8, RGB, or None: the same exposure with k x k pixels of colour for
             every pixel of depth, if the camera provides them and its settings request them.
+        infrared: (h, w) uint16, linear in the light, or None: the same exposure in infrared, if the camera
+            provides it. It shares its optics with depth, so that nothing needs to be registered.
     """
 
     colour: np.ndarray
@@ -34,10 +36,21 @@ class RgbdFrame:
     timestamp_s: float
     serial: str
     fine_colour: np.ndarray | None = None
+    infrared: np.ndarray | None = None
 
 
 class Camera(Device):
     """A calibrated depth camera. Construction neither connects nor captures; ``with`` does."""
+
+    @property
+    def exposures(self) -> int:
+        """Exposures of a frame; with several, depth is their median and the timestamp that of the first."""
+        return 1
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether its pose was measured by hand, good to centimetres: `execute_grasp` then refuses."""
+        return False
 
     @abstractmethod
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:

@@ -163,7 +163,8 @@ def judge_calibration(calibration: Calibration, path: Path, workspace: Workspace
         return Finding(
             level="warn",
             subject="calibration",
-            text=f"{path} was measured by hand, good to centimetres: run python -m hal.calibrate",
+            text=f"{path} was measured by hand, good to centimetres, and no grasp is executed with it: run "
+            "python -m hal.calibrate",
         )
     if calibration.rms_translation_m > _RMS_OK[0] or calibration.rms_rotation_rad > _RMS_OK[1]:
         return Finding(level="warn", subject="calibration", text=f"{said}: large residuals; calibrate again")
@@ -290,15 +291,19 @@ def check_stream(camera: Camera, frames: list[RgbdFrame], *, timeout_s: float = 
     except HalError as error:
         yield Finding(level="fail", subject="camera stream", text=str(error))
         return
-    rate = _N_FRAMES / (time.monotonic() - begin)
+    n = camera.exposures
+    rate = n * _N_FRAMES / (time.monotonic() - begin)
     stamps = np.array([frame.timestamp_s for frame in frames])
     height, width = frames[0].depth.shape
     said = f"{width} x {height} pixels, {rate:.1f} frames/s, {max(ages) * 1e3:.0f} ms old at most"
+    if n > 1:
+        said = f"{said} (each the median of {n} exposures)"
+    age_s = max(ages) - (n - 1) / rate  # since the last exposure of a frame
     if (np.diff(stamps) <= 0).any():
         yield Finding(
             level="fail", subject="camera stream", text=f"{said}: the same exposure twice; open it again"
         )
-    elif rate < _GOOD_RATE or max(ages) > _MAX_AGE_S:
+    elif rate < _GOOD_RATE or age_s > _MAX_AGE_S:
         yield Finding(
             level="warn", subject="camera stream", text=f"{said}: slow; plug it into a USB 3 port of its own"
         )

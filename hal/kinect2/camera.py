@@ -22,7 +22,8 @@ from hal.errors import (
 )
 from hal.kinect2.config import Kinect2Config
 from hal.kinect2.driver import Kinect2Settings
-from hal.kinect2.images import HEIGHT, WIDTH, metric_depth, rgb_colour, unmirrored_intrinsics
+from hal.kinect2.images import HEIGHT, WIDTH, Undistortion, metric_depth, unmirrored_intrinsics
+from hal.kinect2.registration import COLOUR_HEIGHT, COLOUR_WIDTH, Registration
 from mskgrasp.core.geometry import Pose
 
 _log = logging.getLogger(__name__)
@@ -53,6 +54,18 @@ class Kinect2Camera(Camera):
         self._serial = ""
         self._intrinsics = np.eye(3)
         self._calibration: Calibration | None = None
+        self._undistortion: Undistortion | None = None
+        self._registrations: dict[int, Registration] = {}
+
+    @property
+    def exposures(self) -> int:
+        """See `Camera.exposures`."""
+        return self._config.exposures
+
+    @property
+    def by_hand(self) -> bool:
+        """See `Camera.by_hand`; known once the camera is connected."""
+        return self._calibration is not None and self._calibration.by_hand
 
     def connect(self) -> None:
         """Open the camera and wait for its first frame.
@@ -74,6 +87,7 @@ class Kinect2Camera(Camera):
             latency_s=config.latency_s,
             max_skew_s=config.max_skew_s,
             timeout_s=config.connect_timeout_s,
+            n_exposures=config.exposures,
         )
         # Opening and starting take up to another ten seconds.
         opening_s = config.connect_timeout_s + 10
@@ -99,7 +113,11 @@ class Kinect2Camera(Camera):
             process.close()
             raise
         self._process, self._lost = process, None
-        self._intrinsics = self._choose_intrinsics(unmirrored_intrinsics(**reply["intrinsics"]))
+        lens, colour = reply["lens"], reply["colour"]
+        pinhole = {name: lens[name] for name in ("fx", "fy", "cx", "cy")}
+        self._intrinsics = self._choose_intrinsics(unmirrored_intrinsics(**pinhole))
+        self._undistortion = Undistortion(lens)
+        self._registrations = {k: Registration(lens, colour, k) for k in {1, config.colour_scale}}
         if config.warm_up_s > 0:
             _log.warning(
                 "camera %s has just been started: its depth drifts by millimetres for the first %.0f minutes",
@@ -123,13 +141,12 @@ class Kinect2Camera(Camera):
             CommunicationLost: The camera was unplugged, or its driver crashed or hung; open it again.
         """
         with self._lock:
-            if self._process is None or self._calibration is None:
+            if self._process is None or self._calibration is None or self._undistortion is None:
                 raise NotConnected("Kinect2Camera is not connected; use it inside its context (with ...)")
             if self._lost is not None:
                 raise CommunicationLost(self._lost)
             if not 0 < timeout_s < 3600:
                 raise CaptureFailed(f"timeout {timeout_s:g} s is outside 0 .. 3600 s")
-            n_pixels = WIDTH * HEIGHT
             try:
                 answer = self._process.ask(
                     "capture",
@@ -143,25 +160,30 @@ class Kinect2Camera(Camera):
             except CommunicationLost as error:
                 self._lost = str(error)
                 raise
-        data = answer.payload[0]
-        depth = metric_depth(
-            np.frombuffer(data, np.float32, n_pixels).reshape(HEIGHT, WIDTH), self._config.depth_offset
-        )
+        data, n = answer.payload[0], WIDTH * HEIGHT
+        raw_depth, raw_infrared = np.frombuffer(data, np.float32, 2 * n).reshape(2, HEIGHT, WIDTH)
+        raw_colour = np.frombuffer(data, np.uint8, offset=8 * n).reshape(COLOUR_HEIGHT, COLOUR_WIDTH, 4)
+        depth = metric_depth(self._undistortion.nearest(raw_depth), self._config.depth_offset)
         valid = float(np.isfinite(depth).mean())
         if valid < self._config.min_valid:
             raise CaptureFailed(
                 f"camera {self._serial} measured {valid:.1%} of its depth image, less than "
                 f"{self._config.min_valid:.1%} (min_valid); uncover it, and keep it 0.5 to 4.5 m away"
             )
+        # Colour is registered with the corrected depth.
+        colours = {
+            k: registration.apply(raw_colour, depth) for k, registration in self._registrations.items()
+        }
+        infrared = self._undistortion.interpolated(raw_infrared)
         return RgbdFrame(
-            colour=rgb_colour(
-                np.frombuffer(data, np.uint8, 4 * n_pixels, offset=4 * n_pixels).reshape(HEIGHT, WIDTH, 4)
-            ),
+            colour=colours[1],
             depth=depth,
             intrinsics=self._intrinsics.copy(),
             T_base_camera=Pose.from_vector(self._calibration.T_base_camera.as_vector()),
             timestamp_s=answer.result["exposed_s"],
             serial=self._serial,
+            fine_colour=colours[self._config.colour_scale] if self._config.colour_scale > 1 else None,
+            infrared=np.rint(infrared.clip(0, 65535)).astype(np.uint16),
         )
 
     def _choose_intrinsics(self, factory: np.ndarray) -> np.ndarray:

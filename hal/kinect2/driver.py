@@ -7,6 +7,7 @@ import importlib.util
 import sys
 import time
 import types
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -15,11 +16,15 @@ import numpy as np
 from hal.errors import CaptureFailed, CommunicationLost, DriverMissing, IncompatibleDriver, NotConnected
 from hal.kinect2.clock import TICK_S, ExposureClock
 from hal.kinect2.config import Pipeline
-from hal.kinect2.images import HEIGHT, WIDTH
+from hal.kinect2.images import median_of_valid
+from hal.kinect2.registration import POWERS
 
-_NAMES = {
-    "CpuPacketPipeline", "Frame", "FrameType", "Freenect2", "Registration", "SyncMultiFrameListener",
-}  # fmt: skip
+_NAMES = {"CpuPacketPipeline", "FrameType", "Freenect2", "SyncMultiFrameListener"}
+_LENS = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
+_COLOUR = (
+    "fx", "fy", "cx", "cy", "shift_d", "shift_m",
+    *(f"{axis}_x{i}y{j}" for axis in ("mx", "my") for i, j in POWERS),
+)  # fmt: skip
 _SLICE_S = 0.2
 """Longest wait of one call into the vendor's driver, s."""
 
@@ -34,10 +39,12 @@ class Kinect2Settings:
         latency_s: Greatest delay from exposure to arrival, s.
         max_skew_s: Greatest time between the exposures of colour and depth, s.
         timeout_s: Time the camera has from opening to its first frame, s.
+        n_exposures: Exposures of a frame.
     """
 
     serial: str | None
     pipeline: Pipeline
+    n_exposures: int
     latency_s: float
     max_skew_s: float
     timeout_s: float
@@ -45,15 +52,17 @@ class Kinect2Settings:
 
 @dataclass(frozen=True, kw_only=True)
 class RawFrame:
-    """Copies of the images that libfreenect2 delivered, mirrored.
+    """Copies of the images that libfreenect2 delivered, mirrored and distorted.
 
     Attributes:
-        depth_mm: (424, 512) float32, undistorted.
-        colour_bgrx: (424, 512, 4) uint8, registered to depth.
-        exposed_s: Earliest time of the exposure, monotonic clock, s.
+        depth_mm: (424, 512) float32, 0 where invalid.
+        infrared: (424, 512) float32, 0 to 65535.
+        colour_bgrx: (1080, 1920, 4) uint8.
+        exposed_s: Earliest time of the (first) exposure, monotonic clock, s.
     """
 
     depth_mm: np.ndarray
+    infrared: np.ndarray
     colour_bgrx: np.ndarray
     exposed_s: float
 
@@ -78,29 +87,29 @@ class Kinect2Driver:
         # An absent device crashes the process when it is used, so that it must be in the list just read.
         self._device = self._context.openDevice(self.serial.encode(), pipeline=self._pipeline())
         kinds = self._vendor.FrameType
-        self._listener = self._vendor.SyncMultiFrameListener(int(kinds.Color | kinds.Depth))
+        self._listener = self._vendor.SyncMultiFrameListener(int(kinds.Color | kinds.Ir | kinds.Depth))
         self._device.setColorFrameListener(self._listener)
         self._device.setIrAndDepthFrameListener(self._listener)
         self._device.start()
-        infrared = self._device.getIrCameraParams()  # zero before start, and where start failed silently
-        if not infrared.fx > 0:
+        lens = self._device.getIrCameraParams()  # zero before start, and where start failed silently
+        if not lens.fx > 0:
             raise NotConnected(
                 f"camera {self.serial} did not start; unplug its power for ten seconds, and use a USB 3 port "
                 "of an Intel or NEC controller"
             )
-        self.intrinsics = {name: float(getattr(infrared, name)) for name in ("fx", "fy", "cx", "cy")}
-        self._registration = self._vendor.Registration(infrared, self._device.getColorCameraParams())
-        self._undistorted = self._vendor.Frame(WIDTH, HEIGHT, 4)
-        self._registered = self._vendor.Frame(WIDTH, HEIGHT, 4)
+        self.lens = {name: float(getattr(lens, name)) for name in _LENS}
+        colour = self._device.getColorCameraParams()
+        self.colour = {name: float(getattr(colour, name)) for name in _COLOUR}
 
     def capture(self, timeout_s: float) -> RawFrame:
-        """Capture a frame exposed after this call.
+        """Capture a frame exposed after this call: the median of ``n_exposures`` of depth and infrared.
 
         Raises:
-            CaptureFailed: None came in time.
+            CaptureFailed: Not all of them came in time.
             CommunicationLost: The camera is gone.
         """
         asked_s = time.monotonic()
+        taken: list[RawFrame] = []
         refused: dict[str, int] = {}
         if self._listener.hasNewFrame():  # from before the call, however old
             self._listener.release(self._listener.waitForNewFrame(milliseconds=1))
@@ -113,15 +122,17 @@ class Kinect2Driver:
             finally:
                 self._listener.release(frames)
             if isinstance(result, RawFrame):
-                return result
-            if result:
+                taken.append(result)
+                if len(taken) == self._settings.n_exposures:
+                    return _merged(taken)
+            elif result:
                 refused[result] = refused.get(result, 0) + 1
-        self._explain(timeout_s, refused)
+        self._explain(timeout_s, len(taken), refused)
 
     def _read(self, frames: Any, asked_s: float) -> RawFrame | str:
         """The frame, or why it is refused; empty if it was exposed before the request."""
         arrived_s = time.monotonic()
-        depth, colour = frames["depth"], frames["color"]
+        depth, infrared, colour = frames["depth"], frames["ir"], frames["color"]
         if not self._clock.advance_s(depth.timestamp) > 0:
             return "stale (the camera's clock stands still)"
         exposed_s, late_s = self._clock.date(depth.timestamp, arrived_s)
@@ -130,21 +141,28 @@ class Kinect2Driver:
         skew_s = ((colour.timestamp - depth.timestamp + (1 << 31)) % (1 << 32) - (1 << 31)) * TICK_S
         if abs(skew_s) > self._settings.max_skew_s:
             return f"without colour of the same moment (max_skew_s {self._settings.max_skew_s:g} s)"
-        if getattr(depth, "status", 0) or getattr(colour, "status", 0):  # not in every version of the binding
+        if any(getattr(one, "status", 0) for one in (depth, infrared, colour)):  # not in every binding
             return "marked as bad by the driver"
         if exposed_s < asked_s:
             return ""
-        self._registration.apply(colour, depth, self._undistorted, self._registered)
         return RawFrame(
-            depth_mm=self._undistorted.asarray(np.float32).copy(),
-            colour_bgrx=self._registered.asarray(np.uint8).copy(),
+            depth_mm=depth.asarray(np.float32).copy(),
+            infrared=infrared.asarray(np.float32).copy(),
+            colour_bgrx=colour.asarray(np.uint8).copy(),
             exposed_s=exposed_s,
         )
 
-    def _explain(self, timeout_s: float, refused: dict[str, int]) -> NoReturn:
+    def _explain(self, timeout_s: float, n_taken: int, refused: dict[str, int]) -> NoReturn:
         if self.serial not in self._serials():
             raise CommunicationLost(
                 f"camera {self.serial} is unplugged or has lost its power; connect it and open the cell again"
+            )
+        n = self._settings.n_exposures
+        if n_taken:
+            others = "".join(f"; {count} were {reason}" for reason, count in refused.items())
+            raise CaptureFailed(
+                f"camera {self.serial} delivered {n_taken} of {n} exposures within {timeout_s:g} s{others}; "
+                "allow more time, lower camera.exposures, or light the scene (in the dark it is slower)"
             )
         if refused:
             came = "; ".join(f"{count} {reason}" for reason, count in refused.items())
@@ -187,6 +205,16 @@ class Kinect2Driver:
                 f"this libfreenect2 was built without {name}; set camera.pipeline to cpu"
             )
         return getattr(self._vendor, name)()
+
+
+def _merged(taken: Sequence[RawFrame]) -> RawFrame:
+    """One frame of several exposures, its colour that of the last."""
+    return RawFrame(
+        depth_mm=median_of_valid([one.depth_mm for one in taken]),
+        infrared=median_of_valid([one.infrared for one in taken]),
+        colour_bgrx=taken[-1].colour_bgrx,
+        exposed_s=taken[0].exposed_s,
+    )
 
 
 def import_vendor() -> Any:

@@ -38,12 +38,12 @@ class Worker:
             settings = Kinect2Settings(**request["settings"])
             self._driver = driver = Kinect2Driver(settings)
             driver.capture(settings.timeout_s)
-            return Answer(result={"serial": driver.serial, "intrinsics": driver.intrinsics})
+            return Answer(result={"serial": driver.serial, "lens": driver.lens, "colour": driver.colour})
         assert self._driver is not None, "the first request is connect"
         frame = self._driver.capture(request["capture_timeout_s"])
         return Answer(
             result={"exposed_s": frame.exposed_s},
-            payload=[frame.depth_mm.data.cast("B"), frame.colour_bgrx.data.cast("B")],
+            payload=[image.data.cast("B") for image in (frame.depth_mm, frame.infrared, frame.colour_bgrx)],
         )
 
 

@@ -50,6 +50,16 @@ class RecordingCamera(SharingDevice, Camera):
         self._camera, self._writer = camera, writer
         self._resource = _Recorded(camera, writer)
 
+    @property
+    def exposures(self) -> int:
+        """See `Camera.exposures`."""
+        return self._camera.exposures
+
+    @property
+    def by_hand(self) -> bool:
+        """See `Camera.by_hand`."""
+        return self._camera.by_hand
+
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
         """See `Camera.capture`."""
         return self._writer.call(

@@ -35,5 +35,11 @@ def test_what_is_abstract_is_all_that_a_camera_needs():
         assert camera.capture().depth.shape == (2, 3)
 
 
-def test_a_frame_has_no_fine_colour_unless_the_camera_gives_one():
-    assert frame().fine_colour is None
+def test_a_frame_has_neither_fine_colour_nor_infrared_unless_the_camera_gives_them():
+    assert frame().fine_colour is None and frame().infrared is None
+
+
+def test_a_frame_is_one_exposure_from_a_calibrated_pose_unless_the_camera_says_otherwise():
+    own = {name: lambda self: None for name in Camera.__abstractmethods__}
+    camera = type("Own", (Camera,), own)()
+    assert (camera.exposures, camera.by_hand) == (1, False)

@@ -97,6 +97,17 @@ def test_stale_repeated_and_missing_frames_are_found(ages, level, words):
     assert finding.level == level and words in finding.text
 
 
+@pytest.mark.parametrize(("n", "level"), [(1, "warn"), (9, "ok")])
+def test_several_exposures_may_take_their_time(monkeypatch, n: int, level: str):
+    """0.2 s each, 0.6 s old: too slow and too old for one exposure, not for the median of nine."""
+    clock = iter(np.arange(0.0, 100.0, 0.1))
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    camera = Frames([0.6] * 11)
+    monkeypatch.setattr(Frames, "exposures", n)
+    (finding,) = check_stream(camera, [])
+    assert finding.level == level and ("median of 9 exposures" in finding.text) == (n == 9)
+
+
 def calibration(**changes: object) -> Calibration:
     good = Calibration(
         serial="a", T_base_camera=DOWN, intrinsics=None, rms_translation_m=5e-4, rms_rotation_rad=2e-3,
@@ -109,7 +120,7 @@ def calibration(**changes: object) -> Calibration:
     ("changes", "level", "words"),
     [
         ({}, "ok", "24 poses"),
-        (dict(n_poses=0), "warn", "measured by hand"),
+        (dict(n_poses=0), "warn", "measured by hand, good to centimetres, and no grasp is executed"),
         (dict(n_poses=9), "warn", "few poses"),
         (dict(rms_translation_m=0.02), "warn", "large residuals"),
         (dict(serial="b"), "fail", "camera b, not of camera a"),

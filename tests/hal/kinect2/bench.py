@@ -47,6 +47,17 @@ class Bench:
         held = dict(T=T_camera_board.as_matrix().tolist(), size=size, texture=str(path))
         self.set(plates=[held])
 
+    def show_plates(
+        self, *plates: tuple[float, float, float, float, float, int | None], **values: Any
+    ) -> None:
+        """Show level plates: x, y of the middle, width along x, length along y, z (base frame), and grey."""
+        shown = []
+        for x, y, width, length, z, grey in plates:
+            T_base_plate = Pose(position=np.array([x, y, z]), quat_wxyz=_overhead().quat_wxyz)
+            pose = _overhead().inverse() @ T_base_plate
+            shown.append(dict(T=pose.as_matrix().tolist(), size=[length, width], grey=grey))
+        self.set(plates=shown, **values)
+
     def set(self, **values: Any) -> None:
         """Tells the fake driver what happens from now on."""
         text = json.dumps({"serials": [SERIAL]} | values)
@@ -54,17 +65,17 @@ class Bench:
         unfinished.write_text(text, encoding="utf-8")
         unfinished.replace(self._control)
 
-    def calibrate(self, serial: str = SERIAL, intrinsics: np.ndarray | None = None) -> None:
+    def calibrate(
+        self, serial: str = SERIAL, intrinsics: np.ndarray | None = None, n_poses: int = 20
+    ) -> None:
         """Writes the calibration file: 0.8 m over the middle of the usual region."""
-        matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = OVERHEAD, (0.5, 0.0, 0.8)
         calibration = Calibration(
             serial=serial,
-            T_base_camera=Pose.from_matrix(matrix),
+            T_base_camera=_overhead(),
             intrinsics=intrinsics,
             rms_translation_m=0.001,
             rms_rotation_rad=0.001,
-            n_poses=20,
+            n_poses=n_poses,
             made="2026-10-01T12:00:00",
         )
         write_calibration(self.calibration, calibration)
@@ -72,15 +83,23 @@ class Bench:
     def camera(self, **settings: Any) -> Kinect2Camera:
         """A camera, not connected; quiet about warming up, and patient with a busy machine.
 
-        What it measures too far is corrected.
+        What it measures too far is corrected; a frame is one exposure.
         """
         values: dict[str, Any] = dict(
             driver="kinect2",
             serial=SERIAL,
             calibration=self.calibration,
             depth_offset=-0.024,
+            exposures=1,
             warm_up_s=0,
             connect_timeout_s=60,
             latency_s=0.4,
         )
         return Kinect2Camera(Kinect2Config(**(values | settings)))
+
+
+def _overhead() -> Pose:
+    """``T_base_camera``: 0.8 m over the middle of the usual region."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = OVERHEAD, (0.5, 0.0, 0.8)
+    return Pose.from_matrix(matrix)

@@ -24,7 +24,7 @@ TIMEOUT_S = 20.0
 def driver(**changes: Any) -> Iterator[Kinect2Driver]:
     """Open and streaming."""
     settings: dict[str, Any] = dict(
-        serial=None, pipeline="cpu", latency_s=0.1, max_skew_s=0.1, timeout_s=TIMEOUT_S
+        serial=None, pipeline="cpu", latency_s=0.1, max_skew_s=0.1, timeout_s=TIMEOUT_S, n_exposures=1
     )
     opened = Kinect2Driver(Kinect2Settings(**(settings | changes)))
     yield opened
@@ -34,8 +34,7 @@ def driver(**changes: Any) -> Iterator[Kinect2Driver]:
 def test_the_only_camera_is_taken_and_its_factory_calibration_is_read(fake: ModuleType, bench: Bench):
     with driver() as opened:
         assert opened.serial == SERIAL
-        infrared = fake.scene.INFRARED
-        assert opened.intrinsics == {name: infrared[name] for name in ("fx", "fy", "cx", "cy")}
+        assert opened.lens == fake.scene.INFRARED and opened.colour == fake.scene.COLOUR
 
 
 def test_the_wanted_camera_of_several_is_taken(fake: ModuleType, bench: Bench):
@@ -54,12 +53,28 @@ def test_a_frame_is_a_copy_exposed_after_it_was_asked_for(fake: ModuleType, benc
         frame = opened.capture(TIMEOUT_S)
         assert asked <= frame.exposed_s <= time.monotonic()
         assert frame.depth_mm.shape == (424, 512) and frame.depth_mm.dtype == np.float32
-        assert frame.colour_bgrx.shape == (424, 512, 4) and frame.colour_bgrx.dtype == np.uint8
-        kept = frame.depth_mm.copy(), frame.colour_bgrx.copy()
+        assert frame.infrared.shape == (424, 512) and frame.infrared.dtype == np.float32
+        assert frame.colour_bgrx.shape == (1080, 1920, 4) and frame.colour_bgrx.dtype == np.uint8
+        images = frame.depth_mm, frame.infrared, frame.colour_bgrx
+        kept = [image.copy() for image in images]
         opened.capture(TIMEOUT_S)
-        assert np.array_equal(kept[0], frame.depth_mm, equal_nan=True) and np.array_equal(
-            kept[1], frame.colour_bgrx
-        )
+        for before, after in zip(kept, images, strict=True):
+            assert np.array_equal(before, after, equal_nan=before.dtype == np.float32)
+
+
+def test_several_exposures_are_merged_by_their_median_and_dated_by_the_first(fake: ModuleType, bench: Bench):
+    bench.set(noise_mm=1.3)
+    with driver(latency_s=0.4) as one, driver(n_exposures=9, latency_s=0.4) as several:
+        table = np.s_[100:320, 60:200]
+        single = one.capture(TIMEOUT_S).depth_mm[table]
+        asked = time.monotonic()
+        merged = several.capture(TIMEOUT_S)
+        assert asked <= merged.exposed_s <= time.monotonic() - 8 / 30
+        assert single.std() == pytest.approx(1.3, rel=0.05)
+        assert merged.depth_mm[table].std() == pytest.approx(0.53, rel=0.08)  # sqrt(pi / 2 / 9) of it
+    with driver(n_exposures=20, latency_s=0.4) as slow:
+        with pytest.raises(CaptureFailed, match=r"\d+ of 20 exposures within 0.9 s.*lower camera.exposures"):
+            slow.capture(0.9)
 
 
 def test_frames_go_on_where_the_cameras_counter_wraps_round(fake: ModuleType, bench: Bench):
@@ -110,9 +125,11 @@ def test_a_library_without_a_decoder_or_a_name_is_named(fake: ModuleType, bench:
     with pytest.raises(IncompatibleDriver, match="built without OpenGLPacketPipeline"):
         with driver(pipeline="opengl"):
             pass
-    monkeypatch.delattr(fake, "Registration")
+    monkeypatch.delattr(fake, "SyncMultiFrameListener")
     monkeypatch.delattr(fake, "FrameType")
-    with pytest.raises(IncompatibleDriver, match="has no FrameType, Registration; install version 0.1.4"):
+    with pytest.raises(
+        IncompatibleDriver, match="has no FrameType, SyncMultiFrameListener; install version 0.1.4"
+    ):
         import_vendor()
 
 

@@ -10,7 +10,7 @@ import pytest
 from hal.errors import CommunicationLost, MotionAborted, OutOfWorkspace
 from hal.replay import RecordingWriter, read_recording, recorded_cell
 from tests.hal.replay.program import at, run_on
-from tests.hal.replay.toy import ToyArm, toy_cell
+from tests.hal.replay.toy import ToyArm, ToyCamera, toy_cell
 
 
 def test_a_recorded_cell_does_what_the_cell_does(tmp_path: Path):
@@ -42,6 +42,16 @@ def test_a_command_is_kept_with_its_arguments_its_error_and_the_state_after_it(t
     assert (stopped.call, stopped.arguments) == ("stop", {})
     times = [event.at_s for event in (gripper, refused, aborted, stopped)]
     assert times == sorted(times) and min(event.took_s for event in (gripper, aborted)) >= 0
+
+
+def test_a_recorded_camera_says_of_itself_what_the_camera_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    cell = recorded_cell(toy_cell(), tmp_path / "run.h5")
+    assert (cell.camera.by_hand, cell.camera.exposures) == (False, 1)
+    monkeypatch.setattr(ToyCamera, "by_hand", True)
+    monkeypatch.setattr(ToyCamera, "exposures", 9)
+    assert (cell.camera.by_hand, cell.camera.exposures) == (True, 9)
 
 
 def test_an_arm_stops_before_its_stop_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -75,7 +75,7 @@ class Plate:
         z = 1 / self.inverse_depth(x, y)
         points = np.stack([x * z, y * z, z], axis=-1)
         where = (points - self._centre) @ self._turn[:, :2]
-        hit = (np.abs(where) <= self._half).all(axis=-1)
+        hit = np.asarray((np.abs(where) <= self._half).all(axis=-1))
         if not isinstance(self.grey, np.ndarray):
             return hit, z, np.full(z.shape, float(self.grey or 0))
         h, w = self.grey.shape
@@ -128,8 +128,9 @@ def to_colour(x: np.ndarray, y: np.ndarray, inverse_depth: np.ndarray) -> tuple[
     mx, my = -x * INFRARED["fx"] * 0.01, y * INFRARED["fy"] * 0.01
     xx, yy, xy = mx * mx, my * my, mx * my
     terms = (xx * mx, yy * my, xx * my, yy * mx, xx, yy, xy, mx, my, 1.0)
-    wx = sum(COLOUR[f"mx_x{i}y{j}"] * term for (i, j), term in zip(_POWERS, terms, strict=True))
-    wy = sum(COLOUR[f"my_x{i}y{j}"] * term for (i, j), term in zip(_POWERS, terms, strict=True))
+    wx, wy = np.zeros_like(x), np.zeros_like(x)
+    for (i, j), term in zip(_POWERS, terms, strict=True):
+        wx, wy = wx + COLOUR[f"mx_x{i}y{j}"] * term, wy + COLOUR[f"my_x{i}y{j}"] * term
     shift = COLOUR["shift_m"] * (inverse_depth / 1e3 - 1 / COLOUR["shift_d"])
     column = (wx / (COLOUR["fx"] * 0.002199) + shift) * COLOUR["fx"] + COLOUR["cx"]
     return column, wy / 0.002199 + COLOUR["cy"]
