@@ -54,6 +54,7 @@ class Recording:
                     timestamp_s=timestamp_s,
                     serial=str(group.attrs["serial"]),
                     fine_colour=group["fine_colour"][index] if "fine_colour" in group else None,
+                    infrared=group["infrared"][index] if "infrared" in group else None,
                 )
         except (OSError, KeyError, IndexError, ValueError) as error:
             raise BadRecording(
@@ -119,6 +120,8 @@ def _check_frames(group: Any) -> int:
         scale = group["fine_colour"].shape[1] // h
         if scale < 1 or group["fine_colour"].shape != (n, scale * h, scale * w, 3):
             raise ValueError(f"frames/fine_colour is {group['fine_colour'].shape}, no multiple of depth")
+    if "infrared" in group and group["infrared"].shape != (n, h, w):
+        raise ValueError(f"frames/infrared is {group['infrared'].shape}, expected {(n, h, w)}")
     if group["depth"].dtype != np.float32 or group["colour"].dtype != np.uint8:
         raise ValueError(f"depth is {group['depth'].dtype}, colour {group['colour'].dtype}")
     return n

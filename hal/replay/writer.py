@@ -139,13 +139,14 @@ class RecordingWriter:
         with self._lock:
             if self._file is None:
                 return -1
+            optional = dict(fine_colour=frame.fine_colour, infrared=frame.infrared)
             values = dict(
                 colour=frame.colour,
                 depth=frame.depth,
                 intrinsics=frame.intrinsics,
                 T_base_camera=np.asarray(frame.T_base_camera.as_vector(), dtype=np.float64),
                 exposed_s=np.float64(frame.timestamp_s - self._start_s),
-                **({} if frame.fine_colour is None else dict(fine_colour=frame.fine_colour)),
+                **{key: image for key, image in optional.items() if image is not None},
             )
             group = self._file.require_group("frames")
             if not group.keys():

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 
 from hal.errors import BadRecording
@@ -40,12 +41,19 @@ def change(path: Path, how) -> None:
         how(file)
 
 
-def test_a_fine_colour_image_is_recorded_where_the_camera_has_one(recording: Path, tmp_path: Path):
+def test_fine_colour_and_infrared_are_recorded_where_the_camera_has_them(recording: Path, tmp_path: Path):
     path = tmp_path / "fine.h5"
     fine_cell = dataclasses.replace(toy_cell(), camera=ToyCamera(fine=True))
     with recorded_cell(fine_cell, path).connected() as cell:
         for _ in range(2):
             cell.camera.capture()
-    fine = read_recording(path).frame(1, 0.0).fine_colour
-    assert fine is not None and fine.shape == (8, 12, 3) and (fine == 20).all()
-    assert read_recording(recording).frame(1, 0.0).fine_colour is None
+    frame = read_recording(path).frame(1, 0.0)
+    assert frame.fine_colour is not None and frame.infrared is not None
+    assert frame.fine_colour.shape == (8, 12, 3) and (frame.fine_colour == 20).all()
+    assert frame.infrared.dtype == np.uint16 and (frame.infrared == 2000).all()
+    without = read_recording(recording).frame(1, 0.0)
+    assert without.fine_colour is None and without.infrared is None
+    change(path, lambda file: file["frames"].move("infrared", "seen"))
+    change(path, lambda file: file["frames"].create_dataset("infrared", (2, 4, 5), np.uint16))
+    with pytest.raises(BadRecording, match=r"frames/infrared is \(2, 4, 5\), expected \(2, 4, 6\)"):
+        read_recording(path)

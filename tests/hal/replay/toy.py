@@ -103,6 +103,7 @@ class ToyCamera(Camera):
             timestamp_s=time.monotonic(),
             serial="toy",
             fine_colour=np.full((8, 12, 3), 10 * self._taken, np.uint8) if self._fine else None,
+            infrared=np.full((4, 6), 1000 * self._taken, np.uint16) if self._fine else None,
         )
 
 
