@@ -112,6 +112,14 @@ def detect(board: Board, colour: np.ndarray) -> Corners:
     )
 
 
+def infrared_grey(infrared: np.ndarray) -> np.ndarray:
+    """(h, w) uint8 of an infrared image (h, w), which is linear in the light and fades with the distance."""
+    light = np.sqrt(np.maximum(infrared, 0).astype(np.float32))
+    # Glints are brighter than any paper by far.
+    brightest = float(np.percentile(light, 99.5))
+    return np.rint((light * (255 / max(brightest, 1.0))).clip(0, 255)).astype(np.uint8)
+
+
 def board_pose(board: Board, corners: Corners, intrinsics: np.ndarray) -> Pose | None:
     """``T_camera_board`` from one view; None if the corners do not determine it (too few, or collinear).
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from hal.calibrate.board_poses import Sight, candidate_poses, way_is_clear
 from hal.calibrate.hand_eye import MIN_VIEWS, BadCalibrationSet, View
 from hal.camera import RgbdFrame
 from hal.cell import Cell
-from hal.charuco import MIN_CORNERS, Board, detect
+from hal.charuco import MIN_CORNERS, Board, detect, infrared_grey
 from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose, pose_distance
@@ -37,6 +38,7 @@ class Picture:
         T_base_camera: Pose of the camera's optical frame in the base, as configured at the time.
         T_base_tcp: Measured pose of the TCP in the base.
         serial: Serial number of the camera.
+        infrared: (h, w) uint16, or None if the camera provides none.
     """
 
     colour: np.ndarray
@@ -45,6 +47,14 @@ class Picture:
     T_base_camera: Pose
     T_base_tcp: Pose
     serial: str
+    infrared: np.ndarray | None = None
+
+    @property
+    def sighted(self) -> np.ndarray:
+        """(h, w, 3) uint8 in which the board is detected: infrared, which shares depth's optics, if any."""
+        if self.infrared is None:
+            return self.colour
+        return np.repeat(infrared_grey(self.infrared)[..., None], 3, axis=2)
 
     @classmethod
     def of(cls, frame: RgbdFrame, state: ArmState) -> Picture:
@@ -56,12 +66,32 @@ class Picture:
             T_base_camera=frame.T_base_camera,
             T_base_tcp=state.T_base_tcp,
             serial=frame.serial,
+            infrared=frame.infrared,
         )
 
     def view(self, board: Board) -> View:
         """Detect the board in the picture."""
         return View(
-            T_base_tcp=self.T_base_tcp, corners=detect(board, self.colour), intrinsics=self.intrinsics
+            T_base_tcp=self.T_base_tcp, corners=detect(board, self.sighted), intrinsics=self.intrinsics
+        )
+
+
+def refuse_invisible(board: Board, pictures: Sequence[Picture]) -> None:
+    """Refuse pictures in which the board is seen in colour and not in infrared.
+
+    Raises:
+        BadCalibrationSet: The board's print does not absorb infrared light.
+    """
+    with_infrared = [picture for picture in pictures if picture.infrared is not None]
+    in_infrared, in_colour = (
+        sum(len(detect(board, image).ids) >= MIN_CORNERS for image in images)
+        for images in ([one.sighted for one in with_infrared], [one.colour for one in with_infrared])
+    )
+    if in_colour > 0 and in_infrared == 0:
+        raise BadCalibrationSet(
+            f"the board was found in colour in {in_colour} of {len(pictures)} pictures, but in no infrared "
+            "image, on which the camera is calibrated; print it with a laser printer (the ink of many inkjet "
+            "printers is invisible in infrared), and keep sunlight off"
         )
 
 
@@ -114,6 +144,7 @@ def take_pictures(
         board, T_tcp_board, sight, table_z, tilt_rad=tilt_rad, rng=rng, possible=_possible(cell)
     )
     taken = found = 0
+    first: list[Picture] = []
     here = start
     for target in targets:
         if not way_is_clear(here, target, T_tcp_board, board, table_z):
@@ -125,14 +156,18 @@ def take_pictures(
         here = target
         arm.wait(settle_s)
         picture = _still_picture(cell)
-        n_corners = len(detect(board, picture.colour).ids)
+        n_corners = len(detect(board, picture.sighted).ids)
         keep(taken, picture, n_corners)
         taken += 1
         found += n_corners >= MIN_CORNERS
+        if found == 0:
+            first.append(picture)
         if found == 0 and taken == _HOPELESS:
             arm.move_to_pose(start, speed=speed)
+            refuse_invisible(board, first)
+            image = "pictures" if picture.infrared is None else "infrared images"
             raise BadCalibrationSet(
-                f"the board was not found in any of the first {taken} pictures (see those in the "
+                f"the board was not found in any of the first {taken} {image} (see those in the "
                 "folder); it must be this board, printed side up, held as --board-at says, and lit evenly"
             )
         if found == n or taken == _SPARE * n:
@@ -176,6 +211,7 @@ def _still_picture(cell: Cell) -> Picture:
 
 def write_picture(path: Path, picture: Picture) -> None:
     """Write a picture; the file appears whole or not at all."""
+    infrared: dict[str, Any] = {} if picture.infrared is None else {"infrared": picture.infrared}
     unfinished = path.with_name(path.name + ".tmp")
     with unfinished.open("wb") as file:
         np.savez_compressed(
@@ -186,6 +222,7 @@ def write_picture(path: Path, picture: Picture) -> None:
             T_base_camera=picture.T_base_camera.as_vector(),
             T_base_tcp=picture.T_base_tcp.as_vector(),
             serial=np.frombuffer(picture.serial.encode(), dtype=np.uint8),
+            **infrared,
         )
     unfinished.replace(path)
 
@@ -205,6 +242,7 @@ def read_picture(path: Path) -> Picture:
                 T_base_camera=Pose.from_vector(arrays["T_base_camera"]),
                 T_base_tcp=Pose.from_vector(arrays["T_base_tcp"]),
                 serial=arrays["serial"].tobytes().decode(),
+                infrared=arrays["infrared"] if "infrared" in arrays else None,
             )
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise UsageError(

@@ -118,7 +118,7 @@ def draw_corners(
                 T_camera_board = found.T_base_camera.inverse() @ picture.T_base_tcp @ found.T_tcp_board
                 expected = project(T_camera_board.apply(board.corners()), picture.intrinsics)
             axes = figure.add_subplot(rows, 3, place + 1)
-            axes.imshow(draw(picture.colour, view.corners, expected))
+            axes.imshow(draw(picture.sighted, view.corners, expected))
             used = "" if found is None or index in found.used else ", not used"
             axes.set_title(
                 f"picture {index}: {len(view.corners.ids)} of {board.n_corners} corners{used}", fontsize=10

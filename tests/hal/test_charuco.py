@@ -8,7 +8,17 @@ import pytest
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
-from hal.charuco import MIN_CORNERS, Board, Corners, board_pose, detect, draw, project, square_px
+from hal.charuco import (
+    MIN_CORNERS,
+    Board,
+    Corners,
+    board_pose,
+    detect,
+    draw,
+    infrared_grey,
+    project,
+    square_px,
+)
 from mskgrasp.core.geometry import Pose, pose_distance
 from tests.hal.board_picture import INTRINSICS, board_picture
 
@@ -48,6 +58,23 @@ def test_the_drawn_pattern_has_its_corners_where_they_are_numbered():
     assert sorted(found.ids.tolist()) == list(range(12))
     expected = 40 / 0.04 * (BOARD.corners()[found.ids, :2] + [0.1, 0.08]) + 10 - 0.5
     assert found.pixels == pytest.approx(expected, abs=0.1)
+
+
+def test_the_board_is_found_in_infrared_that_is_dark_fades_and_has_a_glint():
+    """Linear in the light: print reflects a tenth, the border of the image is five times darker."""
+    pose = random_pose(np.random.default_rng(0))
+    picture = board_picture(BOARD, pose)[..., 0]
+    rows, columns = np.mgrid[0 : picture.shape[0], 0 : picture.shape[1]]
+    fades = 1 / (1 + 4 * ((columns - 256) ** 2 + (rows - 212) ** 2) / 332**2)
+    infrared = (900 * (0.1 + 0.9 * picture / 255) * fades).astype(np.uint16)
+    infrared[5:15, 5:15] = 65535
+    grey = infrared_grey(infrared)
+    assert grey.dtype == np.uint8 and grey.max() == 255
+    found = detect(BOARD, grey)
+    assert len(found.ids) >= 10
+    off = found.pixels - seen_exactly(pose, found.ids).pixels
+    assert np.sqrt((off**2).mean()) < 0.15
+    assert infrared_grey(np.zeros((4, 5), np.uint16)).max() == 0
 
 
 @pytest.mark.parametrize("seed", range(4))

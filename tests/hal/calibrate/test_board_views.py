@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,15 @@ import numpy as np
 import pytest
 
 from hal import Cell
-from hal.calibrate.board_views import Picture, picture_paths, read_picture, take_pictures, write_picture
+from hal.calibrate.board_views import (
+    Picture,
+    picture_paths,
+    read_picture,
+    refuse_invisible,
+    take_pictures,
+    write_picture,
+)
+from hal.calibrate.config import CalibrateConfig
 from hal.calibrate.hand_eye import BadCalibrationSet, solve_hand_eye
 from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.core.errors import UsageError
@@ -59,6 +68,50 @@ def test_a_board_that_is_not_there_ends_after_five_pictures_and_the_hand_returns
     assert pose_distance(cell.arm.state().T_base_tcp, start) == pytest.approx((0, 0), abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("empty", "ink", "message"),
+    [
+        (True, "laser", "not found in any of the first 5 infrared images"),
+        (False, "inkjet", r"found in colour in \d of 5 pictures, but in no infrared image, .* laser printer"),
+    ],
+)
+def test_an_infrared_stream_without_a_board_ends_in_one_line(empty: bool, ink: str, message: str):
+    cell = bench(empty=empty, ink=ink)
+    start = cell.arm.state().T_base_tcp
+    with pytest.raises(BadCalibrationSet, match=message) as caught:
+        take(cell)
+    assert "\n" not in str(caught.value)
+    assert pose_distance(cell.arm.state().T_base_tcp, start) == pytest.approx((0, 0), abs=1e-6)
+
+
+def test_the_board_is_sought_in_infrared_where_there_is_any(taken: list[tuple[int, Picture, int]]):
+    (_, picture, n_corners), *_ = take(bench(ink="laser"))[1]
+    assert n_corners >= 6 and len(picture.view(BOARD).corners.ids) == n_corners
+    blank = dataclasses.replace(picture, colour=np.zeros_like(picture.colour))
+    assert len(blank.view(BOARD).corners.ids) == n_corners
+    dark = dataclasses.replace(picture, infrared=np.zeros_like(picture.depth, np.uint16))
+    assert len(dark.view(BOARD).corners.ids) == 0
+    refuse_invisible(BOARD, [picture, dark])  # one was found
+    refuse_invisible(BOARD, [one for _, one, _ in taken])  # no infrared at all
+    with pytest.raises(BadCalibrationSet, match="in colour in 2 of 2 pictures"):
+        refuse_invisible(BOARD, [dark, dark])
+
+
+def test_a_camera_that_does_not_look_straight_down_is_found(monkeypatch: pytest.MonkeyPatch):
+    """It is said to be 3 cm and some degrees from where it is."""
+    true = CalibrateConfig(camera_at=(0.15, 0.2, 0.95), camera_towards=(0.5, 0.0, 0.2)).T_base_camera()
+    rough = CalibrateConfig(camera_at=(0.17, 0.18, 0.96), camera_towards=(0.53, 0.02, 0.2)).T_base_camera()
+    cell = bench(pose=true)
+    capture = cell.camera.capture
+    monkeypatch.setattr(
+        cell.camera, "capture", lambda *a: dataclasses.replace(capture(*a), T_base_camera=rough)
+    )
+    _, kept = take(cell)
+    found = solve_hand_eye(BOARD, [picture.view(BOARD) for _, picture, _ in kept])
+    distance, angle = pose_distance(found.T_base_camera, true)
+    assert distance < 3e-3 and np.degrees(angle) < 0.3
+
+
 def test_an_arm_that_reaches_too_few_poses_says_so(monkeypatch):
     cell = bench()
     reached: list[tuple[float, ...]] = []
@@ -100,8 +153,12 @@ def test_a_picture_survives_its_file_to_the_bit(taken: list[tuple[int, Picture, 
         assert one.dtype == other.dtype and np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
     for name in ("T_base_camera", "T_base_tcp"):
         assert np.array_equal(getattr(picture, name).as_vector(), getattr(read, name).as_vector())
-    assert read.serial == "toy"
+    assert read.serial == "toy" and read.infrared is None
     assert [path.name for path in tmp_path.iterdir()] == ["pose-000.npz"]
+    infrared = np.arange(picture.depth.size).reshape(picture.depth.shape).astype(np.uint16)
+    write_picture(tmp_path / "pose-000.npz", dataclasses.replace(picture, infrared=infrared))
+    again = read_picture(tmp_path / "pose-000.npz").infrared
+    assert again is not None and again.dtype == np.uint16 and np.array_equal(again, infrared)
 
 
 def test_pictures_are_listed_in_the_order_in_which_they_were_taken(tmp_path: Path):

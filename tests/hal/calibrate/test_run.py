@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import signal
 import time
 from pathlib import Path
@@ -9,14 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hal.calibrate.board_views import Picture, picture_paths, read_picture
+from hal.calibrate.board_views import Picture, picture_paths, read_picture, take_pictures, write_picture
 from hal.calibrate.config import CalibrateConfig
-from hal.calibrate.hand_eye import HandEye, solve_hand_eye
+from hal.calibrate.hand_eye import BadCalibrationSet, HandEye, solve_hand_eye
 from hal.calibrate.run import capture, solve
 from hal.camera_calibration import read_calibration
 from hal.charuco import Board
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import pose_distance
+from tests.hal.calibrate.toy_bench import BOARD as TOY_BOARD
+from tests.hal.calibrate.toy_bench import HELD, bench
 from tests.programs import running
 
 SAPIEN = Path(__file__).parents[3] / "configs" / "cells" / "sapien.yaml"
@@ -83,6 +86,33 @@ def test_a_damaged_picture_is_named(folder: Path, tmp_path: Path):
         (tmp_path / "pose-000.npz").write_bytes(content)
         with pytest.raises(UsageError, match="pose-000.npz cannot be read"):
             solve(CalibrateConfig(out=tmp_path), tmp_path, BOARD, None)
+
+
+def test_pictures_with_and_without_infrared_are_not_mixed(tmp_path: Path):
+    kept = taken("laser")[:2]
+    write_picture(tmp_path / "pose-000.npz", kept[0])
+    write_picture(tmp_path / "pose-001.npz", dataclasses.replace(kept[1], infrared=None))
+    with pytest.raises(UsageError, match="holds 1 pictures with and 1 without an infrared image"):
+        solve(CalibrateConfig(out=tmp_path), tmp_path, TOY_BOARD, None)
+
+
+def test_stored_pictures_whose_infrared_shows_no_board_name_the_print(tmp_path: Path):
+    for index, picture in enumerate(taken("laser")):
+        blank = dataclasses.replace(picture, infrared=np.full_like(picture.depth, 4400, np.uint16))
+        write_picture(tmp_path / f"pose-{index:03d}.npz", blank)
+    with pytest.raises(BadCalibrationSet, match="in no infrared image, .* print it with a laser") as caught:
+        solve(CalibrateConfig(out=tmp_path), tmp_path, TOY_BOARD, None)
+    assert "\n" not in str(caught.value) and (tmp_path / "corners.png").is_file()
+    assert not (tmp_path / "calibration.yaml").exists()
+
+
+def taken(ink: str) -> list[Picture]:
+    kept: list[Picture] = []
+    take_pictures(
+        bench(ink=ink), TOY_BOARD, HELD, n=8, tilt_rad=0.5, nearest=0.5, speed=0.2, settle_s=0.0,
+        rng=np.random.default_rng(0), keep=lambda _, picture, __: kept.append(picture),
+    )  # fmt: skip
+    return kept
 
 
 def test_ctrl_c_keeps_the_pictures(tmp_path: Path):

@@ -37,28 +37,33 @@ class BoardCamera(Camera):
     Args:
         arm: Holds the board.
         empty: The hand is empty.
+        pose: Where the camera is.
+        ink: What infrared shows of the board: "laser" print, "inkjet", which is invisible, or no image.
     """
 
-    def __init__(self, arm: ToyArm, *, empty: bool = False):
-        self._arm, self._empty = arm, empty
+    def __init__(self, arm: ToyArm, *, empty: bool = False, pose: Pose = OVERHEAD, ink: str | None = None):
+        self._arm, self._empty, self._pose, self._ink = arm, empty, pose, ink
 
     def connect(self) -> None: ...
     def close(self) -> None: ...
 
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
-        T_camera_board = OVERHEAD.inverse() @ self._arm.state().T_base_tcp @ HELD
+        T_camera_board = self._pose.inverse() @ self._arm.state().T_base_tcp @ HELD
         hidden = self._empty or T_camera_board.position[2] < 0.1
+        colour = np.full((*SHAPE, 3), 110, np.uint8) if hidden else board_picture(BOARD, T_camera_board)
+        printed = {"laser": colour[..., 0], "inkjet": np.full(SHAPE, 110, np.uint8)}
         return RgbdFrame(
-            colour=np.full((*SHAPE, 3), 110, np.uint8) if hidden else board_picture(BOARD, T_camera_board),
+            colour=colour,
+            infrared=None if self._ink is None else 40 * printed[self._ink].astype(np.uint16),
             depth=np.full(SHAPE, np.nan, np.float32) if hidden else depth_of_board(T_camera_board),
             intrinsics=INTRINSICS,
-            T_base_camera=OVERHEAD,
+            T_base_camera=self._pose,
             timestamp_s=time.monotonic(),
             serial="toy",
         )
 
 
-def bench(*, empty: bool = False) -> Cell:
+def bench(*, empty: bool = False, pose: Pose = OVERHEAD, ink: str | None = None) -> Cell:
     """Connected: the arm beside the camera's view, the table at 0."""
     arm = ToyArm()
     arm.connect()
@@ -70,4 +75,4 @@ def bench(*, empty: bool = False) -> Cell:
         lift_height=0.1,
         grasp_force=20.0,
     )
-    return Cell(camera=BoardCamera(arm, empty=empty), arm=arm, workspace=table)
+    return Cell(camera=BoardCamera(arm, empty=empty, pose=pose, ink=ink), arm=arm, workspace=table)
