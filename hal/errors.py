@@ -27,6 +27,10 @@ class CaptureFailed(HalError):
     """The camera delivered no frame, a stale one or a partial one."""
 
 
+class NotCalibrated(HalError):
+    """The camera's pose was measured by hand: no motion may depend on it."""
+
+
 class OutOfWorkspace(HalError):
     """The commanded pose lies outside the workspace, the joint limits or the table clearance."""
 

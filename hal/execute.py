@@ -8,7 +8,7 @@ import numpy as np
 
 from hal.arm import JOINT_TOLERANCE
 from hal.cell import Cell
-from hal.errors import MotionAborted, Stopped
+from hal.errors import MotionAborted, NotCalibrated, Stopped
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import HOLD_S, MAX_OPENING, MIN_GAP, Grasp
 
@@ -52,9 +52,11 @@ def execute_grasp(cell: Cell, grasp: Grasp) -> GraspResult:
         grasp: A single one, base frame.
 
     Raises:
+        NotCalibrated: The camera's pose was measured by hand; nothing moves.
         OutOfWorkspace: The grasp is refused before anything moves.
         HalError: The arm was lost or stopped; a motion that met resistance is a result, not an error.
     """
+    refuse_by_hand(cell)
     arm, lift = cell.arm, cell.workspace.lift_height
     target, above, lifted = grasp.T_base_tcp, above_grasp(cell, grasp), grasp.raised(lift).T_base_tcp
     for pose in (target, above, lifted):
@@ -86,6 +88,19 @@ def execute_grasp(cell: Cell, grasp: Grasp) -> GraspResult:
         T_base_tcp=state.T_base_tcp,
         aborted=None,
     )
+
+
+def refuse_by_hand(cell: Cell) -> None:
+    """Refuse motions to what the camera sees while its pose is good to centimetres only.
+
+    Raises:
+        NotCalibrated: The camera's pose was measured by hand.
+    """
+    if cell.camera.by_hand:
+        raise NotCalibrated(
+            "the camera's pose was measured by hand, good to centimetres: nothing moves to what it sees; "
+            "calibrate it (python -m hal.calibrate --cell FILE) and set camera.calibration to the result"
+        )
 
 
 def above_grasp(cell: Cell, grasp: Grasp) -> Pose:

@@ -14,6 +14,7 @@ import torch
 
 from hal import Cell, GraspResult, RgbdFrame, cell_from_yaml, execute_grasp, go_home, put_down
 from hal.errors import MotionAborted, OutOfWorkspace, Stopped
+from hal.execute import refuse_by_hand
 from hal.operator import Operator
 from mskgrasp.core.errors import NoGraspFound, NoPartFound, TapeDoesNotFit
 from mskgrasp.core.geometry import Pose
@@ -166,9 +167,11 @@ class TrialEngine:
             then: Motion after the grasp, in words for the operator.
 
         Raises:
+            NotCalibrated: The camera's pose was measured by hand; nothing moves.
             HalError: The cell was lost.
             StoppedByOperator: The operator ended the run.
         """
+        refuse_by_hand(self.cell)
         while True:
             self.home()
             no_tape = ""

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from hal import Cell, GraspOutcome, execute_grasp, go_home, let_go, put_down
-from hal.errors import NeedsRecovery, OutOfWorkspace, Stopped
+from hal.errors import NeedsRecovery, NotCalibrated, OutOfWorkspace, Stopped
 from hal.execute import above_grasp, lower
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
-from tests.hal.replay.toy import ToyArm, toy_cell
+from tests.hal.replay.toy import ToyArm, ToyCamera, toy_cell
 
 GRASP = Grasp.from_vector(np.array([0.4, 0.1, 0.06, 0.3]))
 
@@ -166,3 +166,13 @@ def test_on_its_way_home_the_hand_first_rises(cell: Cell, arm: WritingArm):
     arm.log.clear()
     go_home(cell)
     assert arm.log == [("gripper", 0.08)]
+
+
+def test_nothing_moves_to_what_a_camera_sees_whose_pose_was_measured_by_hand(
+    cell: Cell, arm: WritingArm, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(ToyCamera, "by_hand", True)
+    with pytest.raises(NotCalibrated, match=r"by hand, .*: nothing moves .*hal.calibrate") as caught:
+        execute_grasp(cell, GRASP)
+    assert arm.log == [] and "\n" not in str(caught.value)
+    go_home(cell)  # home does not depend on the camera

@@ -8,8 +8,8 @@ import io
 import numpy as np
 import pytest
 
-from hal import Cell
-from hal.errors import CaptureFailed, MotionAborted, NeedsRecovery, Stopped
+from hal import Arm, Cell
+from hal.errors import CaptureFailed, MotionAborted, NeedsRecovery, NotCalibrated, Stopped
 from hal.operator import Operator
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
@@ -103,6 +103,13 @@ def test_an_operator_who_is_asked_sees_the_plan_and_may_have_the_part_placed_aga
     )
     assert planned.plan is not None and (tmp_path / "next.png").stat().st_size > 10_000
     assert asked.getvalue().count(f"{planned.plan.summary}; then to the pallet") == 2
+
+
+def test_a_camera_measured_by_hand_ends_a_trial_before_anything_moves(box_cell: BoxCell, monkeypatch):
+    monkeypatch.setattr(type(box_cell.engine.cell.camera), "by_hand", True)
+    monkeypatch.setattr(Arm, "move_gripper", None)  # would fail if it were tried
+    with pytest.raises(NotCalibrated, match="measured by hand"):
+        box_cell.engine.present(box_cell.part, box_cell.seed, BesideTheMiddle(box_cell.engine, 0.0, 0.0, 0.0))
 
 
 def test_a_person_who_stops_the_arm_is_not_overruled(box_cell: BoxCell):
