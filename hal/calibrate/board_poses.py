@@ -63,18 +63,21 @@ def candidate_poses(
     # The farthest the board may be: there a square is still this many pixels wide.
     farthest = float(sight.intrinsics[0, 0]) * board.square / _SIZE_PX
     camera = sight.T_base_camera
-    to_table = float(camera.position[2]) - table_z
-    farthest = min(farthest, to_table - TABLE_MARGIN)
+    over_table = float(camera.position[2]) - table_z - TABLE_MARGIN
+    towards_camera = _leaning(camera.as_matrix()[:3, 2])
     for k in range(_TRIES):
         pixel = rng.uniform([0, 0], [sight.width - 1, sight.height - 1])
         ray = np.linalg.solve(sight.intrinsics, np.array([*pixel, 1.0]))
-        centre = camera.apply(ray * rng.uniform(min(sight.nearest, farthest), farthest))
+        falls = float(camera.position[2] - camera.apply(ray)[2])
+        deepest = min(farthest, over_table / falls) if falls > 0 else farthest
+        centre = camera.apply(ray * rng.uniform(min(sight.nearest, deepest), deepest))
         # Directions of the tilt go round, so that a small set has all of them; a third is tilted by less.
         towards = 2 * np.pi * 0.381966 * k
         lean = tilt_rad * rng.uniform(0.3, 1.0)
         turn = Rotation.from_rotvec(lean * np.array([np.cos(towards), np.sin(towards), 0.0]))
         T_base_board = Pose(
-            position=centre, quat_wxyz=(turn * _facing(rng.uniform(-1, 1))).as_quat(scalar_first=True)
+            position=centre,
+            quat_wxyz=(towards_camera * turn * _facing(rng.uniform(-1, 1))).as_quat(scalar_first=True),
         )
         if not in_sight(inner, T_base_board, sight):
             continue
@@ -106,6 +109,16 @@ def way_is_clear(start: Pose, goal: Pose, T_tcp_board: Pose, board: Board, table
 
 def _lowest(outline: np.ndarray, T_base_board: Pose) -> float:
     return float(T_base_board.apply(outline)[:, 2].min())
+
+
+def _leaning(axis: np.ndarray) -> Rotation:
+    """The smallest turn from straight down to a camera's axis (3,), base frame."""
+    down = np.array([0.0, 0.0, -1.0])
+    about = np.cross(down, axis)
+    sine = float(np.linalg.norm(about))
+    if sine < 1e-9:
+        return Rotation.identity()
+    return Rotation.from_rotvec(about / sine * np.arctan2(sine, down @ axis))
 
 
 def _facing(share: float) -> Rotation:

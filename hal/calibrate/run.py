@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from hal.calibrate.board_print import print_board
-from hal.calibrate.board_views import Picture, picture_paths, read_picture, take_pictures, write_picture
+from hal.calibrate.board_views import (
+    Picture,
+    picture_paths,
+    read_picture,
+    refuse_invisible,
+    take_pictures,
+    write_picture,
+)
 from hal.calibrate.config import CalibrateConfig
 from hal.calibrate.hand_eye import BadCalibrationSet, solve_hand_eye
 from hal.calibrate.report import (
@@ -43,8 +50,6 @@ _MARGIN = 0.01
 """White paper around the simulated board, metres."""
 _PLATE = 0.02
 """Distance of the pads on the handle of the simulated board, metres."""
-LOOKING_DOWN = np.array([0.0, 1.0, -1.0, 0.0]) / np.sqrt(2)
-"""Quaternion wxyz of a camera that points straight down, the top of its image away from the base."""
 
 
 def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
@@ -110,11 +115,18 @@ def solve(config: CalibrateConfig, folder: Path, board: Board, workspace: Worksp
         raise UsageError(
             f"{folder} holds pictures of several cameras: {', '.join(serials)}; keep those of one"
         )
+    n_infrared = sum(picture.infrared is not None for picture in pictures)
+    if 0 < n_infrared < len(pictures):
+        raise UsageError(
+            f"{folder} holds {n_infrared} pictures with and {len(pictures) - n_infrared} without an infrared "
+            "image; keep those of one kind"
+        )
     views = [picture.view(board) for picture in pictures]
     try:
         found = solve_hand_eye(board, views)
     except BadCalibrationSet:
         draw_corners(board, pictures, views, None, config.out / "corners.png")
+        refuse_invisible(board, pictures)
         raise
     offset = depth_offset(board, pictures, found)
     calibration = Calibration(
@@ -158,12 +170,13 @@ def _with_camera_at(values: dict[str, Any], config: CalibrateConfig, cell_file: 
         if not calibration_path(camera["calibration"], cell_file).is_file():
             raise UsageError(
                 f"{cell_file}: there is no calibration file {camera['calibration']} yet; measure with a tape "
-                "where the camera is and give it as --camera-at X Y Z (base frame, m), good to 3 cm"
+                "where the camera is and give it as --camera-at X Y Z (base frame, m), good to 3 cm; if it "
+                "does not look straight down, add --camera-towards X Y Z, what is in the middle of its image"
             )
         return values
     by_hand = Calibration(
         serial="any",
-        T_base_camera=Pose(position=np.array(config.camera_at), quat_wxyz=LOOKING_DOWN),
+        T_base_camera=config.T_base_camera(),
         intrinsics=None,
         rms_translation_m=0.03,
         rms_rotation_rad=0.1,

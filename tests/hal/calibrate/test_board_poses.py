@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hal.calibrate.board_poses import TABLE_MARGIN, Sight, candidate_poses, in_sight, way_is_clear
+from hal.calibrate.config import CalibrateConfig
 from hal.charuco import Board
 from mskgrasp.core.geometry import Pose
 from tests.hal.board_picture import INTRINSICS
@@ -61,6 +62,23 @@ def test_the_printed_side_faces_the_camera_tilted_no_more_than_asked(found: list
         leans.append(np.degrees(np.arccos(np.clip(-normal[2], -1, 1))))
     assert max(leans) <= 30 + 1e-6 and min(leans) >= 9 - 1e-6
     assert np.ptp(leans) > 15  # not all by the same angle
+
+
+@pytest.mark.parametrize("towards", [(0.5, 0.0, 0.1), (0.1, 0.0, 0.1), (0.9, 0.3, 0.1)])
+def test_a_camera_that_looks_sideways_sees_the_board_face_to_face_too(towards: tuple[float, float, float]):
+    """Up to 24 degrees off the vertical; a board that faced the ceiling would be tilted by as much more."""
+    config = CalibrateConfig(camera_at=(0.5, 0.0, 1.2), camera_towards=towards)
+    camera = config.T_base_camera()
+    sight = Sight(T_base_camera=camera, intrinsics=INTRINSICS, width=512, height=424, nearest=0.5)
+    found = poses(40, sight=sight)
+    assert len(found) == 40
+    axis = camera.as_matrix()[:3, 2]
+    leans = [np.degrees(np.arccos((pose @ HELD).as_matrix()[:3, 2] @ axis)) for pose in found]
+    assert max(leans) <= 30 + 1e-6 and min(leans) >= 9 - 1e-6
+    depths = [camera.inverse().apply((pose @ HELD).position)[2] for pose in found]
+    assert np.ptp(depths) > 0.3  # from the nearest to the table, whichever way that is
+    for pose in found:
+        assert (pose @ HELD).apply(BOARD.outline(0.01))[:, 2].min() >= TABLE_Z + TABLE_MARGIN
 
 
 def test_the_tilts_go_round(found: list[Pose]):

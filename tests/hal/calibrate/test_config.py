@@ -27,11 +27,39 @@ def test_a_point_of_the_board_is_where_turn_and_place_put_it(
 
 
 @pytest.mark.parametrize(
+    ("towards", "turn", "right", "down", "forward"),
+    [
+        (None, 0.0, [0, -1, 0], [-1, 0, 0], [0, 0, -1]),  # the image's top away from the base
+        (None, 180.0, [0, 1, 0], [1, 0, 0], [0, 0, -1]),
+        (None, 90.0, [-1, 0, 0], [0, 1, 0], [0, 0, -1]),  # its top to the right of before
+        ((0.5, 0.5, 0.5), 0.0, [0, -0.7071, -0.7071], [-1, 0, 0], [0, 0.7071, -0.7071]),
+        ((0.0, 0.0, 0.5), 0.0, [0, -1, 0], [-0.7071, 0, 0.7071], [-0.7071, 0, -0.7071]),
+    ],
+)
+def test_a_camera_measured_by_hand_looks_where_it_is_pointed(
+    towards, turn: float, right: list[float], down: list[float], forward: list[float]
+):
+    config = CalibrateConfig(camera_at=(0.5, 0.0, 1.0), camera_towards=towards, camera_turn_deg=turn)
+    pose = config.T_base_camera()
+    assert pose.position.tolist() == [0.5, 0.0, 1.0]
+    assert pose.as_matrix()[:3, :3] == pytest.approx(np.stack([right, down, forward], axis=1), abs=1e-3)
+
+
+@pytest.mark.parametrize(
     ("values", "message"),
     [
         ({"poses": 7}, "'poses': input should be greater than or equal to 8"),
         ({"tilt_deg": 60}, "'tilt_deg': input should be less than or equal to 50"),
         ({"board_turn_deg": 181}, "'board_turn_deg'"),
+        ({"camera_towards": (0.5, 0, 0)}, "give camera_at, too"),
+        ({"camera_turn_deg": 90.0}, "give camera_at, too"),
+        (
+            {"camera_at": (0.5, 0, 1), "camera_towards": (2, 0, 1)},
+            "camera_towards [2.0, 0.0, 1.0] is 0 degrees below the horizon of a camera at [0.5, 0.0, 1.0], "
+            "at least 30 are needed",
+        ),
+        ({"camera_at": (0.5, 0, 1), "camera_towards": (0.5, 0, 1)}, "is 0 degrees below the horizon"),
+        ({"camera_at": (0.5, 0, 1), "camera_towards": (0.5, 0, 2)}, "is -90 degrees below the horizon"),
         ({"speed": 0}, "'speed': input should be greater than 0"),
         ({"board": {"square": 0.04, "marker": 0.05}}, "marker 0.05 m must be 0.4 to 0.9 times the square"),
     ],

@@ -92,9 +92,13 @@ def test_a_tenth_of_a_pixel_of_noise_leaves_less_than_a_millimetre_and_a_tenth_o
 
 
 def test_the_halves_of_the_pictures_say_how_large_the_error_is():
-    found = solve_hand_eye(BOARD, views_of(hand_poses(24, 30), 0.2))
-    assert 0.02 < found.half_rotation_rad * 180 / np.pi < 1.0
-    assert errors(found)[1] < 3 * np.degrees(found.half_rotation_rad)
+    """One draw of the noise may make the halves agree by chance; of several the median tells."""
+    poses = hand_poses(24, 30)
+    found = [solve_hand_eye(BOARD, views_of(poses, 0.2, seed)) for seed in range(5)]
+    half = np.median([np.degrees(one.half_rotation_rad) for one in found])
+    assert 0.01 < half < 1.0
+    assert np.median([errors(one)[1] for one in found]) < 2 * half
+    assert max(errors(one)[1] for one in found) < 3 * half
 
 
 def test_a_view_that_contradicts_the_others_is_left_out():

@@ -31,6 +31,7 @@ CELLS = Path(__file__).parents[3] / "configs" / "cells"
         ),
         (calibrate, ["--cell", "empty.yaml", "--camera-at", "0", "0", "1"], "'type' is None; legal: sapien"),
         (calibrate, ["--cell", "."], "Is a directory"),
+        (calibrate, ["--camera-towards", "0.5", "0", "0"], "give camera_at, too"),
         (doctor, ["--cell", "none.yaml"], "No such file"),
         (doctor, ["--cell", "."], "Is a directory"),
     ],
