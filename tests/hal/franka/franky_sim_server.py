@@ -3,7 +3,8 @@
 An FR3 over the real wire protocol of server version 10, its dynamics in MuJoCo. Faults, which franky-sim does
 not have, are commanded on standard input, one a line, as in `tests.hal.franka.fci5_server`:
 
-    reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | q | clock
+    reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | q | clock |
+    record (the commands of motions from now on) | save FILE (them, as `commands` reads it)
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ import time
 
 import franky_sim
 import mujoco
+import numpy as np
 from franky_sim.franka_gripper_protocol import GripperCommand, GripperCommandStatus
 from franky_sim.franka_robot_protocol import (
     AutomaticErrorRecoveryCommand,
     MoveStatus,
     RobotCommand,
     RobotMode,
+    UDPCommand,
 )
 from franky_sim.franka_robot_server import FrankaRobotServer
 from franky_sim.franka_robot_state import FrankaRobotState
@@ -40,18 +43,46 @@ ANSWERS = {
 
 
 class FaultyServer(FrankaRobotServer):
-    """franky-sim's server with a reflex and a user stop."""
+    """franky-sim's server with a reflex, a user stop and a record of what is commanded."""
 
     fault: RobotMode | None = None
     ticks = 0
+    record: list[UDPCommand] | None = None
+    answered = False
 
     @property
     def robot_state(self) -> FrankaRobotState:
         state = super().robot_state
+        if not (self.current_motion_id and self.answered):
+            # A robot at rest desires none; franky-sim differentiates measurements, in which a joint chatters.
+            state = state.replace(
+                dq_d=(0.0,) * 7, ddq_d=(0.0,) * 7, O_dP_EE_c=(0.0,) * 6, O_ddP_EE_c=(0.0,) * 6
+            )
         if self.fault is None:
             return state
         reasons = tuple(self.fault is RobotMode.kReflex and k == _CARTESIAN_REFLEX for k in range(41))
         return state.replace(robot_mode=self.fault, reflex_reason=reasons)
+
+    def _handle_udp_command(self, command_data: bytes) -> None:
+        super()._handle_udp_command(command_data)
+        command = UDPCommand.from_bytes(command_data)
+        self.answered = not command.motion_generation_finished
+        if self.record is not None:
+            self.record.append(command)
+
+    def start_motion(self, controller_mode, motion_generator_mode, motion_id) -> None:
+        """A robot starts from where it was commanded to be; franky-sim would step to where it is measured."""
+        self.answered = False
+        desired = self.robot.state
+        super().start_motion(controller_mode, motion_generator_mode, motion_id)
+        self._FrankaRobotServer__current_control_command = UDPCommand(
+            q_c=tuple(desired.q_d), O_T_EE_c=tuple(desired.O_T_EE_d)
+        )
+
+    def wait_for_command(self) -> None:
+        """A record has no gaps: a busy client's command comes late, and a robot waits for nobody."""
+        if self.record is not None and self.current_motion_id and self.answered:
+            select.select([getattr(self, "_FrankaServer__udp_socket")], [], [], 0.5)  # noqa: B009
 
     def set_fault(self, mode: RobotMode, status: MoveStatus) -> None:
         self.fault = mode
@@ -106,6 +137,7 @@ def serve(server, simulator: MujocoSimulator, robot: FaultyServer, answers: Answ
         simulator.step()
         robot.send_state()
         robot.ticks += 1
+        robot.wait_for_command()
         if select.select([sys.stdin], [], [], 0)[0]:
             line = sys.stdin.readline()
             if not line:
@@ -136,6 +168,18 @@ def obey(words: list[str], simulator: MujocoSimulator, robot: FaultyServer, answ
             return " ".join(str(value) for value in robot.robot.inner_state.q)
         case ["clock"]:
             return str(robot.ticks * 1e-3)
+        case ["record"]:
+            robot.record = []
+        case ["save", file]:
+            assert robot.record
+            np.savez(
+                file,
+                ticks=[command.message_id for command in robot.record],
+                joints=[command.q_c for command in robot.record],
+                poses=[np.reshape(command.O_T_EE_c, (4, 4), order="F") for command in robot.record],
+                elbows=[command.elbow_c for command in robot.record],
+            )
+            robot.record = None
         case _:
             raise ValueError(words)
     return "done"
