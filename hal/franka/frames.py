@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from hal.errors import NotConnected
 from mskgrasp.core.geometry import Pose
@@ -20,6 +21,10 @@ F_T_EE = np.array([[_TURN, _TURN, 0, 0], [-_TURN, _TURN, 0, 0], [0, 0, 1, TCP_OF
 """The Franka Hand's TCP in the flange: turned by -45 degrees, 0.1034 m out (Franka Hand's datasheet)."""
 _POSITION_TOLERANCE = 0.5e-3
 _ROTATION_TOLERANCE = 2e-3
+_SHORT = 1e-4
+"""A shorter shift or turn has no direction, m or rad."""
+_ALONG = 1e-3
+"""A line this close to an axis is along it, rad: off by 0.03 mm at 0.25 m/s."""
 
 
 def matrix_from_columns(values: Sequence[float]) -> np.ndarray:
@@ -30,6 +35,44 @@ def matrix_from_columns(values: Sequence[float]) -> np.ndarray:
 def pose_from_columns(values: Sequence[float]) -> Pose:
     """``T_a_b`` of libfranka's 16 numbers, quaternion w x y z."""
     return Pose.from_matrix(matrix_from_columns(values))
+
+
+def tool_along(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """Turn (4, 4) of the frame at ``start`` that puts an axis on the line from there to ``goal``.
+
+    What of the rotation is across the line gets an axis, too. It turns as little as possible: not at all for
+    a descent of a vertical hand, or where the axes lie so already.
+
+    Args:
+        start: (4, 4) pose in the base.
+        goal: (4, 4) pose in the base.
+    """
+    way = start[:3, :3].T @ (goal[:3, 3] - start[:3, 3])
+    turn = Rotation.from_matrix(start[:3, :3].T @ goal[:3, :3]).as_rotvec()
+    first, second = (way, turn) if np.linalg.norm(way) > _SHORT else (turn, np.zeros(3))
+    tool = np.eye(4)
+    if np.linalg.norm(first) < _SHORT:
+        return tool
+    nearest = int(np.abs(first).argmax())
+    axis = np.sign(first[nearest]) * np.eye(3)[nearest]
+    swing = _least_turn(axis, first)
+    across = swing.inv().apply(second)
+    across[nearest] = 0.0
+    spin = Rotation.identity()
+    if np.linalg.norm(across) > _ALONG:
+        other = int(np.abs(across).argmax())
+        spin = _least_turn(np.sign(across[other]) * np.eye(3)[other], across)
+    tool[:3, :3] = (swing * spin).as_matrix()
+    return tool
+
+
+def _least_turn(axis: np.ndarray, direction: np.ndarray) -> Rotation:
+    """Turn of a unit vector onto a direction less than a right angle away; none where it is there."""
+    normal = np.cross(axis, direction / np.linalg.norm(direction))
+    sine = float(np.linalg.norm(normal))
+    if sine < _ALONG:
+        return Rotation.identity()
+    return Rotation.from_rotvec(normal / sine * math.asin(sine))
 
 
 def check_end_effector(f_t_ee: Sequence[float]) -> None:

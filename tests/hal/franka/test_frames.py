@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from hal.errors import NotConnected
 from hal.franka import PandaPyArmConfig
 from hal.franka.driver import column_major
-from hal.franka.frames import F_T_EE, check_end_effector, matrix_from_columns, pose_from_columns
+from hal.franka.frames import F_T_EE, check_end_effector, matrix_from_columns, pose_from_columns, tool_along
 from mskgrasp.core.geometry import Pose, quat_multiply
 from mskgrasp.core.panda_kinematics import forward
 
@@ -54,3 +55,47 @@ def test_the_frankas_hand_is_the_only_end_effector():
         with pytest.raises(NotConnected, match="choose it in Desk") as caught:
             check_end_effector(column_major(wrong))
         assert "\n" not in str(caught.value)
+
+
+def goal_from(start: np.ndarray, way: list[float], turn: list[float]) -> np.ndarray:
+    """The pose after a shift and a turn, both in the frame at the start."""
+    change = np.eye(4)
+    change[:3, :3], change[:3, 3] = Rotation.from_rotvec(turn).as_matrix(), way
+    return start @ change
+
+
+small = st.lists(st.floats(-0.3, 0.3), min_size=3, max_size=3)
+
+
+@settings(deadline=None, max_examples=50)
+@given(shares, small, small)
+def test_a_line_lies_on_an_axis_of_the_turned_tool(share: list[float], way: list[float], turn: list[float]):
+    start = forward(LOWER + np.array(share) * (UPPER - LOWER))[0]
+    tool = tool_along(start, goal_from(start, way, turn))
+    assert tool[:3, :3] @ tool[:3, :3].T == pytest.approx(np.eye(3), abs=1e-9)
+    assert not tool[:3, 3].any()
+    length = np.linalg.norm(way)
+    if length > 1e-3:
+        assert np.abs(tool[:3, :3].T @ way).max() == pytest.approx(length, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("way", "turn"),
+    [
+        ([0, 0, 0.1], [0, 0, 0.5]),  # a descent of a vertical hand that turns
+        ([-0.1, 0, 0], [0, 0, 0]),
+        ([0, 0, 1e-6], [0, 0.3, 0]),
+        ([1e-5, 1e-6, 0], [1e-6, 1e-5, 0]),
+        ([2e-5, 0, 0.1], [3e-5, -3e-5, 0]),  # what is left of a motion before
+    ],
+)
+def test_a_tool_that_moves_along_its_axes_is_not_turned(way: list[float], turn: list[float]):
+    start = forward((LOWER + UPPER) / 2)[0]
+    assert np.array_equal(tool_along(start, goal_from(start, way, turn)), np.eye(4))
+
+
+def test_a_turn_across_the_line_lies_on_an_axis_too():
+    start = forward((LOWER + UPPER) / 2)[0]
+    tool = tool_along(start, goal_from(start, [0.05, 0.08, 0.02], [0.08, -0.05, 0.0]))
+    turned = np.abs(tool[:3, :3].T @ [0.08, -0.05, 0.0])
+    assert turned.max() == pytest.approx(np.linalg.norm(turned), rel=1e-5)
