@@ -11,7 +11,15 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hal.arm import JOINT_TOLERANCE, STOPPED, Arm, ArmState, GraspOutcome
+from hal.arm import (
+    JOINT_TOLERANCE,
+    POSITION_TOLERANCE,
+    ROTATION_TOLERANCE,
+    STOPPED,
+    Arm,
+    ArmState,
+    GraspOutcome,
+)
 from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery, Stopped
 from hal.franka.config import JOINT_SPEED, FrankyArmConfig, PandaPyArmConfig
 from hal.franka.driver import DriverSettings, DriverState
@@ -20,7 +28,7 @@ from hal.franka.frames import check_end_effector, pose_from_columns
 from hal.franka.link import DriverLink
 from hal.franka.path import JointPath, joint_path, straight_path
 from hal.limits import ArmLimits
-from mskgrasp.core.geometry import Pose
+from mskgrasp.core.geometry import Pose, pose_distance
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.panda_kinematics import forward_pose, reachable
 
@@ -32,10 +40,12 @@ _RECOVERY_S = 2.0
 """The robot's mode may lag behind its recovery by this, s."""
 _STILL_WIDTH = 1e-4
 _STILL_JOINT, _STANDING_S = 1e-4, 0.4
-"""An arm that approaches its goal by less than this angle, rad, in this time, s, is at rest."""
+"""An arm whose joints move by less than this angle, rad, in this time, s, is at rest."""
+_STILL_ERROR = 0.02
+"""An arm that approaches its goal by less than this fraction of the tolerance comes no closer."""
 _POLL_S = 0.05
 _TRIES = 3
-"""Attempts at a motion: Ruckig, which franky uses, finds no trajectory on one path in a thousand."""
+"""Attempts at a motion: Ruckig, which franky uses, may find no trajectory until the arm stands still."""
 
 
 class FrankaArm(Arm):
@@ -149,15 +159,19 @@ class FrankaArm(Arm):
                 joint_speed=config.max_joint_speed * JOINT_SPEED,
                 lower=self.limits.joint_lower,
                 upper=self.limits.joint_upper,
-            )
+            ),
+            T_base_tcp,
         )
 
-    def _travel(self, path_from: Callable[[np.ndarray], JointPath]) -> None:
-        """Follow a path from the current joints (7,); plan again if the driver finds no trajectory."""
+    def _travel(self, path_from: Callable[[np.ndarray], JointPath], T_base_tcp: Pose | None = None) -> None:
+        """Follow a path from the current joints (7,), straight to a pose where one is given.
+
+        It is planned again if the driver finds no trajectory.
+        """
         for left in reversed(range(_TRIES)):
             path = path_from(np.array(self._ready().joints))
             try:
-                return self._follow(path)
+                return self._follow(path, T_base_tcp)
             except NoTrajectory:
                 if not left or not _is_idle(self._stand_still()):
                     raise
@@ -172,26 +186,35 @@ class FrankaArm(Arm):
                 break
         return state
 
-    def _follow(self, path: JointPath) -> None:
+    def _follow(self, path: JointPath, T_base_tcp: Pose | None) -> None:
         # A driver that takes several times the duration of a motion hangs.
         timeout_s = 4 * path.duration_s + self._config.settle_s + self._config.patience_s
         values = {name: array.tolist() for name, array in asdict(path).items()}
+        if T_base_tcp is not None:
+            values["T_base_tcp"] = T_base_tcp.as_matrix().tolist()
         try:
-            self._ask("move", timeout_s=timeout_s, **values)
+            self._ask("move_joints" if T_base_tcp is None else "move_straight", timeout_s=timeout_s, **values)
         except MotionAborted as error:
             self._raise_aborted(error)
-        goal = path.joints[-1]
         deadline = time.monotonic() + self._config.settle_s
         # Closer than the base class requires, so that its check has a margin; an arm that approaches no
         # further is as close as it gets.
         nearest, since = math.inf, time.monotonic()
-        while (error := np.abs(np.array(self._measure().joints) - goal).max()) > JOINT_TOLERANCE / 4:
+        while (error := self._error(path.joints[-1], T_base_tcp)) > 1 / 4:
             now = time.monotonic()
-            if error < nearest - _STILL_JOINT:
+            if error < nearest - _STILL_ERROR:
                 nearest, since = error, now
             if now > deadline or now - since > _STANDING_S or self._stop.is_set():
                 return
             time.sleep(_POLL_S)
+
+    def _error(self, joints: np.ndarray, T_base_tcp: Pose | None) -> float:
+        """Distance to the goal as a fraction of what the base class tolerates."""
+        state = self._measure()
+        if T_base_tcp is None:
+            return float(np.abs(np.array(state.joints) - joints).max()) / JOINT_TOLERANCE
+        distance, angle = pose_distance(pose_from_columns(state.o_t_ee), T_base_tcp)
+        return max(distance / POSITION_TOLERANCE, angle / ROTATION_TOLERANCE)
 
     def _wait(self, seconds: float) -> None:
         self._stop.wait(seconds)

@@ -81,8 +81,12 @@ class Driver(Protocol):
         """Measure; may be called during a motion."""
         ...
 
-    def move(self, path: JointPath) -> None:
-        """Follow a path to its end; return when the arm is there, or raise."""
+    def move_joints(self, path: JointPath) -> None:
+        """Move to the end of a path of `joint_path` in its time; return when the arm is there, or raise."""
+        ...
+
+    def move_straight(self, path: JointPath, T_base_tcp: np.ndarray) -> None:
+        """Move the TCP straight to a pose (4, 4) in its path's time; return when it is there, or raise."""
         ...
 
     def home_gripper(self) -> bool:

@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from hal.franka.driver import MODES, DriverSettings, DriverState, column_major
-from hal.franka.path import JointPath
+from hal.franka.frames import tool_along
+from hal.franka.path import JointPath, Peaks
 
 if TYPE_CHECKING:
     import franky
 
 _POLL_S = 0.02
 _OWED_S = 0.5
+_LEAST_SHARE, _LEAST_WAY = 0.05, 1e-3
+"""A joint with less than this share of the longest way, or less than this way, rad, gets its limits.
+
+Too low for what is left of a motion before, a limit would make the motion take many times its duration.
+"""
+_RAD_PER_M, _M_PER_RAD = 0.5, 0.1
+"""The same for the turn of a straight motion against its shift, and for the shift against the turn."""
+_FRAME_S, _FILTER_S = 5.0, 0.3
+"""Time the robot has to report a turned frame, s, and time after which filtered speeds forget the turn, s."""
+_SAME_FRAME = 1e-9
+_NEAR_RAD = 0.05
+"""Desired and measured orientation of an arm at rest differ by less, rad."""
 
 
 class FrankyDriver:
@@ -37,14 +54,13 @@ class FrankyDriver:
 
     def state(self) -> DriverState:
         """Measure; may be called during a motion."""
-        robot, gripper = self._robot.state, self._gripper.state
-        if not self._robot.is_in_control:
-            # The first of the waiting states is from before this call; the one after it is not.
-            robot = self._robot.state
+        robot, gripper = self._fresh_state(), self._gripper.state
+        # Independent of a tool that a straight motion has turned.
+        o_t_ee = robot.O_T_EE.matrix @ np.linalg.inv(robot.NE_T_EE.matrix)
         return DriverState(
             joints=[float(value) for value in robot.q],
-            o_t_ee=column_major(robot.O_T_EE.matrix),
-            f_t_ee=column_major(robot.F_T_EE.matrix),
+            o_t_ee=column_major(o_t_ee),
+            f_t_ee=column_major(robot.F_T_NE.matrix),
             width=gripper.width,
             max_width=gripper.max_width,
             mode=MODES[int(robot.robot_mode)],
@@ -52,22 +68,99 @@ class FrankyDriver:
             seconds=time.monotonic(),
         )
 
-    def move(self, path: JointPath) -> None:
-        """Follow a path through its knots, with the knots' speeds; between them franky interpolates."""
-        franky = self._franky
-        path = path.without_creep()
-        waypoints = [
-            franky.JointWaypoint(
-                franky.JointState(joints, speed),
-                minimum_time=franky.Duration(round((after - before) * 1000)),
-            )
-            for joints, speed, before, after in zip(
-                path.joints[1:], path.speeds[1:], path.seconds[:-1], path.seconds[1:], strict=True
-            )
-        ]
+    def _fresh_state(self) -> franky.RobotState:
+        robot = self._robot.state
+        if not self._robot.is_in_control:
+            # The first of the waiting states is from before this call; the one after it is not.
+            robot = self._robot.state
+        return robot
+
+    def move_joints(self, path: JointPath) -> None:
+        """Move to the end of a path by one motion.
+
+        With limits in proportion to their ways all joints have the same profile: a straight line in their
+        space, whose speed, acceleration and jerk are no greater than those of the path.
+        """
+        goal = path.joints[-1]
+        way = np.abs(goal - self._fresh_state().q_d)
+        limits = Peaks.of(np.maximum(way, max(_LEAST_SHARE * way.max(), _LEAST_WAY)), path.duration_s)
+        robot = self._robot
+        for limit, peak in (
+            (robot.joint_velocity_limit, limits.speed),
+            (robot.joint_acceleration_limit, limits.acceleration),
+            (robot.joint_jerk_limit, limits.jerk),
+        ):
+            limit.set(np.minimum(peak, limit.max))
+        self._run(self._franky.JointMotion(goal))
+
+    def move_straight(self, path: JointPath, T_base_tcp: np.ndarray) -> None:
+        """Move the TCP straight to a pose (4, 4) by one motion of the path's duration and peaks.
+
+        franky gives each axis of the end effector's frame at the start its own profile under the same limits,
+        so that the TCP leaves a line between the axes by millimetres: the frame is turned onto the line.
+        The parts of a turn along the line and across it keep profiles of their own: with both the hand tilts
+        by milliradians on the way.
+        """
+        state = self._fresh_state()
+        tool = tool_along(state.O_T_EE_d.matrix @ np.linalg.inv(state.NE_T_EE.matrix), T_base_tcp)
+        self._turn_tool(tool)
+        try:
+            self._run(self._straight_motion(T_base_tcp @ tool, path.duration_s))
+        except self._franky.NetworkException:
+            raise  # a command to a robot that is gone blocks for ever
+        except BaseException:
+            self._turn_tool_back()
+            raise
+        self._turn_tool_back()
+
+    def _straight_motion(self, goal: np.ndarray, seconds: float) -> franky.CartesianMotion:
+        start = self._fresh_state().O_T_EE_d.matrix
+        way = float(np.linalg.norm(goal[:3, 3] - start[:3, 3]))
+        angle = float(Rotation.from_matrix(start[:3, :3].T @ goal[:3, :3]).magnitude())
+        shift = Peaks.of(np.array(max(way, _M_PER_RAD * angle, _LEAST_WAY)), seconds)
+        turn = Peaks.of(np.array(max(angle, _RAD_PER_M * way, _LEAST_WAY)), seconds)
+        robot = self._robot
+        for limit, peak in (
+            (robot.translation_velocity_limit, shift.speed),
+            (robot.translation_acceleration_limit, shift.acceleration),
+            (robot.translation_jerk_limit, shift.jerk),
+            (robot.rotation_velocity_limit, turn.speed),
+            (robot.rotation_acceleration_limit, turn.acceleration),
+            (robot.rotation_jerk_limit, turn.jerk),
+        ):
+            limit.set(min(float(peak), limit.max))
+        return self._franky.CartesianMotion(self._franky.Affine(goal))
+
+    def _turn_tool(self, tool: np.ndarray) -> None:
+        """Turn the end effector's frame to (4, 4) against that of Desk.
+
+        Raises:
+            RuntimeError: The robot did not take it; nothing moves.
+        """
+        if np.allclose(self._fresh_state().NE_T_EE.matrix, tool, atol=_SAME_FRAME):
+            return
+        self._robot.set_ee(column_major(tool))
+        deadline, seen = time.monotonic() + _FRAME_S, None
+        while time.monotonic() < deadline:
+            state = self._fresh_state()
+            off = Rotation.from_matrix(state.O_T_EE.matrix[:3, :3].T @ state.O_T_EE_d.matrix[:3, :3])
+            if np.allclose(state.NE_T_EE.matrix, tool, atol=_SAME_FRAME) and off.magnitude() < _NEAR_RAD:
+                seen = seen or state.time
+                if state.time.to_sec() - seen.to_sec() > _FILTER_S:
+                    return
+            time.sleep(_POLL_S)
+        raise RuntimeError(f"the robot did not turn its end effector's frame within {_FRAME_S:g} s")
+
+    def _turn_tool_back(self) -> None:
+        # States do not depend on it and the next straight motion turns it anyway, so a robot in a fault,
+        # which refuses this, may keep it.
+        with contextlib.suppress(self._franky.CommandException, RuntimeError):
+            self._turn_tool(np.eye(4))
+
+    def _run(self, motion: franky.BaseJointPositionMotion | franky.BaseCartesianPoseMotion) -> None:
         if self._stopped.is_set():
             raise RuntimeError("Move command preempted!")
-        self._robot.move(franky.JointWaypointMotion(waypoints), asynchronous=True)
+        self._robot.move(motion, asynchronous=True)
         while not self._robot.join_motion(timeout=_POLL_S):
             if self._stopped.is_set():
                 self._robot.stop()

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from concurrent.futures import Future, wait
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from hal.errors import CommunicationLost
 from hal.franka.driver import MODES, DriverSettings, DriverState
@@ -78,13 +77,17 @@ class PandaPyDriver:
             seconds=time.monotonic(),
         )
 
-    def move(self, path: JointPath) -> None:
+    def move_straight(self, path: JointPath, T_base_tcp: np.ndarray) -> None:
+        """Follow a path along a straight line; the pose is that of its end."""
+        self.move_joints(path)
+
+    def move_joints(self, path: JointPath) -> None:
         """Follow a path, then correct the error that friction leaves."""
         self._check()
         controller = self._panda_py.controllers.JointPosition(
             np.array(self._settings.stiffness), np.array(self._settings.damping)
         )
-        wanted = CubicHermiteSpline(path.seconds, path.joints, path.speeds)
+        wanted = path.curve()
         speed = wanted.derivative()
         with self._use:
             self._panda.start_controller(controller)

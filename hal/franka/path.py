@@ -6,17 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
 
 from hal.errors import OutOfWorkspace
 from mskgrasp.core.geometry import Pose, pose_distance, straight_line
-from mskgrasp.core.minimum_jerk import minimum_jerk, minimum_jerk_duration, minimum_jerk_rate
+from mskgrasp.core.minimum_jerk import minimum_jerk, minimum_jerk_duration
 from mskgrasp.core.panda_kinematics import POSE_TOLERANCE, forward_pose, track, within_limits
 
 PERIOD_S = 0.05
-"""Time between two knots of a path, s: a cubic between them is off by less than 0.1 mm at 0.5 m/s."""
-
-CREEP_RAD = 2e-5
-"""A joint that moves by less over a whole path is held, rad: 0.02 mm at the hand."""
+"""Time between two knots of a path, s: the curve between them is off by less than 0.01 mm at 0.5 m/s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,29 +24,43 @@ class JointPath:
     Attributes:
         seconds: (k,) since the start.
         joints: (k, 7) radians.
-        speeds: (k, 7) radians a second; zero at both ends.
     """
 
     seconds: np.ndarray
     joints: np.ndarray
-    speeds: np.ndarray
 
     @property
     def duration_s(self) -> float:
         """Seconds from the first knot to the last."""
         return float(self.seconds[-1])
 
-    def without_creep(self) -> JointPath:
-        """The same path with joints held that move by less than `CREEP_RAD`.
+    def curve(self) -> BSpline:
+        """Joints (7,) over seconds: without steps of acceleration, and without any at both ends."""
+        at_rest = [(1, np.zeros(7)), (2, np.zeros(7))]
+        return make_interp_spline(self.seconds, self.joints, k=5, bc_type=(at_rest, at_rest))
 
-        A profile over a millionth of a radian is at the end of a trajectory solver's accuracy: Ruckig, which
-        franky uses, sometimes finds none on such a path (error -111), which aborts the motion.
-        """
-        still = np.ptp(self.joints, axis=0) < CREEP_RAD
-        return JointPath(
-            seconds=self.seconds,
-            joints=np.where(still, self.joints[0], self.joints),
-            speeds=np.where(still, 0.0, self.speeds),
+
+@dataclass(frozen=True, kw_only=True)
+class Peaks:
+    """Greatest rates of a minimum-jerk motion.
+
+    Attributes:
+        speed: (...) m/s or rad/s.
+        acceleration: (...) m/s^2 or rad/s^2.
+        jerk: (...) m/s^3 or rad/s^3.
+    """
+
+    speed: np.ndarray
+    acceleration: np.ndarray
+    jerk: np.ndarray
+
+    @classmethod
+    def of(cls, distance: np.ndarray, seconds: float) -> Peaks:
+        """Peaks over distances (...) in m or rad, all in the same time (derivatives of `minimum_jerk`)."""
+        return cls(
+            speed=15 / 8 * distance / seconds,
+            acceleration=10 / math.sqrt(3) * distance / seconds**2,
+            jerk=60 * distance / seconds**3,
         )
 
 
@@ -58,9 +70,9 @@ def joint_path(
     """All joints from (7,) to (7,) radians together, under speeds (7,) rad/s and accelerations (7,)."""
     way = goal - start
     seconds = max(_duration(abs(way[i]), speed[i], acceleration[i]) for i in range(7))
-    share, rate = _profile(seconds)
+    share = _profile(seconds)
     times = np.linspace(0, seconds, len(share))
-    return JointPath(seconds=times, joints=start + share[:, None] * way, speeds=rate[:, None] * way)
+    return JointPath(seconds=times, joints=start + share[:, None] * way)
 
 
 def straight_path(
@@ -95,7 +107,8 @@ def straight_path(
     distance, angle = pose_distance(here, goal)
     seconds = max(_duration(distance, speed, acceleration), _duration(angle, turn_speed, turn_acceleration))
     path = _along(start, here, goal, seconds, lower, upper)
-    excess = float((np.abs(path.speeds) / joint_speed).max())
+    times = np.linspace(0, seconds, 4 * len(path.seconds))
+    excess = float((np.abs(path.curve()(times, 1)) / joint_speed).max())
     if excess > 1.0:
         path = _along(start, here, goal, 1.02 * excess * seconds, lower, upper)
     return path
@@ -104,7 +117,7 @@ def straight_path(
 def _along(
     start: np.ndarray, here: Pose, goal: Pose, seconds: float, lower: np.ndarray, upper: np.ndarray
 ) -> JointPath:
-    share, _ = _profile(seconds)
+    share = _profile(seconds)
     joints, error = track(straight_line(here, goal, share).as_matrix(), start)
     if not (error < POSE_TOLERANCE).all() or not within_limits(joints, lower, upper):
         target = ", ".join(f"{value:.3f}" for value in goal.position)
@@ -113,16 +126,13 @@ def _along(
             "move to other joints first"
         )
     joints[0] = start
-    speeds = np.gradient(joints, seconds / (len(share) - 1), axis=0)
-    speeds[0] = speeds[-1] = 0.0
-    return JointPath(seconds=np.linspace(0, seconds, len(share)), joints=joints, speeds=speeds)
+    return JointPath(seconds=np.linspace(0, seconds, len(share)), joints=joints)
 
 
-def _profile(seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Fractions of the path and their rate at the knots: minimum jerk."""
+def _profile(seconds: float) -> np.ndarray:
+    """Fractions of the path at the knots: minimum jerk."""
     n = max(4, math.ceil(seconds / PERIOD_S))
-    t = np.arange(n + 1) / n
-    return minimum_jerk(t), minimum_jerk_rate(t) / seconds
+    return minimum_jerk(np.arange(n + 1) / n)
 
 
 def _duration(distance: float, peak_speed: float, peak_acceleration: float) -> float:

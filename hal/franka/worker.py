@@ -87,11 +87,14 @@ class Worker:
             "home_gripper": driver.home_gripper,
             "move_gripper": lambda: driver.move_gripper(request["width"], request["speed"]),
             "grasp": lambda: driver.grasp(request["speed"], request["force"]),
-            "move": lambda: driver.move(
-                JointPath(**{key: np.array(request[key]) for key in ("seconds", "joints", "speeds")})
-            ),
+            "move_joints": lambda: driver.move_joints(_path(request)),
+            "move_straight": lambda: driver.move_straight(_path(request), np.array(request["T_base_tcp"])),
         }
         return verbs[request["op"]]()
+
+
+def _path(request: dict[str, Any]) -> JointPath:
+    return JointPath(seconds=np.array(request["seconds"]), joints=np.array(request["joints"]))
 
 
 def new_driver(name: DriverName) -> Driver:

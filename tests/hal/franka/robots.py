@@ -143,15 +143,19 @@ def arm_at(folder: Path, driver: DriverName, host: str, **settings: object) -> F
     return arm
 
 
-@contextmanager
-def linked(driver: DriverName, host: str) -> Iterator[DriverLink]:
-    """A driver in its process, connected to a robot; patient with a busy machine."""
+def driver_settings(host: str) -> DriverSettings:
+    """What a driver is told when it connects; patient with a busy machine."""
     arm = PandaPyArmConfig(driver="panda_py", host=host)
-    settings = DriverSettings(
+    return DriverSettings(
         host=host, realtime=False, contact_torque=[20.0] * 7, contact_force=20.0,
         stiffness=list(arm.stiffness), damping=list(arm.damping), settle_s=10.0,
     )  # fmt: skip
-    link = DriverLink(driver, settings, TIMEOUT_S)
+
+
+@contextmanager
+def linked(driver: DriverName, host: str) -> Iterator[DriverLink]:
+    """A driver in its process, connected to a robot."""
+    link = DriverLink(driver, driver_settings(host), TIMEOUT_S)
     try:
         yield link
     finally:

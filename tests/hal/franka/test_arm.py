@@ -55,7 +55,7 @@ def test_the_config_bounds_the_speed_whatever_a_program_asks_for(tmp_path: Path)
 
 
 def test_a_motion_that_the_solver_gives_up_is_planned_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Speeds that no joint can have are what makes it give up every time."""
+    """A motion of days is what makes it give up every time."""
     impossible = [2, 3]
 
     def path_from(*args: Any, **settings: Any) -> JointPath:
@@ -63,7 +63,7 @@ def test_a_motion_that_the_solver_gives_up_is_planned_again(tmp_path: Path, monk
         if impossible[0] == 0:
             return path
         impossible[0] -= 1
-        return replace(path, speeds=1e3 * path.speeds)
+        return replace(path, seconds=1e6 * path.seconds)
 
     monkeypatch.setattr("hal.franka.arm.joint_path", path_from)
     with robot_for("franky") as robot, arm_at(tmp_path, "franky", robot.host) as arm:

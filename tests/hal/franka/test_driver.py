@@ -52,7 +52,7 @@ def verbs(kind: type) -> dict[str, list[str]]:
 @pytest.mark.parametrize("kind", [FrankyDriver, PandaPyDriver])
 def test_both_drivers_have_the_verbs_of_the_interface_and_no_other(kind: type):
     assert verbs(kind) == verbs(Driver)
-    assert len(verbs(Driver)) == 8
+    assert len(verbs(Driver)) == 9
 
 
 @pytest.mark.parametrize("message", [SETTINGS, STATE], ids=["settings", "state"])

@@ -48,8 +48,8 @@ def test_a_driver_that_hangs_is_ended_and_reported_even_where_it_reads_no_reques
         assert link is not None
         os.kill(link.pid, signal.SIGSTOP)
         begin = time.monotonic()
-        with pytest.raises(CommunicationLost, match="did not answer 'move' within 1.0 s"):
-            link.ask("move", timeout_s=1.0, seconds=[0.0] * 100_000)  # more than a pipe holds
+        with pytest.raises(CommunicationLost, match="did not answer 'move_joints' within 1.0 s"):
+            link.ask("move_joints", timeout_s=1.0, seconds=[0.0] * 100_000)  # more than a pipe holds
         assert time.monotonic() - begin < 30
         with pytest.raises(CommunicationLost, match="ended by SIGKILL"):
             arm.state()

@@ -50,7 +50,7 @@ def test_an_arm_arrives_within_a_milliradian_although_its_controller_leaves_an_e
     robot: FakeRobot, link: DriverLink
 ):
     path = path_by(robot, 0.1)
-    link.ask("move", timeout_s=TIMEOUT_S, **plain_path(path))
+    link.ask("move_joints", timeout_s=TIMEOUT_S, **plain_path(path))
     assert np.abs(robot.joints() - path.joints[-1]).max() < 2e-3
     # After a motion panda_py would repeat its last sample: what follows must be seen.
     robot.order("user_stop")
@@ -66,12 +66,12 @@ def test_a_stop_ends_a_motion_and_is_in_force_until_recover(robot: FakeRobot, li
     )
     stopper.start()
     with pytest.raises(MotionAborted, match="preempted"):
-        link.ask("move", timeout_s=TIMEOUT_S, **plain_path(path))
+        link.ask("move_joints", timeout_s=TIMEOUT_S, **plain_path(path))
     stopper.join()
     stood = robot.joints()
     assert 0.02 <= np.abs(stood - begin).max() < 0.3
     with pytest.raises(MotionAborted, match="preempted"):
-        link.ask("move", timeout_s=TIMEOUT_S, **plain_path(path_by(robot, 0.1)))
+        link.ask("move_joints", timeout_s=TIMEOUT_S, **plain_path(path_by(robot, 0.1)))
     assert link.ask("move_gripper", timeout_s=TIMEOUT_S, width=0.02, speed=0.1) is False
     assert robot.joints() == pytest.approx(stood, abs=1e-3)
     assert link.ask("recover", timeout_s=TIMEOUT_S) is True
