@@ -11,7 +11,9 @@ import numpy as np
 
 from hal.arm import Arm
 from hal.camera import Camera
+from hal.limits import PAD_CORNER, plane_height
 from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import PAD_REACH, TABLE_CLEARANCE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,12 +21,14 @@ class Workspace:
     """The table in front of the arm.
 
     Attributes:
-        table_z: Height of the table, base frame, metres.
+        table_z: Height of the table in the region's middle, base frame, metres.
         region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
         home: (7,) joints at which the arm is out of the camera's sight, radians.
         min_height: Points lower than this over the table count as table, metres.
         lift_height: Height by which a grasped part is lifted, metres.
         grasp_force: Gripper force, N.
+        clearance: Least distance of the pads from the table, metres.
+        table_slope: Rise of the table along x and along y, metres a metre.
     """
 
     table_z: float
@@ -33,6 +37,21 @@ class Workspace:
     min_height: float
     lift_height: float
     grasp_force: float
+    clearance: float = TABLE_CLEARANCE
+    table_slope: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def centre(self) -> np.ndarray:
+        """(2,) middle of the region, base frame, metres."""
+        x_min, x_max, y_min, y_max = self.region
+        return np.array([(x_min + x_max) / 2, (y_min + y_max) / 2])
+
+    def lowest_grasp_z(self, xy: np.ndarray) -> np.ndarray:
+        """Least z (...) of grasps at points (..., 2) whose pads keep clear of the table, metres."""
+        # On a slope a corner of the pads is nearer to the table than their middle.
+        corner = PAD_CORNER * float(np.linalg.norm(self.table_slope))
+        table = plane_height(xy, self.table_z, self.table_slope, self.centre)
+        return table + corner + PAD_REACH + self.clearance
 
 
 class PartFeeder(Protocol):

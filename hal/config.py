@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from hal.arm import POSITION_TOLERANCE
 from hal.sensor_noise import SensorNoise
 from mskgrasp.core.config import Config
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import TABLE_CLEARANCE
 from mskgrasp.core.panda_kinematics import top_down
 from mskgrasp.core.settings import REGION, Overhead
 
@@ -19,11 +22,24 @@ READY: Seven = (0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398)
 """The Panda's usual ready pose, radians: the hand is behind the camera's field of view."""
 
 
+def _measured(value: Any) -> Any:
+    if value is None:
+        raise ValueError("the table's height is not measured yet: run hal.touch (python -m hal.touch --help)")
+    return value
+
+
+Slope = Annotated[float, Field(ge=-0.05, le=0.05)]
+
+
 class WorkspaceConfig(Config):
     """Table in front of the arm and limits of the TCP."""
 
-    table_z: float = Field(ge=-0.5, le=0.5)
-    """Height of the table in the robot's base frame, m; measure it: touch the table with closed fingers."""
+    table_z: Annotated[float, Field(ge=-0.5, le=0.5), BeforeValidator(_measured)]
+    """Height of the table in the region's middle, base frame, m; `python -m hal.touch` measures it."""
+    table_slope: tuple[Slope, Slope] = (0.0, 0.0)
+    """Rise of the table along x and along y, m a metre; `python -m hal.touch` measures it."""
+    clearance: float = Field(default=0.003, gt=POSITION_TOLERANCE, le=0.05)
+    """Least distance of the pads from the table, m; more than the arm's tolerance of arrival."""
     region: tuple[float, float, float, float] = (0.38, 0.62, -0.12, 0.12)
     """x_min, x_max, y_min, y_max where parts lie, base frame, m."""
     home: Seven = READY
@@ -69,6 +85,31 @@ class DevicesConfig(Config):
     workspace: WorkspaceConfig
 
 
+class TableError(Config):
+    """Difference of a simulated table from what the cell states, as real tables have it; for tests."""
+
+    height: float = Field(default=0.0, ge=-0.005, le=0.005)
+    """Height in the region's middle over the stated one, m."""
+    slope: tuple[float, float] = (0.0, 0.0)
+    """Rise along x and along y, m a metre."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if max(map(abs, self.slope)) > 0.02:
+            raise ValueError(f"slope {list(self.slope)} must be within -0.02 .. 0.02 m a metre")
+        return self
+
+    def motion(self, centre: np.ndarray, table_z: float) -> Pose:
+        """Motion from the stated table, level at ``table_z``, to the true one, turned about a centre (2,)."""
+        normal = np.array([-self.slope[0], -self.slope[1], 1.0])
+        normal /= np.linalg.norm(normal)
+        # The shortest turn of z to the normal.
+        quat = np.array([1.0 + normal[2], -normal[1], normal[0], 0.0])
+        middle = np.array([*centre, table_z])
+        there = Pose(position=middle + [0, 0, self.height], quat_wxyz=quat / np.linalg.norm(quat))
+        return there @ Pose(position=-middle, quat_wxyz=np.array([1.0, 0, 0, 0]))
+
+
 class SimulatedCellConfig(Config):
     """Settings that the cells of all simulators share."""
 
@@ -86,6 +127,10 @@ class SimulatedCellConfig(Config):
     """Height by which a grasped part is lifted, m."""
     grasp_force: float = Field(default=30.0, gt=0, le=70)
     """Gripper force, N."""
+    clearance: float = Field(default=TABLE_CLEARANCE, ge=TABLE_CLEARANCE, le=0.05)
+    """Least distance of the pads from the table, m."""
+    table_error: TableError = TableError()
+    """Error of the table that programs are not told; none by default."""
     camera: Overhead = Overhead()
     """The overhead depth camera."""
     noise: SensorNoise = SensorNoise()

@@ -17,7 +17,7 @@ from hal.execute import APPROACH
 from hal.limits import ArmLimits
 from mskgrasp.core.config import check_config
 from mskgrasp.core.errors import BadConfig
-from mskgrasp.core.grasp import lowest_grasp_z, pose_base_tcp
+from mskgrasp.core.grasp import pose_base_tcp
 
 ArmDriver = Literal["franky", "panda_py", "replay"]
 CameraDriver = Literal["kinect2", "replay", "sapien"]
@@ -38,6 +38,8 @@ def devices_cell(values: dict[str, Any], path: Path) -> Cell:
         min_height=table.min_height,
         lift_height=table.lift_height,
         grasp_force=table.grasp_force,
+        clearance=table.clearance,
+        table_slope=table.table_slope,
     )
     arm = _arm(config.arm, table, workspace, path)
     camera, feeder = _camera(config.camera, workspace, path)
@@ -66,6 +68,9 @@ def _arm(values: dict[str, Any], table: WorkspaceConfig, workspace: Workspace, p
                 box_upper=np.array(table.box_upper),
                 table_z=table.table_z,
                 max_force=config.max_grasp_force,
+                clearance=table.clearance,
+                table_slope=np.array(table.table_slope),
+                table_centre=workspace.centre,
             )
             arm = FrankaArm(config, limits)
             _check_fit(arm, workspace, path)
@@ -121,11 +126,10 @@ def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
             f"{path}: workspace.home puts joint {i + 1} at {workspace.home[i]:.3f} rad, outside "
             f"{arm.limits.joint_lower[i]:.3f} .. {arm.limits.joint_upper[i]:.3f} rad"
         )
-    lowest = lowest_grasp_z(workspace.table_z)
-    heights = (lowest, lowest + workspace.lift_height, workspace.table_z + APPROACH)
     x_min, x_max, y_min, y_max = workspace.region
     for x, y in ((x_min, y_min), (x_min, y_max), (x_max, y_min), (x_max, y_max)):
-        for z in heights:
+        lowest = float(workspace.lowest_grasp_z(np.array([x, y])))
+        for z in (lowest, lowest + workspace.lift_height, workspace.table_z + APPROACH):
             for theta in (-np.pi / 2, np.pi / 2):
                 pose = pose_base_tcp(np.array([x, y, z, theta]))
                 try:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hal.errors import OutOfWorkspace
 from mskgrasp.core.geometry import Pose, straight_line
-from mskgrasp.core.grasp import PAD_REACH, TABLE_CLEARANCE, lowest_grasp_z
+from mskgrasp.core.grasp import PAD_REACH, TABLE_CLEARANCE
 
 _CHECKS = 33
 """Checked points of a motion; on a motion of 2 m they are 6 cm apart."""
+TOUCH_DEPTH = 0.05
+"""Depth under the table's stated height to which the pads may be moved in search of it, metres."""
 _SLACK = 1e-3
 """Tolerance along a path, metres: an arm rests as exactly as its drives hold it."""
 _UNIT = 1e-3
@@ -26,6 +28,9 @@ _HAND_CORNERS = np.array(
     ]
 )
 
+PAD_CORNER = 0.0575
+"""Distance of the open pads' farthest corner from the hand's axis, metres."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ArmLimits:
@@ -36,8 +41,11 @@ class ArmLimits:
         joint_upper: (7,) radians.
         box_lower: (3,) the TCP stays inside this box, base frame, metres.
         box_upper: (3,) the other corner.
-        table_z: Height of the table, base frame, metres; the pads stay clear of it.
+        table_z: Height of the table at `table_centre`, base frame, metres; the hand stays clear of it.
         max_force: Greatest gripper force, N.
+        clearance: Least distance of the hand from the table, metres.
+        table_slope: (2,) rise of the table along x and along y, metres a metre.
+        table_centre: (2,) point at which the table is at ``table_z``, base frame, metres.
     """
 
     joint_lower: np.ndarray
@@ -46,6 +54,22 @@ class ArmLimits:
     box_upper: np.ndarray
     table_z: float
     max_force: float
+    clearance: float = TABLE_CLEARANCE
+    table_slope: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    table_centre: np.ndarray = field(default_factory=lambda: np.zeros(2))
+
+    def over_table(self, T_base_tcp: Pose) -> float:
+        """Distance of the open hand's lowest corner from the table, metres; negative below it."""
+        corners = T_base_tcp.apply(_HAND_CORNERS)
+        table = plane_height(corners[:, :2], self.table_z, self.table_slope, self.table_centre)
+        return float((corners[:, 2] - table).min())
+
+
+def plane_height(
+    xy: np.ndarray, z: float, slope: Sequence[float] | np.ndarray, centre: Sequence[float] | np.ndarray
+) -> np.ndarray:
+    """Heights (...) at points (..., 2) of a plane with a slope (2,) and the height ``z`` at a centre (2,)."""
+    return z + (np.asarray(xy) - np.asarray(centre)) @ np.asarray(slope, dtype=np.float64)
 
 
 def lowest_point(T_base_tcp: Pose) -> float:
@@ -84,13 +108,23 @@ def check_target_pose(limits: ArmLimits, T_base_tcp: Pose) -> None:
         raise OutOfWorkspace(f"a target's quaternion must have length 1, got {quat_wxyz.tolist()} (w x y z)")
     if _outside(limits, position) > 0:
         raise OutOfWorkspace(f"TCP target {shown(position)} m is outside the workspace {_box(limits)}")
-    clearance = lowest_point(T_base_tcp) - limits.table_z
-    if clearance < TABLE_CLEARANCE - 1e-6:
+    over = limits.over_table(T_base_tcp)
+    if over < limits.clearance - 1e-6:
         raise OutOfWorkspace(
-            f"TCP target z {position[2]:.4f} m would bring the hand {clearance * 1e3:.1f} mm over the "
-            f"table; it must stay {TABLE_CLEARANCE * 1e3:g} mm above (pointing down: z >= "
-            f"{lowest_grasp_z(limits.table_z):.4f} m)"
+            f"TCP target z {position[2]:.4f} m would bring the hand {over * 1e3:.1f} mm over the table; it "
+            f"must stay {limits.clearance * 1e3:g} mm above (here z >= "
+            f"{position[2] - over + limits.clearance:.4f} m)"
         )
+
+
+def touching(limits: ArmLimits) -> ArmLimits:
+    """Limits of a motion that ends at a contact: it may go `TOUCH_DEPTH` below where the table should be."""
+    lowest = min(float(limits.box_lower[2]), limits.table_z) - TOUCH_DEPTH
+    return replace(
+        limits,
+        box_lower=np.array([*limits.box_lower[:2], lowest]),
+        table_z=limits.table_z - TOUCH_DEPTH - limits.clearance,
+    )
 
 
 def check_line(limits: ArmLimits, start: Pose, goal: Pose) -> None:
@@ -134,10 +168,11 @@ def check_joint_path(
 
 def _check_way(limits: ArmLimits, poses: list[Pose], what: str) -> None:
     """Refuse a path that leaves the limits; an arm guided out of them may return, but go no farther."""
-    heights = np.array([lowest_point(pose) for pose in poses])
-    if heights.min() < min(heights[0], limits.table_z + TABLE_CLEARANCE) - _SLACK:
+    over = np.array([limits.over_table(pose) for pose in poses])
+    if over.min() < min(over[0], limits.clearance) - _SLACK:
         raise OutOfWorkspace(
-            f"{what} brings the hand down to {heights.min():.3f} m; the table is at {limits.table_z:g} m"
+            f"{what} brings the hand down to {limits.table_z + over.min():.3f} m; the table is at "
+            f"{limits.table_z:g} m"
         )
     excess = np.array([_outside(limits, pose.position) for pose in poses])
     if excess.max() > excess[0] + _SLACK:

@@ -13,12 +13,13 @@ import numpy as np
 from hal.arm import Arm
 from hal.camera import Camera, RgbdFrame
 from hal.cell import BoardHolder, Cell, Workspace
-from hal.config import SimulatedCellConfig
+from hal.config import SimulatedCellConfig, TableError
 from hal.device import SharingDevice
 from hal.errors import MotionAborted, NotConnected, OutOfWorkspace
 from hal.limits import ArmLimits, shown
 from hal.sensor_noise import SensorNoise, add_noise
 from mskgrasp.core.geometry import Pose, pose_distance, straight_line
+from mskgrasp.core.grasp import TABLE_CLEARANCE
 from mskgrasp.core.minimum_jerk import minimum_jerk_duration
 from mskgrasp.core.panda_kinematics import (
     JOINT_LOWER,
@@ -51,6 +52,7 @@ class SimulatedWorld(ABC):
         home: (7,) joints of the arm while a part is placed, radians.
         part: Part on the table at first: a name or a folder.
         seed: Determines its position and turn.
+        table_error: Difference of the table from what the cell states.
         presented: Number of parts placed so far.
         presented_seed: Seed of the last placement.
     """
@@ -60,6 +62,7 @@ class SimulatedWorld(ABC):
     home: np.ndarray
     part: str
     seed: int
+    table_error: TableError = field(default_factory=TableError)
     presented: int = field(default=0, init=False)
     presented_seed: int = field(default=0, init=False)
     _users: int = field(default=0, init=False)
@@ -69,6 +72,14 @@ class SimulatedWorld(ABC):
         """Pose of the camera, over the middle of the region."""
         x_min, x_max, y_min, y_max = self.region
         return self.overhead.T_base_camera(((x_min + x_max) / 2, (y_min + y_max) / 2))
+
+    @property
+    def table_motion(self) -> Pose | None:
+        """Motion, in the base, from the stated table to the true one; None where they are the same."""
+        if self.table_error == TableError():
+            return None
+        x_min, x_max, y_min, y_max = self.region
+        return self.table_error.motion(np.array([(x_min + x_max) / 2, (y_min + y_max) / 2]), TABLE_Z)
 
     def open(self) -> None:
         """Build the world for its first user.
@@ -210,8 +221,8 @@ def contact_fault(limit: float) -> MotionAborted:
     return MotionAborted(f"contact force over {limit:.0f} N: the arm stopped; call recover() when it is safe")
 
 
-def panda_limits() -> ArmLimits:
-    """Limits of the Panda over the simulated table."""
+def panda_limits(clearance: float = TABLE_CLEARANCE) -> ArmLimits:
+    """Limits of the Panda over the simulated table, from which the hand keeps a clearance, metres."""
     return ArmLimits(
         joint_lower=np.array(JOINT_LOWER),
         joint_upper=np.array(JOINT_UPPER),
@@ -219,6 +230,7 @@ def panda_limits() -> ArmLimits:
         box_upper=np.array([0.75, 0.4, 0.75]),
         table_z=TABLE_Z,
         max_force=70.0,
+        clearance=clearance,
     )
 
 
@@ -240,6 +252,7 @@ def simulated_cell(
             min_height=config.noise.least_height if config.min_height is None else config.min_height,
             lift_height=config.lift_height,
             grasp_force=config.grasp_force,
+            clearance=config.clearance,
         ),
         feeder=world,
         tracker=world,

@@ -21,6 +21,7 @@ def mujoco_cell(config: MujocoCellConfig) -> Cell:
         home=np.array(config.home),
         part=config.part,
         seed=config.seed,
+        table_error=config.table_error,
     )
-    camera, arm = MujocoCamera(world, config.noise), MujocoArm(world, panda_limits())
+    camera, arm = MujocoCamera(world, config.noise), MujocoArm(world, panda_limits(config.clearance))
     return simulated_cell(config, world, camera, arm)

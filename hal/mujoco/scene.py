@@ -10,6 +10,7 @@ import trimesh
 
 from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.panda import HAND_BODIES, HIDDEN, OTHERS, SEEN, add_panda, stiff
+from mskgrasp.core.geometry import Pose
 from mskgrasp.core.settings import TABLE_Z
 from mskgrasp.parts import Part
 from mskgrasp.parts.hulls import hull_corners
@@ -19,12 +20,15 @@ _NET_FORCE = 3
 _TABLE_COLOUR, _PART_COLOUR = (0.33, 0.35, 0.38, 1.0), (0.55, 0.57, 0.6, 1.0)
 
 
-def build_model(physics: MujocoPhysics, parts: Sequence[Part]) -> mujoco.MjModel:
+def build_model(
+    physics: MujocoPhysics, parts: Sequence[Part], table_motion: Pose | None = None
+) -> mujoco.MjModel:
     """Compile the model of the cell; the first part is ``part0``, the one that is grasped.
 
     Sensors: ``<body>_force`` of every body of the hand and of ``part0`` counts the contacts of that body and
     sums their forces (number, x, y, z; MuJoCo gives the force that the body exerts); ``grip`` is the same for
-    all contacts between hand and ``part0``.
+    all contacts between hand and ``part0``. The table is level and at its stated height unless
+    a motion displaces it.
     """
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
@@ -40,10 +44,12 @@ def build_model(physics: MujocoPhysics, parts: Sequence[Part]) -> mujoco.MjModel
     option.impratio = 10
     option.gravity = [0, 0, -9.81]
     add_panda(spec, physics)
+    stated = np.array([0, 0, TABLE_Z])
     spec.worldbody.add_geom(
         name="table",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
-        pos=[0, 0, TABLE_Z],
+        pos=stated if table_motion is None else table_motion.apply(stated),
+        quat=[1, 0, 0, 0] if table_motion is None else table_motion.quat_wxyz,
         size=[0, 0, 0.1],
         group=SEEN,
         priority=1,

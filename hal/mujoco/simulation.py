@@ -68,14 +68,20 @@ class Simulation:
         parts: The first is the one that is grasped.
         poses: ``T_base_obj`` of each.
         home: (7,) joints of the arm, radians.
+        table_motion: Motion of the table from where it is stated, in the base; None for none.
     """
 
     def __init__(
-        self, physics: MujocoPhysics, parts: Sequence[Part], poses: Sequence[Pose], home: np.ndarray
+        self,
+        physics: MujocoPhysics,
+        parts: Sequence[Part],
+        poses: Sequence[Pose],
+        home: np.ndarray,
+        table_motion: Pose | None = None,
     ):
         self.physics = physics
         self.parts = tuple(parts)
-        self.model = build_model(physics, parts)
+        self.model = build_model(physics, parts, table_motion)
         self.data = mujoco.MjData(self.model)
         self.step_s = physics.step_s
         self._corners = [np.concatenate(hull_corners(part)) for part in parts]
@@ -117,7 +123,7 @@ class Simulation:
 
     # ------------------------------------------------------------------ motions
 
-    def follow(self, joints: np.ndarray, *, stop: Callable[[], bool]) -> bool:
+    def follow(self, joints: np.ndarray, *, stop: Callable[[], bool], limit: float | None = None) -> bool:
         """Move the arm along a path and let it come to rest.
 
         Where the hand is over all parts, and these are at rest, nothing can happen: the arm is placed along
@@ -126,10 +132,12 @@ class Simulation:
         Args:
             joints: (k, 7) radians, a step apart, k > 2; the first are the `target`.
             stop: Read every few steps; True ends the motion.
+            limit: Contact force that ends it, N; by default the reflex's.
 
         Returns:
             False where the contact force ended it.
         """
+        limit = self.physics.reflex_force if limit is None else limit
         path = _Path.through(joints, self.step_s)
         free = self._in_air(path.joints)
         pressed = self._pressed()
@@ -150,7 +158,7 @@ class Simulation:
                 load = self.load()
                 if self._measured >= len(self._forces):
                     pressed = min(pressed, load)
-                if load - pressed > self.physics.reflex_force:
+                if load - pressed > limit:
                     return False
         if simulated:
             self.stand(SETTLE_S, stop=lambda: False)

@@ -71,12 +71,14 @@ class MujocoWorld(SimulatedWorld):
         drawn = random_resting_pose(
             new.resting, new.resting_probability, corners, self.region, np.random.RandomState(seed)
         )
+        pose, moved = Pose.from_vector(drawn), self.table_motion
         staying = self._outside() if keep else []
         self._simulation = _simulation()(
             self.physics,
             [new, *(one for one, _ in staying)],
-            [Pose.from_vector(drawn), *(pose for _, pose in staying)],
+            [pose if moved is None else moved @ pose, *(pose for _, pose in staying)],
             self.home,
+            moved,
         )
         self.presented, self.presented_seed = self.presented + 1, seed
 

@@ -89,6 +89,8 @@ def _read(path: Path, file: Any) -> Recording:
         key: np.array(value) if isinstance(value, list) else value
         for key, value in json.loads(file.attrs["limits"]).items()
     }
+    # A recording made before a table had a slope has none.
+    tuples: dict[str, Any] = {key: tuple(table[key]) for key in ("region", "table_slope") if key in table}
     events = tuple(_event(text) for text in file["events"].asstr()[:])
     n_frames = _check_frames(file["frames"]) if "frames" in file else 0
     for event in events:
@@ -97,7 +99,7 @@ def _read(path: Path, file: Any) -> Recording:
     return Recording(
         path=path,
         made=str(file.attrs["made"]),
-        workspace=Workspace(**{**table, "region": tuple(table["region"]), "home": np.array(table["home"])}),
+        workspace=Workspace(**{**table, **tuples, "home": np.array(table["home"])}),
         limits=ArmLimits(**limits),
         events=events,
         n_frames=n_frames,

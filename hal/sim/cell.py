@@ -21,8 +21,9 @@ def sapien_cell(config: SapienCellConfig) -> Cell:
         home=np.array(config.home),
         part=config.part,
         seed=config.seed,
+        table_error=config.table_error,
         tape=config.tape,
         colour_scale=config.colour_scale,
     )
-    camera, arm = SapienCamera(world, config.noise), SapienArm(world, panda_limits())
+    camera, arm = SapienCamera(world, config.noise), SapienArm(world, panda_limits(config.clearance))
     return simulated_cell(config, world, camera, arm, board_holder=world)

@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 
 import gymnasium
 import numpy as np
+import sapien
 import torch
+from mani_skill.utils.structs.actor import Actor
 
 from hal.errors import NotConnected
 from hal.sim.board import show_board
@@ -23,7 +25,7 @@ from mskgrasp.parts import find_part
 from mskgrasp.parts.hulls import hull_corners
 from tasks import GraspDisplacementEnv
 from tasks.attempt.clearance import hand_clearance
-from tasks.scene.frames import base_pose
+from tasks.scene.frames import base_pose, to_world
 from tasks.scene.renderer import render_backend
 
 
@@ -104,6 +106,7 @@ class SapienWorld(SimulatedWorld):
         self.presented, self.presented_seed = self.presented + 1, seed
         # A fresh scene each time, so that a trial does not depend on those before it.
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
+        self._move_table()
         self._beside = [
             restore(self.env.scene, lying, pose, number, 2 * self.physics.friction_table_part)
             for number, (lying, pose) in enumerate(staying)
@@ -113,6 +116,15 @@ class SapienWorld(SimulatedWorld):
         if self.tape is not None:
             entity = self.env.part._objs[0]
             stick_tape(entity, self.env.parts[0], self.part_pose().quat_wxyz, self.tape)
+
+    def _move_table(self) -> None:
+        """Move the table, and the part with it, to where they truly are."""
+        moved = self.table_motion
+        if moved is None:
+            return
+        for body in (self.env.scene.actors["table"], self.env.part):
+            pose = moved @ _pose_of(body)
+            body.set_pose(sapien.Pose(to_world(pose.position), pose.quat_wxyz))
 
     def fine_colour(self) -> np.ndarray | None:
         """Fine colour image of the current scene; None if the settings request none."""
@@ -175,7 +187,11 @@ class SapienWorld(SimulatedWorld):
 
 
 def _pose(lying: Lying) -> Pose:
-    pose = base_pose(lying.body)
+    return _pose_of(lying.body)
+
+
+def _pose_of(body: Actor) -> Pose:
+    pose = base_pose(body)
     return Pose(
         position=pose.position[0].cpu().numpy().astype(np.float64),
         quat_wxyz=pose.quat_wxyz[0].cpu().numpy().astype(np.float64),

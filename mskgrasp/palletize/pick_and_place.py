@@ -158,8 +158,11 @@ class PickAndPlace:
         return replace(known, reason="OutOfWorkspace"), target, None
 
     def _pose(self, plan: GraspPlan, displacement: np.ndarray, target: Target) -> Grasp:
-        table_z = self._cell.workspace.table_z
-        return place_pose(plan.grasp, displacement, plan.view.centre_base, target, table_z)
+        workspace = self._cell.workspace
+        pose = place_pose(plan.grasp, displacement, plan.view.centre_base, target, workspace.table_z)
+        x, y, z = pose.position
+        clear = float(workspace.lowest_grasp_z(pose.position[:2]))
+        return replace(pose, position=np.array([x, y, max(z, clear)]))
 
     def _measured(
         self,

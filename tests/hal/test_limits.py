@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from hal.limits import (
     check_target_pose,
     lowest_point,
     shown,
+    touching,
 )
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER, forward_pose
@@ -54,6 +55,27 @@ def test_the_lowest_corner_of_the_hand_is_found(pose: Pose, height: float):
     assert lowest_point(pose) == pytest.approx(height, abs=1e-9)
 
 
+def test_the_hand_keeps_its_clearance_from_a_sloping_table():
+    """The table rises by 1 % along x through z = 0.1 at x = 0.5; a pad is 11 mm wide on each side."""
+    limits = replace(
+        LIMITS, clearance=0.003, table_slope=np.array([0.01, 0.0]), table_centre=np.array([0.5, 0.0])
+    )
+    for x in (0.4, 0.5, 0.6):
+        lowest = 0.1 + 0.01 * (x - 0.5 + 0.011) + 0.0095 + 0.003
+        check_target_pose(limits, hand(x, 0.1, lowest + 1e-5))
+        with pytest.raises(OutOfWorkspace, match=r"3.0 mm over the table|2.9 mm over the table"):
+            check_target_pose(limits, hand(x, 0.1, lowest - 1e-5))
+
+
+def test_a_motion_towards_a_contact_may_go_5_cm_under_the_table():
+    limits = touching(replace(LIMITS, clearance=0.003))
+    check_target_pose(limits, hand(0.5, 0.0, 0.05 + 0.0095 + 1e-5))
+    with pytest.raises(OutOfWorkspace):
+        check_target_pose(limits, hand(0.5, 0.0, 0.05 + 0.0095 - 1e-5))
+    with pytest.raises(OutOfWorkspace, match="outside the workspace"):
+        check_target_pose(limits, hand(0.8, 0.0, 0.2))
+
+
 def test_joints_at_their_limits_are_accepted_and_beyond_them_named():
     check_target_joints(LIMITS, LIMITS.joint_lower)
     check_target_joints(LIMITS, LIMITS.joint_upper)
@@ -78,7 +100,7 @@ def test_a_target_is_refused_at_the_first_tenth_of_a_millimetre_too_low():
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("side", ["box_lower", "box_upper"])
 def test_each_face_of_the_box_is_a_limit(axis: int, side: str):
-    roomy = dataclasses.replace(LIMITS, table_z=-1.0)
+    roomy = replace(LIMITS, table_z=-1.0)
     position = np.array([0.5, 0.0, 0.3])
     position[axis] = getattr(LIMITS, side)[axis]
     check_target_pose(roomy, hand(*position))
@@ -117,12 +139,12 @@ def test_a_line_that_dips_between_tilted_ends_is_refused():
 
 
 def test_a_joint_motion_is_checked_where_it_ends_and_on_its_way():
-    narrow = dataclasses.replace(LIMITS, box_upper=np.array([0.7, 0.29, 0.6]))
+    narrow = replace(LIMITS, box_upper=np.array([0.7, 0.29, 0.6]))
     check_joint_path(narrow, forward_pose, READY, READY + np.array([0.5, 0, 0, 0, 0, 0, 0]))
     # The hand is 0.307 m from the base's axis: a turn of 80 degrees brings it to y = 0.302 m.
     with pytest.raises(OutOfWorkspace, match=r"these joints put the TCP at \(0.053, 0.302, 0.487\) m"):
         check_joint_path(narrow, forward_pose, READY, READY + np.array([np.radians(80), 0, 0, 0, 0, 0, 0]))
-    wide = dataclasses.replace(narrow, box_lower=np.array([-0.4, -0.4, 0.1]))
+    wide = replace(narrow, box_lower=np.array([-0.4, -0.4, 0.1]))
     start, goal = (READY + np.array([np.radians(turn), 0, 0, 0, 0, 0, 0]) for turn in (60, 120))
     with pytest.raises(OutOfWorkspace, match=r"way to these joints passes .*0.307.*; move there in steps"):
         check_joint_path(wide, forward_pose, start, goal)

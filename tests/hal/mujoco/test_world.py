@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hal.config import READY
+from hal.config import READY, TableError
 from hal.errors import NotConnected
 from hal.mujoco import MujocoCellConfig, mujoco_cell
 from hal.mujoco.world import MujocoWorld
 from mskgrasp.core.errors import BadPart
+from mskgrasp.core.geometry import pose_distance
 from mskgrasp.parts import Part
 from tests.hal.mujoco.conftest import MakeBox
 
@@ -117,3 +118,17 @@ def test_an_unknown_part_is_refused_and_the_table_stays_as_it_is(box: MakeBox):
     with pytest.raises(BadPart, match="no_such_part"):
         world.present("no_such_part", 2)
     assert world.simulation is before and world.presented_seed == 0
+
+
+def test_a_part_lies_on_a_table_with_an_error():
+    """3 mm higher, and by the slope more or less where the part lies."""
+    flat, wrong = (
+        mujoco_cell(CONFIG.model_copy(update={"table_error": error}))
+        for error in (TableError(), TableError(height=0.003, slope=(0.01, 0.0)))
+    )
+    with flat.connected(), wrong.connected():
+        assert flat.tracker is not None and wrong.tracker is not None
+        level, moved = flat.tracker.part_pose(), wrong.tracker.part_pose()
+    rise = 0.003 + 0.01 * (moved.position[0] - 0.5)
+    assert moved.position[2] - level.position[2] == pytest.approx(rise, abs=2e-4)
+    assert pose_distance(level, moved)[1] == pytest.approx(0.01, abs=1e-3)

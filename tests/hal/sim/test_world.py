@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import sapien
 
+from hal.config import TableError
 from hal.errors import NotConnected
 from hal.sim import SapienCellConfig, sapien_cell
 from hal.sim.world import SapienWorld
 from mskgrasp.core.errors import BadPart
-from mskgrasp.core.geometry import quat_about_z
+from mskgrasp.core.geometry import pose_distance, quat_about_z
 from mskgrasp.core.grasp import pose_base_tcp
 from mskgrasp.parts import Part
 from tasks.scene.frames import to_world
@@ -105,3 +106,17 @@ def test_what_lies_beside_the_region_counts_for_height_and_room(world: SapienWor
     assert world.reach(pose_base_tcp(np.array([0.45, 0.25, 0.02, 0.0]))) == pytest.approx(0.010, abs=1e-4)
     world.present(str(block.folder), 0)
     assert world.reach(pose_base_tcp(np.array([0.45, 0.25, 0.02, 0.0]))) is None
+
+
+def test_a_part_lies_on_a_table_with_an_error(block: Part):
+    """3 mm higher, and by the slope more or less where the part lies."""
+    poses = []
+    for error in (TableError(), TableError(height=0.003, slope=(0.01, 0.0))):
+        cell = sapien_cell(SapienCellConfig(type="sapien", part=str(block.folder), table_error=error))
+        with cell.arm:
+            assert cell.tracker is not None
+            poses.append(cell.tracker.part_pose())
+    level, moved = poses
+    rise = 0.003 + 0.01 * (moved.position[0] - 0.5)
+    assert moved.position[2] - level.position[2] == pytest.approx(rise, abs=2e-4)
+    assert pose_distance(level, moved)[1] == pytest.approx(0.01, abs=2e-3)
