@@ -12,7 +12,15 @@ import numpy as np
 
 from hal.device import Device
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
-from hal.limits import ArmLimits, check_joint_path, check_line, check_target_joints, check_target_pose, shown
+from hal.limits import (
+    ArmLimits,
+    check_joint_path,
+    check_line,
+    check_target_joints,
+    check_target_pose,
+    shown,
+    touching,
+)
 from mskgrasp.core.geometry import Pose, pose_distance
 from mskgrasp.core.grasp import MAX_OPENING
 
@@ -24,6 +32,10 @@ ROTATION_TOLERANCE = 1e-2
 """Greatest rotation error of the TCP at the end of a straight motion, radians."""
 WIDTH_TOLERANCE = 2e-3
 """Greatest error of the pads' distance at the end of a motion, metres."""
+MAX_TOUCH_FORCE = 15.0
+"""Greatest force at which `Arm.move_until_contact` ends, N."""
+MAX_TOUCH_SPEED = 0.05
+"""Greatest speed of that motion, m/s: the arm still moves while the contact is detected."""
 
 STOPPED = "stop() was called; call recover() when it is safe"
 
@@ -122,11 +134,41 @@ class Arm(Device):
         with self._motion():
             check_line(self.limits, self._state().T_base_tcp, T_base_tcp)
             self._move_to_pose(T_base_tcp, speed)
-            distance, angle = pose_distance(self._state().T_base_tcp, T_base_tcp)
-            if distance > POSITION_TOLERANCE or angle > ROTATION_TOLERANCE:
-                raise MotionAborted(
-                    f"the arm stopped {distance * 1e3:.1f} mm and {angle:.3f} rad short of its pose"
-                )
+            self._check_arrival(T_base_tcp)
+
+    def move_until_contact(self, T_base_tcp: Pose, *, force: float = 5.0, speed: float = 0.01) -> Pose | None:
+        """Move the TCP along a straight line towards a pose until the hand meets something.
+
+        The only motion that may bring the hand to the table, and `hal.limits.TOUCH_DEPTH` below its stated
+        height. After a contact, which is no error, the arm stands still there; move away from it next.
+
+        Args:
+            T_base_tcp: Where the motion ends at the latest.
+            force: External force on the hand, more than at the start, that is a contact, N.
+            speed: Greatest speed, m/s.
+
+        Returns:
+            ``T_base_tcp`` measured at the contact; None if the pose was reached without one.
+
+        Raises:
+            OutOfWorkspace: The pose, force or speed is outside its limits, or out of reach; nothing moved.
+            MotionAborted: Stopped, or the robot's own reflex was quicker; use less speed or force.
+            NeedsRecovery: An earlier error was not acknowledged.
+        """
+        if not 0 < force <= MAX_TOUCH_FORCE:
+            raise OutOfWorkspace(f"contact force {force:g} N is outside 0 .. {MAX_TOUCH_FORCE:g} N")
+        if not 0 < speed <= MAX_TOUCH_SPEED:
+            raise OutOfWorkspace(
+                f"speed {speed:g} m/s is outside 0 .. {MAX_TOUCH_SPEED:g} m/s towards a contact"
+            )
+        limits = touching(self.limits)
+        self._check_pose(limits, T_base_tcp)
+        with self._motion():
+            check_line(limits, self._state().T_base_tcp, T_base_tcp)
+            contact = self._move_until_contact(T_base_tcp, force, speed)
+            if contact is None:
+                self._check_arrival(T_base_tcp)
+            return contact
 
     def move_gripper(self, width: float) -> None:
         """Move the pads to a distance in metres; to hold something use `grasp`.
@@ -206,9 +248,19 @@ class Arm(Device):
         Raises:
             OutOfWorkspace: Names the limit that the target violates.
         """
-        check_target_pose(self.limits, T_base_tcp)
+        self._check_pose(self.limits, T_base_tcp)
+
+    def _check_pose(self, limits: ArmLimits, T_base_tcp: Pose) -> None:
+        check_target_pose(limits, T_base_tcp)
         if not self._reachable(T_base_tcp):
             raise OutOfWorkspace(f"TCP target {shown(T_base_tcp.position)} m is out of the arm's reach")
+
+    def _check_arrival(self, T_base_tcp: Pose) -> None:
+        distance, angle = pose_distance(self._state().T_base_tcp, T_base_tcp)
+        if distance > POSITION_TOLERANCE or angle > ROTATION_TOLERANCE:
+            raise MotionAborted(
+                f"the arm stopped {distance * 1e3:.1f} mm and {angle:.3f} rad short of its pose"
+            )
 
     def _require_connection(self) -> None:
         if not self._connected():
@@ -261,6 +313,10 @@ class Arm(Device):
 
     @abstractmethod
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None: ...
+
+    @abstractmethod
+    def _move_until_contact(self, T_base_tcp: Pose, force: float, speed: float) -> Pose | None:
+        """``T_base_tcp`` measured at the contact, where the arm then stands; None without one."""
 
     @abstractmethod
     def _move_gripper(self, width: float) -> None: ...

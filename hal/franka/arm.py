@@ -147,8 +147,20 @@ class FrankaArm(Arm):
         )
 
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
+        self._travel_straight(T_base_tcp, speed)
+
+    def _move_until_contact(self, T_base_tcp: Pose, force: float, speed: float) -> Pose | None:
+        met = self._travel_straight(T_base_tcp, speed, force)
+        if met is None:
+            return None
+        self._refuse_unless_idle(self._stand_still())
+        return pose_from_columns(met)
+
+    def _travel_straight(
+        self, T_base_tcp: Pose, speed: float, until_force: float | None = None
+    ) -> list[float] | None:
         config = self._config
-        self._travel(
+        return self._travel(
             lambda here: straight_path(
                 here,
                 T_base_tcp,
@@ -161,17 +173,26 @@ class FrankaArm(Arm):
                 upper=self.limits.joint_upper,
             ),
             T_base_tcp,
+            until_force,
         )
 
-    def _travel(self, path_from: Callable[[np.ndarray], JointPath], T_base_tcp: Pose | None = None) -> None:
+    def _travel(
+        self,
+        path_from: Callable[[np.ndarray], JointPath],
+        T_base_tcp: Pose | None = None,
+        until_force: float | None = None,
+    ) -> list[float] | None:
         """Follow a path from the current joints (7,), straight to a pose where one is given.
 
         It is planned again if the driver finds no trajectory.
+
+        Returns:
+            (16,) the TCP's pose at a contact over ``until_force``, N, as the driver gives it; None without.
         """
         for left in reversed(range(_TRIES)):
             path = path_from(np.array(self._ready().joints))
             try:
-                return self._follow(path, T_base_tcp)
+                return self._follow(path, T_base_tcp, until_force)
             except NoTrajectory:
                 if not left or not _is_idle(self._stand_still()):
                     raise
@@ -186,16 +207,21 @@ class FrankaArm(Arm):
                 break
         return state
 
-    def _follow(self, path: JointPath, T_base_tcp: Pose | None) -> None:
+    def _follow(
+        self, path: JointPath, T_base_tcp: Pose | None, until_force: float | None
+    ) -> list[float] | None:
         # A driver that takes several times the duration of a motion hangs.
         timeout_s = 4 * path.duration_s + self._config.settle_s + self._config.patience_s
         values = {name: array.tolist() for name, array in asdict(path).items()}
         if T_base_tcp is not None:
-            values["T_base_tcp"] = T_base_tcp.as_matrix().tolist()
+            values |= {"T_base_tcp": T_base_tcp.as_matrix().tolist(), "until_force": until_force}
+        op = "move_joints" if T_base_tcp is None else "move_straight"
         try:
-            self._ask("move_joints" if T_base_tcp is None else "move_straight", timeout_s=timeout_s, **values)
+            met = self._ask(op, timeout_s=timeout_s, **values)
         except MotionAborted as error:
             self._raise_aborted(error)
+        if met is not None:
+            return met
         deadline = time.monotonic() + self._config.settle_s
         # Closer than the base class requires, so that its check has a margin; an arm that approaches no
         # further is as close as it gets.
@@ -205,8 +231,9 @@ class FrankaArm(Arm):
             if error < nearest - _STILL_ERROR:
                 nearest, since = error, now
             if now > deadline or now - since > _STANDING_S or self._stop.is_set():
-                return
+                break
             time.sleep(_POLL_S)
+        return None
 
     def _error(self, joints: np.ndarray, T_base_tcp: Pose | None) -> float:
         """Distance to the goal as a fraction of what the base class tolerates."""

@@ -7,6 +7,7 @@ would block everything, Ctrl-C included. A process can be killed; the robot stop
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -85,8 +86,16 @@ class Driver(Protocol):
         """Move to the end of a path of `joint_path` in its time; return when the arm is there, or raise."""
         ...
 
-    def move_straight(self, path: JointPath, T_base_tcp: np.ndarray) -> None:
-        """Move the TCP straight to a pose (4, 4) in its path's time; return when it is there, or raise."""
+    def move_straight(
+        self, path: JointPath, T_base_tcp: np.ndarray, until_force: float | None = None
+    ) -> list[float] | None:
+        """Move the TCP straight to a pose (4, 4) in its path's time; return when it is there, or raise.
+
+        An external force on the hand of ``until_force``, N, more than at the start, ends the motion.
+
+        Returns:
+            (16,) ``o_t_ee`` measured at that force, with the arm at rest; None at the pose.
+        """
         ...
 
     def home_gripper(self) -> bool:
@@ -112,6 +121,11 @@ class Driver(Protocol):
             False where a stopped gripper never answered: its link must be opened again.
         """
         ...
+
+
+def felt_force(wrench: Sequence[float] | np.ndarray, at_start: Sequence[float] | np.ndarray) -> float:
+    """Force, N, of an external wrench (6,) beyond that at the start of a motion, which is a model's error."""
+    return float(np.linalg.norm(np.subtract(wrench, at_start)[:3]))
 
 
 def column_major(matrix: np.ndarray) -> list[float]:

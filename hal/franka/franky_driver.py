@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from hal.franka.driver import MODES, DriverSettings, DriverState, column_major
+from hal.franka.driver import MODES, DriverSettings, DriverState, column_major, felt_force
 from hal.franka.frames import tool_along
 from hal.franka.path import JointPath, Peaks
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _POLL_S = 0.02
 _OWED_S = 0.5
+_TOUCH_POLL_S = 0.002
+"""Time between two readings of the force in a motion that a contact ends, s."""
 _LEAST_SHARE, _LEAST_WAY = 0.05, 1e-3
 """A joint with less than this share of the longest way, or less than this way, rad, gets its limits.
 
@@ -93,25 +95,31 @@ class FrankyDriver:
             limit.set(np.minimum(peak, limit.max))
         self._run(self._franky.JointMotion(goal))
 
-    def move_straight(self, path: JointPath, T_base_tcp: np.ndarray) -> None:
+    def move_straight(
+        self, path: JointPath, T_base_tcp: np.ndarray, until_force: float | None = None
+    ) -> list[float] | None:
         """Move the TCP straight to a pose (4, 4) by one motion of the path's duration and peaks.
 
         franky gives each axis of the end effector's frame at the start its own profile under the same limits,
         so that the TCP leaves a line between the axes by millimetres: the frame is turned onto the line.
         The parts of a turn along the line and across it keep profiles of their own: with both the hand tilts
         by milliradians on the way.
+
+        Returns:
+            (16,) ``o_t_ee`` at an external force over ``until_force``, N; None at the pose.
         """
         state = self._fresh_state()
         tool = tool_along(state.O_T_EE_d.matrix @ np.linalg.inv(state.NE_T_EE.matrix), T_base_tcp)
         self._turn_tool(tool)
         try:
-            self._run(self._straight_motion(T_base_tcp @ tool, path.duration_s))
+            met = self._run(self._straight_motion(T_base_tcp @ tool, path.duration_s), until_force)
         except self._franky.NetworkException:
             raise  # a command to a robot that is gone blocks for ever
         except BaseException:
             self._turn_tool_back()
             raise
         self._turn_tool_back()
+        return met
 
     def _straight_motion(self, goal: np.ndarray, seconds: float) -> franky.CartesianMotion:
         start = self._fresh_state().O_T_EE_d.matrix
@@ -157,13 +165,35 @@ class FrankyDriver:
         with contextlib.suppress(self._franky.CommandException, RuntimeError):
             self._turn_tool(np.eye(4))
 
-    def _run(self, motion: franky.BaseJointPositionMotion | franky.BaseCartesianPoseMotion) -> None:
+    def _run(
+        self,
+        motion: franky.BaseJointPositionMotion | franky.BaseCartesianPoseMotion,
+        until_force: float | None = None,
+    ) -> list[float] | None:
         if self._stopped.is_set():
             raise RuntimeError("Move command preempted!")
+        at_start = self._fresh_state().O_F_ext_hat_K
         self._robot.move(motion, asynchronous=True)
-        while not self._robot.join_motion(timeout=_POLL_S):
+        while not self._robot.join_motion(timeout=_POLL_S if until_force is None else _TOUCH_POLL_S):
             if self._stopped.is_set():
                 self._robot.stop()
+            elif until_force is not None:
+                state = self._robot.state
+                if felt_force(state.O_F_ext_hat_K, at_start) > until_force:
+                    self._end_at_contact()
+                    return column_major(state.O_T_EE.matrix @ np.linalg.inv(state.NE_T_EE.matrix))
+        return None
+
+    def _end_at_contact(self) -> None:
+        """Stop the arm; the end of the motion by this stop is no fault."""
+        self._robot.stop()
+        try:
+            self._robot.join_motion()
+        except self._franky.ControlException as error:
+            if "preempted" not in str(error):
+                raise
+        if self._stopped.is_set():
+            raise RuntimeError("Move command preempted!")
 
     def home_gripper(self) -> bool:
         """Open and close the fingers to find their greatest width."""

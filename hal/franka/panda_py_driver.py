@@ -10,7 +10,7 @@ from concurrent.futures import Future, wait
 import numpy as np
 
 from hal.errors import CommunicationLost
-from hal.franka.driver import MODES, DriverSettings, DriverState
+from hal.franka.driver import MODES, DriverSettings, DriverState, felt_force
 from hal.franka.faults import explain
 from hal.franka.path import JointPath
 
@@ -77,12 +77,21 @@ class PandaPyDriver:
             seconds=time.monotonic(),
         )
 
-    def move_straight(self, path: JointPath, T_base_tcp: np.ndarray) -> None:
-        """Follow a path along a straight line; the pose is that of its end."""
-        self.move_joints(path)
+    def move_straight(
+        self, path: JointPath, T_base_tcp: np.ndarray, until_force: float | None = None
+    ) -> list[float] | None:
+        """Follow a path along a straight line; the pose is that of its end.
+
+        Returns:
+            (16,) ``o_t_ee`` at an external force over ``until_force``, N; None at the pose.
+        """
+        return self._follow(path, until_force)
 
     def move_joints(self, path: JointPath) -> None:
         """Follow a path, then correct the error that friction leaves."""
+        self._follow(path, None)
+
+    def _follow(self, path: JointPath, until_force: float | None) -> list[float] | None:
         self._check()
         controller = self._panda_py.controllers.JointPosition(
             np.array(self._settings.stiffness), np.array(self._settings.damping)
@@ -90,17 +99,27 @@ class PandaPyDriver:
         wanted = path.curve()
         speed = wanted.derivative()
         with self._use:
+            at_start = list(self._robot.read_once().O_F_ext_hat_K)
             self._panda.start_controller(controller)
             self._moving = True
         self._ticks = (0.0, time.monotonic())
+        met: list[float] | None = None
         try:
             # The robot's own clock, which runs on while this process pauses.
             while (now := controller.get_time()) < path.duration_s:
                 self._check()
                 self._check_clock(now)
+                if until_force is not None:
+                    state = self._panda.get_state()
+                    if felt_force(state.O_F_ext_hat_K, at_start) > until_force:
+                        met = list(state.O_T_EE)
+                        # Standing here, the soft controller no longer presses.
+                        self._settle(controller, np.array(state.q))
+                        break
                 controller.set_control(wanted(now), speed(now))
                 time.sleep(_PERIOD_S)
-            self._settle(controller, path.joints[-1])
+            else:
+                self._settle(controller, path.joints[-1])
         except RobotSilent:
             raise  # a stop command to a robot that is gone blocks for ever
         except BaseException:
@@ -108,6 +127,7 @@ class PandaPyDriver:
             raise
         self._end()
         self._raise_error()
+        return met
 
     def _settle(self, controller, goal: np.ndarray) -> None:  # noqa: ANN001 (the package is imported late)
         correction, still = np.zeros(7), np.zeros(7)

@@ -88,7 +88,9 @@ class Worker:
             "move_gripper": lambda: driver.move_gripper(request["width"], request["speed"]),
             "grasp": lambda: driver.grasp(request["speed"], request["force"]),
             "move_joints": lambda: driver.move_joints(_path(request)),
-            "move_straight": lambda: driver.move_straight(_path(request), np.array(request["T_base_tcp"])),
+            "move_straight": lambda: driver.move_straight(
+                _path(request), np.array(request["T_base_tcp"]), request.get("until_force")
+            ),
         }
         return verbs[request["op"]]()
 

@@ -35,12 +35,25 @@ class MujocoArm(SimulatedArm[MujocoWorld]):
         self._follow(self._world.simulation.target + shares * way)
 
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
+        self._follow(self._straight(T_base_tcp, speed))
+
+    def _move_until_contact(self, T_base_tcp: Pose, force: float, speed: float) -> Pose | None:
+        simulation = self._world.simulation
+        joints = self._straight(T_base_tcp, speed)
+        if simulation.follow(joints, stop=self._stop.is_set, limit=force):
+            return None
+        met = forward_pose(simulation.joints)
+        simulation.halt()  # it no longer presses
+        return met
+
+    def _straight(self, T_base_tcp: Pose, speed: float) -> np.ndarray:
+        """Joints (steps + 1, 7) of the straight line to a pose."""
         start = self._world.simulation.target
         line, seconds = self._line(forward_pose(start), T_base_tcp, speed)
         joints, error = track(line.as_matrix(), start)
         self._check_tracked(joints, float(error.max()), T_base_tcp)
         waypoints = CubicSpline(np.linspace(0, 1, len(joints) + 1), np.vstack([start, joints]))
-        self._follow(waypoints(self._shares(seconds)))
+        return waypoints(self._shares(seconds))
 
     def _shares(self, seconds: float) -> np.ndarray:
         """(steps + 1,) shares of a path, from 0 to 1."""

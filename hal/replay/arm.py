@@ -11,7 +11,7 @@ from hal.arm import STOPPED, Arm, ArmState, GraspOutcome
 from hal.device import SharingDevice
 from hal.errors import NeedsRecovery, NotRecorded, OutOfWorkspace, Stopped
 from hal.replay.config import ReplayArmConfig
-from hal.replay.events import COMMANDS, arm_state, plain
+from hal.replay.events import COMMANDS, arm_state, plain, pose
 from hal.replay.playback import Playback
 from hal.replay.reader import read_recording
 from mskgrasp.core.errors import MskgraspError
@@ -70,6 +70,11 @@ class ReplayArm(SharingDevice, Arm):
     def move_to_pose(self, T_base_tcp: Pose, *, speed: float = 0.1) -> None:
         """See `Arm.move_to_pose`."""
         self._replay("move_to_pose", T_base_tcp=T_base_tcp, speed=speed)
+
+    def move_until_contact(self, T_base_tcp: Pose, *, force: float = 5.0, speed: float = 0.01) -> Pose | None:
+        """See `Arm.move_until_contact`."""
+        contact = self._replay("move_until_contact", T_base_tcp=T_base_tcp, force=force, speed=speed)
+        return None if contact is None else pose(contact)
 
     def move_gripper(self, width: float) -> None:
         """See `Arm.move_gripper`."""
@@ -131,4 +136,5 @@ class ReplayArm(SharingDevice, Arm):
         raise AssertionError("a recording answers above the backend")
 
     _state = _forward = _reachable = _move_to_joints = _move_to_pose = _move_gripper = _beneath
+    _move_until_contact = _beneath
     _grasp = _wait = _recover = _beneath

@@ -18,7 +18,8 @@ SCHEMA = 1
 KIND = "mskgrasp cell recording"
 
 Command = Literal[
-    "capture", "present", "move_to_joints", "move_to_pose", "move_gripper", "grasp", "wait", "recover"
+    "capture", "present", "move_to_joints", "move_to_pose", "move_until_contact", "move_gripper", "grasp",
+    "wait", "recover",
 ]  # fmt: skip
 COMMANDS: tuple[str, ...] = get_args(Command)
 """Calls that act, in sequence; the calls between them are queries."""

@@ -93,6 +93,10 @@ class RecordingArm(SharingDevice, Arm):
         """See `Arm.move_to_pose`."""
         self._record("move_to_pose", T_base_tcp=T_base_tcp, speed=speed)
 
+    def move_until_contact(self, T_base_tcp: Pose, *, force: float = 5.0, speed: float = 0.01) -> Pose | None:
+        """See `Arm.move_until_contact`."""
+        return self._record("move_until_contact", T_base_tcp=T_base_tcp, force=force, speed=speed)
+
     def move_gripper(self, width: float) -> None:
         """See `Arm.move_gripper`."""
         self._record("move_gripper", width=width)
@@ -132,6 +136,7 @@ class RecordingArm(SharingDevice, Arm):
         raise AssertionError("everything is passed on above the backend")
 
     _state = _forward = _reachable = _move_to_joints = _move_to_pose = _move_gripper = _beneath
+    _move_until_contact = _beneath
     _grasp = _wait = _halt = _recover = _beneath
 
 

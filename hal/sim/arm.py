@@ -32,6 +32,10 @@ STOP_CHECK_S = 0.02
 """Time between two checks whether a wait was stopped, s."""
 
 
+class _Met(Exception):
+    """The hand has met what it was to touch."""
+
+
 class SapienArm(SimulatedArm[SapienWorld]):
     """The Panda of a `SapienWorld`; a contact force over the reflex limit ends a motion."""
 
@@ -60,15 +64,31 @@ class SapienArm(SimulatedArm[SapienWorld]):
         self._follow(torch.stack([start, goal]), seconds)
 
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
+        self._follow(*self._straight(T_base_tcp, speed))
+
+    def _move_until_contact(self, T_base_tcp: Pose, force: float, speed: float) -> Pose | None:
+        try:
+            self._follow(*self._straight(T_base_tcp, speed), limit=force)
+        except _Met:
+            met = self._state().T_base_tcp
+            self._recover()  # the drives no longer press
+            return met
+        return None
+
+    def _straight(self, T_base_tcp: Pose, speed: float) -> tuple[Tensor, float]:
+        """Joint waypoints (k, 7) of the straight line to a pose, with its start, and its duration, s."""
         start = self._target()
         here = Pose.from_matrix(forward(start)[0].numpy())
         line, seconds = self._line(here, T_base_tcp, speed)
         joints, error = track(torch.as_tensor(line.as_matrix()), start)
         self._check_tracked(joints.numpy(), float(error.max()), T_base_tcp)
-        self._follow(torch.cat([start[None], joints]), seconds)
+        return torch.cat([start[None], joints]), seconds
 
-    def _follow(self, waypoints: Tensor, seconds: float) -> None:
-        """Move along joint waypoints (k, 7), evenly spaced, with a minimum-jerk profile."""
+    def _follow(self, waypoints: Tensor, seconds: float, *, limit: float | None = None) -> None:
+        """Move along joint waypoints (k, 7), evenly spaced, with a minimum-jerk profile.
+
+        A contact force over ``limit``, N, by default the reflex's, ends the motion with `_Met`.
+        """
         motion = self._world.env.motion
         path = _interpolate(waypoints, torch.from_numpy(minimum_jerk_steps(motion.n_steps(seconds))))
         # In free air long steps do: what the arm does there nothing feels.
@@ -80,9 +100,9 @@ class SapienArm(SimulatedArm[SapienWorld]):
                 with motion.coarsely(AIR_HZ):
                     every = self._world.physics.rate_hz // motion.rate_hz
                     picked = [*range(begin + every - 1, end - 1, every), end - 1]
-                    pressed = self._follow_piece(path[picked], pressed)
+                    pressed = self._follow_piece(path[picked], pressed, limit)
             else:
-                pressed = self._follow_piece(path[begin:end], pressed)
+                pressed = self._follow_piece(path[begin:end], pressed, limit)
         self._pause(SETTLE_S, bool(in_air[-1]))
 
     def _in_air(self, path: Tensor) -> np.ndarray:
@@ -98,10 +118,11 @@ class SapienArm(SimulatedArm[SapienWorld]):
         # Pads that close on a groove press the part on the table; that eases as the hand rises.
         return float(np.linalg.norm(self._world.env.contacts.load(holding=True))) if self._force else 0.0
 
-    def _follow_piece(self, path: Tensor, pressed: float) -> float:
+    def _follow_piece(self, path: Tensor, pressed: float, touch: float | None) -> float:
         """Follow joints (n, 7), one a step; return the force that the hand still presses with."""
         motion, contacts = self._world.env.motion, self._world.env.contacts
-        limit, holding = self._world.physics.reflex_force, self._force > 0
+        reflex_force, holding = self._world.physics.reflex_force, self._force > 0
+        limit = reflex_force if touch is None else touch
         reflex = Reflex(contacts, motion, holding=holding)
 
         def check(_: int) -> bool:
@@ -111,7 +132,7 @@ class SapienArm(SimulatedArm[SapienWorld]):
             return self._stop.is_set() or force - pressed > limit
 
         if not motion.follow(path[:, None], check=check, check_every=1):
-            raise contact_fault(limit)
+            raise contact_fault(reflex_force) if touch is None or self._stop.is_set() else _Met
         return pressed
 
     def _pause(self, seconds: float, in_air: bool) -> None:

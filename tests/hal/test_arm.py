@@ -140,3 +140,33 @@ def test_a_command_of_another_thread_waits_for_the_end_of_the_first(arm: ToyArm,
     first.join()
     second.join()
     assert seen == [0.5]
+
+
+def test_a_contact_is_no_fault_and_where_it_was_is_known(arm: ToyArm):
+    arm.move_to_pose(at(0.4, 0.0, 0.1))
+    contact = arm.move_until_contact(at(0.4, 0.0, -0.02))
+    assert contact is not None and contact.position == pytest.approx([0.4, 0.0, 0.05])
+    arm.move_to_pose(at(0.4, 0.0, 0.1))
+    assert arm.move_until_contact(at(0.4, 0.0, 0.06)) is None
+
+
+def test_a_search_that_ends_short_of_its_pose_without_a_contact_is_a_fault(arm: ToyArm, monkeypatch):
+    arm.move_to_pose(at(0.4, 0.0, 0.1))
+    monkeypatch.setattr(arm, "_move_until_contact", lambda *_: None)
+    with pytest.raises(MotionAborted, match="40.0 mm"):
+        arm.move_until_contact(at(0.4, 0.0, 0.06))
+    with pytest.raises(NeedsRecovery):
+        arm.move_gripper(0.05)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"force": 0.0}, "contact force 0 N"),
+        ({"force": 16.0}, "outside 0 .. 15 N"),
+        ({"speed": 0.06}, "outside 0 .. 0.05 m/s"),
+    ],
+)
+def test_a_contact_is_sought_slowly_and_softly(arm: ToyArm, settings: dict[str, float], message: str):
+    with pytest.raises(OutOfWorkspace, match=message):
+        arm.move_until_contact(at(0.4, 0.0, 0.06), **settings)

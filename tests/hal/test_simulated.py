@@ -42,7 +42,9 @@ class ToyArm(SimulatedArm[ToyWorld]):
     def _nothing(self, *_: object) -> None:
         raise NotImplementedError
 
-    _state = _move_to_joints = _move_to_pose = _move_gripper = _grasp = _wait = _recover = _nothing  # type: ignore[assignment]
+    _state = _move_to_joints = _move_to_pose = _move_until_contact = _move_gripper = _grasp = _wait = (
+        _recover
+    ) = _nothing  # type: ignore[assignment]
 
 
 def make_world() -> ToyWorld:

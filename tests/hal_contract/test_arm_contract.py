@@ -24,11 +24,15 @@ from hal.open_cell import SIMULATED
 from hal.replay import ReplayArm, ReplayArmConfig, recorded_cell
 from hal.replay.recorder import RecordingArm
 from mskgrasp.core.geometry import Pose, pose_distance, quat_multiply
-from mskgrasp.core.grasp import Grasp, pose_base_tcp
+from mskgrasp.core.grasp import PAD_REACH, Grasp, pose_base_tcp
 from tests.hal.franka.robots import robot_for, write_cell
 from tests.hal.replay.toy import toy_cell
 from tests.hal_contract.conftest import CELLS
 
+TOUCHED = pose_base_tcp(np.array([0.4, -0.1, -0.02, 0.0]))
+"""Under a place of the table where no part lies."""
+BACK = Pose(position=np.array([0.0, 0.0, -0.06]), quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
+"""Away from what the hand points at."""
 STILL_RAD, STILL_M = 2e-3, 1e-3
 """An arm in MuJoCo creeps by this much when it stands."""
 
@@ -49,6 +53,7 @@ def backend(name: str, folder: Path) -> AbstractContextManager[Path]:
             yield path
         elif name == "franky" or name == "panda_py":
             with robot_for(name) as robot:
+                robot.order("table 0.0 0.0")
                 yield write_cell(folder, name, robot.host)
         else:
             raise ValueError(name)
@@ -188,6 +193,25 @@ def test_a_straight_motion_is_straight(cell: Cell):
     assert max(float(np.linalg.norm(offset)) for offset in offsets) < 4e-3
 
 
+def test_a_closed_hand_stands_where_it_touches_the_table_and_moves_on(cell: Cell):
+    arm = cell.arm
+    arm.move_gripper(0.0)
+    arm.move_to_pose(TOUCHED @ BACK, speed=0.5)
+    contact = arm.move_until_contact(TOUCHED, force=5.0, speed=0.02)
+    assert contact is not None
+    assert contact.position == pytest.approx([*TOUCHED.position[:2], PAD_REACH], abs=1e-3)
+    assert pose_distance(arm.state().T_base_tcp, contact)[0] < 1.5e-3
+    arm.move_to_pose(TOUCHED @ BACK, speed=0.5)  # a contact is no fault
+
+
+def test_a_hand_that_meets_nothing_arrives(cell: Cell):
+    target = TOUCHED @ BACK
+    cell.arm.move_gripper(0.0)
+    assert cell.arm.move_until_contact(target @ BACK, speed=0.05) is None
+    assert cell.arm.move_until_contact(target, speed=0.05) is None
+    assert pose_distance(cell.arm.state().T_base_tcp, target)[0] < POSITION_TOLERANCE
+
+
 def test_the_gripper_reaches_a_width(cell: Cell):
     cell.arm.move_gripper(0.03)
     assert cell.arm.state().gripper_width == pytest.approx(0.03, abs=2e-3)
@@ -216,6 +240,10 @@ def test_a_command_outside_the_limits_is_refused_and_nothing_moves(cell: Cell):
         lambda: arm.move_to_pose(pose_base_tcp(np.array([1.5, 0.0, 0.2, 0.0]))),
         lambda: arm.move_to_pose(pose_base_tcp(np.array([0.5, np.nan, 0.2, 0.0]))),
         lambda: arm.move_to_pose(over_the_table(), speed=0.0),
+        lambda: arm.move_until_contact(TOUCHED, force=50.0),
+        lambda: arm.move_until_contact(TOUCHED, speed=0.2),
+        lambda: arm.move_until_contact(pose_base_tcp(np.array([0.5, 0.0, -0.06, 0.0]))),
+        lambda: arm.move_until_contact(pose_base_tcp(np.array([0.9, 0.0, 0.0, 0.0]))),
         lambda: arm.move_gripper(0.2),
         lambda: arm.move_gripper(-0.01),
         lambda: arm.grasp(500.0),
@@ -290,8 +318,9 @@ def test_stop_from_another_thread_ends_a_motion_and_nothing_moves_before_recover
         lambda arm, k: arm.grasp(20.0),
         lambda arm, k: arm.wait(5.0),
         lambda arm, k: arm.move_to_pose(over_the_table(0.3 if k % 2 == 0 else 0.35)),
+        lambda arm, k: arm.move_until_contact(over_the_table(0.45 if k % 2 == 0 else 0.4), speed=0.05),
     ],
-    ids=["gripper", "grasp", "wait", "line"],
+    ids=["gripper", "grasp", "wait", "line", "touch"],
 )
 def test_stop_ends_every_kind_of_motion(cell: Cell, name: str, command):
     with stopped_after(0.005 if name in SIMULATED else 0.2, cell, name):

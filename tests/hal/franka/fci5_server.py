@@ -6,6 +6,7 @@ the tests: it knows external torque control alone, which is what panda_py uses. 
 that the client loads for its dynamics. Faults are commanded on standard input, one a line:
 
     reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | unhomed | flange |
+    table Z SLOPE (a table that pushes the hand up) |
     q (answers with the joints) | clock (answers with the robot's time, s)
 """
 
@@ -22,7 +23,7 @@ import numpy as np
 
 from hal.franka.frames import F_T_EE
 from mskgrasp.core.panda_kinematics import forward
-from tests.hal.franka.wire import Channel, GripperState, RobotState, ask_for_priority
+from tests.hal.franka.wire import Channel, GripperState, RobotState, Table, ask_for_priority
 
 VERSION, GRIPPER_VERSION = 5, 3
 CONNECT, MOVE, STOP_MOVE, RECOVER, LOAD_MODEL = 0, 1, 2, 12, 13
@@ -56,6 +57,7 @@ class Robot:
     tick: int = 0
     pose: np.ndarray = field(default_factory=lambda: forward(READY)[0])
     f_t_ee: np.ndarray = field(default_factory=lambda: F_T_EE)
+    table: Table | None = None
 
     def step(self) -> None:
         self.tick += 1
@@ -86,6 +88,7 @@ class Robot:
                 controller=self.controller,
                 mode=self.mode,
                 reflexes=self.reflexes,
+                pushed_up=0.0 if self.table is None else self.table.push(self.pose[0, 3], self.pose[2, 3]),
             ).pack()
         )
 
@@ -142,6 +145,8 @@ class Robot:
                 self.finish(2, USER_STOPPED)
             case "user_release":
                 self.mode = IDLE
+            case "table":
+                self.table = Table(z=float(words[1]), slope_x=float(words[2]))
             case "flange":
                 self.f_t_ee = np.eye(4)  # no end effector is chosen in Desk
 

@@ -4,6 +4,7 @@ An FR3 over the real wire protocol of server version 10, its dynamics in MuJoCo.
 not have, are commanded on standard input, one a line, as in `tests.hal.franka.fci5_server`:
 
     reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | q | clock |
+    table Z SLOPE (a table that pushes the hand up) |
     record (the commands of motions from now on) | save FILE (them, as `commands` reads it)
 """
 
@@ -29,7 +30,7 @@ from franky_sim.franka_robot_state import FrankaRobotState
 from franky_sim.franka_server import BaseCommand
 from franky_sim.mujoco_simulator import MujocoSimulator
 
-from tests.hal.franka.wire import ask_for_priority
+from tests.hal.franka.wire import Table, ask_for_priority
 
 _LATE_S = 0.005
 _TURN_S = 3e-4
@@ -46,6 +47,7 @@ class FaultyServer(FrankaRobotServer):
     """franky-sim's server with a reflex, a user stop and a record of what is commanded."""
 
     fault: RobotMode | None = None
+    table: Table | None = None
     ticks = 0
     record: list[UDPCommand] | None = None
     answered = False
@@ -58,6 +60,9 @@ class FaultyServer(FrankaRobotServer):
             state = state.replace(
                 dq_d=(0.0,) * 7, ddq_d=(0.0,) * 7, O_dP_EE_c=(0.0,) * 6, O_ddP_EE_c=(0.0,) * 6
             )
+        if self.table is not None:
+            push = self.table.push(state.O_T_EE[12], state.O_T_EE[14])
+            state = state.replace(O_F_ext_hat_K=(0.0, 0.0, push, 0.0, 0.0, 0.0))
         if self.fault is None:
             return state
         reasons = tuple(self.fault is RobotMode.kReflex and k == _CARTESIAN_REFLEX for k in range(41))
@@ -158,6 +163,8 @@ def obey(words: list[str], simulator: MujocoSimulator, robot: FaultyServer, answ
             robot.fault = None
         case ["answer", status]:
             answers.status = ANSWERS[status]
+        case ["table", z, slope_x]:
+            robot.table = Table(z=float(z), slope_x=float(slope_x))
         case ["part", width]:
             model = simulator.model
             assert model is not None

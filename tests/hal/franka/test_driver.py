@@ -11,7 +11,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from hal.franka.driver import MODES, Driver, DriverSettings, DriverState, column_major
+from hal.franka.driver import MODES, Driver, DriverSettings, DriverState, column_major, felt_force
 from hal.franka.franky_driver import FrankyDriver
 from hal.franka.panda_py_driver import PandaPyDriver
 
@@ -64,3 +64,9 @@ def test_a_matrix_is_sent_column_by_column():
     matrix = np.arange(16).reshape(4, 4)  # 0 1 2 3 in the first row
     assert column_major(matrix) == [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15]
     assert all(type(value) is float for value in column_major(matrix))
+
+
+def test_the_force_of_a_contact_is_what_was_not_there_at_the_start():
+    """The force estimate at rest is a model's error; moments do not count."""
+    assert felt_force([1.0, 2.0, 8.0, 9.0, 9.0, 9.0], [1.0, 2.0, 3.0, 0.0, 0.0, 0.0]) == pytest.approx(5.0)
+    assert felt_force([3.0, 0.0, 4.0, 0, 0, 0], [0.0] * 6) == pytest.approx(5.0)

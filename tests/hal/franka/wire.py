@@ -12,9 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mskgrasp.core.grasp import PAD_REACH
+
 STATE = struct.Struct("<Q 96d d9d3d d9d3d 2d2d 56d 7d6d7d6d 7d6d6d6d3d 2d2d2d 16d6d6d 7d7d B B 41? 41? B d")
 GRIPPER_STATE = struct.Struct("<Idd?H")
 assert STATE.size == 2373 and GRIPPER_STATE.size == 23
+_STIFFNESS = 2e4
+"""Stiffness of a table, N/m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +35,7 @@ class RobotState:
     controller: int
     mode: int
     reflexes: tuple[int, ...]
+    pushed_up: float = 0.0
 
     def pack(self) -> bytes:
         pose, eye = self.pose.flatten(order="F"), np.eye(4).flatten()
@@ -42,7 +47,7 @@ class RobotState:
                 *(np.zeros(26), np.zeros(4)),
                 # The client limits the change of its torques against the last that it finds here.
                 *(self.torque, self.torque, zeros, self.q, self.q, self.dq, zeros, zeros),
-                *(np.zeros(26), np.zeros(28), np.zeros(6)),
+                *(np.zeros(26), zeros, [0.0, 0.0, self.pushed_up, 0.0, 0.0, 0.0], np.zeros(15), np.zeros(6)),
                 *(pose, np.zeros(12), self.q, zeros),
             ]
         )
@@ -50,6 +55,18 @@ class RobotState:
         return STATE.pack(
             self.tick, *numbers, self.generator, self.controller, *[False] * 41, *reason, self.mode, 1.0
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A springy table under the hand, a plane z + slope_x x: it is felt, and does not hold the hand."""
+
+    z: float
+    slope_x: float = 0.0
+
+    def push(self, x: float, z: float) -> float:
+        """Force on the pads of a hand that points down with its TCP there, N."""
+        return max(0.0, _STIFFNESS * (self.z + self.slope_x * x - (z - PAD_REACH)))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -67,6 +67,13 @@ class ToyArm(Arm):
         self._joints = np.concatenate([T_base_tcp.position, np.zeros(4)])
         self._quat_wxyz = T_base_tcp.quat_wxyz
 
+    def _move_until_contact(self, T_base_tcp: Pose, force: float, speed: float) -> Pose | None:
+        position = T_base_tcp.position
+        met = position[2] < 0.05
+        where = np.array([*position[:2], 0.05]) if met else position
+        self._joints, self._quat_wxyz = np.concatenate([where, np.zeros(4)]), T_base_tcp.quat_wxyz
+        return Pose(position=where, quat_wxyz=T_base_tcp.quat_wxyz) if met else None
+
     def _move_gripper(self, width: float) -> None:
         self._width = width
 
