@@ -8,6 +8,8 @@ import numpy as np
 
 from mskgrasp.core.geometry import Pose
 
+HIGHEST_TABLE = 0.002
+"""Greatest height over its stated one at which a table may be seen, m: less than the hand's clearance."""
 _INLIER = 0.012
 """Greatest distance of the table's points from the plane, metres: about five times a Kinect v2's noise."""
 _LEAST_POINTS = 200
@@ -21,6 +23,7 @@ class TablePlane:
     Attributes:
         z: Its height in the middle of the region, base frame, metres.
         tilt_rad: Its angle against the base's x-y plane.
+        slope: (2,) its rise along x and along y, metres a metre.
         noise: RMS distance of the table's points from it, metres.
         share: Fraction of the region's points on the plane.
         valid: Fraction of the region's pixels with a depth.
@@ -28,6 +31,7 @@ class TablePlane:
 
     z: float
     tilt_rad: float
+    slope: tuple[float, float]
     noise: float
     share: float
     valid: float
@@ -87,6 +91,7 @@ def fit_table(
     return TablePlane(
         z=float(plane[2]),
         tilt_rad=float(np.arctan(np.linalg.norm(plane[:2]))),
+        slope=(float(plane[0]), float(plane[1])),
         noise=float(np.sqrt(np.mean(rest**2))),
         share=float(inliers.mean()),
         valid=float(valid.mean()),

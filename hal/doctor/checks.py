@@ -20,10 +20,10 @@ from hal.charuco import project
 from hal.errors import HalError, OutOfWorkspace
 from hal.execute import APPROACH
 from hal.open_cell import SIMULATED
-from hal.table import fit_table
+from hal.table import HIGHEST_TABLE, fit_table
 from mskgrasp.core.errors import BadConfig, MskgraspError
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import MAX_OPENING, lowest_grasp_z, pose_base_tcp
+from mskgrasp.core.grasp import MAX_OPENING, pose_base_tcp
 
 Level = Literal["ok", "warn", "fail"]
 
@@ -220,9 +220,9 @@ def check_arm(arm: Arm, connect_s: float) -> Iterator[Finding]:
 
 def check_reach(arm: Arm, workspace: Workspace) -> Finding:
     """Whether every corner of the region can be grasped, lifted and approached."""
-    lowest = lowest_grasp_z(workspace.table_z)
     x_min, x_max, y_min, y_max = workspace.region
     for x, y in ((x_min, y_min), (x_min, y_max), (x_max, y_min), (x_max, y_max)):
+        lowest = float(workspace.lowest_grasp_z(np.array([x, y])))
         for z in (lowest, lowest + workspace.lift_height, workspace.table_z + APPROACH):
             for theta in (-np.pi / 2, 0.0, np.pi / 2):
                 try:
@@ -350,23 +350,31 @@ def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
     remedy = "" if level == "ok" else "; avoid glossy or black surfaces and sunlight"
     yield Finding(level=level, subject="depth", text=f"{said}, noise {plane.noise * 1e3:.1f} mm{remedy}")
     off = plane.z - workspace.table_z
-    tilt_deg = np.degrees(plane.tilt_rad)
+    tilt_rad = float(np.arctan(np.linalg.norm(np.subtract(plane.slope, workspace.table_slope))))
+    tilt_deg = np.degrees(tilt_rad)
     said = f"{off * 1e3:+.1f} mm from table_z {workspace.table_z:.4f} m, tilted by {tilt_deg:.2f} degrees"
-    if plane.tilt_rad > 2 * _TILT_OK:
+    if tilt_rad > 2 * _TILT_OK:
         yield Finding(
             level="fail",
             subject="table",
-            text=f"{said}; calibrate again (python -m hal.calibrate), or level it",
+            text=f"{said}; run hal.touch, then calibrate again (python -m hal.calibrate)",
         )
     elif abs(off) >= workspace.min_height:
         yield Finding(
             level="fail",
             subject="table",
-            text=f"{said}: parts are not detected with an error this large; touch the table with "
-            f"closed fingers: if table_z holds, add {off:+.4f} to camera.depth_offset (the camera measures "
-            f"{'short' if off > 0 else 'too far'}), else correct table_z",
+            text=f"{said}: parts are not detected with an error this large; run hal.touch: if table_z "
+            f"holds, add {off:+.4f} to camera.depth_offset (the camera measures "
+            f"{'short' if off > 0 else 'too far'})",
         )
-    elif abs(off) > max(_TABLE_OK, workspace.min_height / 2) or plane.tilt_rad > _TILT_OK:
+    elif off > HIGHEST_TABLE:
+        yield Finding(
+            level="fail",
+            subject="table",
+            text=f"{said}: programs refuse a table seen more than {HIGHEST_TABLE * 1e3:g} mm higher; run "
+            f"hal.touch: if table_z holds, add {off:+.4f} to camera.depth_offset",
+        )
+    elif abs(off) > max(_TABLE_OK, workspace.min_height / 2) or tilt_rad > _TILT_OK:
         yield Finding(
             level="warn",
             subject="table",

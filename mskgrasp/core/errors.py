@@ -49,6 +49,10 @@ class NoPartFound(MskgraspError):
     """The depth image shows no part that could be grasped."""
 
 
+class TableTooHigh(MskgraspError):
+    """The table is seen higher over its stated height than the fingers' clearance allows."""
+
+
 class MarkersNotFound(MskgraspError):
     """The tape squares on the part are not seen well enough to measure its motion."""
 

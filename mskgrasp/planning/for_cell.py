@@ -31,6 +31,7 @@ def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
         table_z=workspace.table_z,
         region=workspace.region,
         min_height=workspace.min_height,
+        lowest_grasp_z=workspace.lowest_grasp_z,
     )
 
 

@@ -7,14 +7,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hal.camera import RgbdFrame
+from hal.table import HIGHEST_TABLE
 from mskgrasp.core.displacement_covariance import object_displacement_covariance
-from mskgrasp.core.errors import BadModel, NoGraspFound
+from mskgrasp.core.errors import BadModel, NoGraspFound, TableTooHigh
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
@@ -176,10 +178,12 @@ class Planner:
         table_z: float,
         region: tuple[float, float, float, float],
         min_height: float = 0.002,
+        lowest_grasp_z: Callable[[np.ndarray], np.ndarray] | None = None,
     ):
         """Take the workspace: table height, region (x_min, x_max, y_min, y_max), least height of a part.
 
-        All in metres, base frame.
+        All in metres, base frame. ``lowest_grasp_z`` gives the least z (n,) of grasps at points (n, 2), as
+        `hal.Workspace.lowest_grasp_z` does; by default `TABLE_CLEARANCE` over a level table.
 
         Raises:
             BadModel: The policy needs variances and the model predicts none.
@@ -193,6 +197,7 @@ class Planner:
         self.table_z = table_z
         self.region = region
         self.min_height = min_height
+        self._lowest_grasp_z = lowest_grasp_z
 
     def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
         """Plan a grasp of the part in a frame.
@@ -200,6 +205,7 @@ class Planner:
         Raises:
             NoPartFound: No part is detected.
             NoGraspFound: No candidate has the required quality.
+            TableTooHigh: The table is seen more than `hal.table.HIGHEST_TABLE` over its stated height.
         """
         started = time.perf_counter()
         view, drawn = self.sample(frame, rng)
@@ -264,7 +270,7 @@ class Planner:
         for number in range(self.config.refinements):
             loss = -found[best.rows] if self.config.policy == "quality" else best.scores
             elite = candidates[best.rows[np.argsort(loss, kind="stable")[: max(1, n_best // 4)]]]
-            drawn = grasps_near(elite, 4 * n_best, scene.view, rng, width=0.5 ** (number + 1))
+            drawn = self._clear(grasps_near(elite, 4 * n_best, scene.view, rng, width=0.5 ** (number + 1)))
             if self.config.check_fingers:
                 drawn = drawn[fingers_free(scene, drawn)]
             quality = qualities(self.models, scene, drawn, self.config.chunk_size)
@@ -280,6 +286,7 @@ class Planner:
 
         Raises:
             NoPartFound: No part is detected.
+            TableTooHigh: The table is seen more than `hal.table.HIGHEST_TABLE` over its stated height.
         """
         view = view_part(
             frame.depth,
@@ -290,7 +297,20 @@ class Planner:
             min_height=self.min_height,
             alone=True,
         )
-        return view, Grasp.from_vector(sample_grasps(view, self.config.n_candidates, rng))
+        if view.table_offset > HIGHEST_TABLE:
+            raise TableTooHigh(
+                f"the table is seen {1e3 * view.table_offset:.1f} mm over table_z {self.table_z:g}, more "
+                f"than {1e3 * HIGHEST_TABLE:g} mm: the fingers could press on it; run hal.touch, and if "
+                "table_z holds, correct camera.depth_offset"
+            )
+        grasps = self._clear(sample_grasps(view, self.config.n_candidates, rng))
+        return view, Grasp.from_vector(grasps)
+
+    def _clear(self, grasps: np.ndarray) -> np.ndarray:
+        """Raise grasps (n, 4) whose pads would be too near the table."""
+        if self._lowest_grasp_z is not None:
+            grasps[:, 2] = np.maximum(grasps[:, 2], self._lowest_grasp_z(grasps[:, :2]))
+        return grasps
 
 
 def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:

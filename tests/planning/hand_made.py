@@ -48,7 +48,11 @@ def hand_made_models(variance=True):
     return models
 
 
-def planner(config=None, models=None):
+def planner(config=None, models=None, **settings):
     return Planner(
-        models or hand_made_models(), config or PlannerConfig(n_candidates=600), table_z=0.0, region=REGION
+        models or hand_made_models(),
+        config or PlannerConfig(n_candidates=600),
+        table_z=0.0,
+        region=REGION,
+        **settings,
     )

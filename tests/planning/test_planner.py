@@ -1,3 +1,4 @@
+import contextlib
 import dataclasses
 import json
 import subprocess
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound
+from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound, TableTooHigh
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
@@ -172,3 +173,22 @@ def test_two_parts_are_refused():
     other = Box(x=0.45, y=-0.06, yaw=0.0, size=(0.04, 0.02, 0.02))
     with pytest.raises(NoPartFound, match="two things lie in the region.*take one away"):
         planner().plan(synthetic.frame([BOX, other]), np.random.default_rng(0))
+
+
+def test_no_candidate_is_lower_than_the_cell_allows():
+    def lowest(xy: np.ndarray) -> np.ndarray:
+        return 0.02 + 0.01 * (xy[:, 0] - 0.5)
+
+    found = planner(PlannerConfig(n_candidates=600, refinements=2), lowest_grasp_z=lowest)
+    candidates = found.plan(FRAME, np.random.default_rng(0)).candidates.as_vector()
+    assert (candidates[:, 2] >= lowest(candidates[:, :2]) - 1e-12).all()
+    free = planner(PlannerConfig(n_candidates=600, refinements=2)).plan(FRAME, np.random.default_rng(0))
+    assert (free.candidates.as_vector()[:, 2] < 0.0195).any()
+
+
+@pytest.mark.parametrize(("offset", "refused"), [(0.0015, False), (-0.004, False), (0.0025, True)])
+def test_a_table_seen_more_than_2_mm_too_high_is_refused(offset: float, refused: bool):
+    depth = FRAME.depth + np.random.default_rng(0).normal(0, 0.002, FRAME.depth.shape).astype(np.float32)
+    frame = dataclasses.replace(FRAME, depth=(depth - offset).astype(np.float32))
+    with pytest.raises(TableTooHigh, match=r"run hal\.touch") if refused else contextlib.nullcontext():
+        planner(min_height=0.006).sample(frame, np.random.default_rng(0))

@@ -109,7 +109,7 @@ def test_without_depth_the_report_says_so(exact: HandEye, pictures: list[Picture
 def test_the_tables_height_is_corrected_by_the_cameras_error(
     offset: float | None, table_z: float | None, words: str
 ):
-    plane = TablePlane(z=-0.024, tilt_rad=0.02, noise=0.002, share=1.0, valid=1.0)
+    plane = TablePlane(z=-0.024, tilt_rad=0.02, slope=(0.02, 0.0), noise=0.002, share=1.0, valid=1.0)
     error = None if offset is None else DepthOffset(metres=offset, spread=0.0, n_views=3)
     assert words in describe_table(plane, error, table_z)
     assert "not seen" in describe_table(None, error, table_z)

@@ -28,7 +28,8 @@ from tests.hal.flat_table import DOWN, WORKSPACE, frame_of_table
     ("z", "slope", "level", "words"),
     [
         (0.001, 0.0, "ok", "+1.0 mm"),
-        (0.004, 0.0, "warn", "warm up"),
+        (0.004, 0.0, "fail", "programs refuse a table seen more than 2 mm higher"),
+        (-0.004, 0.0, "warn", "warm up"),
         (-0.024, 0.0, "fail", "add -0.0240 to camera.depth_offset (the camera measures too far)"),
         (0.0, 0.03, "fail", "tilted by 1.72 degrees"),
     ],
@@ -36,6 +37,12 @@ from tests.hal.flat_table import DOWN, WORKSPACE, frame_of_table
 def test_a_table_elsewhere_is_found_with_its_remedy(z: float, slope: float, level: str, words: str):
     depth, table = check_table(frame_of_table(z, slope), WORKSPACE)
     assert depth.level == "ok" and table.level == level and words in table.text
+
+
+def test_a_tilt_that_the_file_states_is_no_fault():
+    stated = dataclasses.replace(WORKSPACE, table_slope=(0.03, 0.0))
+    _, table = check_table(frame_of_table(0.001, 0.03), stated)
+    assert table.level == "ok" and "tilted by 0.00 degrees" in table.text
 
 
 def test_missing_depth_is_found():
