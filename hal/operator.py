@@ -93,6 +93,14 @@ class Operator:
             "May the arm move? y: yes, n: no, place the part again, q: stop: ", {"y": True, "n": False}
         )
 
+    def confirm(self, question: str) -> bool:
+        """The operator's answer to a question, yes or no; True without a question if no operator is asked.
+
+        Raises:
+            StoppedByOperator: The operator ended the run.
+        """
+        return not self.asks or self._ask(question, {"y": True, "n": False})
+
     def recover(self, cell: Cell, reason: str) -> None:
         """Recover the arm after a contact, once the operator confirms.
 

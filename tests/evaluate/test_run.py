@@ -24,6 +24,7 @@ from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
 from tests.browser import Page
+from tests.hal.real_cell import measured_cell
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -215,11 +216,9 @@ def test_a_missing_file_is_reported_before_any_part_is_looked_for(
         (dict(compare=(f"a={PRETRAINED}",)), "--experiment displacement"),
         (dict(tape=(0.012, 0.008)), "--measure markers"),
         (dict(measure="markers", tape=(0.008, 0.012)), "at least 1.25 times"),
-        (dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml", noise="iid"), "for a simulated cell"),
-        (
-            dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml", workers=2),
-            "one cell; omit --workers",
-        ),
+        (dict(cell="real", noise="iid"), "for a simulated cell"),
+        (dict(cell="real", workers=2), "one cell; omit --workers"),
+        (dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml"), r"run hal\.touch"),
         (dict(experiment="displacement", compare=("a-b=x",)), "label=folder"),
         (dict(experiment="displacement", compare=("a",)), "label=folder"),
         (dict(experiment="displacement", compare=(f"LOWESS={PRETRAINED}",)), "is not 'lowess'"),
@@ -235,6 +234,8 @@ def test_a_missing_file_is_reported_before_any_part_is_looked_for(
 def test_unusable_settings_are_refused_in_one_line_and_leave_no_folder(
     changes: dict[str, Any], message: str, tmp_path: Path
 ):
+    if changes.get("cell") == "real":
+        changes = changes | {"cell": measured_cell(tmp_path)}
     with pytest.raises(MskgraspError, match=message) as raised:
         evaluate(config(tmp_path / "out", **changes))
     assert raised.value.exit_code == 2

@@ -5,13 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
 from hal import cell_from_yaml
+from hal.errors import OutOfWorkspace
 from hal.franka import FrankaArm, PandaPyArmConfig
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.grasp import pose_base_tcp
+from tests.hal.real_cell import measured_cell
 from tests.hal_contract.conftest import CELLS
 
 GOOD: dict[str, Any] = {
@@ -70,6 +74,25 @@ def test_a_table_of_unknown_height_is_asked_for(tmp_path: Path):
     path.write_text(yaml.safe_dump({**GOOD, "workspace": {}}))
     with pytest.raises(BadConfig, match=r"'workspace\.table_z': field required"):
         cell_from_yaml(path)
+
+
+def test_the_documented_cell_is_refused_until_its_table_is_measured(tmp_path: Path):
+    with pytest.raises(BadConfig, match=r"'workspace\.table_z': .*run hal\.touch") as caught:
+        cell_from_yaml(CELLS / "panda_kinect2.yaml")
+    assert "\n" not in str(caught.value)
+    cell = cell_from_yaml(measured_cell(tmp_path))
+    assert cell.workspace.clearance == cell.arm.limits.clearance == 0.003
+
+
+def test_a_slope_of_the_table_reaches_arm_and_planner(tmp_path: Path):
+    path = write(tmp_path / "cell.yaml", workspace={"table_z": 0.01, "table_slope": [0.01, 0.0]})
+    cell = cell_from_yaml(path)
+    high, low = (float(cell.workspace.lowest_grasp_z(np.array([x, 0.0]))) for x in (0.62, 0.38))
+    assert high - low == pytest.approx(0.0024)
+    cell.arm.check_pose(pose_base_tcp(np.array([0.62, 0.0, high, 0.0])))
+    cell.arm.check_pose(pose_base_tcp(np.array([0.38, 0.0, low, 0.0])))
+    with pytest.raises(OutOfWorkspace, match="over the table"):
+        cell.arm.check_pose(pose_base_tcp(np.array([0.62, 0.0, low, 0.0])))
 
 
 def test_the_documented_cell_is_slower_and_gentler_than_the_defaults():

@@ -92,3 +92,10 @@ def test_it_is_asked_in_a_terminal(real):
     os.close(ours)
     assert out == b"True\n", err
     assert b"May the arm move? y: yes" in err
+
+
+def test_a_question_is_answered_by_yes_or_no_and_not_asked_on_a_simulated_cell(real):
+    asked, prompts = operator(real, "maybe\nn\ny\n")
+    assert not asked.confirm("Write it? ") and asked.confirm("Write it? ")
+    assert prompts.getvalue().count("Write it?") == 3
+    assert Operator(cell_from_yaml(SIMULATED)).confirm("Write it? ")

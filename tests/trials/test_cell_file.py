@@ -9,6 +9,7 @@ import yaml
 
 from mskgrasp.core.errors import UsageError
 from mskgrasp.trials.cell_file import read_cell
+from tests.hal.real_cell import measured_cell
 
 CELLS = Path(__file__).parents[2] / "configs" / "cells"
 
@@ -40,9 +41,9 @@ def test_measuring_by_markers_adds_tape_to_a_simulated_cell(tmp_path: Path):
 
 def test_a_real_cells_file_is_used_in_place(tmp_path: Path):
     """It names files relative to its own folder."""
-    real = CELLS / "panda_kinect2.yaml"
+    real = measured_cell(tmp_path)
     found = read_cell(real, noise=None, measure="markers", tape=None)
-    assert found.write(tmp_path) == real and not list(tmp_path.iterdir())
+    assert found.write(tmp_path) == real and list(tmp_path.iterdir()) == [real]
     assert found.tape is not None and not found.simulated and found.noise == ""
     with pytest.raises(UsageError, match="for a simulated cell"):
         read_cell(real, noise="iid", measure="truth", tape=None)

@@ -14,9 +14,9 @@ from hal.operator import Operator
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
-from mskgrasp.core.shipped import config_file
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.trials.engine import ExecutedGrasp, TrialEngine, connected_engine
+from tests.hal.real_cell import measured_cell
 from tests.hal.replay.toy import toy_cell
 from tests.planning.hand_made import FRAME, planner
 from tests.trials.box_grasps import BesideTheMiddle, BoxCell
@@ -134,6 +134,6 @@ def test_a_real_cell_is_not_connected_where_nobody_can_be_asked(tmp_path, monkey
     monkeypatch.setattr(Cell, "connected", None)  # would fail if it were tried
     with (
         pytest.raises(UsageError, match="standard input is no terminal"),
-        connected_engine(config_file("cells/panda_kinect2.yaml"), yes=False, picture=tmp_path, tape=None),
+        connected_engine(measured_cell(tmp_path), yes=False, picture=tmp_path, tape=None),
     ):
         pass

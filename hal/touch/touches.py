@@ -1,0 +1,119 @@
+"""Touches of the table with the closed fingers of any arm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hal.arm import Arm
+from hal.cell import Cell, Workspace
+from hal.errors import HalError
+from hal.execute import APPROACH, go_home
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import PAD_REACH, pose_base_tcp
+
+N_POINTS = 5
+ABOVE = 0.02
+"""Distance of the pads from the table as the hand moves from one point to the next, metres."""
+BELOW = 0.015
+"""Depth under the first contact down to which the table is searched at the other points, metres."""
+PART_ROOM = 0.08
+"""No point is nearer than this to a part whose pose is known, metres."""
+_TRAVEL_SPEED = 0.1
+
+
+class TableNotFound(HalError):
+    """The fingers met no table where it should be."""
+
+
+def touch_points(region: tuple[float, float, float, float], part: np.ndarray | None) -> np.ndarray:
+    """Five points (5, 2) of a region to touch: its corners and its middle, as far as no part is near.
+
+    Args:
+        region: x_min, x_max, y_min, y_max, base frame, metres.
+        part: (2,) place of a part on the table; None if there is none, or nothing knows.
+    """
+    x_min, x_max, y_min, y_max = region
+    x, y = (x_min + x_max) / 2, (y_min + y_max) / 2
+    corners = [(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)]
+    edges = [(x, y_min), (x_max, y), (x, y_max), (x_min, y)]
+    points = np.array([*corners, (x, y), *edges])
+    if part is not None:
+        distance = np.linalg.norm(points - part, axis=1)
+        near = distance < PART_ROOM
+        # Those near the part come last, the nearest at the very end.
+        points = points[np.lexsort([np.where(near, -distance, 0.0), near])]
+    return points[:N_POINTS]
+
+
+def touch_table(
+    cell: Cell,
+    *,
+    search: float,
+    force: float,
+    speed: float,
+    touched: Callable[[int, np.ndarray], None] = lambda number, point: None,
+) -> np.ndarray:
+    """Touch the table at five points with the closed fingers, then move the arm home.
+
+    Args:
+        cell: Its arm is connected; its region is clear but for a part that its tracker knows.
+        search: Distance from its stated height within which the table is searched, metres.
+        force: Force that is a touch, N.
+        speed: Speed towards the table, m/s; twice as much for the first contact.
+        touched: Called with the number and position (3,) of each point.
+
+    Returns:
+        (5, 3) touched points, base frame, metres.
+
+    Raises:
+        TableNotFound: The fingers met nothing there, or something above it.
+        HalError: The arm was stopped or lost, or cannot reach the points.
+    """
+    arm, workspace = cell.arm, cell.workspace
+    part = None if cell.tracker is None else np.asarray(cell.tracker.part_pose().position)[:2]
+    places = touch_points(workspace.region, part)
+    go_home(cell)
+    arm.move_gripper(0.0)
+    arm.move_to_pose(_above(places[0], workspace.table_z + APPROACH), speed=_TRAVEL_SPEED)
+    first = _touch(arm, places[0], workspace.table_z - search, force, 2 * speed)
+    _check_found(first, places[0], workspace, search)
+    assert first is not None
+    travel = max(first[2], workspace.table_z) + ABOVE
+    points = []
+    for number, place in enumerate(places):
+        here = arm.state().T_base_tcp.position
+        arm.move_to_pose(_above(here[:2], travel), speed=_TRAVEL_SPEED)
+        arm.move_to_pose(_above(place, travel), speed=_TRAVEL_SPEED)
+        point = _touch(arm, place, first[2] - BELOW, force, speed)
+        _check_found(point, place, workspace, search)
+        assert point is not None
+        touched(number, point)
+        points.append(point)
+    go_home(cell)
+    return np.array(points)
+
+
+def _above(xy: np.ndarray, z: float) -> Pose:
+    """Pose of a hand that points down with the tips of its pads at a height."""
+    return pose_base_tcp(np.array([*xy, z + PAD_REACH, 0.0]))
+
+
+def _touch(arm: Arm, xy: np.ndarray, lowest: float, force: float, speed: float) -> np.ndarray | None:
+    """(3,) point where the pads touch the table; None if they reach a height without."""
+    contact = arm.move_until_contact(_above(xy, lowest), force=force, speed=speed)
+    return None if contact is None else contact.apply(np.array([0.0, 0.0, PAD_REACH]))
+
+
+def _check_found(point: np.ndarray | None, place: np.ndarray, workspace: Workspace, search: float) -> None:
+    where = f"({place[0]:.3f}, {place[1]:.3f}) m"
+    stated = f"within {search * 1e3:g} mm of the height {workspace.table_z:.4f} m that is stated for it"
+    remedy = "measure it by tape and give it as --table-at Z (base frame, m)"
+    if point is None:
+        raise TableNotFound(f"the fingers met no table at {where} {stated}; {remedy}")
+    if point[2] > workspace.table_z + search:
+        raise TableNotFound(
+            f"the fingers met something at {where}, {point[2]:.4f} m high, and no table {stated}; clear the "
+            f"region, or {remedy}"
+        )
