@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 import yaml
 
+from hal import Cell
 from hal.franka.arm import FrankaArm
+from hal.operator import Operator
 from hal.touch import run as touch
 from hal.touch import touches
 from tests.hal.franka.robots import robot_for, write_cell
-from tests.hal.touch.tables import CELLS, simulated_file
+from tests.hal.touch.tables import CELLS, feeling_cell, simulated_file, tilted
 from tests.programs import run_here
 
 QUICK = ("--speed", "0.025")
@@ -156,3 +158,56 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     assert done.returncode == 2 and message in done.stderr
     assert done.stderr.startswith("program: ") and done.stderr.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ([] if text is None else ["cell.yaml"])
+
+
+def felt(monkeypatch: pytest.MonkeyPatch, folder: Path, answers: list[bool]) -> Path:
+    """A real cell's file whose arm feels a sloping table; its operator gives these answers."""
+    stated: list[float] = []
+
+    def build(values: dict, path: Path) -> Cell:
+        stated.append(values["workspace"]["table_z"])
+        return feeling_cell(tilted(0.013, (0.008, 0.0)), table_z=stated[0])
+
+    monkeypatch.setattr(touch, "cell_from_values", build)
+    monkeypatch.setattr(Operator, "__init__", lambda self, cell, yes: None)
+    monkeypatch.setattr(Operator, "confirm", lambda self, question: answers.pop(0))
+    path = folder / "cell.yaml"
+    path.write_text(REAL + "workspace:\n  table_z: null   # tape\n  region: [0.38, 0.62, -0.12, 0.12]\n")
+    return path
+
+
+def test_an_operator_who_agrees_twice_gets_the_file_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    path = felt(monkeypatch, tmp_path, [True, True])
+    before, out = path.read_text(), str(tmp_path / "out")
+    done = run_here(touch.main, "--cell", str(path), "--table-at", "0.0", "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert path.read_text() == before.replace(
+        "table_z: null   # tape\n", "table_z: 0.013   # tape\n  table_slope: [0.008, 0.0]\n"
+    )
+    assert sorted(found.name for found in (tmp_path / "out").iterdir()) == ["table.json", "table.png"]
+
+
+def test_an_operator_who_does_not_want_the_file_written_keeps_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    path = felt(monkeypatch, tmp_path, [True, False])
+    before, out = path.read_text(), str(tmp_path / "out")
+    done = run_here(touch.main, "--cell", str(path), "--table-at", "0.0", "--out", out)
+    assert done.returncode == 0 and "is as before" in done.stdout
+    assert path.read_text() == before and (tmp_path / "out" / "table.json").is_file()
+
+
+def test_an_operator_who_does_not_want_the_arm_to_move_ends_the_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    path = felt(monkeypatch, tmp_path, [False])
+    before, out = path.read_text(), str(tmp_path / "out")
+    done = run_here(touch.main, "--cell", str(path), "--table-at", "0.0", "--out", out)
+    assert done.returncode == 130 and "nothing moved" in done.stderr
+    assert path.read_text() == before and not (tmp_path / "out").exists()
+
+
+def test_the_help_teaches_what_happens_to_the_cell_and_its_file():
+    done = run_here(touch.main, "--help")
+    for words in ("emergency", "--table-at", "table.json", "table_slope", "stays as it is", "docs/touch.md"):
+        assert words in done.stdout
