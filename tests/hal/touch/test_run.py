@@ -82,7 +82,7 @@ def test_a_driver_that_dies_in_the_middle_of_a_touch_leaves_nothing_half_written
     ask, asked = FrankaArm._ask, []
 
     def die_in_the_second(self: FrankaArm, op: str, **values: object) -> object:
-        if op == "move" and values.get("until_force") is not None:
+        if op == "move_straight" and values.get("until_force") is not None:
             asked.append(op)
             if len(asked) == 2:
                 os.kill(self._connected_link().pid, signal.SIGKILL)
@@ -96,7 +96,7 @@ def test_a_driver_that_dies_in_the_middle_of_a_touch_leaves_nothing_half_written
         done = run_here(touch.main, "--cell", str(path), "--out", str(tmp_path / "out"), "--yes", *QUICK)
         begin = robot.joints()
         robot.wait(0.5)
-        assert robot.joints() == pytest.approx(begin, abs=1e-3)
+        assert robot.joints() == pytest.approx(begin, abs=5e-3)
     assert done.returncode == 1 and "ended by SIGKILL" in done.stderr and done.stderr.count("\n") == 1
     assert path.read_bytes() == before and not (tmp_path / "out").exists()
 
