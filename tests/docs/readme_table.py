@@ -171,10 +171,11 @@ def _validation(stored: StoredReport) -> list[ReadmeRow]:
     )
     shift, success = found["equivalence"]["displacement"], found["equivalence"]["success"]
     shown = "shown" if found["equivalent"] else "not shown"
+    setting, yardstick = (report[name].replace(" it", " iterations") for name in ("production", "yardstick"))
     return [
         ReadmeRow(
             name="labels against finer steps",
-            text=f"production against {report['yardstick'].replace(' it', ' iterations')}: "
+            text=f"{setting} (simulation version {report['versions']['simulation']}) against {yardstick}: "
             f"median displacement {1e3 * shift['estimate']:.2f} mm beyond that of starts moved by 10 um, "
             f"success {100 * success['estimate']:+.1f} points; equivalence within "
             f"{1e3 * shift['margin']:g} mm and {100 * success['margin']:g} points is {shown}",
