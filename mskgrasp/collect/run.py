@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.core.files import LOCK, exclusive_lock
 from mskgrasp.core.shipped import config_file
 from mskgrasp.dataset import ShardInfo, read_shard, shard_path
-from mskgrasp.dataset.labels import read_labels
+from mskgrasp.dataset.labels import ShardLabels, read_labels
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.catalogue import ratings, read_index, representative_entries
 from mskgrasp.runtime.cli import make_folder
@@ -76,7 +77,7 @@ def collect(config: CollectConfig) -> None:
         with exclusive_lock(config.out) as alone:
             if not alone:
                 raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
-            _collect(config, [part for _, part in parts])
+            _collect(config, [part for _, part in parts], known)
 
 
 def check_labels(info: ShardInfo, config: CollectConfig) -> None:
@@ -115,10 +116,15 @@ def sampled(names: list[str], count: int) -> list[str]:
     return [entry.name for entry in representative_entries((index.parts[name] for name in names), count)]
 
 
-def _collect(config: CollectConfig, parts: list[Part]) -> None:
+def _collect(config: CollectConfig, parts: list[Part], known: Mapping[tuple[str, int], ShardLabels]) -> None:
+    hashes = {part.name: part.content_hash for part in parts}
+    for name, index in known:
+        if name in hashes and known[name, index].info.part_hash != hashes[name]:
+            raise BadDataset(
+                f"labels of shard {index} of part '{name}' are of another shape: the part has changed since"
+            )
     prepare_folder(config)
     everything = plan_shards(config, parts)
-    hashes = {part.name: part.content_hash for part in parts}
     missing = [task for task in everything if not is_done(config.out, task, hashes[task.part])]
     done = sum(task.n for task in everything) - sum(task.n for task in missing)
     print(

@@ -128,7 +128,7 @@ def recipe_hash(name: str) -> str:
         SCHEMA_VERSION,
         stamp("part", PART_VERSION),
         stamp(".".join(module.split(".")[-2:]), recipe.version),
-        cad.library_versions() if module.startswith(cad.__name__) else "",
+        cad.package_versions() if module.startswith(cad.__name__) else "",
         recipe.name,
         recipe.family,
         recipe.source,

@@ -200,6 +200,14 @@ def test_a_dataset_is_made_again_from_its_labels(collected, tmp_path):
         assert np.array_equal(one.depth, two.depth) and np.array_equal(one.failure, two.failure)
     other = collect(tmp_path / "other", "--labels", str(tmp_path / "all.labels"), "--seed", "6")
     assert other.returncode == 1 and "other settings (seed differ)" in other.stderr
+    with h5py.File(tmp_path / "all.labels", "r+") as file:
+        shards = json.loads(file["shards"][:].tobytes())
+        shards[0]["part_hash"] = "0" * 16
+        del file["shards"]
+        file["shards"] = np.frombuffer(json.dumps(shards).encode(), np.uint8)
+    changed = collect(tmp_path / "other", "--labels", str(tmp_path / "all.labels"))
+    assert changed.returncode == 1 and "another shape: the part has changed" in changed.stderr
+    shutil.rmtree(tmp_path / "other")
     nowhere = collect(tmp_path / "other", "--labels", str(tmp_path / "none.labels"))
     assert nowhere.returncode == 2 and "no file of labels" in nowhere.stderr
     assert not (tmp_path / "other").exists()

@@ -19,10 +19,10 @@ class ToyWorld(SimulatedWorld):
     built = freed = 0
 
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        raise NotImplementedError
+        pytest.fail("no part is asked for")
 
     def part_pose(self) -> Pose:
-        raise NotImplementedError
+        pytest.fail("no pose is asked for")
 
     def _build(self) -> None:
         self.built += 1
@@ -40,7 +40,7 @@ class ToyCamera(SimulatedCamera[ToyWorld]):
 
 class ToyArm(SimulatedArm[ToyWorld]):
     def _nothing(self, *_: object) -> None:
-        raise NotImplementedError
+        pytest.fail("no motion is asked for")
 
     _state = _move_to_joints = _move_to_pose = _move_until_contact = _move_gripper = _grasp = _wait = (
         _recover

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import pickle
+import copy
+import multiprocessing
 import subprocess
 import sys
 
@@ -12,7 +13,8 @@ TASK = ShardTask(part="nut", folder="/parts/nut", index=2, first=200, n=100, see
 
 
 def test_a_task_is_the_same_after_a_journey_to_another_process_and_counts_as_a_key():
-    again = pickle.loads(pickle.dumps(TASK))
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        again = pool.apply(copy.copy, (TASK,))
     assert again == TASK and {TASK: 1}[again] == 1
     assert ShardTask(**{**vars(TASK), "first": 201}) != TASK
 

@@ -17,7 +17,7 @@ def available() -> bool:
     return all(importlib.util.find_spec(name) is not None for name in VENDORS)
 
 
-def library_versions() -> dict[str, str]:
+def package_versions() -> dict[str, str]:
     """Versions of the libraries, on which the shapes depend."""
     return {name: importlib.metadata.version(name) for name in VENDORS}
 
