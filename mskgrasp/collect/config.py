@@ -21,9 +21,14 @@ class PartFilter(Config):
     max_length: float | None = None
     """Greatest length of a part's longest axis, m; longer parts are not collected."""
     min_success: float | None = Field(default=None, ge=0, le=1)
-    """Parts rated lower (`parts rate`) are not collected; others turning out lower are marked as not kept."""
+    """Parts that fewer grasps of the first shard lift get no further shards, and are marked as not kept."""
     max_success: float | None = Field(default=None, ge=0, le=1)
-    """Parts rated higher are not collected; others turning out higher are marked as not kept."""
+    """Parts that more grasps of the first shard lift get no further shards, and are marked as not kept."""
+
+    @property
+    def bounds_success(self) -> bool:
+        """Whether success rates matter."""
+        return self.min_success is not None or self.max_success is not None
 
     def takes_length(self, longest_axis: float) -> bool:
         """Whether a part of this length, metres, is worth collecting."""

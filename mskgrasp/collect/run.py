@@ -25,10 +25,10 @@ from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.core.files import LOCK, exclusive_lock
 from mskgrasp.core.shipped import config_file
-from mskgrasp.dataset import ShardInfo, read_shard, shard_path
+from mskgrasp.dataset import ShardInfo, read_shard, read_success, shard_path
 from mskgrasp.dataset.labels import ShardLabels, read_labels
 from mskgrasp.parts import Part, chosen_names, find_part
-from mskgrasp.parts.catalogue import ratings, read_index, representative_entries
+from mskgrasp.parts.catalogue import read_index, representative_entries
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 from mskgrasp.runtime.options import parse
@@ -124,16 +124,14 @@ def _collect(config: CollectConfig, parts: list[Part], known: Mapping[tuple[str,
                 f"labels of shard {index} of part '{name}' are of another shape: the part has changed since"
             )
     prepare_folder(config)
-    everything = plan_shards(config, parts)
-    missing = [task for task in everything if not is_done(config.out, task, hashes[task.part])]
-    done = sum(task.n for task in everything) - sum(task.n for task in missing)
-    print(
-        f"{len(parts)} parts, {sum(task.n for task in everything)} attempts into {config.out}"
-        + (f", {done} of them already there" if done else "")
-        + (f"; {_worker_summary(config, missing)}" if missing else "")
-    )
-    if missing:
-        _simulate(config, missing, parts, done)
+    tasks = plan_shards(config, parts)
+    if config.part_filter.bounds_success:
+        _make_missing(config, [task for task in tasks if task.index == 0], parts)
+        parts = passing_parts(config, parts)
+        print(f"{len(parts)} parts pass the part filter by the success of their first shard")
+        names = {part.name for part in parts}
+        tasks = [task for task in tasks if task.index > 0 and task.part in names]
+    _make_missing(config, tasks, parts)
     with ctrl_c_deferred():  # takes seconds
         from mskgrasp.collect.report import draw_summary, print_summary, summarise_parts, write_summary
 
@@ -141,6 +139,27 @@ def _collect(config: CollectConfig, parts: list[Part], known: Mapping[tuple[str,
     print_summary(summaries)
     write_summary(summaries, config.out)
     print(f"wrote {config.out / 'summary.json'} and {draw_summary(config.out, config.seed)}")
+
+
+def passing_parts(config: CollectConfig, parts: list[Part]) -> list[Part]:
+    """The parts whose success rate in their first shard the part filter takes."""
+    rates = {part.name: read_success(shard_path(config.out, part.name, 0))[0].mean() for part in parts}
+    return [part for part in parts if config.part_filter.takes_success(float(rates[part.name]))]
+
+
+def _make_missing(config: CollectConfig, tasks: list[ShardTask], parts: list[Part]) -> None:
+    """Simulate those of the shards that are not on disk."""
+    hashes = {part.name: part.content_hash for part in parts}
+    checked = progress(tasks, title="check shards", unit="shard")
+    missing = [task for task in checked if not is_done(config.out, task, hashes[task.part])]
+    done = sum(task.n for task in tasks) - sum(task.n for task in missing)
+    print(
+        f"{len(parts)} parts, {sum(task.n for task in tasks)} attempts into {config.out}"
+        + (f", {done} of them already there" if done else "")
+        + (f"; {_worker_summary(config, missing)}" if missing else "")
+    )
+    if missing:
+        _simulate(config, missing, parts, done)
 
 
 def _worker_summary(config: CollectConfig, missing: list[ShardTask]) -> str:
@@ -157,23 +176,15 @@ def _n_workers(config: CollectConfig, missing: list[ShardTask]) -> int:
 
 
 def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:
-    """The requested parts that pass the part filter, by the names given; those that are missing are built."""
-    bounds = config.part_filter
-    rated = ratings() if bounds.min_success is not None or bounds.max_success is not None else {}
+    """The requested parts of the filter's lengths, by the names given; those that are missing are built."""
     parts: list[tuple[str, Part]] = []
-    easy_or_hard = 0
     for name in progress(config.parts, title="parts", unit="part"):
         part = find_part(name)
-        rating = rated.get(part.content_hash)
-        if not bounds.takes_length(part.longest_axis):
+        if not config.part_filter.takes_length(part.longest_axis):
             size = f"longest axis {part.longest_axis * 1e3:.0f} mm"
             print(f"left out {part.name}: {size} is outside the part filter", file=sys.stderr)
-        elif rating is not None and not bounds.takes_success(rating.rate):
-            easy_or_hard += 1
         else:
             parts.append((name, part))
-    if easy_or_hard:
-        print(f"left out {easy_or_hard} parts that were rated outside the part filter", file=sys.stderr)
     names = [part.name for _, part in parts]
     doubles = sorted({name for name in names if names.count(name) > 1})
     if doubles:

@@ -27,10 +27,9 @@ def model_card(meta: ModelMeta) -> str:
         meta: Description of a trained model.
     """
     known = meta.training
-    report = meta.metrics.get("test", meta.metrics)
-    side = "test" if "test" in meta.metrics else "validation"
+    reports = {side: meta.metrics[side] for side in ("test", "test_known") if side in meta.metrics}
     settings = known.get("settings", {})
-    sides = [len(known.get(f"{name}_parts", ())) for name in ("training", "validation", "test")]
+    sides = [len(known.get(f"{name}_parts", ())) for name in ("training", "validation", "test", "test_known")]
     lines = [
         "# Model card",
         "",
@@ -43,7 +42,8 @@ def model_card(meta: ModelMeta) -> str:
         f"- {known.get('attempts', 0)} simulated training attempts, "
         f"{known.get('successes', 0)} of them successes",
         f"- {sides[0]} training parts, {sides[1]} validation parts (early stopping and calibration), "
-        f"{sides[2]} test parts (held out from both)",
+        f"{sides[2]} test parts (held out from both), "
+        f"{sides[3]} test_known parts (other sizes of families that were trained on)",
         f"- digest of grasps and outcomes: `{str(known.get('data_fingerprint', ''))[:16]}`",
         "",
         *(["## Labels", "", *map(_label_lines, meta.labels), ""] if meta.labels else []),
@@ -51,9 +51,11 @@ def model_card(meta: ModelMeta) -> str:
         "",
         *(f"- {name}: {_words(settings[name])}" for name in sorted(settings)),
         "",
-        f"## On held-out {side} parts",
-        "",
-        *(line for rows in result_rows(report) for line in (*_table(rows), "")),
+        *(
+            line
+            for side, report in (reports or {"validation": meta.metrics}).items()
+            for line in (f"## On held-out {side} parts", "", *_result_lines(report))
+        ),
         "Intervals are of 95 %, bootstrapped over parts. RMSE is over all random grasps that succeeded;",
         "a planner chooses among those of which the network is most confident.",
         "",
@@ -62,6 +64,10 @@ def model_card(meta: ModelMeta) -> str:
         _LIMITS,
     ]
     return "\n".join(lines)
+
+
+def _result_lines(report: dict[str, Any]) -> list[str]:
+    return [line for rows in result_rows(report) for line in (*_table(rows), "")]
 
 
 def _label_lines(source: LabelSource) -> str:

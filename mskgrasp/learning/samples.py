@@ -289,15 +289,15 @@ def _shard_samples(
 
 
 def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "catalogue"]) -> dict[str, Split]:
-    """Assign each part to training, validation or test.
+    """Assign each part to a side of the split.
 
     A part keeps its side when other parts join the dataset. Training and validation get one at least.
 
     Args:
         parts: Names.
         fraction: Share of validation parts, for a split by name.
-        by: name: a hash of the part's name; catalogue: the catalogue's split, which keeps near-duplicates
-            together, and the name for parts that are not in it.
+        by: name: a hash of the part's name; catalogue: the catalogue's split, which holds out whole families,
+            and the name for parts that are not in it.
 
     Raises:
         BadDataset: There are fewer than two parts, or no catalogue.

@@ -28,9 +28,12 @@ from mskgrasp.learning.network_config import Normalisation
 from mskgrasp.learning.networks import displacement_loss, with_noise
 from mskgrasp.learning.samples import SAMPLES_VERSION, Samples, part_sides
 from mskgrasp.learning.symmetry import mirror_and_turn
+from mskgrasp.parts.catalogue import SPLITS
 
 _LEAST_TARGET_STD = (1e-4, 1e-4, 1e-4, 1e-3)
 """Least deviation of a target, metres and radians: less (parts that never rise) is simulation noise."""
+_RECORDED = {"train": "training"}
+"""Names of sides in a model's record, where they differ."""
 
 
 class TrainingDiverged(MskgraspError):
@@ -57,12 +60,15 @@ class Sides:
     Attributes:
         training: Rows to train on.
         validation: Rows that select the epoch and calibrate.
-        test: Rows for the final metrics only; empty if parts are split by name.
+        test: Rows of families that training never sees, for the final metrics only.
+        test_known: Rows of other sizes of families that it sees, for the final metrics only. Like ``test``
+            empty if parts are split by name.
     """
 
     training: Tensor
     validation: Tensor
     test: Tensor
+    test_known: Tensor
 
 
 def split(samples: Samples, config: LearningConfig) -> Sides:
@@ -75,8 +81,7 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
     rows = [
         torch.nonzero(torch.isin(samples.part, torch.tensor(numbers, dtype=torch.int64)))[:, 0]
         for numbers in (
-            [number for number, name in enumerate(samples.parts) if sides[name] == side]
-            for side in ("train", "validation", "test")
+            [number for number, name in enumerate(samples.parts) if sides[name] == side] for side in SPLITS
         )
     ]
     for name, side in zip(("training", "validation"), rows, strict=False):
@@ -84,7 +89,7 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
         if n_success in (0, n):
             kind = "success" if n_success == 0 else "failure"
             raise BadDataset(f"no {kind} among the {n} attempts at the {name} parts; collect more attempts")
-    return Sides(training=rows[0], validation=rows[1], test=rows[2])
+    return Sides(training=rows[0], validation=rows[1], test=rows[2], test_known=rows[3])
 
 
 def describe_networks(samples: Samples, training_rows: Tensor, config: LearningConfig) -> ModelMeta:
@@ -112,9 +117,10 @@ def describe_networks(samples: Samples, training_rows: Tensor, config: LearningC
         training={
             "attempts": len(training_rows),
             "successes": int(success.sum()),
-            "training_parts": [name for name in samples.parts if sides[name] == "train"],
-            "validation_parts": [name for name in samples.parts if sides[name] == "validation"],
-            "test_parts": [name for name in samples.parts if sides[name] == "test"],
+            **{
+                f"{_RECORDED.get(side, side)}_parts": [name for name in samples.parts if sides[name] == side]
+                for side in SPLITS
+            },
             "skipped": samples.skipped,
             "data_fingerprint": samples.fingerprint,
             "samples_version": SAMPLES_VERSION,
@@ -356,6 +362,7 @@ def train(
         found = held_out.calibrate(models, samples, sides.validation)
         models = replace(models, meta=meta.model_copy(update={"calibration": found}))
     stored = held_out.measure_models(models, samples, sides.training, sides.validation).to_json()
-    if len(sides.test):
-        stored["test"] = held_out.measure_models(models, samples, sides.training, sides.test).to_json()
+    for side, rows in (("test", sides.test), ("test_known", sides.test_known)):
+        if len(rows):
+            stored[side] = held_out.measure_models(models, samples, sides.training, rows).to_json()
     return replace(models, meta=models.meta.model_copy(update={"metrics": stored})), history

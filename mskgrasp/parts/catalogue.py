@@ -20,8 +20,9 @@ from mskgrasp.core.errors import BadPart
 from mskgrasp.core.files import write_whole
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import builtin_names, recipe_hash, starter_names, unknown_part
+from mskgrasp.parts.recipes.families import VARIANT_OF
 
-INDEX_VERSION = 1
+INDEX_VERSION = 2
 INDEX_NAME = "catalogue.json"
 USABLE_LENGTH = (0.020, 0.150)
 """Longest axis of the catalogue's parts, metres: the paper's range."""
@@ -30,9 +31,10 @@ THIN = 0.004
 NEIGHBOUR = 1.10
 """Parts of a family whose sorted edges all differ by less than this factor are near-duplicates."""
 
-Split = Literal["train", "validation", "test"]
-SPLITS: tuple[Split, ...] = ("train", "validation", "test")
-_SHARES = {"train": 0.70, "validation": 0.15, "test": 0.15}
+Split = Literal["train", "validation", "test", "test_known"]
+SPLITS: tuple[Split, ...] = ("train", "validation", "test", "test_known")
+_FAMILY_SHARES: dict[Split, float] = {"test": 0.15, "validation": 0.08}
+_KNOWN_SHARE = 0.08
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +81,7 @@ class Entry:
         content_hash: Content hash of the part.
         recipe_hash: Hash of its recipe.
         group: Shared by near-duplicates: the name of the first of them.
-        split: Side of the split, the same for all of a group.
+        split: Side of the split (`split_of`), the same for all of a group.
         rating: From a collected dataset; None before the command ``rate``.
     """
 
@@ -225,7 +227,8 @@ def make_index(entries: Iterable[Entry], failures: Mapping[str, str], before: In
         kept[entry.name] = replace(entry, rating=old.rating if old and same else None)
     groups = near_duplicates(kept.values())
     parts = {
-        name: replace(entry, group=groups[name], split=split_of(groups[name])) for name, entry in kept.items()
+        name: replace(entry, group=groups[name], split=split_of(entry.family, groups[name]))
+        for name, entry in kept.items()
     }
     return Index(parts=parts, left_out=left_out)
 
@@ -252,21 +255,29 @@ def near_duplicates(entries: Iterable[Entry]) -> dict[str, str]:
     return group
 
 
-def split_of(group: str) -> Split:
-    """The split of a group, by the hash of its name, so that it never changes."""
-    number = int.from_bytes(hashlib.sha256(f"split {group}".encode()).digest()[:8], "big") / 2**64
-    for side in SPLITS:
-        number -= _SHARES[side]
+def split_of(family: str, group: str) -> Split:
+    """The split of a part, by hashes of names, so that it never changes.
+
+    ``test`` and ``validation`` are whole families, with their variants: nothing like them is trained on.
+    ``test_known`` are groups of near-duplicates within the other families.
+    """
+    number = _hash(f"family {VARIANT_OF.get(family, family)}")
+    for side, share in _FAMILY_SHARES.items():
+        number -= share
         if number < 0:
             return side
-    return SPLITS[-1]
+    return "test_known" if _hash(group) < _KNOWN_SHARE else "train"
+
+
+def _hash(name: str) -> float:
+    return int.from_bytes(hashlib.sha256(f"split {name}".encode()).digest()[:8], "big") / 2**64
 
 
 def chosen_names(words: Iterable[str]) -> list[str]:
     """Names of parts by names, folders, or the sets below.
 
     ``starter``: 25 parts, built in a few seconds. ``catalogue``: all parts of the catalogue.
-    ``train``, ``validation``, ``test``: the parts of the catalogue in that split.
+    ``train``, ``validation``, ``test``, ``test_known``: the parts of the catalogue in that split.
 
     Raises:
         BadPart: A set of the catalogue is named before the catalogue is built.
@@ -299,11 +310,6 @@ def representative_entries(entries: Iterable[Entry], count: int) -> list[Entry]:
         members.sort(key=lambda entry: (entry.volume, entry.name))
         chosen += [members[int((i + 0.5) * len(members) / n)] for i in range(n)]
     return chosen
-
-
-def ratings() -> dict[str, Rating]:
-    """Ratings by content hash, so that a part that has changed has none."""
-    return {e.content_hash: e.rating for e in read_index().parts.values() if e.rating is not None}
 
 
 def with_ratings(index: Index, found: Mapping[str, Rating]) -> Index:

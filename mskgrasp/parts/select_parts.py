@@ -8,15 +8,15 @@ from typing import Any
 
 from mskgrasp.core.errors import UsageError
 from mskgrasp.parts.builtin import find_part, starter_names
-from mskgrasp.parts.catalogue import chosen_names
+from mskgrasp.parts.catalogue import SPLITS, chosen_names
 
 
 def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int = 0) -> list[str]:
     """Names or folders of parts by names, folders and sets.
 
-    ``train``, ``validation`` and ``test``: the sets of the model, where its training names them; otherwise
-    those of the catalogue, the last two without parts that the model was trained on. ``all``: every part of
-    the starter set. Other words as in `mskgrasp.parts.chosen_names`.
+    ``train``, ``validation``, ``test`` and ``test_known``: the sets of the model, where its training names
+    them; otherwise those of the catalogue, all but the first without parts that the model was trained on.
+    ``all``: every part of the starter set. Other words as in `mskgrasp.parts.chosen_names`.
 
     Args:
         words: Names, folders and sets.
@@ -33,7 +33,7 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
         known = training.get("training_parts") or ()
         if word == "train" and known:
             sets.append(list(known))
-        elif word in ("validation", "test"):
+        elif word in SPLITS and word != "train":
             unseen = training.get(f"{word}_parts")
             sets.append(unseen or [name for name in chosen_names((word,)) if name not in known])
         else:

@@ -92,7 +92,7 @@ def run_training(config: TrainConfig) -> int:
     sides = split(samples, config)
     console.print(
         f"{len(sides.training)} attempts to train on, "
-        f"{len(sides.validation) + len(sides.test)} at held-out parts; "
+        f"{len(samples) - len(sides.training)} at held-out parts; "
         f"{float(samples.success.double().mean()):.0%} succeed; on {device}"
     )
     if samples.skipped:

@@ -116,7 +116,8 @@ def score(samples: Samples, config: LearningConfig, share: float) -> dict[str, f
     sides = split(samples, config)
     drawn = torch.randperm(len(sides.training), generator=torch.Generator().manual_seed(0))
     training = sides.training[drawn[: round(share * len(drawn))].sort().values]
-    sides = Sides(training=training, validation=sides.validation, test=sides.test[:0])
+    none = training[:0]
+    sides = Sides(training=training, validation=sides.validation, test=none, test_known=none)
     with tempfile.TemporaryDirectory() as folder:
         models, _ = train(samples, config, checkpoint_path=Path(folder) / "checkpoint", sides=sides)
     gqn, gdn = models.meta.metrics["gqn"], models.meta.metrics["gdn"]

@@ -19,7 +19,7 @@ from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.run import check_out, is_done, main
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock
-from mskgrasp.dataset import list_shards, read_shard
+from mskgrasp.dataset import list_shards, read_shard, read_success, shard_path
 from mskgrasp.dataset.labels import export_labels
 from mskgrasp.simulation.shard_task import ShardTask
 from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, collect, command
@@ -189,6 +189,24 @@ def test_two_collections_do_not_write_into_one_folder(collected, tmp_path):
     assert done.returncode == 2 and "another collection is writing" in done.stderr
     with exclusive_lock(out) as alone:
         assert alone
+
+
+def test_parts_that_the_first_shard_shows_outside_the_filter_get_no_further_shards(collected, tmp_path):
+    export_labels(collected, tmp_path / "all.labels")
+    rates = {part: read_success(shard_path(collected, part, 0))[0].mean() for part in PARTS}
+    for side in ("min", "max"):
+        out = tmp_path / side
+        bound = (f"--part-filter.{side}-success", f"{max(rates.values()) + 0.01:.6f}")
+        passing = PARTS if side == "max" else ()
+        for _ in range(2):  # the second run finds all that is needed
+            done = collect(out, "--labels", str(tmp_path / "all.labels"), *bound)
+            assert done.returncode == 0, done.stderr
+            assert f"{len(passing)} parts pass the part filter" in done.stdout
+            assert [path.name for path in list_shards(out)] == [
+                shard_path(out, part, index).name
+                for part in sorted(PARTS)
+                for index in range(2 if part in passing else 1)
+            ]
 
 
 def test_a_dataset_is_made_again_from_its_labels(collected, tmp_path):

@@ -69,6 +69,40 @@ STARTER = (
 """The starter set: 25 parts of 17 families that are built in a few seconds; the demo uses them."""
 
 
+VARIANT_OF = {
+    "button_flange_screw": "button_screw",
+    "chamfered_washer": "washer",
+    "coupling_nut": "hex_nut",
+    "fine_timing_pulley": "timing_pulley",
+    "flanged_linear_bearing": "linear_bearing",
+    "heavy_flange_bolt": "flange_bolt",
+    "high_nut": "hex_nut",
+    "inch_pan_screw": "pan_head_screw",
+    "inch_socket_screw": "socket_screw",
+    "l_bolt": "j_bolt",
+    "large_washer": "washer",
+    "lobular_cheese_screw": "cheese_head_screw",
+    "lobular_pan_screw": "pan_head_screw",
+    "long_t_nut": "t_nut",
+    "low_profile_screw": "socket_screw",
+    "pan_washer_screw": "pan_head_screw",
+    "pipe_turnbuckle": "turnbuckle",
+    "raised_cheese_screw": "cheese_head_screw",
+    "raised_countersunk_screw": "countersunk_screw",
+    "slotted_countersunk_screw": "countersunk_screw",
+    "spherical_bearing": "bearing",
+    "spoked_gear": "spur_gear",
+    "square_u_bolt": "u_bolt",
+    "standoff_mf": "standoff_ff",
+    "thick_washer": "washer",
+    "thin_nut": "hex_nut",
+    "two_piece_collar": "clamp_collar",
+    "u_bolt_nuts": "u_bolt",
+    "webbed_gear": "spur_gear",
+}
+"""Families that are variants of another one: they are on its side of the split."""
+
+
 @lru_cache(maxsize=1)
 def recipes() -> dict[str, Recipe]:
     """All built-in parts by name, sorted."""
