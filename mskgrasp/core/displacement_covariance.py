@@ -1,4 +1,4 @@
-"""Covariance of a point's displacement, from the variances of the grasp displacement."""
+"""Spread of a part's points, from the mean and the variances of grasp displacement and swing."""
 
 from __future__ import annotations
 
@@ -31,3 +31,11 @@ def object_displacement_covariance(
     jacobian[..., 1, 3] = -cos * arm[..., 0] + sin * arm[..., 1]
     jacobian[..., 3, 3] = -1.0
     return jacobian * variance[..., None, :] @ np.swapaxes(jacobian, -1, -2)
+
+
+def swing_squared(mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """Expected squared swing (...), radians squared, of predictions (..., k): 0 where k = 4, without swing.
+
+    The mean counts, too: a part that hangs askew cannot be placed flat.
+    """
+    return (mean[..., 4:] ** 2 + variance[..., 4:]).sum(axis=-1)

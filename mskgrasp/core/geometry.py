@@ -112,6 +112,22 @@ def twist_and_swing(quat_wxyz: Array) -> tuple[Array, Array]:
     return twist, swing
 
 
+def swing_vector(quat_wxyz: Array) -> Array:
+    """Rotation vectors (..., 2), radians about x and y, of what remains when the twist about z is removed.
+
+    Args:
+        quat_wxyz: Unit quaternions (..., 4), split as in `twist_and_swing`.
+    """
+    xp = array_namespace(quat_wxyz)
+    w, x, y, z = components(quat_wxyz)
+    # quat * conjugate(twist), multiplied out, times the length of its part along w.
+    along_x, along_y = x * w - y * z, x * z + y * w
+    length = xp.sqrt(along_x * along_x + along_y * along_y)
+    _, swing = twist_and_swing(quat_wxyz)
+    scale = swing / xp.where(length > 0, length, xp.ones_like(length))
+    return joined([along_x * scale, along_y * scale])
+
+
 def rotation_angle(quat_wxyz: Array) -> Array:
     """Angles (...) of the rotations of unit quaternions (..., 4), radians in [0, pi]."""
     xp = array_namespace(quat_wxyz)

@@ -27,6 +27,7 @@ from mskgrasp.core.geometry import (
     quat_conjugate,
     quat_multiply,
     quat_rotate,
+    swing_vector,
     twist_and_swing,
     wrap_angle,
 )
@@ -59,6 +60,8 @@ HOLD_S = 0.2
 """Time for which a lifted part is held before it is judged, seconds."""
 MAX_DISPLACEMENT = 0.05
 """Largest displacement of a held part in the hand, metres; a row with a larger one is not used as a label."""
+ASKEW = float(np.radians(2.0))
+"""A part that tilts by more in the hand hangs askew, radians."""
 EJECTED_DISTANCE = 0.05
 """A part that ends this far from its initial position, and not in the hand, was ejected, metres."""
 FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled", "unreachable")
@@ -152,10 +155,18 @@ def object_displacement(T_tcp_obj_before: Pose, T_tcp_obj_after: Pose) -> tuple[
     """
     before, after = (_tcp_to_grasp_frame(pose) for pose in (T_tcp_obj_before, T_tcp_obj_after))
     xp = array_namespace(before.position)
-    rotation = quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz))
-    dtheta, tilt = twist_and_swing(rotation)
+    dtheta, tilt = twist_and_swing(quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz)))
     moved = after.position - before.position
     return xp.concat([moved, dtheta[..., None]], axis=-1), tilt
+
+
+def swing_in_hand(T_tcp_obj_before: Pose, T_tcp_obj_after: Pose) -> Array:
+    """Swing (..., 2) of a part in the hand: the rotation vector about the grasp frame's x and y, radians.
+
+    Its length is the tilt of `object_displacement`, which takes the same poses.
+    """
+    before, after = (_tcp_to_grasp_frame(pose) for pose in (T_tcp_obj_before, T_tcp_obj_after))
+    return swing_vector(quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz)))
 
 
 def _tcp_to_grasp_frame(T_tcp_obj: Pose) -> Pose:

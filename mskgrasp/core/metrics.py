@@ -37,14 +37,14 @@ def _root_mean(squares: np.ndarray) -> float:
 
 
 def standardised_error(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """(true - mean) / standard deviation, (n, 4), the angle's difference wrapped."""
+    """(true - mean) / standard deviation, (n, k), the difference of the angle (column 3) wrapped."""
     error = np.asarray(true, dtype=np.float64) - np.asarray(mean, dtype=np.float64)
     error[:, 3] = wrap_angle(error[:, 3])
     return error / np.sqrt(np.asarray(variance, dtype=np.float64))
 
 
 def gaussian_nll(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> float:
-    """Mean negative log likelihood of true (n, 4) under independent Gaussians, nats, constant included.
+    """Mean negative log likelihood of true (n, k) under independent Gaussians, nats, constant included.
 
     Units are metres and radians, so that good predictions have negative values.
     """
@@ -55,25 +55,25 @@ def gaussian_nll(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> fl
 
 
 def coverage(mean: np.ndarray, variance: np.ndarray, true: np.ndarray, level: float = 0.9) -> np.ndarray:
-    """Share of true values inside the central interval of probability ``level``, per axis (4,)."""
+    """Share of true values inside the central interval of probability ``level``, per axis (k,)."""
     if not len(true):
-        return np.full(4, np.nan)
+        return np.full(np.shape(true)[1], np.nan)
     half_width = norm.ppf((1 + level) / 2)
     return (np.abs(standardised_error(mean, variance, true)) <= half_width).mean(axis=0)
 
 
 def crps(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Continuous ranked probability score of Gaussians, per axis (4,), in the axes' units; 0 is perfect.
+    """Continuous ranked probability score of Gaussians, per axis (k,), in the axes' units; 0 is perfect.
 
     Gneiting and Raftery (2007), equation 21: sigma (z (2 Phi(z) - 1) + 2 phi(z) - 1 / sqrt(pi)).
     """
     z = standardised_error(mean, variance, true)
     score = z * (2 * norm.cdf(z) - 1) + 2 * norm.pdf(z) - 1 / np.sqrt(np.pi)
-    return (np.sqrt(variance) * score).mean(axis=0) if len(z) else np.full(4, np.nan)
+    return (np.sqrt(variance) * score).mean(axis=0) if len(z) else np.full(np.shape(true)[1], np.nan)
 
 
 def calibration_error(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Mean difference of level and coverage of the central intervals of 5, 10, ... 95 %, per axis (4,)."""
+    """Mean difference of level and coverage of the central intervals of 5, 10, ... 95 %, per axis (k,)."""
     levels = np.linspace(0.05, 0.95, 19)
     covered = np.stack([coverage(mean, variance, true, level) for level in levels])
     return np.abs(covered - levels[:, None]).mean(axis=0)

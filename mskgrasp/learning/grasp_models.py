@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor
@@ -41,8 +41,8 @@ class ModelCalibration(Config):
     quality_slope: float = Field(default=1.0, gt=0.0)
     quality_offset: float = 0.0
     """Platt scaling of the quality (1999): its log odds become slope * log odds + offset."""
-    variance_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    """Factor of each variance, so that the central 90 % interval holds 90 %."""
+    variance_scale: tuple[float, ...] = ()
+    """Factor of each variance, so that the central 90 % interval holds 90 %; empty: 1."""
 
 
 class ModelMeta(Config):
@@ -56,6 +56,19 @@ class ModelMeta(Config):
     """Simulations that the labels come from; empty: not recorded."""
     training: dict[str, Any] = {}
     metrics: dict[str, Any] = {}
+
+    @model_validator(mode="after")
+    def _numbers_fit_the_network(self) -> ModelMeta:
+        n = self.network.n_outputs
+        sizes = {
+            "normalisation.target_mean": len(self.normalisation.target_mean),
+            "normalisation.target_std": len(self.normalisation.target_std),
+            "calibration.variance_scale": len(self.calibration.variance_scale) or n,
+        }
+        for name, size in sizes.items():
+            if size != n:
+                raise ValueError(f"{name} has {size} numbers, the network predicts {n}")
+        return self
 
     @field_validator("network", mode="before")
     @classmethod
@@ -99,7 +112,9 @@ class Models:
     def grasp_displacement(
         self, patches: Tensor, centre_grasp: Tensor, height: Tensor, theta: Tensor | None = None
     ) -> tuple[Tensor, Tensor | None]:
-        """Mean and variance (n, 4) of the grasp displacement, of patches (n, 1, r, c) in metres.
+        """Mean and variance (n, k) of grasp displacement and swing, of patches (n, 1, r, c) in metres.
+
+        k is 6 if the network predicts the swing, radians about x and y of the grasp frame, otherwise 4.
 
         Args:
             patches: Centred on the grasps and rotated with them; with ``image: object`` centred on the part
@@ -115,7 +130,7 @@ class Models:
         means, variances = [], []
         for view, centre, signs in views(patches, centre_grasp):
             mean, variance = self.gdn(view, centre, height)
-            means.append(signs * mean)
+            means.append(signs[: mean.shape[1]] * mean)
             variances.append(variance)
         each = torch.stack(means)
         mean = each.mean(0)
@@ -129,8 +144,8 @@ class Models:
         return torch.sigmoid(calibration.quality_slope * odds + calibration.quality_offset).to(logits.dtype)
 
     def _calibrated(self, mean: Tensor, variance: Tensor | None) -> tuple[Tensor, Tensor | None]:
-        scale = mean.new_tensor(self.meta.calibration.variance_scale)
-        return mean, None if variance is None else variance * scale
+        scale = self.meta.calibration.variance_scale
+        return mean, variance * mean.new_tensor(scale) if scale and variance is not None else variance
 
     def _check(self, patches: Tensor, shape: tuple[int, int]) -> None:
         rows, columns = shape

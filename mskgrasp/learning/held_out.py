@@ -9,9 +9,9 @@ from scipy.special import logit
 from scipy.stats import norm
 
 from mskgrasp.core import metrics
-from mskgrasp.core.displacement_covariance import object_displacement_covariance
+from mskgrasp.core.displacement_covariance import object_displacement_covariance, swing_squared
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.grasp import to_object_displacement
+from mskgrasp.core.grasp import ASKEW, to_object_displacement
 from mskgrasp.learning.grasp_models import ModelCalibration, Models
 from mskgrasp.learning.model_metrics import (
     DisplacementMetrics,
@@ -24,7 +24,8 @@ from mskgrasp.learning.model_metrics import (
 from mskgrasp.learning.samples import Samples
 
 _CHUNK = 64
-AXES = ("x", "y", "z", "theta")
+AXES = ("x", "y", "z", "theta", "swing_x", "swing_y")
+"""Predicted components; the last two by networks that predict the swing alone."""
 _REPEATS = 200
 """Bootstrap repeats for the intervals of the scores, some of which sort."""
 _RADIUS = 0.03
@@ -49,7 +50,7 @@ def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.
 def predict_grasp_displacement(
     models: Models, samples: Samples, rows: torch.Tensor
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Predict mean and variance (n, 4) of the grasp displacement; without a variance it is NaN."""
+    """Predict mean and variance (n, k) of `Samples.targets`; without a variance it is NaN."""
     means, variances = [], []
     for r in rows.split(_CHUNK):
         mean, variance = models.grasp_displacement(
@@ -71,14 +72,14 @@ def centroid_displacement(
     Args:
         samples: The dataset.
         rows: n rows.
-        mean: (n, 4) of the grasp displacement.
-        variance: (n, 4) the same.
+        mean: (n, k) of the grasp displacement; columns after the fourth are not used.
+        variance: (n, k) the same.
 
     Returns:
         Mean and variance (n, 4), the variance to first order.
     """
     origin_grasp = samples.origin_grasp[rows].double().numpy()
-    covariance = object_displacement_covariance(mean, variance, origin_grasp)
+    covariance = object_displacement_covariance(mean[:, :4], variance[:, :4], origin_grasp)
     return to_object_displacement(mean, origin_grasp), np.diagonal(covariance, axis1=-2, axis2=-1)
 
 
@@ -91,11 +92,11 @@ def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> ModelCali
     """
     quality = predict_quality(models, samples, rows)
     slope, offset = _platt(logit(np.clip(quality, 1e-9, 1 - 1e-9)), samples.success[rows].numpy())
-    scale = (1.0, 1.0, 1.0, 1.0)
+    scale = ()
     held = rows[samples.success[rows]]
     mean, variance = predict_grasp_displacement(models, samples, held)
     if np.isfinite(variance).all() and len(held) >= _LEAST_TO_SCALE:
-        target = samples.grasp_displacement[held].double().numpy()
+        target = samples.targets(held, models.meta.network).double().numpy()
         quantile = np.quantile(np.abs(metrics.standardised_error(mean, variance, target)), 0.9, axis=0)
         scale = tuple(np.maximum((quantile / norm.ppf(0.95)) ** 2, 1e-6))
     return ModelCalibration(quality_slope=slope, quality_offset=offset, variance_scale=scale)
@@ -164,10 +165,10 @@ def displacement_metrics(
     training_rows = training_rows[samples.success[training_rows]]
     rows = rows[samples.success[rows]]
     mean, variance = predict_grasp_displacement(models, samples, rows)
-    training = samples.grasp_displacement[training_rows].double().numpy()
+    training = samples.targets(training_rows, models.meta.network).double().numpy()
     floor = 1e-12
     constants = (
-        (np.zeros(4), np.maximum((training**2).mean(axis=0), floor)),
+        (np.zeros(training.shape[1]), np.maximum((training**2).mean(axis=0), floor)),
         (training.mean(axis=0), np.maximum(training.var(axis=0), floor)),
     )
     zero, training_mean = (
@@ -214,7 +215,9 @@ def _uncertainty_metrics(
     if not np.isfinite(variance).all() or not len(rows):
         return None
     shift, turn, expected = _centroid_errors(samples, rows, mean, variance)
-    target = samples.grasp_displacement[rows].double().numpy()
+    target = _targets(samples, rows, mean)
+    score = expected[:, :3].sum(axis=1) + _RADIUS**2 * (expected[:, 3] + swing_squared(mean, variance))
+    tilted = samples.swing[rows].norm(dim=1).numpy() > ASKEW
     axes = {
         "crps": metrics.crps(mean, variance, target),
         "calibration_error": metrics.calibration_error(mean, variance, target),
@@ -225,20 +228,27 @@ def _uncertainty_metrics(
         for level in (50, 80, 90, 95)
     }
     return UncertaintyMetrics(
-        axes={name: dict(zip(AXES, map(float, values), strict=True)) for name, values in axes.items()},
+        axes={name: dict(zip(AXES, map(float, values), strict=False)) for name, values in axes.items()},
         ause_translation=metrics.ause(shift, expected[:, :3].sum(axis=1)),
         ause_rotation=metrics.ause(turn, expected[:, 3]),
         least_uncertain={
-            f"{share:.0%}": _errors_of_least(shift, turn, expected, share) for share in (0.03, 0.1, 0.3)
+            f"{share:.0%}": _errors_of_least(score, share, shift, turn, tilted) for share in (0.03, 0.1, 0.3)
         },
     )
 
 
-def _errors_of_least(shift: np.ndarray, turn: np.ndarray, variance: np.ndarray, share: float) -> list[float]:
-    """Compute RMSE of translation and rotation over the share of samples of least predicted variance."""
-    score = variance[:, :3].sum(axis=1) + _RADIUS**2 * variance[:, 3]
+def _errors_of_least(
+    score: np.ndarray, share: float, shift: np.ndarray, turn: np.ndarray, tilted: np.ndarray
+) -> list[float]:
+    """Compute RMSE of translation and rotation, and the share tilted, over the samples of least score."""
     kept = np.argsort(score, kind="stable")[: max(1, round(share * len(score)))]
-    return [_root_mean(values[kept] ** 2) for values in (shift, turn)]
+    return [*(_root_mean(values[kept] ** 2) for values in (shift, turn)), float(tilted[kept].mean())]
+
+
+def _targets(samples: Samples, rows: torch.Tensor, predicted: np.ndarray) -> np.ndarray:
+    """Get true grasp displacements (n, 4), or with swing (n, 6), as many columns as are predicted."""
+    both = torch.cat([samples.grasp_displacement[rows], samples.swing[rows]], dim=1)
+    return both[:, : predicted.shape[1]].double().numpy()
 
 
 def _root_mean(squared: np.ndarray) -> float:
@@ -257,12 +267,12 @@ def prediction_errors(
     """Compute RMSE over the displacement of the true centroid, likelihood and coverage over the grasp's."""
     predicted, _ = centroid_displacement(samples, rows, mean, variance)
     displacement = samples.displacement[rows].double().numpy()
-    target = samples.grasp_displacement[rows].double().numpy()
+    target = _targets(samples, rows, mean)
     covered = metrics.coverage(mean, variance, target)
     known = bool(np.isfinite(variance).all())
     return PredictionErrors(
         translation_rmse=metrics.translation_rmse(predicted, displacement),
         rotation_rmse=metrics.rotation_rmse(predicted, displacement),
         nll=metrics.gaussian_nll(mean, variance, target) if known else None,
-        coverage_90=dict(zip(AXES, covered.tolist(), strict=True)) if known else None,
+        coverage_90=dict(zip(AXES, covered.tolist(), strict=False)) if known else None,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from mskgrasp.core.grasp import ASKEW
 from mskgrasp.core.settings import Physics
 from mskgrasp.learning.grasp_models import ModelMeta
 from mskgrasp.learning.label_source import LabelSource
@@ -18,6 +19,8 @@ _LIMITS = """\
 - Large displacements, above all of round parts that roll between the pads, are predicted with a large
   deviation. Choose by the predicted deviation, not by the mean.
 """
+
+_AXES = {"x": "x", "y": "y", "z": "z", "theta": "turn", "swing_x": "swing about x", "swing_y": "about y"}
 
 
 def model_card(meta: ModelMeta) -> str:
@@ -110,17 +113,20 @@ def _quality_rows(gqn: dict[str, Any]) -> list[tuple[str, ...]]:
 
 
 def _displacement_rows(gdn: dict[str, Any]) -> list[tuple[str, ...]]:
-    head = (f"displacement of {gdn['n']} successes", "translation RMSE, mm", "rotation RMSE, degrees")
+    head = (
+        f"displacement of {gdn['n']} successes", "translation RMSE, mm", "rotation RMSE, degrees",
+        f"tilt over {math.degrees(ASKEW):.0f} degrees",
+    )  # fmt: skip
     units = {"translation_rmse": 1e3, "rotation_rmse": math.degrees(1)}
     between = gdn.get("intervals", {})
     network = [f"{factor * gdn[key]:.2f} {_range(between.get(key), factor)}" for key, factor in units.items()]
-    rows = [head, ("network, and 95 % interval", *network)]
+    rows = [head, ("network, and 95 % interval", *network, "")]
     for name in ("zero_displacement", "training_mean"):
         values = (f"{factor * gdn[name][key]:.2f}" for key, factor in units.items())
-        rows.append((f"predicting {name.replace('_', ' ')}", *values))
-    for share, errors in gdn.get("least_uncertain", {}).items():
-        values = (f"{factor * error:.2f}" for factor, error in zip(units.values(), errors, strict=True))
-        rows.append((f"the most confident {share}", *values))
+        rows.append((f"predicting {name.replace('_', ' ')}", *values, ""))
+    for share, (translation, rotation, *tilted) in gdn.get("least_uncertain", {}).items():
+        values = (f"{1e3 * translation:.2f}", f"{math.degrees(rotation):.2f}")
+        rows.append((f"the most confident {share}", *values, f"{tilted[0]:.1%}" if tilted else ""))
     return rows
 
 
@@ -128,19 +134,22 @@ def _axis_rows(gdn: dict[str, Any]) -> list[tuple[str, ...]]:
     axes = gdn.get("axes")
     if not axes:
         return []
-    names = ("x", "y", "z", "theta")
+    names = tuple(axes["rmse"])
     rows: list[tuple[str, ...]] = [
-        ("by axis of the grasp displacement", "x, mm", "y, mm", "z, mm", "turn, degrees")
+        ("by axis of the grasp displacement", *(f"{_AXES[name]}, {_unit_of(name)[1]}" for name in names))
     ]
     for key, label in (("rmse", "RMSE"), ("crps", "CRPS"), ("sharpness", "mean predicted deviation")):
-        factors = (1e3, 1e3, 1e3, math.degrees(1))
-        rows.append((label, *(f"{f * axes[key][name]:.2f}" for f, name in zip(factors, names, strict=True))))
+        rows.append((label, *(f"{_unit_of(name)[0] * axes[key][name]:.2f}" for name in names)))
     for level in (50, 80, 90, 95):
         rows.append(
             (f"inside the {level} % interval", *(f"{axes[f'coverage_{level}'][name]:.1%}" for name in names))
         )
     ause = f"AUSE of random's: translation {gdn['ause_translation']:.2f}, rotation {gdn['ause_rotation']:.2f}"
-    return [*rows, (ause, "", "", "", "")]
+    return [*rows, (ause, *("" for _ in names))]
+
+
+def _unit_of(axis: str) -> tuple[float, str]:
+    return (1e3, "mm") if axis in ("x", "y", "z") else (math.degrees(1), "degrees")
 
 
 def _table(rows: list[tuple[str, ...]]) -> list[str]:

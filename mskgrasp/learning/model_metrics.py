@@ -92,10 +92,12 @@ class UncertaintyMetrics:
     """Metrics of predicted variances.
 
     Attributes:
-        axes: CRPS, calibration error, sharpness, RMSE and coverages of the grasp displacement, by axis.
+        axes: CRPS, calibration error, sharpness, RMSE and coverages of the grasp displacement, and of the
+            swing where it is predicted, by axis.
         ause_translation: Area under the sparsification error, as a share of random order's.
         ause_rotation: The same.
-        least_uncertain: RMSE of translation, metres, and rotation, radians, over shares of least variance.
+        least_uncertain: RMSE of translation, metres, and rotation, radians, and share of parts that hang
+            askew, over the shares of least variance score.
     """
 
     axes: dict[str, dict[str, float]]

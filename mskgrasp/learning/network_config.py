@@ -26,12 +26,19 @@ class _NetworkConfig(Config):
     symmetric_views: bool = False
     """The displacement is the mean of the predictions for the four views that a parallel jaw cannot tell
     apart (`symmetry`), its variance that of their mixture: equivalent grasps get the same prediction."""
+    swing: bool = False
+    """The displacement network predicts the swing of the part in the hand, too (paper: no)."""
     least_std: tuple[float, float] = (0.0, 0.0)
     """Least standard deviation that is predicted, metres and radians (paper: none).
 
     Most parts do not rise in the hand by 0.1 mm, some rise by 10 mm: without a floor the likelihood drives
     the variance of z so low that one such part costs more than all others gain.
     """
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of predicted components: x, y, z, theta, and the swing about x and y."""
+        return 6 if self.swing else 4
 
     @field_validator("least_std")
     @classmethod
@@ -58,10 +65,11 @@ class PatchNetworkConfig(_NetworkConfig):
 
     @model_validator(mode="after")
     def _views_need_rotated_patches(self) -> PatchNetworkConfig:
-        if self.image == "object" and self.symmetric_views:
-            raise ValueError(
-                "symmetric_views needs patches that are rotated with the grasp; with image: object none are"
-            )
+        for name in ("symmetric_views", "swing"):
+            if self.image == "object" and getattr(self, name):
+                raise ValueError(
+                    f"{name} needs patches that are rotated with the grasp; with image: object none are"
+                )
         return self
 
     @property
@@ -138,14 +146,18 @@ NetworkConfig = Annotated[PatchNetworkConfig | HandNetworkConfig, Field(discrimi
 """Either architecture; in a file, ``architecture`` says which."""
 
 
+_Targets = Annotated[tuple[float, ...], Field(min_length=4, max_length=6)]
+
+
 class Normalisation(Config):
     """Numbers from the training data that turn network units into metres, radians and probabilities."""
 
     action_scale: tuple[float, float, float]
     """Largest distance of the object centre from the grasp along each axis, metres."""
-    target_mean: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    target_std: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    """Standard deviation of the grasp displacement, metres and radians."""
+    target_mean: _Targets = (0.0, 0.0, 0.0, 0.0)
+    target_std: _Targets = (1.0, 1.0, 1.0, 1.0)
+    """Mean and standard deviation of the grasp displacement and, where it is predicted, of the swing; metres
+    and radians."""
     base_rate: float = Field(default=0.5, gt=0.0, lt=1.0)
     """Share of successes among the attempts; training balances successes and failures."""
 

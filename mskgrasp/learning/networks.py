@@ -113,21 +113,25 @@ class GraspQualityNetwork(nn.Module):
 
 
 class GraspDisplacementNetwork(nn.Module):
-    """GDN: a Gaussian over the grasp displacement of a successful grasp (paper, section 3.4)."""
+    """GDN: a Gaussian over the grasp displacement of a successful grasp (paper, section 3.4).
+
+    With ``swing: true`` also over the swing of the part: k = 6 components instead of 4.
+    """
 
     def __init__(self, config: NetworkConfig, normalisation: Normalisation):
         super().__init__()
         self.sees_object = config.sees_object
         self.features = make_features(config, normalisation, quality=False)
-        self.mean_head = _head(self.features.n_features, config, 4)
-        self.variance_head = _head(self.features.n_features, config, 4) if config.variance else None
+        n_outputs = config.n_outputs
+        self.mean_head = _head(self.features.n_features, config, n_outputs)
+        self.variance_head = _head(self.features.n_features, config, n_outputs) if config.variance else None
         self.target_mean: Tensor
         self.target_std: Tensor
         self.register_buffer("target_mean", torch.tensor(normalisation.target_mean), persistent=False)
         self.register_buffer("target_std", torch.tensor(normalisation.target_std), persistent=False)
         metres, radians = config.least_std
         self.least_variance: Tensor
-        floor = torch.tensor([metres, metres, metres, radians]).square()
+        floor = torch.tensor([metres, metres, metres, radians, radians, radians])[:n_outputs].square()
         self.register_buffer("least_variance", floor, persistent=False)
 
     def forward(
@@ -137,7 +141,7 @@ class GraspDisplacementNetwork(nn.Module):
         height: Tensor,
         theta: Tensor | None = None,
     ) -> tuple[Tensor, Tensor | None]:
-        """Mean (n, 4) and variance (n, 4) of the grasp displacement, in metres and radians (squared).
+        """Mean and variance (n, k) of grasp displacement and swing, in metres and radians (squared).
 
         The variance is None where the network predicts the mean alone.
 
@@ -163,7 +167,7 @@ class GraspDisplacementNetwork(nn.Module):
         return mean, torch.cat([along, variance[:, 2:]], dim=-1)
 
     def outputs(self, features: Tensor) -> tuple[Tensor, Tensor | None]:
-        """Compute mean and variance (n, 4) from features (n, f), along the axes of the patch."""
+        """Compute mean and variance (n, k) from features (n, f), along the axes of the patch."""
         mean = self.target_mean + self.target_std * self.mean_head(features)
         if self.variance_head is None:
             return mean, None
@@ -196,7 +200,7 @@ def _rotated(vectors: Tensor, angle: Tensor) -> Tensor:
 
 
 def displacement_error(mean: Tensor, target: Tensor) -> Tensor:
-    """Compute target minus mean (n, 4), the angle wrapped."""
+    """Compute target minus mean (n, k), angles wrapped."""
     error = target - mean
     return torch.cat([error[..., :3], wrap_angle(error[..., 3:])], dim=-1)
 
@@ -206,14 +210,14 @@ def displacement_loss(
 ) -> Tensor:
     """Compute equation 5 of the paper: sum of log variance + squared error / variance, batch mean.
 
-    Both are in normalised units, which adds a constant: a loss near 4 means "no better than the training
+    Both are in normalised units, which adds a constant: a loss near k means "no better than the training
     mean". Without variances it is the squared error.
 
     Args:
-        mean: (n, 4) predicted grasp displacement.
-        variance: (n, 4) or None.
-        target: (n, 4).
-        target_std: (4,) the training data's deviation.
+        mean: (n, k) predicted grasp displacement and, with k = 6, swing.
+        variance: (n, k) or None.
+        target: (n, k).
+        target_std: (k,) the training data's deviation.
         beta: 0 is the paper's loss; 0.5 weights each term by the square root of its variance, which fits
             the mean better where the variance is large (Seitzer et al. 2022, arXiv 2203.09168).
     """

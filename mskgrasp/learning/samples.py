@@ -16,7 +16,8 @@ import torch
 from torch import Tensor
 
 from mskgrasp.core.errors import BadDataset, NoPartFound
-from mskgrasp.core.grasp import FAILURES, centre_in_grasp_frame, to_grasp_displacement
+from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import FAILURES, centre_in_grasp_frame, swing_in_hand, to_grasp_displacement
 from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard, u16_to_depth
 from mskgrasp.learning.label_source import LabelSource, distinct, source_of
 from mskgrasp.learning.network_config import NetworkConfig
@@ -25,7 +26,7 @@ from mskgrasp.perception.height_patches import crop_patches, height_image
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.runtime.worker_pool import Work, results
 
-SAMPLES_VERSION = 2
+SAMPLES_VERSION = 3
 """Raised by every change after which a dataset gives other samples: training does not resume with them."""
 HEIGHT_STEP = 1e-4
 """Resolution of stored patches, metres: that of a stored depth."""
@@ -49,6 +50,8 @@ class Samples:
         success: (n,) bool.
         displacement: (n, 4) float32 true displacement of the centroid, NaN where the grasp failed.
         grasp_displacement: (n, 4) float32, the same motion as grasp displacement: the training target.
+        swing: (n, 2) float32 swing of the part in the hand, radians about x and y of the grasp frame, NaN
+            where the grasp failed.
         part: (n,) int64, index into ``parts``.
         parts: Names of the parts.
         skipped: Number of unusable attempts by reason: the planner would find no part in them either, or the
@@ -66,6 +69,7 @@ class Samples:
     success: Tensor
     displacement: Tensor
     grasp_displacement: Tensor
+    swing: Tensor
     part: Tensor
     parts: tuple[str, ...]
     skipped: dict[str, int]
@@ -92,6 +96,11 @@ class Samples:
             return self.patches_of(rows, device)
         return self.object_patches[rows].to(device).float() * HEIGHT_STEP
 
+    def targets(self, rows: Tensor, network: NetworkConfig) -> Tensor:
+        """Get the displacement network's targets (n, k): grasp displacement, and swing if it predicts it."""
+        target = self.grasp_displacement[rows]
+        return torch.cat([target, self.swing[rows]], dim=1) if network.swing else target
+
     def of_parts_between(self, low: float, high: float) -> Samples:
         """Select the parts whose success rate lies in [low, high].
 
@@ -117,6 +126,7 @@ class Samples:
             success=self.success[rows],
             displacement=self.displacement[rows],
             grasp_displacement=self.grasp_displacement[rows],
+            swing=self.swing[rows],
             part=torch.searchsorted(torch.tensor(kept, device=self.part.device), self.part[rows]),
             parts=tuple(self.parts[i] for i in kept),
         )
@@ -258,6 +268,10 @@ def _shard_samples(
         return {}, skipped
     grasp = attempts.grasp[rows].astype(np.float64)
     displacement = attempts.displacement[rows].astype(np.float64)
+    before, after = (
+        Pose.from_vector(poses[rows].astype(np.float64))
+        for poses in (attempts.pose_tcp_obj_before, attempts.pose_tcp_obj_after)
+    )
     origin_grasp = centre_in_grasp_frame(attempts.pose_base_obj[rows, :3].astype(np.float64), grasp)
     table_z = info.table_z + np.array(offsets)
     heights = height_image(torch.from_numpy(depth[rows]), info.intrinsics, info.T_base_camera, table_z)
@@ -285,6 +299,7 @@ def _shard_samples(
         "success": attempts.success[rows],
         "displacement": displacement.astype(np.float32),
         "grasp_displacement": to_grasp_displacement(displacement, origin_grasp).astype(np.float32),
+        "swing": swing_in_hand(before, after).astype(np.float32),
     }, skipped
 
 

@@ -30,7 +30,7 @@ from mskgrasp.learning.samples import SAMPLES_VERSION, Samples, part_sides
 from mskgrasp.learning.symmetry import mirror_and_turn
 from mskgrasp.parts.catalogue import SPLITS
 
-_LEAST_TARGET_STD = (1e-4, 1e-4, 1e-4, 1e-3)
+_LEAST_TARGET_STD = (1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3)
 """Least deviation of a target, metres and radians: less (parts that never rise) is simulation noise."""
 _RECORDED = {"train": "training"}
 """Names of sides in a model's record, where they differ."""
@@ -95,15 +95,16 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
 def describe_networks(samples: Samples, training_rows: Tensor, config: LearningConfig) -> ModelMeta:
     """Describe the networks, with the normalisation measured on the training parts."""
     success = samples.success[training_rows]
-    target = samples.grasp_displacement[training_rows[success]].double()
+    target = samples.targets(training_rows[success], config.network).double()
     scale = samples.centre_grasp[training_rows].abs().amax(dim=0).clamp(min=1e-3)
-    std = target.std(dim=0, correction=0).clamp(min=torch.tensor(_LEAST_TARGET_STD).double())
-    mean = target.mean(dim=0)
+    least = torch.tensor(_LEAST_TARGET_STD[: config.network.n_outputs]).double()
+    std, mean = target.std(dim=0, correction=0), target.mean(dim=0)
     if config.symmetric:
         # Rotated and mirrored copies make all but z symmetric about zero.
-        std = target.square().mean(dim=0).sqrt().clamp(min=torch.tensor(_LEAST_TARGET_STD).double())
-        std[2] = target[:, 2].std(correction=0).clamp(min=_LEAST_TARGET_STD[2])
-        mean = mean * torch.tensor([0.0, 0.0, 1.0, 0.0])
+        rise, rise_std = mean[2].clone(), std[2].clone()
+        std, mean = target.square().mean(dim=0).sqrt(), torch.zeros_like(mean)
+        std[2], mean[2] = rise_std, rise
+    std = torch.maximum(std, least)
     sides = part_sides(samples.parts, config.validation_fraction, config.sides)
     return ModelMeta(
         network=config.network,
@@ -226,7 +227,7 @@ class Stage:
         else:
             patches = s.displacement_patches_of(rows, device)
         centre = s.centre_grasp[rows].to(device)
-        target = s.grasp_displacement[rows].to(device)
+        target = s.targets(rows, self.config.network).to(device)
         if self.config.symmetric:
             patches, centre, target = mirror_and_turn(patches, centre, target, generator)
         if self.config.noise_std > 0:
@@ -266,7 +267,7 @@ class Stage:
         mean, variance = held_out.predict_grasp_displacement(self.models, self.samples, rows)
         predicted = torch.from_numpy(variance) if self.config.network.variance else None
         std = self.models.gdn.target_std.cpu().double()
-        target = self.samples.grasp_displacement[rows].double()
+        target = self.samples.targets(rows, self.config.network).double()
         loss = displacement_loss(torch.from_numpy(mean), predicted, target, std)
         errors = held_out.prediction_errors(self.samples, rows, mean, variance)
         return {

@@ -21,7 +21,7 @@ from mskgrasp.palletize.placement_records import Correction, Placement
 from mskgrasp.parts import find_part
 from mskgrasp.perception.footprint import seen_footprint
 from mskgrasp.perception.markers import planar_displacement
-from mskgrasp.planning.place_pose import Target, place, place_error, place_pose, turned_by
+from mskgrasp.planning.place_pose import Target, drop_of, place, place_error, place_pose, turned_by
 from mskgrasp.planning.planner import GraspPlan, Planner
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.policies import RepeatedPlanner
@@ -140,11 +140,16 @@ class PickAndPlace:
         measured = grasped.displacement_of_centre(plan)
         if measured is not None:
             known = replace(known, measured=measured.tolist())
-        by = {"none": np.zeros(4), "predicted": plan.displacement, "truth": measured}[known.correction]
+        by, swing = {
+            "none": (np.zeros(4), None),
+            "predicted": (plan.displacement, plan.swing),
+            "truth": (measured, grasped.swing),
+        }[known.correction]
         assert by is not None  # truth is refused without a tracker
+        drop = 0.0 if swing is None else drop_of(plan.grasp, plan.view, by[3], swing)
         for target in targets:
             try:
-                place(self._cell, self._pose(plan, by, target), engine.recover)
+                place(self._cell, self._pose(plan, by, target, drop), engine.recover)
             except OutOfWorkspace:
                 continue  # the other target may be reached
             except MotionAborted as error:
@@ -157,11 +162,11 @@ class PickAndPlace:
         engine.put_back(plan)
         return replace(known, reason="OutOfWorkspace"), target, None
 
-    def _pose(self, plan: GraspPlan, displacement: np.ndarray, target: Target) -> Grasp:
-        workspace = self._cell.workspace
-        pose = place_pose(plan.grasp, displacement, plan.view.centre_base, target, workspace.table_z)
+    def _pose(self, plan: GraspPlan, displacement: np.ndarray, target: Target, drop: float = 0.0) -> Grasp:
+        table_z, centre = self._cell.workspace.table_z, plan.view.centre_base
+        pose = place_pose(plan.grasp, displacement, centre, target, table_z, drop=drop)
         x, y, z = pose.position
-        clear = float(workspace.lowest_grasp_z(pose.position[:2]))
+        clear = float(self._cell.workspace.lowest_grasp_z(pose.position[:2]))
         return replace(pose, position=np.array([x, y, max(z, clear)]))
 
     def _measured(

@@ -23,12 +23,16 @@ def plan_text(plan: GraspPlan) -> str:
         for name, value, deviation in zip(("dx", "dy", "dz"), mean[:3], std[:3], strict=True)
     )
     turn = f"dtheta {np.degrees(mean[3]):+.1f} +- {np.degrees(std[3]):.1f} deg"
+    askew = float(np.degrees(np.linalg.norm(plan.swing)))
+    spread = float(np.degrees(np.sqrt(plan.swing_var.sum())))
+    tilt = f"by {askew:.1f} +- {spread:.1f} deg"
     stages = ", ".join(f"{name} {value:.2f} s" for name, value in plan.seconds.items() if name != "total")
     return "\n".join(
         [
             f"grasp         x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, theta {np.degrees(theta):.1f} deg (base)",
             f"quality       {plan.quality:.3f} (best of {len(plan.candidates)}: {plan.qualities.max():.3f})",
             f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
+            *([] if np.isnan(plan.swing).any() else [f"hangs askew   {tilt}"]),
             f"planned in    {plan.seconds['total']:.2f} s ({stages})",
         ]
     )

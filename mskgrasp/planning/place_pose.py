@@ -10,8 +10,16 @@ import numpy as np
 from hal.cell import Cell
 from hal.errors import MotionAborted
 from hal.execute import PUT_DOWN, above_grasp, let_go
-from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing, wrap_angle
-from mskgrasp.core.grasp import Grasp, lowest_grasp_z
+from mskgrasp.core.geometry import (
+    Pose,
+    quat_about_z,
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate,
+    twist_and_swing,
+    wrap_angle,
+)
+from mskgrasp.core.grasp import Grasp, PartView, lowest_grasp_z
 
 EARLY = 0.007
 """Height above the target pose from which contact with the table counts as placed, metres."""
@@ -32,8 +40,35 @@ class Target:
     theta: float
 
 
+def drop_of(grasp: Grasp, view: PartView, dtheta: float, swing: np.ndarray) -> float:
+    """Compute how much lower the lowest corner of a part's box hangs because the part has swung, metres.
+
+    Args:
+        grasp: Grasp of the part, base frame.
+        view: The part before the grasp.
+        dtheta: Turn of the part in the hand, radians.
+        swing: (2,) swing of the part in the hand, radians about x and y of the grasp frame; NaN: unknown.
+    """
+    angle = float(np.linalg.norm(swing))
+    if not angle > 0:
+        return 0.0
+    half = np.asarray(view.size, dtype=np.float64) / 2
+    corners = np.stack(np.meshgrid(*([-1.0, 1.0],) * 3, indexing="ij"), axis=-1).reshape(-1, 3) * half
+    quat_grasp = grasp.T_base_grasp.inverse().quat_wxyz
+    corners = quat_rotate(quat_multiply(quat_grasp, view.T_base_box.quat_wxyz), corners)
+    swung = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) / angle * swing, [0.0]])
+    turn = quat_multiply(swung, quat_about_z(np.asarray(float(dtheta))))
+    return max(0.0, -half[2] - float(quat_rotate(turn, corners)[:, 2].min()))
+
+
 def place_pose(
-    grasp: Grasp, displacement: np.ndarray, centre_base: np.ndarray, target: Target, table_z: float
+    grasp: Grasp,
+    displacement: np.ndarray,
+    centre_base: np.ndarray,
+    target: Target,
+    table_z: float,
+    *,
+    drop: float = 0.0,
 ) -> Grasp:
     """Compute the hand pose, as a grasp, at which the held part is at the target.
 
@@ -47,6 +82,7 @@ def place_pose(
         centre_base: (3,) the part's centre before the grasp, base frame, metres.
         target: Target of the part's centre.
         table_z: Height of the table, metres.
+        drop: As `drop_of` computes it: the hand releases the part so much higher, metres.
 
     Returns:
         Base frame; theta is not wrapped to half a turn, which would turn the part.
@@ -59,7 +95,7 @@ def place_pose(
     x = target.x - (cos * held[0] - sin * held[1])
     y = target.y - (sin * held[0] + cos * held[1])
     # A part that has sunk in the hand is released higher, one that has risen lower.
-    z = max(grasp.position[2] - displacement[2] + PUT_DOWN, lowest_grasp_z(table_z))
+    z = max(grasp.position[2] - displacement[2] + drop + PUT_DOWN, lowest_grasp_z(table_z))
     return Grasp(position=np.array([x, y, z]), theta=theta)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from hal.camera import RgbdFrame
 from hal.table import HIGHEST_TABLE
-from mskgrasp.core.displacement_covariance import object_displacement_covariance
+from mskgrasp.core.displacement_covariance import object_displacement_covariance, swing_squared
 from mskgrasp.core.errors import BadModel, NoGraspFound, TableTooHigh
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
 from mskgrasp.learning.grasp_models import Models
@@ -27,7 +27,10 @@ from mskgrasp.planning.scoring import Scene, displacements, qualities
 
 @dataclass(frozen=True)
 class Shortlist:
-    """Candidates by row (k,), best quality first, with their mean and variance (k, 4) and scores (k,)."""
+    """Candidates by row (k,), best quality first, with their scores (k,), and mean and variance (k, m).
+
+    m is 4, or 6 where the network predicts the swing, too.
+    """
 
     rows: np.ndarray
     mean: np.ndarray
@@ -52,6 +55,9 @@ class GraspPlan:
         grasp_displacement: (4,) expected grasp displacement, predicted by the network: the rigid motion, from
             which `displacement_of` gives that of a point.
         grasp_displacement_var: (4,) its variances; NaN if the network predicts none.
+        swing: (2,) expected swing of the part in the hand, a rotation vector about x and y of the grasp
+            frame, radians; NaN if the network predicts none.
+        swing_var: (2,) its variances; NaN likewise.
         score: Variance score of the grasp, square metres; NaN if the network predicts no variance.
         view: The detected part.
         candidates: The n grasps considered, base frame.
@@ -65,6 +71,8 @@ class GraspPlan:
     quality: float
     grasp_displacement: np.ndarray
     grasp_displacement_var: np.ndarray
+    swing: np.ndarray
+    swing_var: np.ndarray
     score: float
     view: PartView
     candidates: Grasp
@@ -85,12 +93,15 @@ class GraspPlan:
         seconds: dict[str, float],
     ) -> GraspPlan:
         """Make the plan of the shortlist's grasp ``chosen``, of n candidates."""
-        row = best.rows[chosen]
+        row, mean, variance = best.rows[chosen], best.mean[chosen], best.variance[chosen]
+        unknown = np.full(2, np.nan)
         return cls(
             grasp=candidates[row],
             quality=float(qualities[row]),
-            grasp_displacement=best.mean[chosen],
-            grasp_displacement_var=best.variance[chosen],
+            grasp_displacement=mean[:4],
+            grasp_displacement_var=variance[:4],
+            swing=mean[4:] if len(mean) > 4 else unknown,
+            swing_var=variance[4:] if len(mean) > 4 else unknown,
             score=float(best.scores[chosen]),
             view=view,
             candidates=candidates,
@@ -149,6 +160,8 @@ class GraspPlan:
             "displacement_cov": _plain(self.displacement_cov),
             "grasp_displacement": _plain(self.grasp_displacement),
             "grasp_displacement_var": _plain(self.grasp_displacement_var),
+            "swing": _plain(self.swing),
+            "swing_var": _plain(self.swing_var),
             "score": _plain(np.asarray(self.score)),
             "part": {
                 "centre_base": _plain(self.view.centre_base),
@@ -320,21 +333,22 @@ def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:
 
 
 def variance_score(mean: np.ndarray, variance: np.ndarray, grasps: np.ndarray, view: PartView) -> np.ndarray:
-    """Compute var_x + var_y + var_z + r^2 var_theta of the displacement of the seen centre, square metres.
+    """Compute var_x + var_y + var_z + r^2 (var_theta + E |swing|^2) of the seen centre, square metres.
 
     With r the part's radius of gyration it is, to first order, the mean squared distance by which the part's
-    points miss their predicted places.
+    points miss the places where they were to be: predicted ones, and flat as the part lay.
 
     Args:
-        mean: (..., 4) of the grasp displacement.
-        variance: (..., 4) the same.
+        mean: (..., k) of the grasp displacement and, with k = 6, the swing.
+        variance: (..., k) the same.
         grasps: (..., 4) base frame.
         view: The detected part.
     """
     centre_grasp = centre_in_grasp_frame(view.centre_base, grasps)
-    covariance = object_displacement_covariance(mean, variance, centre_grasp)
+    covariance = object_displacement_covariance(mean[..., :4], variance[..., :4], centre_grasp)
     of_centre = np.diagonal(covariance, axis1=-2, axis2=-1)
-    return of_centre[..., :3].sum(axis=-1) + view.gyration_radius**2 * of_centre[..., 3]
+    turned = of_centre[..., 3] + swing_squared(mean, variance)
+    return of_centre[..., :3].sum(axis=-1) + view.gyration_radius**2 * turned
 
 
 def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> int:

@@ -83,7 +83,10 @@ def qualities(models: Models, scene: Scene, grasps: np.ndarray, chunk: int) -> n
 def displacements(
     models: Models, scene: Scene, grasps: np.ndarray, chunk: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Predict mean and variance (n, 4) of the grasps' displacement; without a variance it is NaN."""
+    """Predict mean and variance (n, k) of the grasps' displacement and, with k = 6, swing.
+
+    Without a variance it is NaN.
+    """
     network = models.meta.network
     whole = None
     if network.sees_object:
@@ -95,7 +98,7 @@ def displacements(
         means.append(mean)
         variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
     if not means:
-        return np.zeros((0, 4)), np.zeros((0, 4))
+        return np.zeros((0, network.n_outputs)), np.zeros((0, network.n_outputs))
     return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
 
 

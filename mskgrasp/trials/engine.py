@@ -22,6 +22,7 @@ from mskgrasp.core.grasp import (
     EJECTED_DISTANCE,
     MIN_RISE,
     object_displacement,
+    swing_in_hand,
 )
 from mskgrasp.core.settings import Region, Tape
 from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
@@ -67,14 +68,19 @@ class ExecutedGrasp:
         result: Measurements of the arm; None where it refused the grasp before moving.
         before: ``T_base_obj`` before the grasp; None without a tracker.
         displacement: (4,) object displacement; None where the grasp failed or without a tracker.
-        tilt: Tilt of the part in the hand, radians; None as before.
+        swing: (2,) swing of the part in the hand, radians about x and y of the grasp frame; None as before.
     """
 
     reason: str
     result: GraspResult | None = None
     before: Pose | None = None
     displacement: np.ndarray | None = None
-    tilt: float | None = None
+    swing: np.ndarray | None = None
+
+    @property
+    def tilt(self) -> float | None:
+        """Tilt of the part in the hand, radians; None where the swing is."""
+        return None if self.swing is None else float(np.linalg.norm(self.swing))
 
     @property
     def aborted(self) -> str:
@@ -207,11 +213,14 @@ class TrialEngine:
         reason = _failure(result, before, after, self.cell.workspace.lift_height)
         if reason or before is None or after is None:
             return ExecutedGrasp(reason=reason, result=result, before=before)
-        displacement, swing = object_displacement(
-            plan.grasp.T_base_tcp.inverse() @ before, result.T_base_tcp.inverse() @ after
-        )
+        held = plan.grasp.T_base_tcp.inverse() @ before, result.T_base_tcp.inverse() @ after
+        displacement, _ = object_displacement(*held)
         return ExecutedGrasp(
-            reason="", result=result, before=before, displacement=np.asarray(displacement), tilt=float(swing)
+            reason="",
+            result=result,
+            before=before,
+            displacement=np.asarray(displacement),
+            swing=np.asarray(swing_in_hand(*held)),
         )
 
     def put_back(self, plan: GraspPlan) -> None:

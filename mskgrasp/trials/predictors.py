@@ -63,8 +63,9 @@ class Predictor(Protocol):
         """Predict the grasp displacement of n grasps.
 
         Returns:
-            Mean (n, 4) of the grasp displacement and its variances (n, 4), NaN where it predicts none, both
-            metres and radians along the axes of the grasp frame.
+            Mean (n, k) of the grasp displacement and its variances (n, k), NaN where it predicts none, both
+            metres and radians along the axes of the grasp frame; k is 6 where it predicts the swing, too,
+            otherwise 4.
         """
         ...
 
@@ -126,7 +127,7 @@ def predict_one(
     vector = np.asarray(grasp.as_vector(), dtype=np.float64)
     mean, variance = predictor.predict(observation, Grasp.from_vector(vector[None]))
     point_grasp = centre_in_grasp_frame(np.asarray(point_base, dtype=np.float64), vector)
-    covariance = object_displacement_covariance(mean[0], variance[0], point_grasp)
+    covariance = object_displacement_covariance(mean[0, :4], variance[0, :4], point_grasp)
     return Prediction(
         mean=to_object_displacement(mean[0], point_grasp).tolist(),
         std=np.sqrt(np.diag(covariance)).tolist(),

@@ -17,6 +17,7 @@ from mskgrasp.core.geometry import (
     quat_to_matrix,
     rotation_angle,
     straight_line,
+    swing_vector,
     twist_and_swing,
     wrap_angle,
     wrap_half_turn,
@@ -106,6 +107,9 @@ def test_a_turn_about_z_then_a_tilt_splits_into_just_these(turn, tilt, direction
     twist, swung = twist_and_swing(quat_multiply(swing, quat_about_z(np.array(turn))))
     assert np.isclose(twist, turn, atol=1e-6)
     assert np.isclose(swung, tilt, atol=1e-6)
+    whole = quat_multiply(swing, quat_about_z(np.array(turn)))
+    assert np.allclose(swing_vector(whole), tilt * axis[:2], atol=1e-6)
+    assert np.allclose(swing_vector(torch.from_numpy(-whole)).numpy(), tilt * axis[:2], atol=1e-6)
 
 
 @given(quats())

@@ -15,6 +15,7 @@ from mskgrasp.core.grasp import (
     pose_base_grasp,
     pose_base_tcp,
     sample_grasps,
+    swing_in_hand,
     to_grasp_displacement,
     to_object_displacement,
 )
@@ -30,6 +31,20 @@ def same(first: np.ndarray, second: np.ndarray) -> bool:
     difference = first - second
     difference[..., 3] = wrap_angle(difference[..., 3])
     return bool(np.allclose(difference, 0, atol=1e-9))
+
+
+@given(grasps, shifts, st.tuples(*[st.floats(-1.0, 1.0)] * 2).map(np.array), poses())
+def test_a_part_that_swings_in_the_hand_has_that_swing_in_the_grasp_frame(grasp, shift, swing, part):
+    angle = np.linalg.norm(swing)
+    half = np.sinc(angle / (2 * np.pi)) / 2  # sin(angle / 2) / angle
+    swung = np.concatenate([[np.cos(angle / 2)], half * swing, [0.0]])
+    turn = quat_multiply(swung, quat_about_z(shift[3]))
+    T_base_grasp, T_tcp_base = pose_base_grasp(grasp), pose_base_tcp(grasp).inverse()
+    moved = T_base_grasp @ Pose(position=shift[:3], quat_wxyz=turn) @ T_base_grasp.inverse() @ part
+    found = swing_in_hand(T_tcp_base @ part, T_tcp_base @ moved)
+    assert np.allclose(found, swing, atol=1e-6)
+    _, tilt = object_displacement(T_tcp_base @ part, T_tcp_base @ moved)
+    assert np.isclose(tilt, angle, atol=1e-6)
 
 
 @given(grasps)

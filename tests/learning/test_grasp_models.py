@@ -99,9 +99,9 @@ def test_the_shipped_model_is_loaded_as_its_own_architecture():
     stored = json.loads((PRETRAINED / "model.json").read_text())["network"]
     network = load_models(PRETRAINED).meta.network
     assert isinstance(network, HandNetworkConfig)
-    assert {name: list(v) if isinstance(v, tuple) else v for name, v in network.model_dump().items()} == {
-        name: value for name, value in stored.items() if name not in ("channels", "image")
-    }
+    read = {name: list(v) if isinstance(v, tuple) else v for name, v in network.model_dump().items()}
+    assert read.pop("swing") is False  # of a time before the swing was predicted
+    assert read == {name: value for name, value in stored.items() if name not in ("channels", "image")}
 
 
 def test_descriptions_that_list_both_architectures_are_read(folder):

@@ -7,9 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
+from scipy.spatial.transform import Rotation
 
 from mskgrasp.core.grasp import centre_in_grasp_frame
-from mskgrasp.learning.grasp_models import PRETRAINED, Models, build_models, load_models
+from mskgrasp.learning.grasp_models import PRETRAINED, ModelMeta, Models, build_models, load_models
+from mskgrasp.learning.network_config import Normalisation
 from mskgrasp.learning.symmetry import mirror_and_turn
 from tests import synthetic
 
@@ -54,6 +56,30 @@ def test_turned_and_mirrored_samples_are_what_the_turned_and_mirrored_scene_woul
     assert len(produced) == 4
 
 
+def test_a_swing_is_mirrored_as_the_rotation_that_it_is():
+    rng = np.random.default_rng(1)
+    mirror, half_turn = np.diag([1.0, -1.0, 1.0]), np.diag([-1.0, -1.0, 1.0])
+    motion = np.concatenate([np.zeros((20, 3)), rng.uniform(-0.5, 0.5, (20, 3))], axis=1)
+    for seed in range(5):
+        _, centre, target = mirror_and_turn(
+            torch.zeros(20, 1, 2, 2),
+            torch.ones(20, 3),
+            torch.from_numpy(motion),
+            torch.Generator().manual_seed(seed),
+        )
+        for (_, _, _, turn, *swing), (_, _, _, other, *swung), signs in zip(
+            motion, target.numpy(), centre.numpy(), strict=True
+        ):
+            turned = half_turn if signs[0] < 0 else np.eye(3)
+            image = turned @ (mirror if signs[0] * signs[1] < 0 else np.eye(3))
+            expected = image @ rotation(turn, swing) @ image.T
+            np.testing.assert_allclose(rotation(other, swung), expected, atol=1e-12)
+
+
+def rotation(turn: float, swing: np.ndarray) -> np.ndarray:
+    return (Rotation.from_rotvec([*swing, 0.0]) * Rotation.from_euler("z", turn)).as_matrix()
+
+
 @pytest.fixture(scope="module")
 def models() -> Models:
     """The shipped weights, asked for all views."""
@@ -96,6 +122,22 @@ def test_equal_grasps_are_reported_the_same_displacement(models, flipped, signs)
     one, _ = single.grasp_displacement(patches, centre, height)
     two, _ = single.grasp_displacement(patches.flip(flipped), centre * signs[:3], height)
     assert not torch.allclose(two, signs * one, atol=1e-5)
+
+
+@pytest.mark.parametrize(("flipped", "signs"), VIEWS.values(), ids=VIEWS)
+def test_equal_grasps_are_reported_the_same_swing(models, flipped, signs):
+    swinging = models.meta.network.model_copy(update={"swing": True})
+    targets = Normalisation(
+        action_scale=models.meta.normalisation.action_scale, target_mean=(0.0,) * 6, target_std=(1.0,) * 6
+    )
+    fresh = build_models(ModelMeta(network=swinging, normalisation=targets))
+    patches, centre, height = scenes(models)
+    signs = torch.tensor([*signs, signs[1], signs[1] * signs[3]], dtype=torch.float32)
+    mean, variance = fresh.grasp_displacement(patches, centre, height)
+    other, other_variance = fresh.grasp_displacement(patches.flip(flipped), centre * signs[:3], height)
+    assert mean.shape == variance.shape == (len(patches), 6)
+    assert torch.allclose(other, signs * mean, atol=1e-6)
+    assert torch.allclose(other_variance, variance, rtol=1e-4)
 
 
 def test_views_that_disagree_make_the_displacement_less_certain(models):

@@ -90,7 +90,7 @@ def test_a_checkpoint_of_samples_made_otherwise_is_refused(samples, tmp_path):
         progress = json.loads(file.metadata()["progress"])
     del progress["samples_version"]  # as files were before samples had a version
     save_file(tensors, path, metadata={"progress": json.dumps(progress)})
-    with pytest.raises(UsageError, match="made with version 1 of the samples, this is version 2"):
+    with pytest.raises(UsageError, match="made with version 1 of the samples, this is version 3"):
         learn(samples, SHORT, checkpoint_path=path)
 
 
@@ -101,6 +101,22 @@ def test_a_mean_only_network_and_the_papers_optimiser_can_be_trained(samples, tm
     changes = {"network": PATCH.network.model_copy(update={"variance": False}), "gqn": stage, "gdn": stage}
     models, history = learn(samples, SHORT.model_copy(update=changes), checkpoint_path=tmp_path / "c")
     assert len(history) == 2 and models.meta.metrics["gdn"]["nll"] is None
+
+
+def test_a_network_can_learn_the_swing_and_is_judged_by_it(dataset, tmp_path):
+    network = HAND.network.model_copy(update={"swing": True})
+    longer = HAND.gdn.model_copy(update={"epochs": 40})
+    samples = read_samples(dataset, network)
+    # The synthetic boxes stay flat: here each swings about y as far as it is held off its centre.
+    about_y = 10 * samples.centre_grasp[:, 0]
+    samples = dataclasses.replace(samples, swing=torch.stack([torch.zeros_like(about_y), about_y], dim=1))
+    config = HAND.model_copy(update={"network": network, "gqn": SHORT.gqn, "gdn": longer})
+    models, _ = learn(samples, config, checkpoint_path=tmp_path / "c")
+    gdn = models.meta.metrics["gdn"]
+    assert list(gdn["axes"]["rmse"]) == ["x", "y", "z", "theta", "swing_x", "swing_y"]
+    held = samples.success
+    assert gdn["axes"]["rmse"]["swing_y"] < 0.5 * float(about_y[held].std())
+    assert 0 <= gdn["least_uncertain"]["10%"][2] <= gdn["least_uncertain"]["30%"][2] + 0.2
 
 
 @pytest.mark.parametrize("config", [SHORT, HAND], ids=["the paper's", "ours"])

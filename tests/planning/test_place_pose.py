@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from mskgrasp.core.geometry import Pose, quat_about_z, wrap_angle
-from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, lowest_grasp_z, pose_base_grasp
-from mskgrasp.planning.place_pose import Target, displacement_of_point, place_error, place_pose
+from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, lowest_grasp_z, pose_base_grasp
+from mskgrasp.planning.place_pose import Target, displacement_of_point, drop_of, place_error, place_pose
 
 near = st.floats(-0.04, 0.04)
 angle = st.floats(-3.0, 3.0)
@@ -82,3 +83,35 @@ def test_the_hand_stays_above_the_table_and_follows_a_part_that_sank():
     )
     assert risen.position[2] == lowest_grasp_z(0.0)
     assert wrap_angle(sunk.theta) == sunk.theta
+
+
+def seen_box(yaw: float, height: float) -> PartView:
+    """A box of 80 x 30 mm that lies turned by yaw."""
+    return PartView(
+        centre_base=np.array([0.5, 0.02, height / 2]),
+        T_base_box=Pose(position=np.array([0.5, 0.02, 0.0]), quat_wxyz=quat_about_z(np.asarray(yaw))),
+        size=np.array([0.08, 0.03, height]),
+        gyration_radius=0.02,
+        table_z=0.0,
+    )
+
+
+@given(angle, st.floats(-0.6, 0.6), st.floats(-0.6, 0.6), st.floats(-0.5, 0.5), st.floats(0.005, 0.06))
+def test_a_part_that_hangs_askew_is_let_go_where_its_lowest_corner_nearly_touches(yaw, sx, sy, turn, height):
+    view, grasp = seen_box(yaw, height), Grasp.from_vector(np.array([0.51, 0.02, 0.03, 0.3]))
+    displacement = np.array([0.001, 0.0, -0.002, turn])
+    drop = drop_of(grasp, view, turn, np.array([sx, sy]))
+    target = Target(x=0.5, y=0.0, theta=0.0)
+    pose = place_pose(grasp, displacement, view.centre_base, target, 0.0, drop=drop)
+    corners = np.stack(np.meshgrid(*([-0.5, 0.5],) * 3), axis=-1).reshape(-1, 3)
+    to_grasp = grasp.T_base_grasp.inverse()
+    in_grasp = to_grasp.apply(view.T_base_box.apply(corners * view.size + [0, 0, height / 2]))
+    centre = to_grasp.apply(view.centre_base)
+    rotation = (Rotation.from_rotvec([sx, sy, 0.0]) * Rotation.from_euler("z", turn)).as_matrix()
+    held = centre + displacement[:3] + (in_grasp - centre) @ rotation.T
+    assert pose.T_base_grasp.apply(held)[:, 2].min() == pytest.approx(0.002, abs=1e-9)
+
+
+def test_an_unknown_swing_drops_nothing():
+    view, grasp = seen_box(0.2, 0.02), Grasp.from_vector(np.array([0.51, 0.02, 0.03, 0.3]))
+    assert drop_of(grasp, view, 0.1, np.full(2, np.nan)) == drop_of(grasp, view, 0.1, np.zeros(2)) == 0

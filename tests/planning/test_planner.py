@@ -112,6 +112,15 @@ def test_the_score_is_the_mean_squared_error_of_the_parts_points():
     assert score[0] == pytest.approx(squared.mean(), rel=0.06)
 
 
+def test_a_part_that_swings_has_a_worse_score_by_its_mean_and_its_spread():
+    view = planner().plan(FRAME, np.random.default_rng(0)).view
+    grasp = np.array([[view.centre_base[0], view.centre_base[1], 0.02, 0.0]])
+    flat, swung = np.zeros((1, 4)), np.array([[0, 0, 0, 0, 0.1, -0.2]])
+    variance = np.full((1, 6), 1e-4)
+    more = variance_score(swung, variance, grasp, view) - variance_score(flat, variance[:, :4], grasp, view)
+    assert more[0] == pytest.approx(view.gyration_radius**2 * (0.01 + 0.04 + 2e-4))
+
+
 def test_a_grasp_beside_which_something_stands_is_left_out():
     other = Box(
         x=BOX.x - 0.055 * np.sin(0.4), y=BOX.y + 0.055 * np.cos(0.4), yaw=0.4, size=(0.02, 0.01, 0.03)
