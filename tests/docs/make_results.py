@@ -53,12 +53,14 @@ from mskgrasp.simulation.versions import SIMULATION_VERSION
 from mskgrasp.validate.engines import engine_sections
 from mskgrasp.validate.tables import label_error_section, validation_sections
 from tests.docs.pages import ROOT
-from tests.docs.readme_table import README, rendered_readme
+from tests.docs.readme_table import README, ROWS, rendered_readme
 from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored
 from tests.sim_in_the_loop.regression import Row, stored_figures
 
 FACTS = ("command", "split", "n", "intervals", "model", "simulation", "recorded", "machine")
 """Rows of the table above the figures of a run."""
+TEST_PARTS = RESULTS / "test_parts.csv"
+"""Log of every use of the test parts."""
 _BLOCK = re.compile(r"(<!-- run: ([a-z0-9_]+) -->\n).*?(<!-- end -->)", re.S)
 
 
@@ -173,6 +175,19 @@ def record(name: str) -> None:
     (REPORTS / f"{name}.json").write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
 
+def log_test_parts(name: str) -> None:
+    """Adds a line to the log of the uses of test parts, if the stored run used them."""
+    stored = read_stored(name)
+    if not stored.facts["split"].startswith("test"):
+        return
+    rows = dict(ROWS)[name if name in dict(ROWS) else name.partition("_")[0]](stored)
+    commit, _, date = stored.facts["recorded"].removeprefix("commit ").partition(", ")
+    figures = "; ".join(row.text for row in rows)
+    with open(TEST_PARTS, "a", encoding="utf-8", newline="") as file:
+        line = (date, commit, stored.facts["command"].strip("`"), stored.facts["split"], figures)
+        csv.writer(file, lineterminator="\n").writerow(line)
+
+
 def _size(report: dict[str, Any]) -> str:
     if "engines" in report:
         settings = report["settings"]
@@ -235,6 +250,7 @@ def main() -> int:
     )  # fmt: skip
     for name in parser.parse_args().record:
         record(name)
+        log_test_parts(name)
     for path in (*sorted(RESULTS.glob("*.md")), README):
         before = path.read_text(encoding="utf-8")
         after = rendered_readme(before) if path == README else rendered(before)
