@@ -29,7 +29,7 @@ class LearningConfig(Config):
     seed: int = Field(default=0, ge=0)
     sides: Literal["name", "catalogue"] = "name"
     """Split of the parts: by a hash of their name, or as the catalogue says (validation and test are whole
-    families, `test_known` other sizes of families that are trained on)."""
+    families, `new_sizes` other sizes of families that are trained on)."""
     validation_fraction: float = Field(default=0.2, gt=0.0, lt=1.0)
     """Share of the parts that training never sees, where they are split by name."""
     calibrate: bool = True

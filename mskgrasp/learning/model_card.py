@@ -30,9 +30,9 @@ def model_card(meta: ModelMeta) -> str:
         meta: Description of a trained model.
     """
     known = meta.training
-    reports = {side: meta.metrics[side] for side in ("test", "test_known") if side in meta.metrics}
+    reports = {side: meta.metrics[side] for side in ("test", "new_sizes") if side in meta.metrics}
     settings = known.get("settings", {})
-    sides = [len(known.get(f"{name}_parts", ())) for name in ("training", "validation", "test", "test_known")]
+    sides = [len(known.get(f"{name}_parts", ())) for name in ("training", "validation", "test", "new_sizes")]
     lines = [
         "# Model card",
         "",
@@ -46,7 +46,7 @@ def model_card(meta: ModelMeta) -> str:
         f"{known.get('successes', 0)} of them successes",
         f"- {sides[0]} training parts, {sides[1]} validation parts (early stopping and calibration), "
         f"{sides[2]} test parts (held out from both), "
-        f"{sides[3]} test_known parts (other sizes of families that were trained on)",
+        f"{sides[3]} new_sizes parts (other sizes of families that were trained on)",
         f"- digest of grasps and outcomes: `{str(known.get('data_fingerprint', ''))[:16]}`",
         "",
         *(["## Labels", "", *map(_label_lines, meta.labels), ""] if meta.labels else []),
@@ -113,21 +113,22 @@ def _quality_rows(gqn: dict[str, Any]) -> list[tuple[str, ...]]:
 
 
 def _displacement_rows(gdn: dict[str, Any]) -> list[tuple[str, ...]]:
+    units = {"translation_rmse": 1e3, "rotation_rmse": math.degrees(1)}
+    between = gdn.get("intervals", {})
+    network = [f"{factor * gdn[key]:.2f} {_range(between.get(key), factor)}" for key, factor in units.items()]
+    rows = [("network, and 95 % interval", *network)]
+    for name in ("zero_displacement", "training_mean"):
+        values = (f"{factor * gdn[name][key]:.2f}" for key, factor in units.items())
+        rows.append((f"predicting {name.replace('_', ' ')}", *values))
+    for share, (translation, rotation, *tilted) in gdn.get("least_uncertain", {}).items():
+        values = (f"{1e3 * translation:.2f}", f"{math.degrees(rotation):.2f}")
+        rows.append((f"the most confident {share}", *values, *(f"{one:.1%}" for one in tilted)))
     head = (
         f"displacement of {gdn['n']} successes", "translation RMSE, mm", "rotation RMSE, degrees",
         f"tilt over {math.degrees(ASKEW):.0f} degrees",
     )  # fmt: skip
-    units = {"translation_rmse": 1e3, "rotation_rmse": math.degrees(1)}
-    between = gdn.get("intervals", {})
-    network = [f"{factor * gdn[key]:.2f} {_range(between.get(key), factor)}" for key, factor in units.items()]
-    rows = [head, ("network, and 95 % interval", *network, "")]
-    for name in ("zero_displacement", "training_mean"):
-        values = (f"{factor * gdn[name][key]:.2f}" for key, factor in units.items())
-        rows.append((f"predicting {name.replace('_', ' ')}", *values, ""))
-    for share, (translation, rotation, *tilted) in gdn.get("least_uncertain", {}).items():
-        values = (f"{1e3 * translation:.2f}", f"{math.degrees(rotation):.2f}")
-        rows.append((f"the most confident {share}", *values, f"{tilted[0]:.1%}" if tilted else ""))
-    return rows
+    n_columns = max(map(len, rows))  # earlier models do not tell the tilt
+    return [head[:n_columns], *((*row, "", "")[:n_columns] for row in rows)]
 
 
 def _axis_rows(gdn: dict[str, Any]) -> list[tuple[str, ...]]:

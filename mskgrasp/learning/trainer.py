@@ -61,14 +61,14 @@ class Sides:
         training: Rows to train on.
         validation: Rows that select the epoch and calibrate.
         test: Rows of families that training never sees, for the final metrics only.
-        test_known: Rows of other sizes of families that it sees, for the final metrics only. Like ``test``
+        new_sizes: Rows of other sizes of families that it sees, for the final metrics only. Like ``test``
             empty if parts are split by name.
     """
 
     training: Tensor
     validation: Tensor
     test: Tensor
-    test_known: Tensor
+    new_sizes: Tensor
 
 
 def split(samples: Samples, config: LearningConfig) -> Sides:
@@ -89,7 +89,7 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
         if n_success in (0, n):
             kind = "success" if n_success == 0 else "failure"
             raise BadDataset(f"no {kind} among the {n} attempts at the {name} parts; collect more attempts")
-    return Sides(training=rows[0], validation=rows[1], test=rows[2], test_known=rows[3])
+    return Sides(training=rows[0], validation=rows[1], test=rows[2], new_sizes=rows[3])
 
 
 def describe_networks(samples: Samples, training_rows: Tensor, config: LearningConfig) -> ModelMeta:
@@ -363,7 +363,7 @@ def train(
         found = held_out.calibrate(models, samples, sides.validation)
         models = replace(models, meta=meta.model_copy(update={"calibration": found}))
     stored = held_out.measure_models(models, samples, sides.training, sides.validation).to_json()
-    for side, rows in (("test", sides.test), ("test_known", sides.test_known)):
+    for side, rows in (("test", sides.test), ("new_sizes", sides.new_sizes)):
         if len(rows):
             stored[side] = held_out.measure_models(models, samples, sides.training, rows).to_json()
     return replace(models, meta=models.meta.model_copy(update={"metrics": stored})), history

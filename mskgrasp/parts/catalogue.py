@@ -31,8 +31,8 @@ THIN = 0.004
 NEIGHBOUR = 1.10
 """Parts of a family whose sorted edges all differ by less than this factor are near-duplicates."""
 
-Split = Literal["train", "validation", "test", "test_known"]
-SPLITS: tuple[Split, ...] = ("train", "validation", "test", "test_known")
+Split = Literal["train", "validation", "test", "new_sizes"]
+SPLITS: tuple[Split, ...] = ("train", "validation", "test", "new_sizes")
 _FAMILY_SHARES: dict[Split, float] = {"test": 0.15, "validation": 0.08}
 _KNOWN_SHARE = 0.08
 
@@ -259,14 +259,14 @@ def split_of(family: str, group: str) -> Split:
     """The split of a part, by hashes of names, so that it never changes.
 
     ``test`` and ``validation`` are whole families, with their variants: nothing like them is trained on.
-    ``test_known`` are groups of near-duplicates within the other families.
+    ``new_sizes`` are groups of near-duplicates within the other families.
     """
     number = _hash(f"family {VARIANT_OF.get(family, family)}")
     for side, share in _FAMILY_SHARES.items():
         number -= share
         if number < 0:
             return side
-    return "test_known" if _hash(group) < _KNOWN_SHARE else "train"
+    return "new_sizes" if _hash(group) < _KNOWN_SHARE else "train"
 
 
 def _hash(name: str) -> float:
@@ -277,7 +277,7 @@ def chosen_names(words: Iterable[str]) -> list[str]:
     """Names of parts by names, folders, or the sets below.
 
     ``starter``: 25 parts, built in a few seconds. ``catalogue``: all parts of the catalogue.
-    ``train``, ``validation``, ``test``, ``test_known``: the parts of the catalogue in that split.
+    ``train``, ``validation``, ``test``, ``new_sizes``: the parts of the catalogue in that split.
 
     Raises:
         BadPart: A set of the catalogue is named before the catalogue is built.

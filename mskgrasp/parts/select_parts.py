@@ -14,7 +14,7 @@ from mskgrasp.parts.catalogue import SPLITS, chosen_names
 def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int = 0) -> list[str]:
     """Names or folders of parts by names, folders and sets.
 
-    ``train``, ``validation``, ``test`` and ``test_known``: the sets of the model, where its training names
+    ``train``, ``validation``, ``test`` and ``new_sizes``: the sets of the model, where its training names
     them; otherwise those of the catalogue, all but the first without parts that the model was trained on.
     ``all``: every part of the starter set. Other words as in `mskgrasp.parts.chosen_names`.
 

@@ -117,7 +117,7 @@ def score(samples: Samples, config: LearningConfig, share: float) -> dict[str, f
     drawn = torch.randperm(len(sides.training), generator=torch.Generator().manual_seed(0))
     training = sides.training[drawn[: round(share * len(drawn))].sort().values]
     none = training[:0]
-    sides = Sides(training=training, validation=sides.validation, test=none, test_known=none)
+    sides = Sides(training=training, validation=sides.validation, test=none, new_sizes=none)
     with tempfile.TemporaryDirectory() as folder:
         models, _ = train(samples, config, checkpoint_path=Path(folder) / "checkpoint", sides=sides)
     gqn, gdn = models.meta.metrics["gqn"], models.meta.metrics["gdn"]
