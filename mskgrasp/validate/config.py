@@ -192,11 +192,11 @@ class ValidateConfig(Config):
         """Grasps of each part that are tried under a variant."""
         return min(self.grasps_per_part, self.variant_grasps_per_part)
 
-    def candidates(self) -> list[str]:
-        """Settings of the grid from which data may be collected, production's included."""
+    def candidates(self) -> dict[str, tuple[int, int]]:
+        """Rate and iterations of the grid's settings, production's included, from which data may be collected."""
         pairs = {(rate, count) for rate in self.rates_hz for count in self.iterations}
         pairs.add((self.physics.rate_hz, self.physics.position_iterations))
-        return [setting_name(*pair) for pair in sorted(pairs) if pair[0] >= LEAST_RATE_HZ]
+        return {setting_name(*pair): pair for pair in sorted(pairs) if pair[0] >= LEAST_RATE_HZ}
 
     def settings(self) -> list[Setting]:
         """All that is simulated: production and its floor, references and floors, the grid, variants."""

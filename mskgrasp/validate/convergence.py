@@ -82,7 +82,7 @@ class Convergence:
 def measure_convergence(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> Convergence:
     """Compare the outcomes under all settings."""
     compared = grid(config, outcomes)
-    setting, shown = choose(compared)
+    setting, shown = choose(compared, config.candidates())
     own = next(one for one in compared if one.setting == config.production)
     return Convergence(
         production=config.production,

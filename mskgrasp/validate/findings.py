@@ -143,15 +143,22 @@ def grid(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> list[Setti
     return sorted(found, key=lambda one: one.found.cpu_ms)
 
 
-def choose(candidates: list[SettingComparison]) -> tuple[str, bool]:
+def choose(compared: list[SettingComparison], candidates: Mapping[str, tuple[int, int]]) -> tuple[str, bool]:
     """The cheapest setting that is equivalent, and True.
 
-    Where none is shown to be: False, and the cheapest one whose estimates, if not their intervals, are within
-    the margins; without such a one, that of least excess.
+    All finer ones must be, too: near the margin a coarse setting may pass by the luck of the draw. Where none
+    is shown to be: False, and the cheapest one whose estimates, if not their intervals, are within the
+    margins; without such a one, that of least excess.
+
+    Args:
+        compared: The settings against the reference.
+        candidates: Their rates and iterations by name.
     """
-    by_cost = sorted(candidates, key=lambda one: one.found.cpu_ms)
+    by_cost = sorted(compared, key=lambda one: one.found.cpu_ms)
+    failed = [candidates[one.setting] for one in compared if not one.passed]
     for one in by_cost:
-        if one.passed:
+        rate, iterations = candidates[one.setting]
+        if not any(finer >= rate and more >= iterations for finer, more in failed):
             return one.setting, True
     likely = [one for one in by_cost if _likely(one.displacement) and _likely(one.success)]
     if likely:

@@ -93,7 +93,10 @@ def choice_text(record: Record) -> str:
     choice, margins = record["choice"], record["settings"]["margins"]
     within = f"{1e3 * margins['displacement']:g} mm and {1e2 * margins['success']:g} points of S"
     if choice["shown"]:
-        said = f"The cheapest setting that is equivalent within {within} is {choice['setting']}."
+        said = (
+            f"The cheapest setting that, with all finer ones, is equivalent within {within} is "
+            f"{choice['setting']}."
+        )
     else:
         said = (
             f"No setting is shown to be equivalent within {within}; the cheapest whose estimates are within "

@@ -36,7 +36,9 @@ def test_the_cheapest_equivalent_setting_is_chosen():
     same = outcomes(40)
     near, far = moved(same, [1e-4, 0, 0, 0]), moved(same, [1e-3, 0, 0, 0])
     settings = [judged(near, "dear", 90), judged(near, "cheap", 40), judged(far, "wrong", 10)]
-    assert choose(settings) == ("cheap", True)
+    sizes = {"dear": (1000, 50), "cheap": (500, 50), "wrong": (250, 15)}
+    assert choose(settings, sizes) == ("cheap", True)
+    assert choose(settings, sizes | {"wrong": (500, 100)}) == ("dear", True)  # finer than the cheap one
     [said] = settings[2].complaints()
     assert said.startswith("median displacement beyond the floor: +0.9") and "the margin of 0.25" in said
     assert settings[2].displacement.estimate == pytest.approx(1e-3 - 8e-5, abs=3e-5)
@@ -52,8 +54,11 @@ def test_where_nothing_passes_the_choice_is_by_cost_among_the_likely():
     far = moved(same, [1e-3, 0, 0, 0])
     one = compare_with_reference(found(likely=likely), "likely", REFERENCE, 8, Margins())
     assert not one.passed and "success rate" in one.complaints()[0]
-    assert choose([judged(far, "wrong", 10), one]) == ("likely", False)
-    assert choose([judged(far, "wrong", 10)]) == ("wrong", False)
+    assert choose([judged(far, "wrong", 10), one], {"wrong": (250, 15), "likely": (500, 50)}) == (
+        "likely",
+        False,
+    )
+    assert choose([judged(far, "wrong", 10)], {"wrong": (250, 15)}) == ("wrong", False)
 
 
 def test_a_constant_bias_cannot_hide_behind_the_floor():

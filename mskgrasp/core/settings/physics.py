@@ -26,7 +26,7 @@ class Physics(Config):
     rest. The first 6 mm of the lift, in which the part leaves the table, and the last 20 ms before the part's
     pose in the hand is measured use ``rate_hz``, as does the simulated cell (`hal.sim`) while its hand holds
     a part or is near one. At 250 Hz parts swing in the hand, by up to 13 degrees more than at 1000 Hz."""
-    position_iterations: int = Field(default=25, ge=4)
+    position_iterations: int = Field(default=50, ge=4)
     """Solver iterations a step; `validate` compares them."""
     hold_iterations: int = Field(default=50, ge=4)
     """The same, if more, while a part is lifted and held. With 25 some parts swing in the hand that friction
