@@ -20,7 +20,7 @@ $(READY): pyproject.toml .ci/constraints.txt .ci/setup
 
 # Tests need what collecting and planning do without: [cad] (700 MB), Ray, the drivers, and a browser (100 MB).
 $(TESTABLE): pyproject.toml .ci/constraints.txt .ci/setup
-	PYTHON=$(PYTHON) EXTRAS=dev,cad,cluster,franka,mujoco BROWSER=yes .ci/setup
+	PYTHON=$(PYTHON) EXTRAS=dev,cad,cluster,franka,mujoco,parquet BROWSER=yes .ci/setup
 	@touch $@ $(READY)
 
 collect: $(READY) ## Collect the demo dataset into data/demo (the main job; resumes)

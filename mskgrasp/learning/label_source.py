@@ -6,7 +6,11 @@ from collections.abc import Iterable
 from typing import Any
 
 from mskgrasp.core.config import Config
+from mskgrasp.core.settings import Physics
 from mskgrasp.dataset import ShardInfo
+
+SAME_HEIGHT = 0.05
+"""Camera heights that differ by less are the same, metres: perspective changes by a twentieth."""
 
 
 class LabelSource(Config):
@@ -48,3 +52,34 @@ def distinct(sources: Iterable[LabelSource]) -> tuple[LabelSource, ...]:
         if source not in found:
             found.append(source)
     return tuple(found)
+
+
+def source_text(source: LabelSource) -> str:
+    """Simulation, camera and drawn errors in one line."""
+    drawn = "; ".join(
+        f"{name} {' to '.join(map(str, value)) if isinstance(value, (list, tuple)) else value}"
+        for name, value in sorted(source.noise.items())
+    )
+    return (
+        f"simulation version {source.simulation}, fidelity {source.fidelity}, camera "
+        f"{source.camera_height:.2f} m over the table, errors of the cell: {drawn or 'none'}"
+    )
+
+
+def other_conditions(source: LabelSource, physics: Physics | None, camera_height: float | None) -> list[str]:
+    """Conditions of a cell that the labels were not made under, in words.
+
+    Args:
+        source: Of a model's labels.
+        physics: Settings of a simulated cell; None: a real one.
+        camera_height: Height of the camera above the table, metres; None: not known.
+    """
+    found = []
+    if camera_height is not None and abs(camera_height - source.camera_height) > SAME_HEIGHT:
+        found.append(f"camera {camera_height:.2f} m over the table, not {source.camera_height:.2f}")
+    for name, value in ({} if physics is None else physics.model_dump()).items():
+        usual, drawn = source.physics.get(name), source.noise.get(name)
+        low, high = drawn if isinstance(drawn, (list, tuple)) else (usual, usual)
+        if isinstance(value, float) and low is not None and not low <= value <= high:
+            found.append(f"{name} {value:g}, not {low:g}" + (f" to {high:g}" if high > low else ""))
+    return found

@@ -193,7 +193,7 @@ class ValidateConfig(Config):
         return min(self.grasps_per_part, self.variant_grasps_per_part)
 
     def candidates(self) -> dict[str, tuple[int, int]]:
-        """Rate and iterations of the grid's settings, production's included, from which data may be collected."""
+        """Rate and iterations of the grid's settings from which data may be collected, production's too."""
         pairs = {(rate, count) for rate in self.rates_hz for count in self.iterations}
         pairs.add((self.physics.rate_hz, self.physics.position_iterations))
         return {setting_name(*pair): pair for pair in sorted(pairs) if pair[0] >= LEAST_RATE_HZ}

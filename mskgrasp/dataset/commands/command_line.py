@@ -16,6 +16,7 @@ from mskgrasp.dataset.check import check_dataset, require_dataset
 from mskgrasp.dataset.commands.maniskill import export_maniskill
 from mskgrasp.dataset.export import export_npz
 from mskgrasp.dataset.labels import export_labels
+from mskgrasp.dataset.parquet import CARD, export_parquet
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table
@@ -56,7 +57,7 @@ class InfoCommand:
 
 @dataclass(frozen=True, kw_only=True)
 class ExportCommand:
-    """Write a dataset for other tools (.npz, or ManiSkill's .h5 and .json), or its labels without images.
+    """Write a dataset for other tools (.npz, Parquet, ManiSkill's .h5 and .json), or its labels alone.
 
     docs/dataset.md has the layouts. An existing file is not overwritten.
 
@@ -65,11 +66,13 @@ class ExportCommand:
 
     folder: tyro.conf.Positional[Path]
     """Folder of the dataset."""
-    format: Literal["npz", "maniskill", "labels"]
+    format: Literal["npz", "maniskill", "parquet", "labels"]
     """npz: all arrays in one file, for numpy. maniskill: a trajectory an attempt, for ManiSkill's loaders.
+    parquet: one file with images and a card beside it, to publish (pip install 'mskgrasp[parquet]').
     labels: no images; `mskgrasp.collect --labels` renders them and makes the dataset again."""
     out: Path
-    """The file to write, ending in .npz, .h5 or .labels; with .h5 comes a .json file of the same name."""
+    """The file to write, ending in .npz, .h5, .parquet or .labels; with .h5 comes a .json file of the same
+    name, with .parquet a README.md."""
 
 
 VERBS = {"check": CheckCommand, "info": InfoCommand, "export": ExportCommand}
@@ -134,6 +137,9 @@ def run_export(verb: ExportCommand) -> int:
     require_dataset(verb.folder)
     if verb.format == "npz":
         n, files = export_npz(verb.folder, verb.out, _with_progress), [verb.out]
+    elif verb.format == "parquet":
+        n = export_parquet(verb.folder, verb.out, _with_progress)
+        files = [verb.out, verb.out.parent / CARD]
     elif verb.format == "labels":
         n, files = export_labels(verb.folder, verb.out, _with_progress), [verb.out]
     else:
