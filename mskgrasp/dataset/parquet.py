@@ -37,9 +37,9 @@ _LAYOUT = """
 ## Layout
 
 A row of `{file}` is an attempt. `depth` is a PNG of 16 bits in units of 0.1 mm along the optical axis, 0
-where invalid; columns that only a held part has are null where the grasp failed. Units and frames of the other
-columns are in the metadata of each field; camera, region, physics and drawn errors in that of the schema, as
-JSON under `mskgrasp`.
+where invalid; what only a held part has is null where the grasp failed. Units and frames of the other columns
+are in the metadata of each field; camera, region, physics and drawn errors in that of the schema, as JSON
+under `mskgrasp`.
 """
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from mskgrasp.core.grasp import ASKEW
 from mskgrasp.core.settings import Physics
 from mskgrasp.learning.grasp_models import ModelMeta
-from mskgrasp.learning.label_source import LabelSource
+from mskgrasp.learning.label_source import LabelSource, source_text
 
 _LIMITS = """\
 - For a Franka Hand with its standard pads (80 mm opening), vertical grasps of a single part on a flat table,
@@ -74,18 +74,12 @@ def _result_lines(report: dict[str, Any]) -> list[str]:
 
 
 def _label_lines(source: LabelSource) -> str:
-    """Simulation, camera, settings that differ from today's defaults, and drawn errors, a line each."""
+    """Simulation, camera and drawn errors, and settings that differ from today's defaults, a line each."""
     usual = Physics().model_dump()
     other = [f"{name} {value}" for name, value in source.physics.items() if usual.get(name) != value]
-    drawn = [
-        f"{name} {' to '.join(map(str, value)) if isinstance(value, (list, tuple)) else value}"
-        for name, value in sorted(source.noise.items())
-    ]
     return (
-        f"- simulation version {source.simulation}, fidelity {source.fidelity}, seed {source.seed}\n"
-        f"- camera {source.camera_height:.3f} m above the table\n"
-        f"- physics other than today's: {', '.join(other) or 'none'}\n"
-        f"- errors of the cell: {', '.join(drawn) or 'none'}"
+        f"- {source_text(source)}; seed {source.seed}\n"
+        f"- physics other than today's: {', '.join(other) or 'none'}"
     )
 
 

@@ -9,9 +9,10 @@ import pytest
 
 from mskgrasp.core.errors import BadModel
 from mskgrasp.core.grasp import HAND_GEOMETRY
+from mskgrasp.core.settings import Physics
 from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.learning.grasp_models import DESCRIPTION, PRETRAINED, load_models
-from mskgrasp.learning.label_source import distinct, source_of
+from mskgrasp.learning.label_source import LabelSource, distinct, other_conditions, source_of, source_text
 from mskgrasp.learning.model_card import model_card
 
 
@@ -50,3 +51,22 @@ def test_a_model_of_another_hand_is_refused(tmp_path: Path, collected: Path):
     folder = described(tmp_path, collected, max_opening=0.1)
     with pytest.raises(BadModel, match=r"another hand \(max_opening 100\.0 mm\)"):
         load_models(folder)
+
+
+def test_conditions_other_than_those_of_the_labels_are_named():
+    source = LabelSource(
+        simulation="4", fidelity="cpu", physics=Physics().model_dump(), hand={}, camera_height=0.8, seed=0,
+        noise={"friction_pad_part": (0.3, 0.8), "arm_position_std": 0.001},
+    )  # fmt: skip
+    assert other_conditions(source, Physics(friction_pad_part=0.7), 0.82) == []
+    assert other_conditions(source, None, None) == []
+    smooth = Physics(friction_pad_part=0.2, friction_table_part=0.6)
+    assert other_conditions(source, smooth, 1.1) == [
+        "camera 1.10 m over the table, not 0.80",
+        "friction_pad_part 0.2, not 0.3 to 0.8",
+        "friction_table_part 0.6, not 0.4",
+    ]
+    assert source_text(source) == (
+        "simulation version 4, fidelity cpu, camera 0.80 m over the table, errors of the cell: "
+        "arm_position_std 0.001; friction_pad_part 0.3 to 0.8"
+    )
