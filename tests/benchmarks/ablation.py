@@ -59,6 +59,7 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         "twice the channels": with_(network={"layers": (16, 64), "displacement_layers": (32, 64, 64)}),
         "no half turns and mirror images": with_(symmetric=False, network={"symmetric_views": False}),
         "one view of each grasp": with_(network={"symmetric_views": False}),
+        "the swing is predicted, too": with_(network={"swing": True}),
         "plain likelihood (beta 0)": with_(beta=0.0),
         "beta 1": with_(beta=1.0),
         "no noise": with_(noise_std=0.0),
@@ -78,6 +79,7 @@ def main() -> None:
     parser.add_argument(
         "--share", type=float, default=1.0, help="of the attempts to learn from; the paper's network is slow"
     )
+    parser.add_argument("--seeds", type=int, default=1, help="trainings of each choice")
     parser.add_argument("--only", nargs="*", help="how the names of the wanted choices begin")
     options = parser.parse_args()
     torch.set_num_threads(min(2, os.cpu_count() or 1))
@@ -94,21 +96,32 @@ def main() -> None:
         if not options.only or name.startswith(tuple(options.only))
     }
     known: dict[tuple[int, int, float], Samples] = {}
-    found = {}
-    for name, config in progress(chosen.items(), unit="network"):
+    found, spread = {}, {}
+    for name, config in progress(chosen.items(), unit="choice"):
         look = (*config.network.patch_shape, config.network.patch_side)
         if look not in known:
             known[look] = read_samples(options.data, config.network).of_parts_between(*config.success_range)
-        found[name] = score(known[look], config, options.share)
+        each = [
+            score(known[look], config.model_copy(update={"seed": seed}), options.share)
+            for seed in range(options.seeds)
+        ]
+        found[name] = {key: float(np.mean([one[key] for one in each])) for key in each[0]}
+        spread[name] = {key: float(np.std([one[key] for one in each])) for key in each[0]}
         Console(width=150, stderr=True).print(name, found[name])
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("choice")
     for column in next(iter(found.values())):
         table.add_column(column, justify="right")
     for name, values in found.items():
-        table.add_row(name, *(f"{value:.3g}" if np.isfinite(value) else "-" for value in values.values()))
-    Console(width=150).print(table)
-    print(json.dumps(found))
+        table.add_row(name, *(_cell(value, spread[name][key]) for key, value in values.items()))
+    Console(width=190).print(table)
+    print(json.dumps({"mean": found, "deviation over seeds": spread}))
+
+
+def _cell(value: float, spread: float) -> str:
+    if not np.isfinite(value):
+        return "-"
+    return f"{value:.3g} +- {spread:.2g}" if spread > 0 else f"{value:.3g}"
 
 
 def score(samples: Samples, config: LearningConfig, share: float) -> dict[str, float]:
@@ -133,6 +146,7 @@ def score(samples: Samples, config: LearningConfig, share: float) -> dict[str, f
         "AUSE": gdn["ause_translation"],
         "surest 10 %, mm": 1e3 * surest[0],
         "surest 10 %, deg": float(np.degrees(surest[1])),
+        "surest 10 %, askew %": 100 * surest[2],
     }
 
 
