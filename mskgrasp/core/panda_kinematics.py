@@ -46,6 +46,22 @@ def forward(q: Array) -> tuple[Array, Array]:
         jacobian: (..., 6, 7), linear rows above angular ones, base frame.
     """
     xp = array_namespace(q)
+    frames = joint_frames(q)
+    frame = frames[7]
+    tip = frame[..., :3, 3]
+    axes = xp.stack([joint_frame[..., :3, 2] for joint_frame in frames[:7]], axis=-1)
+    origins = xp.stack([joint_frame[..., :3, 3] for joint_frame in frames[:7]], axis=-1)
+    linear = xp.linalg.cross(axes, tip[..., None] - origins, axis=-2)
+    return frame, xp.concat([linear, axes], axis=-2)
+
+
+def joint_frames(q: Array) -> list[Array]:
+    """Frames of the seven joints, then of the TCP, in the base: eight arrays (..., 4, 4).
+
+    Args:
+        q: (..., 7) joint angles, radians.
+    """
+    xp = array_namespace(q)
     angles = [*components(q), xp.full(q.shape[:-1], -math.pi / 4, dtype=q.dtype, device=device(q))]
     links = _links(
         xp.stack(angles, axis=-1), (*DH_A, 0.0), (*DH_D, FLANGE_OFFSET + TCP_OFFSET), (*DH_ALPHA, 0.0)
@@ -55,11 +71,7 @@ def forward(q: Array) -> tuple[Array, Array]:
     for joint in range(1, 8):
         frame = frame @ links[..., joint, :, :]
         frames.append(frame)
-    tip = frame[..., :3, 3]
-    axes = xp.stack([joint_frame[..., :3, 2] for joint_frame in frames[:7]], axis=-1)
-    origins = xp.stack([joint_frame[..., :3, 3] for joint_frame in frames[:7]], axis=-1)
-    linear = xp.linalg.cross(axes, tip[..., None] - origins, axis=-2)
-    return frame, xp.concat([linear, axes], axis=-2)
+    return frames
 
 
 def forward_pose(q: np.ndarray) -> Pose:
@@ -173,5 +185,11 @@ def within_limits(q: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> bool:
 
 def reachable(T_base_tcp: Pose, lower: np.ndarray, upper: np.ndarray) -> bool:
     """Whether the pose is reached within joint limits (7,) from `HOME`: elbow up, hand down."""
+    q, error = solve(T_base_tcp)
+    return error < POSE_TOLERANCE and within_limits(q, lower, upper)
+
+
+def solve(T_base_tcp: Pose) -> tuple[np.ndarray, float]:
+    """Joints (7,) at which the hand is at a pose, from `HOME`: elbow up; and their remaining error."""
     q, error = track(T_base_tcp.as_matrix()[None], np.array(HOME), iterations=40)
-    return bool(error[0] < POSE_TOLERANCE) and within_limits(q, lower, upper)
+    return q[0], float(error[0])
