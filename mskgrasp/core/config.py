@@ -8,6 +8,7 @@ from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
 
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.files import write_whole
@@ -130,6 +131,12 @@ def _annotation_at(model: type[BaseModel], location: tuple[int | str, ...]) -> A
         if discriminator is not None:
             current, discriminator = _members(current, discriminator).get(str(part)), None
             continue
+        if isinstance(part, int):  # an item of a tuple
+            item = next(iter(get_args(current)), None)
+            current, *notes = get_args(item) or (item,)
+            tags = (one.discriminator for one in notes if isinstance(one, FieldInfo))
+            discriminator = next((tag for tag in tags if isinstance(tag, str)), None)
+            continue
         field = getattr(current, "model_fields", {}).get(part)
         if field is None:
             return None
@@ -139,7 +146,8 @@ def _annotation_at(model: type[BaseModel], location: tuple[int | str, ...]) -> A
 
 def _members(union: Any, discriminator: str) -> dict[str, type[BaseModel]]:
     """Members of a tagged union by their tags."""
-    return {str(member.model_fields[discriminator].default): member for member in get_args(union)}
+    tags = ((get_args(member.model_fields[discriminator].annotation), member) for member in get_args(union))
+    return {str(tag): member for legal, member in tags for tag in legal}
 
 
 def _reason(error: Exception) -> str:
