@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hal.collisions import check_joints, check_path, line_joints
 from hal.device import Device
 from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
 from hal.limits import (
@@ -23,6 +24,7 @@ from hal.limits import (
 )
 from mskgrasp.core.geometry import Pose, pose_distance
 from mskgrasp.core.grasp import MAX_OPENING
+from mskgrasp.core.panda_body import Links
 
 JOINT_TOLERANCE = 5e-3
 """Greatest error of each joint at the end of a joint motion, radians."""
@@ -80,9 +82,11 @@ class Arm(Device):
 
     Attributes:
         simulated: Nothing moves in the real world, so no operator needs to confirm.
+        links: Outline of the arm, which keeps off table and keep-outs; None: the hand alone is checked.
     """
 
     simulated: bool = False
+    links: Links | None = None
 
     def __init__(self, limits: ArmLimits):
         self.limits = limits
@@ -105,7 +109,8 @@ class Arm(Device):
         """Move all joints to (7,) radians at a fraction ``speed`` of their greatest speeds.
 
         Raises:
-            OutOfWorkspace: A joint limit would be passed; nothing moved.
+            OutOfWorkspace: A joint limit would be passed, or a link would come too near to the table or a
+                keep-out; nothing moved.
             MotionAborted: Stopped, in contact, or not arrived.
             NeedsRecovery: An earlier error was not acknowledged.
         """
@@ -114,7 +119,10 @@ class Arm(Device):
         if not 0 < speed <= 1:
             raise OutOfWorkspace(f"speed {speed:g} is outside 0 .. 1 (a fraction of the greatest)")
         with self._motion():
-            check_joint_path(self.limits, self._forward, self._state().joints, target)
+            here = self._state().joints
+            check_joint_path(self.limits, self._forward_all, here, target)
+            if self.links is not None:
+                check_path(self.links, self.limits, np.stack([here, target]), "the way to these joints")
             self._move_to_joints(target, speed)
             error = np.abs(self._state().joints - target).max()
             if error > JOINT_TOLERANCE:
@@ -124,7 +132,8 @@ class Arm(Device):
         """Move the TCP along a straight line to a pose, ``speed`` m/s at most.
 
         Raises:
-            OutOfWorkspace: The pose is outside the box, too near the table, or out of reach; nothing moved.
+            OutOfWorkspace: The pose is outside the box, too near the table, or out of reach, or a link would
+                come too near to the table or a keep-out; nothing moved.
             MotionAborted: Stopped, in contact, or not arrived.
             NeedsRecovery: An earlier error was not acknowledged.
         """
@@ -132,7 +141,7 @@ class Arm(Device):
         if not 0 < speed <= 1:
             raise OutOfWorkspace(f"speed {speed:g} m/s is outside 0 .. 1 m/s")
         with self._motion():
-            check_line(self.limits, self._state().T_base_tcp, T_base_tcp)
+            self._check_line(self.limits, T_base_tcp)
             self._move_to_pose(T_base_tcp, speed)
             self._check_arrival(T_base_tcp)
 
@@ -164,7 +173,7 @@ class Arm(Device):
         limits = touching(self.limits)
         self._check_pose(limits, T_base_tcp)
         with self._motion():
-            check_line(limits, self._state().T_base_tcp, T_base_tcp)
+            self._check_line(limits, T_base_tcp)
             contact = self._move_until_contact(T_base_tcp, force, speed)
             if contact is None:
                 self._check_arrival(T_base_tcp)
@@ -254,6 +263,16 @@ class Arm(Device):
         check_target_pose(limits, T_base_tcp)
         if not self._reachable(T_base_tcp):
             raise OutOfWorkspace(f"TCP target {shown(T_base_tcp.position)} m is out of the arm's reach")
+        if self.links is not None:
+            # Where it is exactly depends on the way there: what touches nowhere is left to the motion.
+            check_joints(self.links, limits, self.links.joints_at(T_base_tcp), margin=0.0)
+
+    def _check_line(self, limits: ArmLimits, T_base_tcp: Pose) -> None:
+        here = self._state()
+        check_line(limits, here.T_base_tcp, T_base_tcp)
+        if self.links is not None:
+            path = line_joints(self.links, here.joints, here.T_base_tcp, T_base_tcp)
+            check_path(self.links, limits, path, "the straight line to this pose")
 
     def _check_arrival(self, T_base_tcp: Pose) -> None:
         distance, angle = pose_distance(self._state().T_base_tcp, T_base_tcp)
@@ -303,6 +322,14 @@ class Arm(Device):
     @abstractmethod
     def _forward(self, joints: np.ndarray) -> Pose:
         """``T_base_tcp`` at joints (7,)."""
+
+    def _forward_all(self, joints: np.ndarray) -> Pose:
+        """``T_base_tcp`` (k,) at joints (k, 7); a backend may do it faster."""
+        poses = [self._forward(one) for one in joints]
+        return Pose(
+            position=np.stack([pose.position for pose in poses]),
+            quat_wxyz=np.stack([pose.quat_wxyz for pose in poses]),
+        )
 
     @abstractmethod
     def _reachable(self, T_base_tcp: Pose) -> bool:

@@ -52,6 +52,11 @@ class Camera(Device):
         """Whether its pose was measured by hand, good to centimetres: `execute_grasp` then refuses."""
         return False
 
+    @property
+    def T_base_camera(self) -> Pose | None:
+        """Pose of the optical frame as far as it is known before a frame: its body is a keep-out there."""
+        return None
+
     @abstractmethod
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
         """Take a fresh frame.

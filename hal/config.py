@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from hal.arm import POSITION_TOLERANCE
+from hal.keep_out_config import KeepOutConfig
 from hal.sensor_noise import SensorNoise
 from mskgrasp.core.config import Config
 from mskgrasp.core.geometry import Pose
@@ -54,6 +55,8 @@ class WorkspaceConfig(Config):
     """Height by which a grasped part is lifted, m."""
     grasp_force: float = Field(default=30.0, gt=0, le=70)
     """Gripper force, N."""
+    keep_out: tuple[KeepOutConfig, ...] = ()
+    """Spheres, capsules and boxes that no link enters, such as posts; the camera makes its own."""
 
     @model_validator(mode="after")
     def _check(self) -> WorkspaceConfig:
@@ -129,6 +132,8 @@ class SimulatedCellConfig(Config):
     """Gripper force, N."""
     clearance: float = Field(default=TABLE_CLEARANCE, ge=TABLE_CLEARANCE, le=0.05)
     """Least distance of the pads from the table, m."""
+    keep_out: tuple[KeepOutConfig, ...] = ()
+    """Spheres, capsules and boxes that no link enters; the camera makes its own."""
     table_error: TableError = TableError()
     """Error of the table that programs are not told; none by default."""
     camera: Overhead = Overhead()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, assert_never, get_args
 
@@ -14,6 +15,8 @@ from hal.cell import Cell, PartFeeder, Workspace
 from hal.config import DevicesConfig, WorkspaceConfig
 from hal.errors import OutOfWorkspace
 from hal.execute import APPROACH
+from hal.keep_out import camera_keep_out
+from hal.keep_out_config import keep_outs
 from hal.limits import ArmLimits
 from mskgrasp.core.config import check_config
 from mskgrasp.core.errors import BadConfig
@@ -43,6 +46,9 @@ def devices_cell(values: dict[str, Any], path: Path) -> Cell:
     )
     arm = _arm(config.arm, table, workspace, path)
     camera, feeder = _camera(config.camera, workspace, path)
+    if arm.links is not None and camera.T_base_camera is not None:
+        body = camera_keep_out(camera.T_base_camera)
+        arm.limits = replace(arm.limits, keep_out=(body, *arm.limits.keep_out))
     return Cell(camera=camera, arm=arm, workspace=workspace, feeder=feeder)
 
 
@@ -71,6 +77,7 @@ def _arm(values: dict[str, Any], table: WorkspaceConfig, workspace: Workspace, p
                 clearance=table.clearance,
                 table_slope=np.array(table.table_slope),
                 table_centre=workspace.centre,
+                keep_out=keep_outs(table.keep_out),
             )
             arm = FrankaArm(config, limits)
             _check_fit(arm, workspace, path)

@@ -8,11 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hal.errors import OutOfWorkspace
-from mskgrasp.core.geometry import Pose, straight_line
+from hal.keep_out import KeepOut
+from mskgrasp.core.geometry import Pose, pose_distance, quat_rotate, straight_line
 from mskgrasp.core.grasp import PAD_REACH, TABLE_CLEARANCE
 
-_CHECKS = 33
-"""Checked points of a motion; on a motion of 2 m they are 6 cm apart."""
+_STEP = 0.01
+"""Greatest distance between two checked points of a straight motion, metres."""
+_TURN = 0.02
+"""Greatest turn of the hand between them, radians: a corner of the palm moves by 2 mm."""
+_JOINT_STEP = 0.02
+"""Greatest angle, summed over the joints, between two checked points of a joint motion, radians."""
 TOUCH_DEPTH = 0.05
 """Depth under the table's stated height to which the pads may be moved in search of it, metres."""
 _SLACK = 1e-3
@@ -46,6 +51,7 @@ class ArmLimits:
         clearance: Least distance of the hand from the table, metres.
         table_slope: (2,) rise of the table along x and along y, metres a metre.
         table_centre: (2,) point at which the table is at ``table_z``, base frame, metres.
+        keep_out: Space that no link enters, for an arm whose links are known (`hal.collisions`).
     """
 
     joint_lower: np.ndarray
@@ -57,12 +63,16 @@ class ArmLimits:
     clearance: float = TABLE_CLEARANCE
     table_slope: np.ndarray = field(default_factory=lambda: np.zeros(2))
     table_centre: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    keep_out: tuple[KeepOut, ...] = ()
 
-    def over_table(self, T_base_tcp: Pose) -> float:
-        """Distance of the open hand's lowest corner from the table, metres; negative below it."""
-        corners = T_base_tcp.apply(_HAND_CORNERS)
-        table = plane_height(corners[:, :2], self.table_z, self.table_slope, self.table_centre)
-        return float((corners[:, 2] - table).min())
+    def over_table(self, T_base_tcp: Pose) -> np.ndarray:
+        """Distances (...) of the open hand's lowest corner from the table, metres; negative below it."""
+        position, quat_wxyz = (
+            np.asarray(value)[..., None, :] for value in (T_base_tcp.position, T_base_tcp.quat_wxyz)
+        )
+        corners = quat_rotate(quat_wxyz, _HAND_CORNERS) + position
+        table = plane_height(corners[..., :2], self.table_z, self.table_slope, self.table_centre)
+        return (corners[..., 2] - table).min(axis=-1)
 
 
 def plane_height(
@@ -108,7 +118,7 @@ def check_target_pose(limits: ArmLimits, T_base_tcp: Pose) -> None:
         raise OutOfWorkspace(f"a target's quaternion must have length 1, got {quat_wxyz.tolist()} (w x y z)")
     if _outside(limits, position) > 0:
         raise OutOfWorkspace(f"TCP target {shown(position)} m is outside the workspace {_box(limits)}")
-    over = limits.over_table(T_base_tcp)
+    over = float(limits.over_table(T_base_tcp))
     if over < limits.clearance - 1e-6:
         raise OutOfWorkspace(
             f"TCP target z {position[2]:.4f} m would bring the hand {over * 1e3:.1f} mm over the table; it "
@@ -133,12 +143,9 @@ def check_line(limits: ArmLimits, start: Pose, goal: Pose) -> None:
     Raises:
         OutOfWorkspace: Names the place.
     """
-    line = straight_line(start, goal, np.linspace(0, 1, _CHECKS))
-    _check_way(
-        limits,
-        [Pose(position=p, quat_wxyz=q) for p, q in zip(line.position, line.quat_wxyz, strict=True)],
-        "the straight line to this pose",
-    )
+    distance, angle = pose_distance(start, goal)
+    n = 2 + int(max(distance / _STEP, angle / _TURN))
+    _check_way(limits, straight_line(start, goal, np.linspace(0, 1, n)), "the straight line to this pose")
 
 
 def check_joint_path(
@@ -148,43 +155,43 @@ def check_joint_path(
 
     Args:
         limits: Limits of the arm.
-        forward: ``T_base_tcp`` at joints (7,).
+        forward: ``T_base_tcp`` (k,) at joints (k, 7).
         start: (7,) current joints, radians.
         goal: (7,) radians, within their limits.
 
     Raises:
         OutOfWorkspace: Names the place.
     """
-    end = forward(goal).position
+    n = 2 + int(np.abs(goal - start).sum() / _JOINT_STEP)
+    poses = forward(start + np.linspace(0, 1, n)[:, None] * (goal - start))
+    end = poses.position[-1]
     if _outside(limits, end) > 0:
         raise OutOfWorkspace(
             f"these joints put the TCP at {shown(end)} m, outside the workspace {_box(limits)}"
         )
-    shares = np.linspace(0, 1, _CHECKS)
-    _check_way(
-        limits, [forward(start + share * (goal - start)) for share in shares], "the way to these joints"
-    )
+    _check_way(limits, poses, "the way to these joints")
 
 
-def _check_way(limits: ArmLimits, poses: list[Pose], what: str) -> None:
-    """Refuse a path that leaves the limits; an arm guided out of them may return, but go no farther."""
-    over = np.array([limits.over_table(pose) for pose in poses])
+def _check_way(limits: ArmLimits, poses: Pose, what: str) -> None:
+    """Refuse poses (k,) that leave the limits; an arm guided out of them may return, but go no farther."""
+    over = limits.over_table(poses)
     if over.min() < min(over[0], limits.clearance) - _SLACK:
         raise OutOfWorkspace(
             f"{what} brings the hand down to {limits.table_z + over.min():.3f} m; the table is at "
             f"{limits.table_z:g} m"
         )
-    excess = np.array([_outside(limits, pose.position) for pose in poses])
+    excess = _outside(limits, poses.position)
     if excess.max() > excess[0] + _SLACK:
-        worst = poses[int(excess.argmax())].position
+        worst = poses.position[int(excess.argmax())]
         raise OutOfWorkspace(
             f"{what} passes {shown(worst)} m, outside the workspace {_box(limits)}; move there in steps"
         )
 
 
-def _outside(limits: ArmLimits, position: np.ndarray) -> float:
-    """Distance of a position from the box, metres; 0 inside."""
-    return max(0.0, float(np.maximum(limits.box_lower - position, position - limits.box_upper).max()))
+def _outside(limits: ArmLimits, position: np.ndarray) -> np.ndarray:
+    """Distances (...) of positions (..., 3) from the box, metres; 0 inside."""
+    beyond = np.maximum(limits.box_lower - position, position - limits.box_upper)
+    return np.maximum(beyond.max(axis=-1), 0.0)
 
 
 def shown(position: np.ndarray) -> str:

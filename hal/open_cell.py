@@ -8,12 +8,16 @@ from pathlib import Path
 from typing import Any, Literal, assert_never, get_args
 
 from hal.cell import Cell
+from hal.collisions import check_joints
+from hal.errors import OutOfWorkspace
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import BadConfig
 
 CellType = Literal["sapien", "mujoco", "devices", "recorded", "replay"]
 SIMULATED: tuple[CellType, ...] = ("sapien", "mujoco")
 """Types of which several may run at once."""
+BUILT_HERE: tuple[CellType, ...] = (*SIMULATED, "devices")
+"""Types that do not stand for another cell."""
 
 
 @contextmanager
@@ -46,6 +50,33 @@ def cell_from_values(values: dict[str, Any], path: Path) -> Cell:
     Raises:
         BadConfig: The values are not valid.
     """
+    cell = _build(values, path)
+    if values["type"] in BUILT_HERE:
+        _check_keep_out(cell, values, path)
+    return cell
+
+
+def _check_keep_out(cell: Cell, values: dict[str, Any], path: Path) -> None:
+    """Refuse keep-outs, or a table, that the arm at home is in or too near to.
+
+    Raises:
+        BadConfig: Names the link, what it is near to, and the remedy.
+    """
+    arm = cell.arm
+    if arm.links is None:
+        given = "workspace" in values and values["workspace"].get("keep_out")
+        if given and values["arm"].get("driver") != "replay":  # which checks nothing
+            raise BadConfig(f"{path}: the links of this arm are unknown, so that it cannot keep out; omit it")
+        return
+    try:
+        check_joints(arm.links, arm.limits, cell.workspace.home)
+    except OutOfWorkspace as error:
+        raise BadConfig(
+            f"{path}: at home {error}; move the home pose (home), or correct keep_out or the camera's pose"
+        ) from error
+
+
+def _build(values: dict[str, Any], path: Path) -> Cell:
     if values.get("type") not in get_args(CellType):
         legal = ", ".join(get_args(CellType))
         raise BadConfig(f"{path}: 'type' is {values.get('type')!r}; legal: {legal}")

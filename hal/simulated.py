@@ -16,11 +16,14 @@ from hal.cell import BoardHolder, Cell, Workspace
 from hal.config import SimulatedCellConfig, TableError
 from hal.device import SharingDevice
 from hal.errors import MotionAborted, NotConnected, OutOfWorkspace
+from hal.keep_out import KeepOut, camera_keep_out
+from hal.keep_out_config import keep_outs
 from hal.limits import ArmLimits, shown
 from hal.sensor_noise import SensorNoise, add_noise
 from mskgrasp.core.geometry import Pose, pose_distance, straight_line
 from mskgrasp.core.grasp import TABLE_CLEARANCE
 from mskgrasp.core.minimum_jerk import minimum_jerk_duration
+from mskgrasp.core.panda_body import PANDA_LINKS
 from mskgrasp.core.panda_kinematics import (
     JOINT_LOWER,
     JOINT_UPPER,
@@ -169,6 +172,11 @@ class SimulatedCamera(SharingDevice, Camera, Generic[WorldT]):
             fine_colour=fine_colour,
         )
 
+    @property
+    def T_base_camera(self) -> Pose:
+        """See `Camera.T_base_camera`."""
+        return self._world.T_base_camera
+
     @abstractmethod
     def _render(self) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
         """Colour, depth without noise, and fine colour or None, as in `RgbdFrame`."""
@@ -178,12 +186,16 @@ class SimulatedArm(SharingDevice, Arm, Generic[WorldT]):
     """The Panda of a simulated world; a contact force over the reflex limit ends a motion."""
 
     simulated = True
+    links = PANDA_LINKS
 
     def __init__(self, world: WorldT, limits: ArmLimits):
         super().__init__(limits)
         self._resource = self._world = world
 
     def _forward(self, joints: np.ndarray) -> Pose:
+        return forward_pose(joints)
+
+    def _forward_all(self, joints: np.ndarray) -> Pose:
         return forward_pose(joints)
 
     def _reachable(self, T_base_tcp: Pose) -> bool:
@@ -221,7 +233,7 @@ def contact_fault(limit: float) -> MotionAborted:
     return MotionAborted(f"contact force over {limit:.0f} N: the arm stopped; call recover() when it is safe")
 
 
-def panda_limits(clearance: float = TABLE_CLEARANCE) -> ArmLimits:
+def panda_limits(clearance: float = TABLE_CLEARANCE, keep_out: tuple[KeepOut, ...] = ()) -> ArmLimits:
     """Limits of the Panda over the simulated table, from which the hand keeps a clearance, metres."""
     return ArmLimits(
         joint_lower=np.array(JOINT_LOWER),
@@ -231,7 +243,14 @@ def panda_limits(clearance: float = TABLE_CLEARANCE) -> ArmLimits:
         table_z=TABLE_Z,
         max_force=70.0,
         clearance=clearance,
+        keep_out=keep_out,
     )
+
+
+def cell_limits(config: SimulatedCellConfig, world: SimulatedWorld) -> ArmLimits:
+    """Limits of the Panda in a simulated cell, whose camera it keeps off as a real one."""
+    camera = camera_keep_out(world.T_base_camera)
+    return panda_limits(config.clearance, (camera, *keep_outs(config.keep_out)))
 
 
 def simulated_cell(

@@ -30,6 +30,7 @@ from hal.franka.path import JointPath, joint_path, straight_path
 from hal.limits import ArmLimits
 from mskgrasp.core.geometry import Pose, pose_distance
 from mskgrasp.core.grasp import MAX_OPENING
+from mskgrasp.core.panda_body import PANDA_LINKS
 from mskgrasp.core.panda_kinematics import forward_pose, reachable
 
 TURN_SPEED = 1.0
@@ -55,6 +56,8 @@ class FrankaArm(Arm):
         config: Driver, robot, speeds and forces.
         limits: Limits of every command.
     """
+
+    links = PANDA_LINKS
 
     def __init__(self, config: FrankyArmConfig | PandaPyArmConfig, limits: ArmLimits):
         super().__init__(limits)
@@ -130,6 +133,9 @@ class FrankaArm(Arm):
     # ------------------------------------------------------------------ motions
 
     def _forward(self, joints: np.ndarray) -> Pose:
+        return forward_pose(joints)
+
+    def _forward_all(self, joints: np.ndarray) -> Pose:
         return forward_pose(joints)
 
     def _reachable(self, T_base_tcp: Pose) -> bool:

@@ -24,6 +24,7 @@ from hal.kinect2.config import Kinect2Config
 from hal.kinect2.driver import Kinect2Settings
 from hal.kinect2.images import HEIGHT, WIDTH, Undistortion, metric_depth, unmirrored_intrinsics
 from hal.kinect2.registration import COLOUR_HEIGHT, COLOUR_WIDTH, Registration
+from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.geometry import Pose
 
 _log = logging.getLogger(__name__)
@@ -61,6 +62,14 @@ class Kinect2Camera(Camera):
     def exposures(self) -> int:
         """See `Camera.exposures`."""
         return self._config.exposures
+
+    @property
+    def T_base_camera(self) -> Pose | None:
+        """See `Camera.T_base_camera`; None without a valid calibration file."""
+        try:
+            return read_calibration(self._config.calibration, serial=self._config.serial).T_base_camera
+        except BadConfig:  # reported when the camera is connected; the arm may move before it is calibrated
+            return None
 
     @property
     def by_hand(self) -> bool:

@@ -9,7 +9,7 @@ from hal.mujoco.arm import MujocoArm
 from hal.mujoco.camera import MujocoCamera
 from hal.mujoco.config import MujocoCellConfig
 from hal.mujoco.world import MujocoWorld
-from hal.simulated import panda_limits, simulated_cell
+from hal.simulated import cell_limits, simulated_cell
 
 
 def mujoco_cell(config: MujocoCellConfig) -> Cell:
@@ -23,5 +23,5 @@ def mujoco_cell(config: MujocoCellConfig) -> Cell:
         seed=config.seed,
         table_error=config.table_error,
     )
-    camera, arm = MujocoCamera(world, config.noise), MujocoArm(world, panda_limits(config.clearance))
+    camera, arm = MujocoCamera(world, config.noise), MujocoArm(world, cell_limits(config, world))
     return simulated_cell(config, world, camera, arm)

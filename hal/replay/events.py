@@ -10,6 +10,7 @@ import numpy as np
 from hal import errors as hal_errors
 from hal.arm import ArmState, GraspOutcome
 from hal.errors import HalError, Stopped
+from hal.keep_out import Box, Capsule, to_plain
 from mskgrasp.core import errors as base_errors
 from mskgrasp.core.errors import MskgraspError
 from mskgrasp.core.geometry import Pose
@@ -66,6 +67,10 @@ def plain(value: Any) -> Any:
                 T_base_tcp=plain(value.T_base_tcp),
                 width=float(value.gripper_width),
             )
+        case Capsule() | Box():
+            return to_plain(value)
+        case tuple() if value and all(isinstance(one, Capsule | Box) for one in value):
+            return [to_plain(one) for one in value]
         case GraspOutcome():
             return dict(width=float(value.width), holding=bool(value.holding))
         case np.ndarray() | np.generic():

@@ -13,6 +13,7 @@ import numpy as np
 from hal.camera import RgbdFrame
 from hal.cell import Workspace
 from hal.errors import BadRecording, MissingRecording
+from hal.keep_out import from_plain
 from hal.limits import ArmLimits
 from hal.replay.events import KIND, SCHEMA, Event, pose
 
@@ -85,9 +86,11 @@ def read_recording(path: Path) -> Recording:
 
 def _read(path: Path, file: Any) -> Recording:
     table = json.loads(file.attrs["workspace"])
+    stored: dict[str, Any] = json.loads(file.attrs["limits"])
+    # A recording made before there were keep-outs has none.
+    keep_out = tuple(from_plain(one) for one in stored.pop("keep_out", ()))
     limits: dict[str, Any] = {
-        key: np.array(value) if isinstance(value, list) else value
-        for key, value in json.loads(file.attrs["limits"]).items()
+        key: np.array(value) if isinstance(value, list) else value for key, value in stored.items()
     }
     # A recording made before a table had a slope has none.
     tuples: dict[str, Any] = {key: tuple(table[key]) for key in ("region", "table_slope") if key in table}
@@ -100,7 +103,7 @@ def _read(path: Path, file: Any) -> Recording:
         path=path,
         made=str(file.attrs["made"]),
         workspace=Workspace(**{**table, **tuples, "home": np.array(table["home"])}),
-        limits=ArmLimits(**limits),
+        limits=ArmLimits(**limits, keep_out=keep_out),
         events=events,
         n_frames=n_frames,
     )

@@ -60,6 +60,11 @@ class RecordingCamera(SharingDevice, Camera):
         """See `Camera.by_hand`."""
         return self._camera.by_hand
 
+    @property
+    def T_base_camera(self) -> Pose | None:
+        """See `Camera.T_base_camera`."""
+        return self._camera.T_base_camera
+
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
         """See `Camera.capture`."""
         return self._writer.call(

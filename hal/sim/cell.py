@@ -9,7 +9,7 @@ from hal.sim.arm import SapienArm
 from hal.sim.camera import SapienCamera
 from hal.sim.config import SapienCellConfig
 from hal.sim.world import SapienWorld
-from hal.simulated import panda_limits, simulated_cell
+from hal.simulated import cell_limits, simulated_cell
 
 
 def sapien_cell(config: SapienCellConfig) -> Cell:
@@ -25,5 +25,5 @@ def sapien_cell(config: SapienCellConfig) -> Cell:
         tape=config.tape,
         colour_scale=config.colour_scale,
     )
-    camera, arm = SapienCamera(world, config.noise), SapienArm(world, panda_limits(config.clearance))
+    camera, arm = SapienCamera(world, config.noise), SapienArm(world, cell_limits(config, world))
     return simulated_cell(config, world, camera, arm, board_holder=world)
