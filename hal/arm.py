@@ -34,6 +34,8 @@ ROTATION_TOLERANCE = 1e-2
 """Greatest rotation error of the TCP at the end of a straight motion, radians."""
 WIDTH_TOLERANCE = 2e-3
 """Greatest error of the pads' distance at the end of a motion, metres."""
+HELD_TOLERANCE = 5e-3
+"""Fingers that have moved by more since they closed have lost what they held, metres."""
 MAX_TOUCH_FORCE = 15.0
 """Greatest force at which `Arm.move_until_contact` ends, N."""
 MAX_TOUCH_SPEED = 0.05
@@ -72,6 +74,19 @@ class GraspOutcome:
     holding: bool
 
 
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """Something in the hand.
+
+    Attributes:
+        T_base_tcp: Pose of the TCP when the fingers closed on it.
+        width: Distance between the pads then, metres.
+    """
+
+    T_base_tcp: Pose
+    width: float
+
+
 class Arm(Device):
     """A seven-axis arm with a parallel gripper; SI units, poses in the base frame.
 
@@ -93,6 +108,7 @@ class Arm(Device):
         self._fault: str | None = None
         self._stop = threading.Event()
         self._busy = threading.Lock()
+        self._held: Held | None = None
 
     # ------------------------------------------------------------------ commands
 
@@ -191,6 +207,7 @@ class Arm(Device):
             raise OutOfWorkspace(f"gripper width {width:g} m is outside 0 .. {MAX_OPENING} m")
         with self._motion():
             self._move_gripper(width)
+            self._held = None
             reached = self._state().gripper_width
             if not self._stop.is_set() and abs(reached - width) > WIDTH_TOLERANCE:
                 raise MotionAborted(
@@ -210,7 +227,22 @@ class Arm(Device):
         if not 0 < force <= self.limits.max_force:
             raise OutOfWorkspace(f"grasp force {force:g} N is outside 0 .. {self.limits.max_force:g} N")
         with self._motion():
-            return self._grasp(force)
+            outcome = self._grasp(force)
+            at = self._state().T_base_tcp
+            self._held = Held(T_base_tcp=at, width=outcome.width) if outcome.holding else None
+            return outcome
+
+    def in_hand(self) -> Held | None:
+        """What `grasp` closed on, if the fingers still hold it; None if not.
+
+        Raises:
+            NotConnected, CommunicationLost: The arm is not connected or does not answer.
+        """
+        self._require_connection()
+        held = self._held
+        if held is None or abs(self._state().gripper_width - held.width) > HELD_TOLERANCE:
+            return None
+        return held
 
     def wait(self, seconds: float) -> None:
         """Hold still for a time, seconds of the cell's own clock.

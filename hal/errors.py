@@ -35,6 +35,14 @@ class OutOfWorkspace(HalError):
     """The commanded pose lies outside the workspace, the joint limits or the table clearance."""
 
 
+class ArmInView(HalError):
+    """The arm is not at home and may hide the table: nothing is planned on such a frame."""
+
+
+class HandFull(HalError):
+    """The hand holds something that would fall if the fingers opened."""
+
+
 class MotionAborted(HalError):
     """A motion ended before its goal: contact, reflex, or stop()."""
 

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hal.arm import JOINT_TOLERANCE
+from hal.arm import JOINT_TOLERANCE, Held
+from hal.camera import RgbdFrame
 from hal.cell import Cell
-from hal.errors import MotionAborted, NotCalibrated, Stopped
+from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, Stopped
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import HOLD_S, MAX_OPENING, MIN_GAP, Grasp
+from mskgrasp.core.grasp import HOLD_S, MAX_OPENING, MIN_GAP, PAD_REACH, Grasp
 
 APPROACH = 0.12
-"""Height over the table from which the straight descent begins, m."""
+"""Least height over the table from which the straight descent begins, m; tall things raise it."""
+
+OVER = 0.015
+"""Distance at which the hand, and what it holds, passes over the tallest thing, m."""
+
+AT_HOME = 0.02
+"""Greatest error of a joint at which the arm counts as at home, rad: its hand is off by 1 cm at most."""
 
 RETREAT = 0.05
 """Height by which the open hand first rises on its way home, so that it does not drag the part along, m."""
@@ -44,12 +52,13 @@ class GraspResult:
     aborted: str | None
 
 
-def execute_grasp(cell: Cell, grasp: Grasp) -> GraspResult:
+def execute_grasp(cell: Cell, grasp: Grasp, *, tallest: float = 0.0) -> GraspResult:
     """Open, approach, descend, close, lift and hold.
 
     Args:
         cell: Connected, without an error in force.
         grasp: A single one, base frame.
+        tallest: Height of the tallest thing over the table, which the open hand passes over, metres.
 
     Raises:
         NotCalibrated: The camera's pose was measured by hand; nothing moves.
@@ -58,7 +67,8 @@ def execute_grasp(cell: Cell, grasp: Grasp) -> GraspResult:
     """
     refuse_by_hand(cell)
     arm, lift = cell.arm, cell.workspace.lift_height
-    target, above, lifted = grasp.T_base_tcp, above_grasp(cell, grasp), grasp.raised(lift).T_base_tcp
+    above = above_grasp(cell, grasp, tallest=tallest)
+    target, lifted = grasp.T_base_tcp, grasp.raised(lift).T_base_tcp
     for pose in (target, above, lifted):
         arm.check_pose(pose)
     try:
@@ -103,14 +113,38 @@ def refuse_by_hand(cell: Cell) -> None:
         )
 
 
-def above_grasp(cell: Cell, grasp: Grasp) -> Pose:
-    """Pre-grasp: from here the hand descends straight to a grasp, and here it returns."""
+def clear_height(cell: Cell, tallest: float, *, below: float = PAD_REACH) -> float:
+    """Height of the TCP at which the hand passes over everything on the table, base frame, metres.
+
+    Args:
+        cell: The cell.
+        tallest: Height of the tallest thing over the table, metres.
+        below: Distance by which pads, or a part in the hand, reach below the TCP, metres.
+    """
+    return cell.workspace.table_z + max(APPROACH, tallest + below + OVER)
+
+
+def above_grasp(cell: Cell, grasp: Grasp, *, tallest: float = 0.0) -> Pose:
+    """Pre-grasp: from here the hand descends straight to a grasp, and here it returns.
+
+    Args:
+        cell: The cell.
+        grasp: A single one, base frame.
+        tallest: Height of the tallest thing over the table, metres: the hand comes from above it.
+    """
     x, y, z = grasp.position
-    height = max(cell.workspace.table_z + APPROACH, z + 0.02)
+    height = max(clear_height(cell, tallest), z + 0.02)
     return replace(grasp, position=np.array([x, y, height])).T_base_tcp
 
 
-def put_down(cell: Cell, grasp: Grasp, *, height: float = PUT_DOWN, opening: float = MAX_OPENING) -> None:
+def put_down(
+    cell: Cell,
+    grasp: Grasp,
+    *,
+    height: float = PUT_DOWN,
+    opening: float = MAX_OPENING,
+    tallest: float = 0.0,
+) -> None:
     """Lower a lifted part to where it was grasped, open the fingers and rise.
 
     Args:
@@ -118,13 +152,14 @@ def put_down(cell: Cell, grasp: Grasp, *, height: float = PUT_DOWN, opening: flo
         grasp: Grasp of the lifted part, base frame.
         height: Height of the release above the grasp, metres; a part that falls 2 mm may shift by 1 mm.
         opening: As in `let_go`.
+        tallest: As in `let_go`.
 
     Raises:
         MotionAborted: The part met the table early, because it hangs lower in the hand than before; or the
             hand touched something as it released the part and rose.
     """
     lower(cell, grasp, height=height)
-    let_go(cell, grasp, opening=opening)
+    let_go(cell, grasp, opening=opening, tallest=tallest)
 
 
 def lower(cell: Cell, grasp: Grasp, *, height: float = 0.0) -> None:
@@ -136,7 +171,7 @@ def lower(cell: Cell, grasp: Grasp, *, height: float = 0.0) -> None:
     cell.arm.move_to_pose(grasp.raised(height).T_base_tcp, speed=0.15)
 
 
-def let_go(cell: Cell, place: Grasp, *, opening: float) -> None:
+def let_go(cell: Cell, place: Grasp, *, opening: float, tallest: float = 0.0) -> None:
     """Open the fingers and rise straight.
 
     Args:
@@ -145,6 +180,7 @@ def let_go(cell: Cell, place: Grasp, *, opening: float) -> None:
         opening: Distance of the pads afterwards, metres; 0 for the least that releases the part, which is
             `RELEASE` more than now. The fingers had room on the way down to the grasp, but since then the
             part has moved between them: one inside a bore may push it as it opens all the way.
+        tallest: Height of the tallest thing over the table, the part included, over which the hand rises, m.
 
     Raises:
         MotionAborted: The hand touched something.
@@ -154,20 +190,78 @@ def let_go(cell: Cell, place: Grasp, *, opening: float) -> None:
         raise ValueError(f"opening {opening} m is outside 0 .. {MAX_OPENING} m")
     width = max(opening, cell.arm.state().gripper_width + RELEASE)
     cell.arm.move_gripper(min(MAX_OPENING, width))
-    cell.arm.move_to_pose(above_grasp(cell, place), speed=0.25)
+    cell.arm.move_to_pose(above_grasp(cell, place, tallest=tallest), speed=0.25)
 
 
-def go_home(cell: Cell) -> None:
-    """Open the fingers, retreat upward and move the arm out of the camera's sight."""
+def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None = None) -> None:
+    """Open the fingers, retreat upward and move the arm out of the camera's sight.
+
+    What the hand holds is not dropped: a person takes it, or the hand puts it down straight below, as high as
+    it was grasped.
+
+    Args:
+        cell: Connected.
+        tallest: Height of the tallest thing over the table, over which the hand rises first, metres.
+        take: Has a person take what the hand holds, and returns whether there is one
+            (`hal.operator.Operator.take`). Without it a simulated arm puts down, and a real one refuses.
+
+    Raises:
+        HandFull: The hand holds something, and nobody was asked; nothing moved.
+        MotionAborted: The hand touched something.
+    """
     arm = cell.arm
+    held = arm.in_hand()
+    if held is not None:
+        if take is None and not arm.simulated:
+            raise HandFull(
+                "the hand holds something, which would fall: put it down (hal.put_down), or take it and open "
+                "the fingers (arm.move_gripper), then go home"
+            )
+        if arm.simulated or take is None or not take():
+            _put_down_below(cell, held)
     arm.move_gripper(MAX_OPENING)
     state = arm.state()
     if np.abs(state.joints - cell.workspace.home).max() < JOINT_TOLERANCE:
         return
     here = state.T_base_tcp
-    above = max(cell.workspace.table_z + APPROACH, here.position[2] + RETREAT)
+    above = max(clear_height(cell, tallest), here.position[2] + RETREAT)
     above = min(above, float(arm.limits.box_upper[2]))
-    arm.move_to_pose(
-        Pose(position=np.array([*here.position[:2], above]), quat_wxyz=here.quat_wxyz), speed=0.25
-    )
+    arm.move_to_pose(_moved_to_height(here, above), speed=0.25)
     arm.move_to_joints(cell.workspace.home)
+
+
+def _put_down_below(cell: Cell, held: Held) -> None:
+    """Lower the hand until what it holds stands as high as it was grasped, or on something else."""
+    here, height = cell.arm.state().T_base_tcp, float(held.T_base_tcp.position[2]) + PUT_DOWN
+    if here.position[2] <= height:
+        return
+    try:
+        cell.arm.move_to_pose(_moved_to_height(here, height), speed=0.15)
+    except Stopped:
+        raise
+    except MotionAborted:
+        cell.arm.recover()  # it stands on what it met
+
+
+def _moved_to_height(pose: Pose, z: float) -> Pose:
+    return Pose(position=np.array([*pose.position[:2], z]), quat_wxyz=pose.quat_wxyz)
+
+
+def capture_at_home(cell: Cell, timeout_s: float = 5.0) -> RgbdFrame:
+    """Take a frame that a grasp may be planned on: the arm is out of the camera's sight.
+
+    Args:
+        cell: Connected.
+        timeout_s: As in `Camera.capture`.
+
+    Raises:
+        ArmInView: The arm is not at home.
+        CaptureFailed: As in `Camera.capture`.
+    """
+    off = np.abs(cell.arm.state().joints - cell.workspace.home)
+    if off.max() > AT_HOME:
+        raise ArmInView(
+            f"joint {int(off.argmax()) + 1} is {off.max():.2f} rad from home: the arm may be in the camera's "
+            "view; move it home first (hal.go_home, or python -m mskgrasp.plan --go-home)"
+        )
+    return cell.camera.capture(timeout_s)

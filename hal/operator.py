@@ -101,6 +101,23 @@ class Operator:
         """
         return not self.asks or self._ask(question, {"y": True, "n": False})
 
+    def take(self) -> bool:
+        """Have the operator hold what the hand holds, before the fingers open.
+
+        Returns:
+            Whether an operator was asked.
+
+        Raises:
+            StoppedByOperator: The operator ended the run; the fingers stay closed.
+        """
+        if self.asks:
+            self._ask(
+                "The hand holds something. Take hold of it; Enter: the fingers open and the arm moves home, "
+                "q to stop: ",
+                {"": True},
+            )
+        return self.asks
+
     def recover(self, cell: Cell, reason: str) -> None:
         """Recover the arm after a contact, once the operator confirms.
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hal.arm import STOPPED, Arm, ArmState, GraspOutcome
+from hal.arm import HELD_TOLERANCE, STOPPED, Arm, ArmState, GraspOutcome, Held
 from hal.device import SharingDevice
 from hal.errors import NeedsRecovery, NotRecorded, OutOfWorkspace, Stopped
 from hal.replay.config import ReplayArmConfig
@@ -79,10 +79,23 @@ class ReplayArm(SharingDevice, Arm):
     def move_gripper(self, width: float) -> None:
         """See `Arm.move_gripper`."""
         self._replay("move_gripper", width=width)
+        self._held = None
 
     def grasp(self, force: float) -> GraspOutcome:
         """See `Arm.grasp`."""
-        return GraspOutcome(**self._replay("grasp", force=force))
+        outcome = GraspOutcome(**self._replay("grasp", force=force))
+        values = self._playback.last_state()
+        at = None if values is None else pose(values["T_base_tcp"])
+        self._held = Held(T_base_tcp=at, width=outcome.width) if at is not None and outcome.holding else None
+        return outcome
+
+    def in_hand(self) -> Held | None:
+        """What the recorded hand held; None also where a person took it, after which the fingers opened."""
+        self._require_connection()
+        held, values, following = self._held, self._playback.last_state(), self._playback.peek()
+        if held is None or values is None or (following is not None and following.call == "move_gripper"):
+            return None
+        return held if abs(values["width"] - held.width) <= HELD_TOLERANCE else None
 
     def wait(self, seconds: float) -> None:
         """Do not wait; see `Arm.wait`."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hal.arm import Arm, ArmState, GraspOutcome
+from hal.arm import Arm, ArmState, GraspOutcome, Held
 from hal.camera import Camera, RgbdFrame
 from hal.cell import PartFeeder, PartTracker
 from hal.device import Device, SharingDevice
@@ -109,6 +109,10 @@ class RecordingArm(SharingDevice, Arm):
     def grasp(self, force: float) -> GraspOutcome:
         """See `Arm.grasp`."""
         return self._record("grasp", force=force)
+
+    def in_hand(self) -> Held | None:
+        """See `Arm.in_hand`; not recorded, as it follows from what is."""
+        return self._arm.in_hand()
 
     def wait(self, seconds: float) -> None:
         """See `Arm.wait`."""

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hal import Cell, GraspOutcome, execute_grasp, go_home, let_go, put_down
-from hal.errors import NeedsRecovery, NotCalibrated, OutOfWorkspace, Stopped
+from hal import Cell, GraspOutcome, capture_at_home, execute_grasp, go_home, let_go, put_down
+from hal.errors import ArmInView, HandFull, NeedsRecovery, NotCalibrated, OutOfWorkspace, Stopped
 from hal.execute import above_grasp, lower
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
@@ -79,6 +79,79 @@ def test_the_hand_comes_from_above_a_tall_part_too(cell: Cell):
     raised = dataclasses.replace(cell, workspace=dataclasses.replace(cell.workspace, table_z=0.05))
     assert above_grasp(raised, GRASP).position == pytest.approx([0.4, 0.1, 0.17])
     assert above_grasp(cell, GRASP).quat_wxyz == pytest.approx(GRASP.T_base_tcp.quat_wxyz)
+
+
+def test_the_hand_comes_from_above_the_tallest_thing_and_rises_over_it(cell: Cell, arm: WritingArm):
+    """A neighbour of 20 cm: the pads, 9.5 mm below the TCP, pass 15 mm over it."""
+    assert above_grasp(cell, GRASP, tallest=0.2).position == pytest.approx([0.4, 0.1, 0.2245])
+    assert above_grasp(cell, GRASP, tallest=0.09).position == pytest.approx([0.4, 0.1, 0.12])
+    execute_grasp(cell, GRASP, tallest=0.2)
+    assert arm.log[1] == ("pose", [0.4, 0.1, 0.2245])
+    arm.log.clear()
+    put_down(cell, GRASP, tallest=0.2)
+    assert arm.log[-1] == ("pose", [0.4, 0.1, 0.2245])
+    arm.log.clear()
+    go_home(cell, tallest=0.3)
+    assert arm.log[1] == ("pose", [0.4, 0.1, 0.3245])
+
+
+def test_a_simulated_hand_puts_down_what_it_holds_before_it_goes_home(cell: Cell, arm: WritingArm):
+    arm.simulated = True
+    execute_grasp(cell, GRASP)
+    arm.log.clear()
+    go_home(cell)
+    assert arm.log[:2] == [("pose", [0.4, 0.1, 0.062]), ("gripper", 0.08)]
+    assert arm.log[-1] == ("joints", cell.workspace.home.tolist()) and arm.in_hand() is None
+
+
+def test_a_simulated_part_that_meets_something_on_its_way_down_is_released_there(cell: Cell, arm: WritingArm):
+    """The toy arm meets something below 5 cm."""
+    arm.simulated = True
+    arm.move_to_pose(Pose(position=np.array([0.4, 0.1, 0.05]), quat_wxyz=GRASP.T_base_tcp.quat_wxyz))
+    arm.grasp(20.0)
+    arm._held = dataclasses.replace(arm._held, T_base_tcp=GRASP.raised(-0.03).T_base_tcp)  # type: ignore[type-var]
+    go_home(cell)
+    assert arm.log[-1] == ("joints", cell.workspace.home.tolist())
+
+
+def test_a_real_hand_does_not_drop_what_it_holds(cell: Cell, arm: WritingArm):
+    execute_grasp(cell, GRASP)
+    arm.log.clear()
+    with pytest.raises(HandFull, match=r"put it down \(hal.put_down\), or take it and open") as caught:
+        go_home(cell)
+    assert arm.log == [] and "\n" not in str(caught.value)
+    arm.wait(0.1)  # a refusal is no fault
+    arm.log.clear()
+    asked: list[int] = []
+    go_home(cell, take=lambda: bool(asked.append(len(arm.log)) or True))
+    assert asked == [0] and arm.log[0] == ("gripper", 0.08)  # a person holds it as the fingers open
+
+
+def test_a_real_hand_that_no_one_watches_puts_down_what_it_holds(cell: Cell, arm: WritingArm):
+    execute_grasp(cell, GRASP)
+    arm.log.clear()
+    go_home(cell, take=lambda: False)
+    assert arm.log[:2] == [("pose", [0.4, 0.1, 0.062]), ("gripper", 0.08)]
+
+
+def test_fingers_that_moved_since_they_closed_hold_nothing(cell: Cell, arm: WritingArm):
+    assert arm.in_hand() is None
+    execute_grasp(cell, GRASP)
+    held = arm.in_hand()
+    assert held is not None and held.width == 0.031
+    assert held.T_base_tcp.position == pytest.approx([0.4, 0.1, 0.06])  # where they closed, not where it is
+    arm._width = 0.0  # slipped out
+    assert arm.in_hand() is None
+    go_home(cell)
+
+
+def test_a_frame_is_taken_for_a_plan_at_home_only(cell: Cell, arm: WritingArm):
+    arm.move_to_joints(cell.workspace.home)
+    assert capture_at_home(cell).serial == "toy"
+    arm.move_to_joints(cell.workspace.home + np.array([0, 0, -0.3, 0, 0, 0, 0]))
+    with pytest.raises(ArmInView, match=r"joint 3 is 0.30 rad from home: .*--go-home\)") as caught:
+        capture_at_home(cell)
+    assert "\n" not in str(caught.value)
 
 
 def test_nothing_between_the_pads_is_not_lifted(cell: Cell, arm: WritingArm):

@@ -99,3 +99,11 @@ def test_a_question_is_answered_by_yes_or_no_and_not_asked_on_a_simulated_cell(r
     assert not asked.confirm("Write it? ") and asked.confirm("Write it? ")
     assert prompts.getvalue().count("Write it?") == 3
     assert Operator(cell_from_yaml(SIMULATED)).confirm("Write it? ")
+
+
+def test_an_operator_takes_what_the_hand_holds_before_the_fingers_open(real):
+    one, asked = operator(real, "\n")
+    assert one.take() and "Take hold of it" in asked.getvalue()
+    with pytest.raises(StoppedByOperator):
+        operator(real, "q\n")[0].take()
+    assert not Operator(cell_from_yaml(real), yes=True).take()

@@ -78,5 +78,5 @@ def test_every_command_is_a_method_of_a_device_and_every_motion_of_an_arm_a_comm
         if not name.startswith("_")
     }
     assert set(COMMANDS) <= methods
-    queries = {"state", "check_pose", "part_pose", "stop", "connect", "close"}
+    queries = {"state", "in_hand", "check_pose", "part_pose", "stop", "connect", "close"}
     assert methods - queries == set(COMMANDS)
