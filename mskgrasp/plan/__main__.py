@@ -8,7 +8,8 @@ from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 DESCRIPTION = """Takes a depth image of the cell and plans a precise grasp of the part in it.
 
 Samples grasps over the part, keeps those of the best predicted quality, and chooses the one whose
-displacement in the hand is best known. Nothing moves. Writes plan.png and plan.json.
+displacement in the hand is best known. Nothing moves, except home with --go-home: an arm that may be in the
+camera's view is an error. Writes plan.png and plan.json.
 
 A part of your own: python -m mskgrasp.plan --part my_bracket.stl"""
 

@@ -26,6 +26,8 @@ class PlanConfig(Config):
     """Place this part (a name, a folder or a CAD file) on the table first; the cell needs a feeder."""
     unit: Unit | None = None
     """Unit of a CAD file's coordinates, where the format states none; mm if not given."""
+    go_home: bool = False
+    """Move the arm home first, out of the camera's view; the operator of a real cell is asked."""
     seed: int = Field(default=0, ge=0)
     """Determines the candidates, and the place of --part."""
     planner: PlannerConfig = PlannerConfig()

@@ -6,7 +6,8 @@ import json
 
 import numpy as np
 
-from hal import open_cell
+from hal import Cell, capture_at_home, go_home, open_cell
+from hal.operator import Operator, StoppedByOperator
 from mskgrasp.plan.config import PlanConfig
 from mskgrasp.planning.for_cell import make_planner, part_name, present
 from mskgrasp.planning.planner import GraspPlan
@@ -38,6 +39,17 @@ def plan_text(plan: GraspPlan) -> str:
     )
 
 
+def _go_home(cell: Cell, operator: Operator) -> None:
+    """Move the arm home, with the consent of the operator of a real one.
+
+    Raises:
+        StoppedByOperator: The operator does not want it to move.
+    """
+    if not operator.confirm("The arm moves home, out of the camera's view. May it move? y: yes, n: no: "):
+        raise StoppedByOperator("stopped by the operator; nothing moved")
+    go_home(cell, take=operator.take)
+
+
 def plan_grasp(config: PlanConfig) -> GraspPlan:
     """Plan one grasp of the part on the cell's table and write plan.json and plan.png.
 
@@ -50,7 +62,9 @@ def plan_grasp(config: PlanConfig) -> GraspPlan:
         planner = make_planner(config.models, config.planner, cell)
         if part is not None:
             present(cell, part, config.seed)
-        frame = cell.camera.capture()
+        if config.go_home:
+            _go_home(cell, Operator(cell))
+        frame = capture_at_home(cell)
         plan = planner.plan(frame, np.random.default_rng(config.seed))
     text = json.dumps(dict(plan.to_json(), seed=config.seed), indent=1, allow_nan=False)
     (config.out / "plan.json").write_text(text + "\n", encoding="utf-8")

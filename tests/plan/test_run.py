@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hal import Cell, open_cell
+from hal.errors import ArmInView
 from mskgrasp.core.errors import BadConfig, UnknownPart
 from mskgrasp.parts import find_part
 from mskgrasp.plan.config import PlanConfig
@@ -32,6 +36,22 @@ def test_a_plan_is_written_with_its_picture_and_a_seed_repeats_it(tmp_path: Path
     assert picture(config.out / "plan.png").shape[1] > 1000
     again = plan_grasp(config)
     np.testing.assert_array_equal(again.grasp.as_vector(), plan.grasp.as_vector())
+
+
+def test_no_grasp_is_planned_while_the_arm_may_be_in_view_unless_it_goes_home(tmp_path: Path, monkeypatch):
+    """The simulated arm stands at home when the cell is opened."""
+
+    @contextmanager
+    def away(path: Path) -> Iterator[Cell]:
+        with open_cell(path) as cell:
+            cell.arm.move_to_joints(cell.workspace.home + np.array([0.3, 0, 0, 0, 0, 0, 0]))
+            yield cell
+
+    monkeypatch.setattr("mskgrasp.plan.run.open_cell", away)
+    config = PlanConfig(out=tmp_path / "plan", planner=PlannerConfig(n_candidates=60))
+    with pytest.raises(ArmInView, match="joint 1 is 0.30 rad from home"):
+        plan_grasp(config)
+    assert plan_grasp(config.model_copy(update={"go_home": True})).quality >= 0
 
 
 def test_a_plan_is_described_in_millimetres_and_degrees():
