@@ -172,8 +172,13 @@ def check_slots_in_reach(cell: Cell, slots: Sequence[Slot]) -> None:
                 ) from error
 
 
-def first_reachable(cell: Cell, poses: Sequence[Grasp]) -> int:
+def first_reachable(cell: Cell, poses: Sequence[Grasp], *, tallest: float = 0.0) -> int:
     """Find the index of the first hand pose at which the arm can place a part.
+
+    Args:
+        cell: The cell.
+        poses: Poses of the hand.
+        tallest: Height of the tallest other thing over the table, metres.
 
     Raises:
         OutOfWorkspace: The arm reaches none; the reason for the first.
@@ -181,7 +186,7 @@ def first_reachable(cell: Cell, poses: Sequence[Grasp]) -> int:
     refused = []
     for index, pose in enumerate(poses):
         try:
-            check_place(cell, pose)
+            check_place(cell, pose, tallest=tallest)
             return index
         except OutOfWorkspace as error:
             refused.append(error)

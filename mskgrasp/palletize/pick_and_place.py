@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hal import RgbdFrame
+from hal import RgbdFrame, capture_at_home
 from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.geometry import Pose
@@ -116,7 +116,7 @@ class PickAndPlace:
 
     def picture(self, slots: list[Slot]) -> np.ndarray:
         """Capture an image (h, w, 3) of the pallet, the arm at home."""
-        return pallet_image(self._cell.camera.capture(), slots, self._cell.workspace.table_z, self._tops)
+        return pallet_image(capture_at_home(self._cell), slots, self._cell.workspace.table_z, self._tops)
 
     def _carry(
         self, frame: RgbdFrame, plan: GraspPlan, targets: Sequence[Target], known: Placement
@@ -127,9 +127,12 @@ class PickAndPlace:
             The outcome, the target, and the frame after placing; None where nothing was placed.
         """
         engine, target = self._engine, targets[0]
+        # Filled slots may be out of the image.
+        tallest = max([engine.tallest(frame, plan.view), *self._tops.values()])
         try:
             # Refused before the grasp, rather than with the part in the hand.
-            first_reachable(self._cell, [self._pose(plan, np.zeros(4), target) for target in targets])
+            poses = [self._pose(plan, np.zeros(4), target) for target in targets]
+            first_reachable(self._cell, poses, tallest=tallest)
         except OutOfWorkspace:
             return replace(known, reason="OutOfWorkspace"), target, None
         grasped = engine.grasp(plan)
@@ -149,7 +152,10 @@ class PickAndPlace:
         drop = 0.0 if swing is None else drop_of(plan.grasp, plan.view, by[3], swing)
         for target in targets:
             try:
-                place(self._cell, self._pose(plan, by, target, drop), engine.recover)
+                place(
+                    self._cell, self._pose(plan, by, target, drop), engine.recover,
+                    tallest=tallest, part_height=float(plan.view.size[2]),
+                )  # fmt: skip
             except OutOfWorkspace:
                 continue  # the other target may be reached
             except MotionAborted as error:

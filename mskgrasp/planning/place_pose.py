@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hal.cell import Cell
 from hal.errors import MotionAborted
-from hal.execute import PUT_DOWN, above_grasp, let_go
+from hal.execute import APPROACH, PUT_DOWN, clear_height, let_go
 from mskgrasp.core.geometry import (
     Pose,
     quat_about_z,
@@ -136,37 +136,80 @@ def displacement_of_point(displacement: np.ndarray, origin: np.ndarray, point: n
     return np.asarray(displacement, dtype=np.float64) + swept
 
 
-def check_place(cell: Cell, pose: Grasp) -> None:
+def carry_height(cell: Cell, pose: Grasp, tallest: float = 0.0) -> float:
+    """Height of the TCP at which the held part passes over everything, base frame, metres.
+
+    Args:
+        cell: The cell.
+        pose: Pose of the hand at which the part stands on the table; it reaches as far below the TCP.
+        tallest: Height of the tallest other thing over the table, metres.
+    """
+    x, y, z = pose.position
+    below = float(z) - cell.workspace.table_z
+    return max(clear_height(cell, tallest, below=below), float(z) + 0.02)
+
+
+def check_place(cell: Cell, pose: Grasp, *, tallest: float = 0.0) -> None:
     """Refuse a pose that the arm cannot reach, before anything moves.
 
+    Args:
+        cell: The cell.
+        pose: As `place_pose` gives it.
+        tallest: Height of the tallest other thing over the table, metres.
+
     Raises:
-        OutOfWorkspace: The arm cannot reach it.
+        OutOfWorkspace: The arm cannot reach it, or the height at which it carries the part over all else.
     """
     cell.arm.check_pose(pose.T_base_tcp)
-    cell.arm.check_pose(above_grasp(cell, pose))
+    cell.arm.check_pose(_above(cell, pose, tallest))
 
 
-def place(cell: Cell, pose: Grasp, recover: Callable[[MotionAborted], None]) -> None:
+def _above(cell: Cell, pose: Grasp, tallest: float) -> Pose:
+    x, y, _ = pose.position
+    return replace(pose, position=np.array([x, y, carry_height(cell, pose, tallest)])).T_base_tcp
+
+
+def place(
+    cell: Cell,
+    pose: Grasp,
+    recover: Callable[[MotionAborted], None],
+    *,
+    tallest: float = 0.0,
+    part_height: float = 0.0,
+) -> None:
     """Move the held part to a pose, release it and retract.
 
-    The fingers open no farther than needed, so as not to push neighbouring parts. A tilted part touches the
-    table early, which ends the motion; it is released there.
+    Where the way leads over something tall the hand rises straight first. The fingers open no farther than
+    needed, so as not to push neighbouring parts. A tilted part touches the table early, which ends the
+    motion; it is released there.
 
     Args:
         cell: The arm has lifted the part.
         pose: As `place_pose` gives it.
         recover: Lets the arm move again after that contact, or raises an error.
+        tallest: Height of the tallest other thing over the table, metres.
+        part_height: Height of the part, over which the open hand rises, metres.
 
     Raises:
         OutOfWorkspace: The pose is refused before anything moves.
         MotionAborted: The part touched something more than `EARLY` above the pose.
     """
-    check_place(cell, pose)
-    cell.arm.move_to_pose(above_grasp(cell, pose), speed=0.25)
+    check_place(cell, pose, tallest=tallest)
+    above, here = _above(cell, pose, tallest), cell.arm.state().T_base_tcp
+    if here.position[2] < above.position[2] and above.position[2] > _usual_height(cell, pose):
+        x, y, _ = here.position
+        up = Pose(position=np.array([x, y, above.position[2]]), quat_wxyz=here.quat_wxyz)
+        cell.arm.move_to_pose(up, speed=0.25)
+    cell.arm.move_to_pose(above, speed=0.25)
     try:
         cell.arm.move_to_pose(pose.T_base_tcp, speed=0.1)
     except MotionAborted as error:
         if cell.arm.state().T_base_tcp.position[2] > pose.position[2] + EARLY:
             raise
         recover(error)
-    let_go(cell, pose, opening=0.0)
+    let_go(cell, pose, opening=0.0, tallest=max(tallest, part_height))
+
+
+def _usual_height(cell: Cell, pose: Grasp) -> float:
+    """Height over low things, which a lifted part has reached, or reaches on its way aside."""
+    return max(cell.workspace.table_z + APPROACH, float(pose.position[2]) + 0.02)

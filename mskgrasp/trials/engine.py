@@ -12,7 +12,16 @@ from typing import Protocol
 import numpy as np
 import torch
 
-from hal import Cell, GraspResult, RgbdFrame, cell_from_yaml, execute_grasp, go_home, put_down
+from hal import (
+    Cell,
+    GraspResult,
+    RgbdFrame,
+    capture_at_home,
+    cell_from_yaml,
+    execute_grasp,
+    go_home,
+    put_down,
+)
 from hal.errors import MotionAborted, OutOfWorkspace, Stopped
 from hal.execute import refuse_by_hand
 from hal.operator import Operator
@@ -21,12 +30,14 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import (
     EJECTED_DISTANCE,
     MIN_RISE,
+    PartView,
     object_displacement,
     swing_in_hand,
 )
 from mskgrasp.core.settings import Region, Tape
 from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
 from mskgrasp.perception.markers import Markers, find_markers
+from mskgrasp.perception.tallest import tallest_thing
 from mskgrasp.planning.place_pose import displacement_of_point
 from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.reports.grasp_figures import draw_plan
@@ -120,6 +131,7 @@ class TrialEngine:
         self.tape = tape
         self._operator = operator
         self._picture = picture
+        self._tallest = 0.0
 
     def home(self) -> None:
         """Move the arm home, out of the camera's view; after a contact, recover and try once more.
@@ -128,10 +140,10 @@ class TrialEngine:
             MotionAborted: A second contact.
         """
         try:
-            go_home(self.cell)
+            go_home(self.cell, tallest=self._tallest, take=self._operator.take)
         except MotionAborted as error:
             self.recover(error)
-            go_home(self.cell)
+            go_home(self.cell, tallest=self._tallest, take=self._operator.take)
 
     def recover(self, error: MotionAborted) -> None:
         """Recover the arm after a contact, with the operator's consent where one is asked.
@@ -145,10 +157,35 @@ class TrialEngine:
         self._operator.recover(self.cell, str(error))
 
     def capture(self) -> RgbdFrame:
-        """Capture a frame with depth rounded as in a file, so that a stored trial can be planned again."""
-        frame = self.cell.camera.capture()
+        """Capture a frame with depth rounded as in a file, so that a stored trial can be planned again.
+
+        The hand then passes over the tallest thing in it.
+
+        Raises:
+            ArmInView: The arm is not at home.
+        """
+        frame = capture_at_home(self.cell)
+        self._tallest = self.tallest(frame)
         depth = np.where(frame.depth > _MAX_DEPTH, np.nan, frame.depth)
         return replace(frame, depth=u16_to_depth(depth_to_u16(depth)))
+
+    @property
+    def passed(self) -> float:
+        """Height over the table of the tallest thing in the last frame, metres."""
+        return self._tallest
+
+    def tallest(self, frame: RgbdFrame, beside: PartView | None = None) -> float:
+        """Height over the table of the tallest thing in a frame, metres.
+
+        Args:
+            frame: Captured with the arm at home.
+            beside: A part that does not count; None: all do.
+        """
+        limits = self.cell.arm.limits
+        return tallest_thing(
+            frame, table_z=self.cell.workspace.table_z, lower=limits.box_lower, upper=limits.box_upper,
+            beside=beside,
+        )  # fmt: skip
 
     def present(
         self,
@@ -206,7 +243,7 @@ class TrialEngine:
         """
         before = self.part_pose()
         try:
-            result = execute_grasp(self.cell, plan.grasp)
+            result = execute_grasp(self.cell, plan.grasp, tallest=self._tallest)
         except OutOfWorkspace as error:
             return ExecutedGrasp(reason=type(error).__name__, before=before)
         after = self.part_pose()
@@ -231,7 +268,7 @@ class TrialEngine:
         if self.cell.arm.simulated and self.cell.feeder is not None:
             return
         try:
-            put_down(self.cell, plan.grasp)
+            put_down(self.cell, plan.grasp, tallest=self._tallest)
         except MotionAborted as error:
             self.recover(error)
 

@@ -116,7 +116,7 @@ def _measure_by_tape(
             raise MarkersNotFound("not put down: the part met the table above the grasp pose") from error
         in_hand = False
         try:
-            let_go(engine.cell, plan.grasp, opening=safe_opening(plan))
+            let_go(engine.cell, plan.grasp, opening=safe_opening(plan), tallest=engine.passed)
         except MotionAborted as error:
             engine.recover(error)
             raise MarkersNotFound("touched: the hand met something as it retracted") from error

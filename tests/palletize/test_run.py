@@ -49,11 +49,11 @@ def test_a_run_whose_cell_was_lost_is_resumed_and_reported(tmp_path, monkeypatch
     out = tmp_path / "run"
     grasped: list[Grasp] = []
 
-    def pulled_cable(cell: Cell, grasp: Grasp) -> GraspResult:
+    def pulled_cable(cell: Cell, grasp: Grasp, *, tallest: float) -> GraspResult:
         if grasped:
             raise CommunicationLost("no answer from the arm")
         grasped.append(grasp)
-        return execute_grasp(cell, grasp)
+        return execute_grasp(cell, grasp, tallest=tallest)
 
     with monkeypatch.context() as patch, pytest.raises(CommunicationLost):
         patch.setattr("mskgrasp.trials.engine.execute_grasp", pulled_cable)

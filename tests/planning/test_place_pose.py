@@ -6,9 +6,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.core.geometry import Pose, quat_about_z, wrap_angle
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, lowest_grasp_z, pose_base_grasp
-from mskgrasp.planning.place_pose import Target, displacement_of_point, drop_of, place_error, place_pose
+from mskgrasp.planning.place_pose import (
+    Target,
+    carry_height,
+    displacement_of_point,
+    drop_of,
+    place,
+    place_error,
+    place_pose,
+)
+from tests.hal.replay.toy import DOWN, toy_cell
 
 near = st.floats(-0.04, 0.04)
 angle = st.floats(-3.0, 3.0)
@@ -115,3 +125,67 @@ def test_a_part_that_hangs_askew_is_let_go_where_its_lowest_corner_nearly_touche
 def test_an_unknown_swing_drops_nothing():
     view, grasp = seen_box(0.2, 0.02), Grasp.from_vector(np.array([0.51, 0.02, 0.03, 0.3]))
     assert drop_of(grasp, view, 0.1, np.full(2, np.nan)) == drop_of(grasp, view, 0.1, np.zeros(2)) == 0
+
+
+class WritingCell:
+    """Notes where the hand is sent; it stands at a height over (0.4, 0)."""
+
+    def __init__(self, z: float):
+        cell = toy_cell()
+        cell.arm.connect()
+        start = Pose(position=np.array([0.4, 0.0, z]), quat_wxyz=DOWN)
+        cell.arm.move_to_pose(start)
+        self.seen: list[list[float]] = []
+        self.cell, move = cell, cell.arm.move_to_pose
+
+        def noted(T_base_tcp: Pose, *, speed: float = 0.1) -> None:
+            self.seen.append(np.asarray(T_base_tcp.position).round(4).tolist())
+            move(T_base_tcp, speed=speed)
+
+        cell.arm.move_to_pose = noted
+
+
+def recover(error: MotionAborted) -> None:
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("z", "tallest", "carried"),
+    [
+        (0.06, 0.0, 0.12),  # low parts: as ever
+        (0.06, 0.04, 0.12),
+        (0.06, 0.1, 0.175),  # the part reaches 6 cm below the TCP, and passes 15 mm over the others
+        (0.15, 0.0, 0.17),
+        (0.15, 0.16, 0.325),
+    ],
+)
+def test_a_part_is_carried_over_the_tallest_thing(z: float, tallest: float, carried: float):
+    pose = Grasp.from_vector(np.array([0.5, 0.2, z, 0.0]))
+    assert carry_height(toy_cell(), pose, tallest) == pytest.approx(carried)
+
+
+def test_a_tall_part_rises_before_it_goes_aside_and_the_hand_leaves_over_it():
+    """Lifted to 16 cm; a filled slot is 16 cm high."""
+    bench = WritingCell(0.16)
+    pose = Grasp.from_vector(np.array([0.5, 0.2, 0.06, 0.0]))
+    place(bench.cell, pose, recover, tallest=0.16, part_height=0.18)
+    assert bench.seen == [
+        [0.4, 0.0, 0.235],  # 16 cm, the part's 6 cm, and 15 mm
+        [0.5, 0.2, 0.235],
+        [0.5, 0.2, 0.06],
+        [0.5, 0.2, 0.2045],  # over the part itself
+    ]
+
+
+def test_a_low_part_goes_straight_aside():
+    bench = WritingCell(0.16)
+    place(bench.cell, Grasp.from_vector(np.array([0.5, 0.2, 0.06, 0.0])), recover, tallest=0.03)
+    assert bench.seen == [[0.5, 0.2, 0.12], [0.5, 0.2, 0.06], [0.5, 0.2, 0.12]]
+
+
+def test_a_place_over_which_the_part_cannot_be_carried_is_refused_before_anything_moves():
+    bench = WritingCell(0.16)
+    pose = Grasp.from_vector(np.array([0.5, 0.2, 0.06, 0.0]))
+    with pytest.raises(OutOfWorkspace):
+        place(bench.cell, pose, recover, tallest=0.95)
+    assert bench.seen == []

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hal import Arm, Cell
-from hal.errors import CaptureFailed, MotionAborted, NeedsRecovery, NotCalibrated, Stopped
+from hal.errors import ArmInView, CaptureFailed, MotionAborted, NeedsRecovery, NotCalibrated, Stopped
 from hal.operator import Operator
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
@@ -19,7 +19,7 @@ from mskgrasp.trials.engine import ExecutedGrasp, TrialEngine, connected_engine
 from tests.hal.real_cell import measured_cell
 from tests.hal.replay.toy import toy_cell
 from tests.planning.hand_made import FRAME, planner
-from tests.trials.box_grasps import BesideTheMiddle, BoxCell
+from tests.trials.box_grasps import SIZE, BesideTheMiddle, BoxCell
 
 
 def test_a_box_beside_the_middle_of_the_hand_ends_in_its_middle(box_cell: BoxCell):
@@ -42,10 +42,12 @@ def test_a_seed_presents_the_same_scene_again(box_cell: BoxCell):
 
 
 def test_depth_is_captured_in_the_resolution_of_a_file(box_cell: BoxCell):
+    box_cell.engine.home()
     steps = box_cell.engine.capture().depth.astype(np.float64) / 1e-4
     assert np.abs(steps - np.rint(steps)).max() < 0.01
     # Beyond 6.5535 m a file holds nothing. The toy camera's k-th frame is k metres away.
     cell = toy_cell()
+    cell.arm.connect()
     engine = TrialEngine(cell, Operator(cell, yes=True))
     seen = [engine.capture().depth for _ in range(3)]
     with pytest.raises(CaptureFailed):
@@ -72,6 +74,28 @@ def test_a_grasp_over_the_part_misses_and_one_on_its_top_collides(box_cell: BoxC
     np.testing.assert_allclose(
         box_cell.engine.cell.arm.state().joints, box_cell.engine.cell.workspace.home, atol=0.01
     )
+
+
+def test_a_held_part_is_put_down_on_the_way_home_not_dropped(box_cell: BoxCell):
+    planned = box_cell.present()
+    assert planned.plan is not None and box_cell.engine.grasp(planned.plan).reason == ""
+    lifted = box_cell.engine.part_pose()
+    assert lifted is not None and lifted.position[2] > 0.09
+    box_cell.engine.home()
+    lying = box_cell.engine.part_pose()
+    assert lying is not None and lying.position[2] == pytest.approx(SIZE[2] / 2, abs=1e-3)
+    np.testing.assert_allclose(lying.position[:2], lifted.position[:2], atol=2e-3)
+    assert box_cell.engine.cell.arm.in_hand() is None
+
+
+def test_no_grasp_is_planned_while_the_arm_may_be_in_view(box_cell: BoxCell):
+    engine = box_cell.engine
+    engine.home()
+    engine.cell.arm.move_to_joints(engine.cell.workspace.home + np.array([0, 0.1, 0, 0, 0, 0, 0]))
+    with pytest.raises(ArmInView, match=r"joint 2 is 0.10 rad from home: .*move it home first"):
+        engine.capture()
+    engine.home()
+    engine.capture()
 
 
 def test_a_grasp_out_of_reach_is_refused_before_anything_moves(box_cell: BoxCell):
