@@ -1,5 +1,9 @@
 """Errors that a user can correct; each message is one line."""
 
+from __future__ import annotations
+
+from typing import Any
+
 
 class MskgraspError(Exception):
     """Base class; the message is one line with the value, the legal values and the remedy."""
@@ -59,3 +63,25 @@ class MarkersNotFound(MskgraspError):
 
 class NoGraspFound(MskgraspError):
     """No candidate grasp meets the planner's criteria."""
+
+
+class GraspRefused(NoGraspFound):
+    """The best candidate is not worth trying: its predicted quality is under the bound.
+
+    Attributes:
+        quality: The best predicted quality.
+    """
+
+    def __init__(self, quality: float, reason: str):
+        super().__init__(f"no grasp found (best quality {quality:.2f}): {reason}")
+        self.quality = quality
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Keep the message as it is in another process."""
+        return _refused, (self.quality, str(self))
+
+
+def _refused(quality: float, message: str) -> GraspRefused:
+    error = GraspRefused(quality, "")
+    error.args = (message,)
+    return error

@@ -15,7 +15,7 @@ from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.reports.quantities import degrees, millimetres
 from mskgrasp.reports.style import saved_figure
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
-from mskgrasp.trials.trial import Trial
+from mskgrasp.trials.trial import REFUSED, Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
 
 
@@ -57,6 +57,8 @@ def draw_trial(run: Path, trial: Trial, path: Path) -> None:
 
 def outcome_text(trial: Trial) -> str:
     """Describe the outcome of a trial in one line."""
+    if trial.reason == REFUSED:
+        return f"not tried (refused: best predicted quality {trial.quality or 0.0:.2f})"
     if not trial.success:
         return f"not lifted ({trial.reason})"
     if trial.measured is None:

@@ -16,6 +16,7 @@ from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.quantities import counted, degrees, millimetres
 from mskgrasp.reports.section import Figure, Section, settings_section
 from mskgrasp.runtime.console_table import Link, Table
+from mskgrasp.trials.trial import REFUSED
 
 TITLES = {"success": "Success of planned grasps", "displacement": "Displacement in the hand"}
 _SUCCESS_COLUMNS = (
@@ -171,12 +172,26 @@ def _success_text(summary: SuccessSummary) -> list[str]:
         f"{rate} lifted, 95 % interval {interval_text(overall.success_interval, digits=1)} (paper: "
         f"{paper['simulated']:.1%} simulated, {paper['real']:.1%} real)"
     ]
+    lines.append(refused_text(overall.reasons, overall.trials, overall.successes))
     if overall.unmeasured:
         n = sum(overall.unmeasured.values())
         lines.append(f"{n} of {overall.successes} lifted not measured: {counted(overall.unmeasured)}")
     if overall.median_planning_s is not None:
         lines.append(f"median planning time {overall.median_planning_s:.2f} s")
     return lines
+
+
+def refused_text(reasons: Mapping[str, int], n_trials: int, n_lifted: int) -> str:
+    """State the share of trials in which no grasp was tried, and the rate without them."""
+    refused = reasons.get(REFUSED, 0)
+    if not n_trials:
+        return "no trial"
+    text = f"refused, as no grasp was worth trying: {refused} of {n_trials} ({refused / n_trials:.0%})"
+    if not refused:
+        return text
+    tried = n_trials - refused
+    rate = f"; of the {tried} grasps tried {n_lifted / tried:.1%} lifted the part" if tried else ""
+    return f"{text}, counted as not lifted{rate}"
 
 
 def _displacement(summary: DisplacementSummary, folder: Path) -> list[Section]:
@@ -201,6 +216,11 @@ def _displacement(summary: DisplacementSummary, folder: Path) -> list[Section]:
     return [
         Section(
             title="Lifted",
+            text=[
+                f"{name}: {refused_text(one.reasons, one.trials, one.successes)}"
+                for name, one in summary.policies.items()
+                if one.reasons.get(REFUSED)
+            ],
             tables=[
                 Table(header=("policy", "lifted", "95 % interval", "failures", "not measured"), rows=lifted)
             ],

@@ -71,6 +71,8 @@ def evaluate(config: EvaluateConfig) -> Report:
             f"{config.models} predicts no variance; use --planner.policy quality, or another model"
         )
     cell = read_cell(config.cell, noise=config.noise, measure=config.measure, tape=config.tape)
+    if not cell.simulated:  # in simulation nothing breaks, and a bound would hide what poor grasps do
+        config = config.model_copy(update={"planner": config.planner.for_motion()})
     if config.workers > 1 and not cell.simulated:
         raise UsageError(f"--workers {config.workers}: {config.cell} is one cell; omit --workers")
     # Parts come last: those that are missing are built, which takes a while.

@@ -28,6 +28,7 @@ from mskgrasp.reports.html import write_html
 from mskgrasp.reports.quantities import counted, degrees, millimetres
 from mskgrasp.reports.section import Figure, Section, settings_section
 from mskgrasp.runtime.console_table import Link, Table
+from mskgrasp.trials.trial import REFUSED
 
 GOAL = 0.5
 """Greatest share of the median error that correcting by the prediction is meant to leave."""
@@ -114,7 +115,16 @@ def result_section(summary: PlacementSummary) -> Section:
         )
         for name, row in summary.corrections.items()
     ]
-    return Section(title="Result", text=gain_lines(summary), tables=[Table(header=_HEADER, rows=rows)])
+    text = [*gain_lines(summary), _refused_line(summary)]
+    return Section(title="Result", text=text, tables=[Table(header=_HEADER, rows=rows)])
+
+
+def _refused_line(summary: PlacementSummary) -> str:
+    """State the share of placements that were not tried."""
+    rows = summary.corrections.values()
+    tried, refused = sum(row.tried for row in rows), sum(row.reasons.get(REFUSED, 0) for row in rows)
+    share = f" ({refused / tried:.0%})" if tried else ""
+    return f"Refused, as no grasp was worth trying: {refused} of {tried}{share}."
 
 
 def _interval_text(interval: Interval | None, scale: float, digits: int = 1) -> str:

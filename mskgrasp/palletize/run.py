@@ -69,6 +69,7 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
             asked but standard input is not a terminal.
         HalError: The cell was lost; finished placements are stored.
     """
+    config = config.model_copy(update={"planner": config.planner.for_motion()})
     models = load_models(config.models)
     slots = config.all_slots()
     corrections, asks = _check(config, slots)

@@ -42,6 +42,17 @@ def footprint_of(points: np.ndarray) -> Footprint:
     return Footprint(sides=np.array([long, short]) * 1e-3, theta=float(wrap_half_turn(np.asarray(theta))))
 
 
+def narrowest_width(points: np.ndarray) -> float:
+    """Compute the least distance between two parallel lines that enclose points (n, 2), metres."""
+    hull = cv2.convexHull((np.asarray(points) * 1e3).astype(np.float32))[:, 0].astype(np.float64) * 1e-3
+    sides = np.roll(hull, -1, axis=0) - hull
+    lengths = np.linalg.norm(sides, axis=1)
+    # The narrowest strip lies along a side of the hull.
+    normals = np.column_stack([-sides[:, 1], sides[:, 0]])[lengths > 0] / lengths[lengths > 0, None]
+    across = hull @ normals.T
+    return float((across.max(axis=0) - across.min(axis=0)).min()) if across.size else 0.0
+
+
 def seen_points(frame: RgbdFrame) -> np.ndarray:
     """Compute the points (h * w, 3) of a frame's pixels, base frame, metres; NaN where invalid."""
     depth = np.asarray(frame.depth, dtype=np.float64)

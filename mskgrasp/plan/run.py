@@ -9,6 +9,7 @@ import numpy as np
 from hal import Cell, capture_at_home, go_home, open_cell
 from hal.operator import Operator, StoppedByOperator
 from mskgrasp.plan.config import PlanConfig
+from mskgrasp.planning.config import MIN_QUALITY
 from mskgrasp.planning.for_cell import make_planner, part_name, present
 from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.reports.grasp_figures import draw_plan
@@ -31,7 +32,8 @@ def plan_text(plan: GraspPlan) -> str:
     return "\n".join(
         [
             f"grasp         x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, theta {np.degrees(theta):.1f} deg (base)",
-            f"quality       {plan.quality:.3f} (best of {len(plan.candidates)}: {plan.qualities.max():.3f})",
+            f"quality       {plan.quality:.3f} (best of {len(plan.candidates)}: {plan.qualities.max():.3f})"
+            + ("" if plan.quality >= MIN_QUALITY else f"; under {MIN_QUALITY:g}, not worth trying"),
             f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
             *([] if np.isnan(plan.swing).any() else [f"hangs askew   {tilt}"]),
             f"planned in    {plan.seconds['total']:.2f} s ({stages})",

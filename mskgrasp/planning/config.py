@@ -8,6 +8,9 @@ from pydantic import Field
 
 from mskgrasp.core.config import Config
 
+MIN_QUALITY = 0.5
+"""Lowest predicted quality of a grasp that is tried, if no other is set: success is likelier than failure."""
+
 
 class PlannerConfig(Config):
     """Settings of the search and the selection; the defaults are the paper's."""
@@ -17,8 +20,9 @@ class PlannerConfig(Config):
     """Share of the candidates, best quality first, among which the variance score selects."""
     policy: Literal["low_variance", "quality"] = "low_variance"
     """quality: take the best quality, regardless of its variance (the paper's experiment 1)."""
-    min_quality: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Lowest predicted quality of a selected grasp."""
+    min_quality: float | None = Field(default=None, ge=0.0, le=1.0)
+    """Lowest predicted quality of a selected grasp; null: none for a plan and for experiments in simulation,
+    which measure what poor grasps do, as the paper did; 0.5 where the plan is carried out."""
     check_fingers: bool = False
     """Exclude grasps whose open fingers would collide with something in the depth image."""
     refinements: int = Field(default=0, ge=0, le=20)
@@ -26,6 +30,17 @@ class PlannerConfig(Config):
     chunk_size: int = Field(default=640, ge=1)
     """Grasps in a batch: many more do not fit a CPU's cache, few have too much overhead. (The
     paper's network, with patches seven times larger, is fastest with 32.)"""
+
+    @property
+    def least_quality(self) -> float:
+        """Lowest predicted quality of a selected grasp; 0 for none."""
+        return self.min_quality or 0.0
+
+    def for_motion(self) -> PlannerConfig:
+        """The settings of a program that carries plans out: a bound on the quality unless one is set."""
+        if self.min_quality is not None:
+            return self
+        return self.model_copy(update={"min_quality": MIN_QUALITY})
 
     @property
     def searches(self) -> bool:

@@ -16,12 +16,13 @@ import numpy as np
 from hal.camera import RgbdFrame
 from hal.table import HIGHEST_TABLE
 from mskgrasp.core.displacement_covariance import object_displacement_covariance, swing_squared
-from mskgrasp.core.errors import BadModel, NoGraspFound, TableTooHigh
+from mskgrasp.core.errors import BadModel, GraspRefused, NoGraspFound, TableTooHigh
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.refine import fingers_free, grasps_near
+from mskgrasp.planning.refusal import refusal_reason
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 
 
@@ -217,7 +218,8 @@ class Planner:
 
         Raises:
             NoPartFound: No part is detected.
-            NoGraspFound: No candidate has the required quality.
+            GraspRefused: No candidate has the required quality; the message says why.
+            NoGraspFound: With ``check_fingers``, the fingers of every candidate would collide.
             TableTooHigh: The table is seen more than `hal.table.HIGHEST_TABLE` over its stated height.
         """
         started = time.perf_counter()
@@ -230,6 +232,7 @@ class Planner:
         best = self._scored(scene, candidates, self._shortlist(scene, candidates, found))
         if self.config.refinements:
             candidates, found, best = self._refined(scene, candidates, found, best, rng)
+        self.refuse_poor(frame, view, candidates, found[best.rows])
         chosen = select(found[best.rows], best.scores, self.config)
         selected = time.perf_counter()
         seconds = {
@@ -239,6 +242,26 @@ class Planner:
             "total": selected - started,
         }
         return GraspPlan.of(view, Grasp.from_vector(candidates), found, best, chosen, seconds=seconds)
+
+    def refuse_poor(
+        self, frame: RgbdFrame, view: PartView, candidates: np.ndarray, qualities: np.ndarray
+    ) -> None:
+        """Refuse a part none of whose grasps is worth trying.
+
+        Args:
+            frame: Frame of the part.
+            view: The part as detected in it.
+            candidates: (n, 4) grasps, base frame.
+            qualities: (k,) predicted qualities of the best of them.
+
+        Raises:
+            GraspRefused: All are lower than ``min_quality``; the message says why.
+        """
+        best = float(qualities.max())
+        if best < self.config.least_quality:
+            scene = Scene.of(frame, view, self.table_z, self.models.device)
+            reason = refusal_reason(frame, scene, candidates, region=self.region, min_height=self.min_height)
+            raise GraspRefused(best, reason)
 
     def _shortlist(self, scene: Scene, candidates: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Find the best candidates; with ``check_fingers`` the best whose fingers are free.
@@ -355,12 +378,11 @@ def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> 
     """Select one of the shortlisted grasps, which are sorted by quality.
 
     Raises:
-        NoGraspFound: None has the required quality.
+        GraspRefused: None has the required quality.
     """
-    good = np.flatnonzero(qualities >= config.min_quality)
+    good = np.flatnonzero(qualities >= config.least_quality)
     if not len(good):
-        raise NoGraspFound(
-            f"the best of the candidates has quality {qualities.max():.2f}, min_quality is "
-            f"{config.min_quality:g}; move the part, or lower min_quality"
+        raise GraspRefused(
+            float(qualities.max()), f"min_quality is {config.least_quality:g}; move the part, or lower it"
         )
     return int(good[0] if config.policy == "quality" else good[np.argmin(scores[good])])

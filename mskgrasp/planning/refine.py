@@ -6,7 +6,6 @@ Grasps are arrays (n, 4), x y z theta in the base frame, as in `mskgrasp.plannin
 from __future__ import annotations
 
 import numpy as np
-import torch
 
 from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.grasp import (
@@ -25,17 +24,29 @@ _LEAST_STD = np.array([0.0005, 0.0005, 0.0005, 0.01])
 
 
 def fingers_free(scene: Scene, grasps: np.ndarray) -> np.ndarray:
-    """Check (n,) whether the open fingers of grasps (n, 4) are free of collisions.
+    """Check (n,) whether the open fingers of grasps (n, 4) are free of collisions: `hand_room`."""
+    return hand_room(scene, grasps)[0]
+
+
+def hand_room(scene: Scene, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Check where open hands have room, and something to close on.
 
     A pixel higher than the finger tips within a finger's footprint collides. Invalid pixels count as table.
+
+    Args:
+        scene: The part and what lies around it.
+        grasps: (n, 4) base frame.
+
+    Returns:
+        Whether the open fingers are free of collisions (n,), and whether something is between the pads (n,).
     """
     reach = MAX_OPENING / 2 + FINGER_THICKNESS
     rows, columns = 2 * int(np.ceil(reach / _STEP)) + 1, 2 * int(np.ceil(FINGER_HALF_WIDTH / _STEP)) + 1
     along = np.abs((np.arange(rows) - (rows - 1) / 2) * _STEP)
     fingers = (along >= MAX_OPENING / 2) & (along <= reach)
-    heights = scene.crop_of(grasps, (rows, columns), _STEP)[:, 0, torch.from_numpy(fingers)]
+    heights = scene.crop_of(grasps, (rows, columns), _STEP)[:, 0].amax(dim=2).cpu().double().numpy()
     tips = grasps[:, 2] - scene.table_z - PAD_REACH
-    return heights.amax(dim=(1, 2)).cpu().double().numpy() <= tips
+    return heights[:, fingers].max(axis=1) <= tips, heights[:, along < MAX_OPENING / 2].max(axis=1) > tips
 
 
 def grasps_near(

@@ -25,7 +25,7 @@ from hal import (
 from hal.errors import MotionAborted, OutOfWorkspace, Stopped
 from hal.execute import refuse_by_hand
 from hal.operator import Operator
-from mskgrasp.core.errors import NoGraspFound, NoPartFound, TapeDoesNotFit
+from mskgrasp.core.errors import GraspRefused, NoGraspFound, NoPartFound, TapeDoesNotFit
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import (
     EJECTED_DISTANCE,
@@ -41,6 +41,7 @@ from mskgrasp.perception.tallest import tallest_thing
 from mskgrasp.planning.place_pose import displacement_of_point
 from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.reports.grasp_figures import draw_plan
+from mskgrasp.trials.trial import REFUSED
 
 _MAX_DEPTH = np.iinfo(np.uint16).max * DEPTH_UNIT
 
@@ -60,7 +61,8 @@ class PlannedGrasp:
     Attributes:
         frame: The part at rest before the grasp.
         plan: None where no grasp was found.
-        reason: Name of the error where no grasp was found; else empty.
+        reason: Reason where no grasp was found: `REFUSED`, or the error's name; else empty.
+        best_quality: Best predicted quality where all grasps were refused; else None.
         no_tape: Reason why the part carries no tape although tape measures; else empty.
     """
 
@@ -68,6 +70,7 @@ class PlannedGrasp:
     plan: GraspPlan | None
     reason: str = ""
     no_tape: str = ""
+    best_quality: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,10 +229,18 @@ class TrialEngine:
             try:
                 plan = planner.plan(frame, np.random.default_rng(seed))
             except (NoPartFound, NoGraspFound) as error:
+                quality = error.quality if isinstance(error, GraspRefused) else None
                 if self._operator.asks:
-                    self._operator.inform(f"no grasp was planned: {error}; place the part again")
-                    continue
-                return PlannedGrasp(frame=frame, plan=None, reason=type(error).__name__, no_tape=no_tape)
+                    again = "; place the part again" if quality is None else ""
+                    self._operator.inform(f"no grasp was planned: {error}{again}")
+                    if quality is None or self._operator.confirm(
+                        "Place the part again? y: yes, n: no, go on without it, q: stop: "
+                    ):
+                        continue
+                reason = type(error).__name__ if quality is None else REFUSED
+                return PlannedGrasp(
+                    frame=frame, plan=None, reason=reason, no_tape=no_tape, best_quality=quality
+                )
             if self._operator.asks:
                 draw_plan(frame, plan, self._picture)
             if self._operator.may_move(self._picture, f"{plan.summary}; {then}" if then else plan.summary):

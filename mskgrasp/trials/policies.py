@@ -80,7 +80,7 @@ class RepeatedPlanner:
 
         Raises:
             NoPartFound: No part is detected.
-            NoGraspFound: No candidate has the required quality.
+            GraspRefused: No candidate has the required quality.
         """
         key = _frame_key(frame, rng)
         if self._last is None or self._last[0] != key:
@@ -111,13 +111,14 @@ class Chooser:
 
         Raises:
             NoPartFound: No part is detected.
-            NoGraspFound: No candidate has the required quality.
+            GraspRefused: No candidate has the required quality.
         """
         config = self.candidates.planner.config.model_copy(update={"policy": self.policy})
         scored_grasps = self.candidates.of(frame, rng)
         view, found, scoring_s = scored_grasps.view, scored_grasps.qualities, scored_grasps.seconds
         scored = time.perf_counter()
         rows = shortlist(found, config.top_fraction)
+        self.candidates.planner.refuse_poor(frame, view, scored_grasps.grasps.as_vector(), found[rows])
         pose = None if self.tracker is None else self.tracker.part_pose()
         observation = PartObservation(part=self.part, frame=frame, view=view, pose_base_obj=pose)
         best_grasps = scored_grasps.grasps[rows]

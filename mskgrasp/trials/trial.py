@@ -9,6 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 Policy = Literal["quality", "low_variance"]
+REFUSED = "refused"
+"""Reason of a trial in which no grasp was tried, as the best predicted quality was under the bound."""
 _LEGAL_KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 
 
@@ -39,7 +41,7 @@ class Trial:
             part's rise; contact and penetration are not measured.
         reason: Reason why it was not; empty where it was.
         grasp: (4,) the executed grasp; None, as the plan's other values, where no grasp was found.
-        quality: Predicted probability of success.
+        quality: Predicted probability of success; that of the best grasp where all were refused.
         point_base: (3,) the point of the part before the grasp whose displacement is predicted and measured,
             metres: its origin by the tracker, or its seen centre where markers measure or nothing tracks the
             part; None where no grasp was found.

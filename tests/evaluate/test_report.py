@@ -14,7 +14,7 @@ from mskgrasp.evaluate.summary import summarise_trials
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Link
 from mskgrasp.trials.trial import Prediction
-from tests.evaluate.made_trials import Model, printed, report_of, trial
+from tests.evaluate.made_trials import NOTHING, Model, printed, report_of, trial
 
 
 def by_title(report: Report) -> dict[str, Section]:
@@ -104,3 +104,12 @@ def test_the_stored_report_is_strict_json_with_trials_in_words():
 def test_an_interval_of_a_share_is_a_range_of_percentages():
     assert interval_text((0.0949, 0.9051), digits=1) == "9.5% - 90.5%"
     assert interval_text((0.0, 1.0)) == "0% - 100%" and interval_text(None) == "-"
+
+
+def test_the_share_of_refused_trials_is_stated_and_the_rate_without_them():
+    refused = dict(NOTHING, reason="refused", quality=0.002)
+    text = printed(summarise_trials([trial(), trial(number=1), trial(number=2, **refused)]))
+    assert "66.7% lifted" in text
+    assert "refused, as no grasp was worth trying: 1 of 3 (33%), counted as not lifted" in text
+    assert "of the 2 grasps tried 100.0% lifted the part" in text
+    assert "refused, as no grasp was worth trying: 0 of 1 (0%)\n" in printed(summarise_trials([trial()]))

@@ -159,11 +159,14 @@ def test_a_run_without_a_success_reports_and_its_trial_is_replayed(tmp_path: Pat
         "--planner.min-quality", "1",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "0 of 1" in done.stdout and "NoGraspFound 1" in done.stdout and "nan" not in done.stdout
+    assert "0 of 1" in done.stdout and "refused 1" in done.stdout and "nan" not in done.stdout
     assert json.loads((out / "report.json").read_text())["overall"]["translation_rmse"] is None
+    (refused,) = trials(out).values()
+    assert refused.reason == "refused" and refused.grasp is None and 0 < (refused.quality or 0) < 1
+    assert "refused, as no grasp was worth trying: 1 of 1 (100%), counted as not lifted" in done.stdout
     again = program("--replay", str(out), "hex_nut_m30-000")
     assert again.returncode == 0, again.stderr
-    assert "not lifted (NoGraspFound)" in again.stdout
+    assert "not tried (refused: best predicted quality 0." in again.stdout
     assert (out / "replay" / "hex_nut_m30-000.png").exists()
 
 

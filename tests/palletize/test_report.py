@@ -86,3 +86,9 @@ def test_a_run_without_a_measured_placement_is_reported_too(tmp_path: Path):
     page = (tmp_path / "report.html").read_text()
     assert "0 of 1 parts placed; no error was measured under every correction." in page
     assert "nan" not in (tmp_path / "report.json").read_text().lower()
+
+
+def test_the_share_of_refused_placements_is_stated():
+    refused = placement(placed=False, reason="refused", translation_error=None, rotation_error=None)
+    text = result_section(summarise_placements([placement(number=1), refused])).text
+    assert "Refused, as no grasp was worth trying: 1 of 2 (50%)." in text

@@ -3,7 +3,13 @@ import pytest
 
 from mskgrasp.core.errors import NoPartFound
 from mskgrasp.core.geometry import wrap_half_turn
-from mskgrasp.perception.footprint import Footprint, footprint_of, pixel_pitch, seen_footprint
+from mskgrasp.perception.footprint import (
+    Footprint,
+    footprint_of,
+    narrowest_width,
+    pixel_pitch,
+    seen_footprint,
+)
 from tests import synthetic
 from tests.synthetic import REGION, TABLE_Z, Box
 
@@ -46,3 +52,19 @@ def test_the_low_plate_of_a_bracket_is_part_of_its_footprint():
 def test_an_empty_table_has_no_footprint():
     with pytest.raises(NoPartFound):
         seen_footprint(synthetic.frame([]), table_z=TABLE_Z, region=REGION, min_height=0.002)
+
+
+@pytest.mark.parametrize("turn", np.linspace(0, np.pi, 7))
+def test_the_narrowest_width_of_a_shape_does_not_depend_on_its_turn(turn: float):
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+
+    def width(points: list[tuple[float, float]]) -> float:
+        return narrowest_width(np.array(points) @ rotation.T + [0.5, -0.1])
+
+    assert width([(0, 0), (0.1, 0), (0.1, 0.03), (0, 0.03), (0.05, 0.01)]) == pytest.approx(0.03, abs=1e-6)
+    # A right triangle of 3, 4 and 5 is as narrow as its height over the longest side.
+    assert width([(0, 0), (0.03, 0), (0, 0.04)]) == pytest.approx(0.024, abs=1e-6)
+    circle = [(0.04 * np.cos(a), 0.04 * np.sin(a)) for a in np.linspace(0, 2 * np.pi, 200)]
+    assert width(circle) == pytest.approx(0.08, abs=1e-4)
+    assert width([(0, 0), (0.1, 0.0)]) == pytest.approx(0.0, abs=1e-6)
+    assert width([(0, 0)]) == 0.0

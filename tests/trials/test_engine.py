@@ -108,10 +108,27 @@ def test_a_grasp_out_of_reach_is_refused_before_anything_moves(box_cell: BoxCell
     np.testing.assert_array_equal(box_cell.engine.cell.arm.state().joints, joints)
 
 
-def test_a_part_for_which_no_grasp_is_found_is_a_result_with_the_errors_name(box_cell: BoxCell):
+def test_a_part_none_of_whose_grasps_is_worth_trying_is_a_result(box_cell: BoxCell):
     certain = planner(PlannerConfig(n_candidates=20, min_quality=1.0))
     planned = box_cell.engine.present(box_cell.part, box_cell.seed, certain)
-    assert planned.plan is None and planned.reason == "NoGraspFound"
+    assert planned.plan is None and planned.reason == "refused"
+    assert planned.best_quality is not None and planned.best_quality < 1
+
+
+def test_an_operator_decides_whether_a_part_that_is_refused_is_placed_again(
+    box_cell: BoxCell, tmp_path, monkeypatch
+):
+    """Placed again once, then the run goes on without it."""
+    cell = box_cell.engine.cell
+    monkeypatch.setattr(type(cell.arm), "simulated", False)
+    asked = io.StringIO()
+    operator = Operator(cell, answers=io.StringIO("y\nn\n"), prompts=asked)
+    engine = TrialEngine(cell, operator, picture=tmp_path / "next.png")
+    certain = planner(PlannerConfig(n_candidates=20, min_quality=1.0))
+    planned = engine.present(box_cell.part, box_cell.seed, certain)
+    assert planned.reason == "refused" and planned.plan is None
+    assert asked.getvalue().count("no grasp was planned: no grasp found (best quality 0.") == 2
+    assert "May the arm move" not in asked.getvalue()
 
 
 def test_an_operator_who_is_asked_sees_the_plan_and_may_have_the_part_placed_again(

@@ -96,8 +96,8 @@ def test_a_hand_that_meets_something_as_it_lets_go_measures_nothing(cell: Cell, 
     )
     let_go, recovered = measurement.let_go, []
 
-    def met(cell: Cell, place: Grasp, *, opening: float) -> None:
-        let_go(cell, place, opening=opening)
+    def met(cell: Cell, place: Grasp, *, opening: float, tallest: float) -> None:
+        let_go(cell, place, opening=opening, tallest=tallest)
         raise MotionAborted("contact")
 
     monkeypatch.setattr(measurement, "let_go", met)
