@@ -89,6 +89,6 @@ def test_a_run_without_a_measured_placement_is_reported_too(tmp_path: Path):
 
 
 def test_the_share_of_refused_placements_is_stated():
-    refused = placement(placed=False, reason="refused", translation_error=None, rotation_error=None)
-    text = result_section(summarise_placements([placement(number=1), refused])).text
+    refused = placement("b", 0, "none", None, reason="refused")
+    text = result_section(summarise_placements([placement("a", 0, "none", 1.0), refused])).text
     assert "Refused, as no grasp was worth trying: 1 of 2 (50%)." in text
