@@ -58,7 +58,7 @@ def draw_trial(run: Path, trial: Trial, path: Path) -> None:
 def outcome_text(trial: Trial) -> str:
     """Describe the outcome of a trial in one line."""
     if trial.reason == REFUSED:
-        return f"not tried (refused: best predicted quality {trial.quality or 0.0:.2f})"
+        return f"not tried (refused: {trial.refusal})"
     if not trial.success:
         return f"not lifted ({trial.reason})"
     if trial.measured is None:

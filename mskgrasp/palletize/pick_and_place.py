@@ -98,7 +98,7 @@ class PickAndPlace:
         )  # fmt: skip
         frame, plan = planned.frame, planned.plan
         if plan is None:
-            return replace(failed, reason=planned.reason)
+            return replace(failed, reason=planned.reason, refusal=planned.refusal)
         known = replace(failed, grasp=plan.grasp.as_vector().tolist(), predicted=plan.displacement.tolist())
         workspace = self._cell.workspace
         footprint = seen_footprint(

@@ -28,6 +28,7 @@ class Placement:
             measured.
         rotation_error: Absolute error of its turn; None as before.
         unmeasured: Reason why a placed part was not measured; empty where it was.
+        refusal: Why all grasps were refused, in a line; empty where one was tried.
     """
 
     part: str
@@ -43,6 +44,7 @@ class Placement:
     translation_error: float | None = None
     rotation_error: float | None = None
     unmeasured: str = ""
+    refusal: str = ""
 
     @property
     def key(self) -> tuple[str, int, int, Correction]:

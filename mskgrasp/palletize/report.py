@@ -248,10 +248,16 @@ def _shift(displacement: list[float] | None) -> str:
     return f"({x * 1e3:+.1f}, {y * 1e3:+.1f}) mm, {np.degrees(turn):+.1f} deg"
 
 
+def _why_lost(one: Placement) -> str:
+    if one.refusal:
+        return f"{one.reason}: {one.refusal}"
+    return one.reason or f"not measured: {one.unmeasured}"
+
+
 def _lost(out: Path, placements: Sequence[Placement]) -> Section:
     """The placements without an error, and why."""
     rows = [
-        [one.part, one.number, one.slot, one.correction, one.reason or f"not measured: {one.unmeasured}"]
+        [one.part, one.number, one.slot, one.correction, _why_lost(one)]
         for one in placements
         if one.translation_error is None
     ]

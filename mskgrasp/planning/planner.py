@@ -260,7 +260,14 @@ class Planner:
         best = float(qualities.max())
         if best < self.config.least_quality:
             scene = Scene.of(frame, view, self.table_z, self.models.device)
-            reason = refusal_reason(frame, scene, candidates, region=self.region, min_height=self.min_height)
+            reason = refusal_reason(
+                frame,
+                scene,
+                candidates,
+                self.config.least_quality,
+                region=self.region,
+                min_height=self.min_height,
+            )
             raise GraspRefused(best, reason)
 
     def _shortlist(self, scene: Scene, candidates: np.ndarray, found: np.ndarray) -> np.ndarray:

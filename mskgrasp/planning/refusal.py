@@ -20,6 +20,7 @@ def refusal_reason(
     frame: RgbdFrame,
     scene: Scene,
     candidates: np.ndarray,
+    bound: float,
     *,
     region: tuple[float, float, float, float],
     min_height: float,
@@ -30,11 +31,12 @@ def refusal_reason(
         frame: Frame of the part.
         scene: The same with the part as detected.
         candidates: (n, 4) grasps of low predicted quality, base frame.
+        bound: Lowest predicted quality of a grasp that is tried.
         region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
         min_height: Least height of a part above the table, metres.
 
     Returns:
-        A clause with its remedy; where the image shows no reason, that the model expects failures.
+        A clause with its remedy; where the image shows no reason, that the model predicts no better.
     """
     free, between = hand_room(scene, candidates)
     fits = float((free & between).mean())
@@ -60,4 +62,7 @@ def refusal_reason(
             "something is in the way of the open fingers wherever they would close on the part; clear the "
             "table around it, or place it another way"
         )
-    return "the model expects every grasp of it to fail; place it another way, or lower planner.min_quality"
+    return (
+        f"the model predicts less than planner.min_quality {bound:g} for every grasp; place the part another "
+        "way, or lower the bound"
+    )

@@ -63,6 +63,7 @@ class PlannedGrasp:
         plan: None where no grasp was found.
         reason: Reason where no grasp was found: `REFUSED`, or the error's name; else empty.
         best_quality: Best predicted quality where all grasps were refused; else None.
+        refusal: Why they were, in a line; else empty.
         no_tape: Reason why the part carries no tape although tape measures; else empty.
     """
 
@@ -71,6 +72,7 @@ class PlannedGrasp:
     reason: str = ""
     no_tape: str = ""
     best_quality: float | None = None
+    refusal: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -239,8 +241,9 @@ class TrialEngine:
                         continue
                 reason = type(error).__name__ if quality is None else REFUSED
                 return PlannedGrasp(
-                    frame=frame, plan=None, reason=reason, no_tape=no_tape, best_quality=quality
-                )
+                    frame=frame, plan=None, reason=reason, no_tape=no_tape, best_quality=quality,
+                    refusal="" if quality is None else str(error),
+                )  # fmt: skip
             if self._operator.asks:
                 draw_plan(frame, plan, self._picture)
             if self._operator.may_move(self._picture, f"{plan.summary}; {then}" if then else plan.summary):

@@ -57,7 +57,8 @@ def run_trial(
     frame, plan = planned.frame, planned.plan
     trial = Trial(part=part, number=number, seed=seed, success=False, reason=planned.reason)
     if plan is None:
-        return TrialRecord(trial=replace(trial, quality=planned.best_quality), frame=frame, plan=None)
+        trial = replace(trial, quality=planned.best_quality, refusal=planned.refusal)
+        return TrialRecord(trial=trial, frame=frame, plan=None)
     done = engine.grasp(plan)
     point = plan.view.centre_base
     if engine.tape is None and done.before is not None:

@@ -58,6 +58,7 @@ class Trial:
         true: (4,) where markers measure, the displacement by the tracker; None without one.
         pose_base_obj: (7,) x y z qw qx qy qz of the part before the grasp; None without a tracker.
         predictions: Predictions of the compared models for this grasp, by label.
+        refusal: Why all grasps were refused, in a line; empty where one was tried.
     """
 
     part: str
@@ -80,6 +81,7 @@ class Trial:
     true: list[float] | None = None
     pose_base_obj: list[float] | None = None
     predictions: dict[str, Prediction] = field(default_factory=dict)
+    refusal: str = ""
 
     @property
     def key(self) -> str:

@@ -166,7 +166,7 @@ def test_a_run_without_a_success_reports_and_its_trial_is_replayed(tmp_path: Pat
     assert "refused, as no grasp was worth trying: 1 of 1 (100%), counted as not lifted" in done.stdout
     again = program("--replay", str(out), "hex_nut_m30-000")
     assert again.returncode == 0, again.stderr
-    assert "not tried (refused: best predicted quality 0." in again.stdout
+    assert "not tried (refused: no grasp found (best quality 0." in again.stdout
     assert (out / "replay" / "hex_nut_m30-000.png").exists()
 
 
