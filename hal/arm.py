@@ -12,7 +12,8 @@ import numpy as np
 
 from hal.collisions import check_joints, check_path, line_joints
 from hal.device import Device
-from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
+from hal.errors import LoadTooHeavy, MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
+from hal.hand import ConfiguredHand, Load, holds
 from hal.limits import (
     ArmLimits,
     check_joint_path,
@@ -53,12 +54,17 @@ class ArmState:
         T_base_tcp: Measured pose of the TCP in the base.
         gripper_width: Distance between the pads, metres.
         timestamp_s: Time of the measurement, seconds on the monotonic clock of this machine.
+        grasped: Whether the hand itself reports a grasp; None where it reports nothing. `Arm.holds` decides.
+        max_width: Greatest distance between the pads that this hand reaches, metres; 0.08 where the hand does
+            not know its own before homing.
     """
 
     joints: np.ndarray
     T_base_tcp: Pose
     gripper_width: float
     timestamp_s: float
+    grasped: bool | None = None
+    max_width: float = MAX_OPENING
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +73,7 @@ class GraspOutcome:
 
     Attributes:
         width: Distance between the pads, metres.
-        holding: Whether something is between them.
+        holding: Whether something is between them, by `Arm.holds`.
     """
 
     width: float
@@ -109,6 +115,7 @@ class Arm(Device):
         self._stop = threading.Event()
         self._busy = threading.Lock()
         self._held: Held | None = None
+        self._load: Load | None = None
 
     # ------------------------------------------------------------------ commands
 
@@ -198,22 +205,66 @@ class Arm(Device):
     def move_gripper(self, width: float) -> None:
         """Move the pads to a distance in metres; to hold something use `grasp`.
 
+        A load that was set is cleared: what the hand held, it has released.
+
         Raises:
-            OutOfWorkspace: The width is outside 0 .. 0.08 m; nothing moved.
+            OutOfWorkspace: The width is outside 0 .. 0.08 m, or more than the hand opens; nothing moved.
             MotionAborted: Stopped, or an obstacle blocks the fingers.
             NeedsRecovery: An earlier error was not acknowledged.
         """
         if not 0 <= width <= MAX_OPENING:
             raise OutOfWorkspace(f"gripper width {width:g} m is outside 0 .. {MAX_OPENING} m")
         with self._motion():
-            self._move_gripper(width)
-            self._held = None
-            reached = self._state().gripper_width
-            if not self._stop.is_set() and abs(reached - width) > WIDTH_TOLERANCE:
-                raise MotionAborted(
-                    f"the pads stopped at {reached:.4f} m instead of {width:.4f} m; remove "
-                    "the obstacle, then call recover()"
+            most = self._known_width()
+            if width > most + WIDTH_TOLERANCE:
+                raise OutOfWorkspace(
+                    f"gripper width {width:g} m is outside 0 .. {most:.4f} m, which homing found; open the "
+                    "hand with open_gripper(), and home it after changing fingers (python -m hal.home)"
                 )
+            self._move_pads(min(width, most))
+
+    def open_gripper(self) -> None:
+        """Open the fingers as far as this hand does, `ArmState.max_width`; a load is cleared.
+
+        Raises:
+            MotionAborted: Stopped, or an obstacle blocks the fingers.
+            NeedsRecovery: An earlier error was not acknowledged.
+        """
+        with self._motion():
+            self._move_pads(self._known_width())
+
+    def home(self) -> None:
+        """Home the gripper: the fingers close and open, so that the hand knows its greatest width again.
+
+        Needed after the fingers were changed; what the hand holds falls, a load is cleared. The arm stands
+        still. A hand that needs no homing opens.
+
+        Raises:
+            MotionAborted: Stopped, or an obstacle blocks the fingers.
+            NeedsRecovery: An earlier error was not acknowledged.
+        """
+        with self._motion():
+            self._home()
+            self._held = None
+            self._clear_load()
+
+    def _move_pads(self, width: float) -> None:
+        self._move_gripper(width)
+        self._held = None
+        reached = self._state().gripper_width
+        if self._stop.is_set():
+            return
+        if abs(reached - width) > WIDTH_TOLERANCE:
+            raise MotionAborted(
+                f"the pads stopped at {reached:.4f} m instead of {width:.4f} m; remove "
+                "the obstacle, then call recover()"
+            )
+        self._clear_load()
+
+    def _clear_load(self) -> None:
+        if self._load is not None:
+            self._set_load(None)
+            self._load = None
 
     def grasp(self, force: float) -> GraspOutcome:
         """Close the fingers until they hold something with ``force`` newtons, or meet.
@@ -233,16 +284,47 @@ class Arm(Device):
             return outcome
 
     def in_hand(self) -> Held | None:
-        """What `grasp` closed on, if the fingers still hold it; None if not.
+        """What `grasp` closed on, if the fingers still hold it by `holds` where they closed; None if not.
 
         Raises:
             NotConnected, CommunicationLost: The arm is not connected or does not answer.
         """
         self._require_connection()
         held = self._held
-        if held is None or abs(self._state().gripper_width - held.width) > HELD_TOLERANCE:
+        if held is None:
             return None
-        return held
+        state = self._state()
+        moved = abs(state.gripper_width - held.width) > HELD_TOLERANCE
+        return None if moved or not self.holds(state) else held
+
+    def holds(self, state: ArmState) -> bool:
+        """Whether the fingers hold something in a state, by the rule `hal.hand.holds`."""
+        return holds(state.gripper_width, state.grasped, self.limits.closed_width)
+
+    def set_load(self, load: Load | None) -> None:
+        """Tell the arm which part its fingers hold, so that it compensates the weight; None for none.
+
+        Call it between grasp and lift; moving the fingers (`move_gripper`, `open_gripper`, `home`) clears it.
+
+        Raises:
+            LoadTooHeavy: The part weighs more than the arm carries; the load is as before.
+            MotionAborted: The robot refused it.
+            NeedsRecovery: An earlier error was not acknowledged.
+        """
+        if load is not None:
+            self.check_load(load.mass)
+        with self._motion():
+            self._set_load(load)
+            self._load = load
+
+    def hand(self) -> ConfiguredHand | None:
+        """The end effector that the robot is configured for; None where the arm does not report it.
+
+        Raises:
+            NotConnected, CommunicationLost: The arm is not connected or does not answer.
+        """
+        self._require_connection()
+        return self._hand()
 
     def wait(self, seconds: float) -> None:
         """Hold still for a time, seconds of the cell's own clock.
@@ -290,6 +372,18 @@ class Arm(Device):
             OutOfWorkspace: Names the limit that the target violates.
         """
         self._check_pose(self.limits, T_base_tcp)
+
+    def check_load(self, mass: float) -> None:
+        """Refuse a part that the arm cannot carry, by its mass in kg; move nothing.
+
+        Raises:
+            LoadTooHeavy: Names both masses and the remedy.
+        """
+        if not mass <= self.limits.max_load:
+            raise LoadTooHeavy(
+                f"the part weighs {mass:.3f} kg, this arm carries {self.limits.max_load:.3f} kg: leave it "
+                "out, or on a real cell raise arm.contact_force and arm.contact_torque (docs/real_cell.md)"
+            )
 
     def _check_pose(self, limits: ArmLimits, T_base_tcp: Pose) -> None:
         check_target_pose(limits, T_base_tcp)
@@ -382,6 +476,20 @@ class Arm(Device):
 
     @abstractmethod
     def _grasp(self, force: float) -> GraspOutcome: ...
+
+    def _known_width(self) -> float:
+        """Greatest distance of the pads, metres; a hand that does not know it yet is homed first."""
+        return MAX_OPENING
+
+    def _home(self) -> None:
+        """Home the fingers; a hand that needs no homing opens them."""
+        self._move_gripper(self._known_width())
+
+    def _set_load(self, load: Load | None) -> None:
+        """Compensate the weight of a part from now on; an arm that holds its pose under any load need not."""
+
+    def _hand(self) -> ConfiguredHand | None:
+        return None
 
     @abstractmethod
     def _wait(self, seconds: float) -> None: ...

@@ -78,6 +78,11 @@ class WorkspaceConfig(Config):
         """(3,) lower corner of the box, base frame, m."""
         return np.array(self.box_lower if self.box_lower is not None else (0.25, -0.4, self.table_z))
 
+    def reach(self) -> float:
+        """Horizontal distance of the box's farthest corner from the base, m."""
+        corners = np.abs([self.lower()[:2], self.box_upper[:2]]).max(axis=0)
+        return float(np.hypot(*corners))
+
 
 class DevicesConfig(Config):
     """Sections of the file; the ``driver`` of ``arm`` and ``camera`` decides how each is checked."""

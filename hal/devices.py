@@ -78,6 +78,8 @@ def _arm(values: dict[str, Any], table: WorkspaceConfig, workspace: Workspace, p
                 table_slope=np.array(table.table_slope),
                 table_centre=workspace.centre,
                 keep_out=keep_outs(table.keep_out),
+                closed_width=config.closed_width,
+                max_load=config.max_load(table.reach()),
             )
             arm = FrankaArm(config, limits)
             _check_fit(arm, workspace, path)

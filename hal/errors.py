@@ -43,6 +43,10 @@ class HandFull(HalError):
     """The hand holds something that would fall if the fingers opened."""
 
 
+class LoadTooHeavy(HalError):
+    """The part weighs more than the arm carries; nothing moved."""
+
+
 class MotionAborted(HalError):
     """A motion ended before its goal: contact, reflex, or stop()."""
 

@@ -11,8 +11,9 @@ from hal.arm import JOINT_TOLERANCE, Held
 from hal.camera import RgbdFrame
 from hal.cell import Cell
 from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, Stopped
+from hal.hand import Load
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import HOLD_S, MAX_OPENING, MIN_GAP, PAD_REACH, Grasp
+from mskgrasp.core.grasp import HOLD_S, MAX_OPENING, PAD_REACH, Grasp
 
 APPROACH = 0.12
 """Least height over the table from which the straight descent begins, m; tall things raise it."""
@@ -39,7 +40,7 @@ class GraspResult:
 
     Attributes:
         lifted: The fingers closed on something and the arm lifted it.
-        holding: The fingers hold something after lift and hold.
+        holding: The fingers hold something after lift and hold, by `Arm.holds`.
         width: Distance of the pads after lift and hold, metres.
         T_base_tcp: Measured pose of the TCP after lift and hold.
         aborted: Reason if the motion ended early, else None; the arm then needs `recover`.
@@ -52,16 +53,18 @@ class GraspResult:
     aborted: str | None
 
 
-def execute_grasp(cell: Cell, grasp: Grasp, *, tallest: float = 0.0) -> GraspResult:
+def execute_grasp(cell: Cell, grasp: Grasp, *, tallest: float = 0.0, load: Load | None = None) -> GraspResult:
     """Open, approach, descend, close, lift and hold.
 
     Args:
         cell: Connected, without an error in force.
         grasp: A single one, base frame.
         tallest: Height of the tallest thing over the table, which the open hand passes over, metres.
+        load: The part, which the arm is told between closing and lift; None where it is not known.
 
     Raises:
         NotCalibrated: The camera's pose was measured by hand; nothing moves.
+        LoadTooHeavy: The arm cannot carry the part; nothing moves.
         OutOfWorkspace: The grasp is refused before anything moves.
         HalError: The arm was lost or stopped; a motion that met resistance is a result, not an error.
     """
@@ -69,14 +72,18 @@ def execute_grasp(cell: Cell, grasp: Grasp, *, tallest: float = 0.0) -> GraspRes
     arm, lift = cell.arm, cell.workspace.lift_height
     above = above_grasp(cell, grasp, tallest=tallest)
     target, lifted = grasp.T_base_tcp, grasp.raised(lift).T_base_tcp
+    if load is not None:
+        arm.check_load(load.mass)
     for pose in (target, above, lifted):
         arm.check_pose(pose)
     try:
-        arm.move_gripper(MAX_OPENING)
+        arm.open_gripper()
         arm.move_to_pose(above, speed=0.4)
         arm.move_to_pose(target, speed=0.25)
         closed = arm.grasp(cell.workspace.grasp_force)
         if closed.holding:
+            if load is not None:
+                arm.set_load(load)
             arm.move_to_pose(lifted, speed=0.25)
             arm.wait(HOLD_S)
     except Stopped:
@@ -93,7 +100,7 @@ def execute_grasp(cell: Cell, grasp: Grasp, *, tallest: float = 0.0) -> GraspRes
     state = arm.state()
     return GraspResult(
         lifted=closed.holding,
-        holding=closed.holding and state.gripper_width > MIN_GAP,
+        holding=closed.holding and arm.holds(state),
         width=state.gripper_width,
         T_base_tcp=state.T_base_tcp,
         aborted=None,
@@ -179,7 +186,8 @@ def let_go(cell: Cell, place: Grasp, *, opening: float, tallest: float = 0.0) ->
         place: Pose of the hand as a grasp, base frame; the hand may be a little higher.
         opening: Distance of the pads afterwards, metres; 0 for the least that releases the part, which is
             `RELEASE` more than now. The fingers had room on the way down to the grasp, but since then the
-            part has moved between them: one inside a bore may push it as it opens all the way.
+            part has moved between them: one inside a bore may push it as it opens all the way. A hand that
+            opens less far opens as far as it does.
         tallest: Height of the tallest thing over the table, the part included, over which the hand rises, m.
 
     Raises:
@@ -188,8 +196,12 @@ def let_go(cell: Cell, place: Grasp, *, opening: float, tallest: float = 0.0) ->
     """
     if not 0 <= opening <= MAX_OPENING:
         raise ValueError(f"opening {opening} m is outside 0 .. {MAX_OPENING} m")
-    width = max(opening, cell.arm.state().gripper_width + RELEASE)
-    cell.arm.move_gripper(min(MAX_OPENING, width))
+    state = cell.arm.state()
+    width = max(opening, state.gripper_width + RELEASE)
+    if width < state.max_width:
+        cell.arm.move_gripper(width)
+    else:
+        cell.arm.open_gripper()
     cell.arm.move_to_pose(above_grasp(cell, place, tallest=tallest), speed=0.25)
 
 
@@ -215,11 +227,11 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
         if take is None and not arm.simulated:
             raise HandFull(
                 "the hand holds something, which would fall: put it down (hal.put_down), or take it and open "
-                "the fingers (arm.move_gripper), then go home"
+                "the fingers (arm.open_gripper), then go home"
             )
         if arm.simulated or take is None or not take():
             _put_down_below(cell, held)
-    arm.move_gripper(MAX_OPENING)
+    arm.open_gripper()
     state = arm.state()
     if np.abs(state.joints - cell.workspace.home).max() < JOINT_TOLERANCE:
         return

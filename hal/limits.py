@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hal.errors import OutOfWorkspace
+from hal.hand import HAND_MASS, PAYLOAD
 from hal.keep_out import KeepOut
 from mskgrasp.core.geometry import Pose, pose_distance, quat_rotate, straight_line
-from mskgrasp.core.grasp import PAD_REACH, TABLE_CLEARANCE
+from mskgrasp.core.grasp import MIN_GAP, PAD_REACH, TABLE_CLEARANCE
 
 _STEP = 0.01
 """Greatest distance between two checked points of a straight motion, metres."""
@@ -52,6 +53,8 @@ class ArmLimits:
         table_slope: (2,) rise of the table along x and along y, metres a metre.
         table_centre: (2,) point at which the table is at ``table_z``, base frame, metres.
         keep_out: Space that no link enters, for an arm whose links are known (`hal.collisions`).
+        closed_width: Pads at this distance or less hold nothing, metres.
+        max_load: Greatest mass of a part in the hand, kg.
     """
 
     joint_lower: np.ndarray
@@ -64,6 +67,8 @@ class ArmLimits:
     table_slope: np.ndarray = field(default_factory=lambda: np.zeros(2))
     table_centre: np.ndarray = field(default_factory=lambda: np.zeros(2))
     keep_out: tuple[KeepOut, ...] = ()
+    closed_width: float = MIN_GAP
+    max_load: float = PAYLOAD - HAND_MASS
 
     def over_table(self, T_base_tcp: Pose) -> np.ndarray:
         """Distances (...) of the open hand's lowest corner from the table, metres; negative below it."""

@@ -35,7 +35,6 @@ from hal.table import fit_table
 from mskgrasp.core.config import read_config, read_yaml, write_config
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.options import parse
 
@@ -196,7 +195,7 @@ def _take_board(cell: Cell, config: CalibrateConfig) -> None:
         cell.board_holder.hold_board(board.image(80, _MARGIN), (width, height), config.T_tcp_board())
         return
     _ask("Press Enter: the fingers open.")
-    arm.move_gripper(MAX_OPENING)
+    arm.open_gripper()
     _ask("Hold the board's handle between the fingers, printed side up, and press Enter: the fingers close.")
     if not arm.grasp(cell.workspace.grasp_force).holding:
         raise BadCalibrationSet(
@@ -208,7 +207,7 @@ def _take_board(cell: Cell, config: CalibrateConfig) -> None:
 def _give_board_back(cell: Cell) -> None:
     if cell.board_holder is None:
         _ask("Take hold of the board and press Enter: the fingers open.")
-        cell.arm.move_gripper(MAX_OPENING)
+        cell.arm.open_gripper()
 
 
 def _ask(prompt: str) -> None:

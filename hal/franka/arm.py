@@ -24,9 +24,10 @@ from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery
 from hal.franka.config import JOINT_SPEED, FrankyArmConfig, PandaPyArmConfig
 from hal.franka.driver import DriverSettings, DriverState
 from hal.franka.faults import NoTrajectory
-from hal.franka.frames import check_end_effector, pose_from_columns
+from hal.franka.frames import check_end_effector, load_in_flange, pose_from_columns
 from hal.franka.link import DriverLink
 from hal.franka.path import JointPath, joint_path, straight_path
+from hal.hand import ConfiguredHand, Load
 from hal.limits import ArmLimits
 from mskgrasp.core.geometry import Pose, pose_distance
 from mskgrasp.core.grasp import MAX_OPENING
@@ -76,6 +77,7 @@ class FrankaArm(Arm):
         """
         if self._link is None:
             self._link = self._new_link()
+            self._load = None
 
     def _new_link(self) -> DriverLink:
         config = self._config
@@ -128,6 +130,8 @@ class FrankaArm(Arm):
             T_base_tcp=pose_from_columns(state.o_t_ee),
             gripper_width=state.width,
             timestamp_s=state.seconds,
+            grasped=state.grasped,
+            max_width=state.max_width if state.max_width > 0 else MAX_OPENING,
         )
 
     # ------------------------------------------------------------------ motions
@@ -271,6 +275,8 @@ class FrankaArm(Arm):
         while not _is_idle(state := self._measure()) and time.monotonic() < deadline:
             time.sleep(_POLL_S)
         self._refuse_unless_idle(state)
+        if self._load is not None and state.load_mass == 0:
+            self._set_load(self._load)
 
     def _ready(self) -> DriverState:
         """Current state, refused unless the robot is idle: the drivers themselves would recover silently."""
@@ -307,21 +313,33 @@ class FrankaArm(Arm):
     def _homed(self) -> DriverState:
         """Before homing the hand does not know its width and refuses to grasp."""
         state = self._ready()
+        if state.load_mass > 0 and self._load is None:
+            self._set_load(None)  # of an earlier program, whose part this one knows nothing about
         if state.max_width <= 0:
-            if not self._ask("home_gripper", timeout_s=self._gripper_timeout_s()):
-                raise MotionAborted("the gripper could not be homed; free the fingers, then call recover()")
+            self._home()
             state = self._measure()
         return state
 
-    def _move_gripper(self, width: float) -> None:
+    def _known_width(self) -> float:
         # Homing finds a greatest width some tenths of a millimetre off the datasheet's 80 mm; the hand
         # refuses anything wider.
-        target = min(width, self._homed().max_width)
+        return self._homed().max_width
+
+    def _home(self) -> None:
+        self._ready()
+        try:
+            homed = self._ask("home_gripper", timeout_s=self._gripper_timeout_s())
+        except MotionAborted as error:
+            self._raise_aborted(error)
+        if not homed:
+            raise MotionAborted("the gripper could not be homed; free the fingers, then call recover()")
+
+    def _move_gripper(self, width: float) -> None:
         try:
             self._ask(
                 "move_gripper",
                 timeout_s=self._gripper_timeout_s(),
-                width=target,
+                width=width,
                 speed=self._config.gripper_speed,
             )
         except MotionAborted as error:
@@ -330,18 +348,29 @@ class FrankaArm(Arm):
 
     def _grasp(self, force: float) -> GraspOutcome:
         self._homed()
-        try:
-            gripped = self._ask(
+        # The answer does not count: some firmware reports an empty grasp by "Command failed!" or "Command
+        # aborted!", and a second grasp of a held part by False. What holds is what the hand then measures.
+        with contextlib.suppress(MotionAborted):
+            self._ask(
                 "grasp",
                 timeout_s=self._gripper_timeout_s(),
                 speed=self._config.gripper_speed,
                 force=force,
             )
-        except MotionAborted:
-            # "Command failed!" and "Command aborted!" are how some firmware reports an empty grasp.
-            gripped = False
-        width = self._still_width()
-        return GraspOutcome(width=width, holding=bool(gripped) and width > self._config.closed_width)
+        self._still_width()
+        state = self._state()
+        return GraspOutcome(width=state.gripper_width, holding=self.holds(state))
+
+    def _set_load(self, load: Load | None) -> None:
+        mass = 0.0 if load is None else float(load.mass)
+        centre, inertia = ([0.0] * 3, [0.0] * 9) if load is None else load_in_flange(load)
+        self._ask("set_load", timeout_s=self._config.patience_s, mass=mass, centre=centre, inertia=inertia)
+
+    def _hand(self) -> ConfiguredHand:
+        state = self._measure()
+        return ConfiguredHand(
+            mass=state.ee_mass, centre_flange=np.array(state.ee_centre), load_mass=state.load_mass
+        )
 
     def _still_width(self) -> float:
         """Width once the fingers are at rest; the hand reports success slightly earlier."""

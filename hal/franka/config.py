@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from hal.hand import HAND_MASS, PAYLOAD
 from mskgrasp.core.config import Config
 from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER
 
@@ -24,6 +25,11 @@ _JOINT_UPPER: dict[Robot, Seven] = {
 }
 JOINT_SPEED = np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61])
 """Greatest joint speeds, rad/s (the Panda's; the FR3's are no lower)."""
+
+
+LOAD_SHARE = 0.8
+"""Share of the reflex's thresholds that a part's weight may take; the rest is for motion and model errors."""
+_GRAVITY = 9.81
 
 
 class FrankaArmConfig(Config):
@@ -50,9 +56,9 @@ class FrankaArmConfig(Config):
     max_grasp_force: float = Field(default=40.0, gt=0, le=70)
     """Greatest gripper force, N (Franka Hand: 70 N continuously)."""
     gripper_speed: float = Field(default=0.05, gt=0, le=0.1)
-    """Speed of the pads, m/s."""
+    """Speed at which the pads' distance changes, twice that of each finger, m/s."""
     closed_width: float = Field(default=1e-3, ge=0, le=0.01)
-    """Pads at this distance or less hold nothing, m."""
+    """Pads at this distance or less hold nothing, m: as they close, and after the lift."""
     connect_timeout_s: float = Field(default=10.0, gt=0, le=120)
     """Time a robot has to accept the connection, s; one that another program holds never answers."""
     patience_s: float = Field(default=5.0, ge=1, le=120)
@@ -61,6 +67,18 @@ class FrankaArmConfig(Config):
     """Time the arm has to come to rest at a goal, s."""
     realtime: bool = False
     """Require real-time scheduling: true on a PREEMPT_RT kernel, false elsewhere."""
+
+    def max_load(self, reach: float) -> float:
+        """Greatest mass of a part, kg, whose weight the thresholds of the reflex hold, up to the payload.
+
+        As the part leaves the table, the robot takes the weight for a contact: until then what it was told
+        it holds is still carried by the table.
+
+        Args:
+            reach: Greatest horizontal distance of the hand from the base, metres.
+        """
+        by_force, by_torque = self.contact_force / _GRAVITY, self.contact_torque / (_GRAVITY * reach)
+        return min(LOAD_SHARE * min(by_force, by_torque), PAYLOAD - HAND_MASS)
 
     def joint_lower(self) -> np.ndarray:
         """(7,) radians, less the margin."""

@@ -56,6 +56,10 @@ class DriverState:
         f_t_ee: (16,) pose of the end effector in the flange, column-major, metres.
         width: Distance of the pads, metres.
         max_width: Greatest width, found by homing, metres; 0 before homing.
+        grasped: Whether the hand reports a grasp (``is_grasped``).
+        ee_mass: Mass of the end effector that Desk states (``m_ee``), kg.
+        ee_centre: (3,) its centre of mass in the flange (``F_x_Cee``), metres.
+        load_mass: Mass of the load last set (``m_load``), kg; 0 for none.
         mode: Mode of the robot.
         errors: Names of libfranka's errors in force, empty where there are none.
         seconds: Time of the measurement on the monotonic clock, s.
@@ -66,6 +70,10 @@ class DriverState:
     f_t_ee: list[float]
     width: float
     max_width: float
+    grasped: bool
+    ee_mass: float
+    ee_centre: list[float]
+    load_mass: float
     mode: Mode
     errors: str
     seconds: float
@@ -108,6 +116,16 @@ class Driver(Protocol):
 
     def grasp(self, speed: float, force: float) -> bool:
         """Close with a force in N until the pads hold something or meet."""
+        ...
+
+    def set_load(self, mass: float, centre: Sequence[float], inertia: Sequence[float]) -> None:
+        """State the part in the hand to an arm at rest; mass 0 for none.
+
+        Args:
+            mass: kg.
+            centre: (3,) centre of mass in the flange, metres.
+            inertia: (9,) about the centre of mass, flange axes, column-major, kg m^2.
+        """
         ...
 
     def stop(self) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from hal.errors import NotConnected
+from hal.hand import Load
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.panda_kinematics import TCP_OFFSET
 
@@ -35,6 +36,14 @@ def matrix_from_columns(values: Sequence[float]) -> np.ndarray:
 def pose_from_columns(values: Sequence[float]) -> Pose:
     """``T_a_b`` of libfranka's 16 numbers, quaternion w x y z."""
     return Pose.from_matrix(matrix_from_columns(values))
+
+
+def load_in_flange(load: Load) -> tuple[list[float], list[float]]:
+    """Centre of mass (3,) in the flange, metres, and inertia (9,) in its axes, column-major, of a load."""
+    turn = F_T_EE[:3, :3]
+    centre = turn @ np.asarray(load.centre_tcp) + F_T_EE[:3, 3]
+    inertia = turn @ np.asarray(load.inertia) @ turn.T
+    return centre.tolist(), inertia.flatten(order="F").tolist()
 
 
 def tool_along(start: np.ndarray, goal: np.ndarray) -> np.ndarray:

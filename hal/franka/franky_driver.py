@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,6 +65,10 @@ class FrankyDriver:
             f_t_ee=column_major(robot.F_T_NE.matrix),
             width=gripper.width,
             max_width=gripper.max_width,
+            grasped=bool(gripper.is_grasped),
+            ee_mass=float(robot.m_ee),
+            ee_centre=[float(value) for value in robot.F_x_Cee],
+            load_mass=float(robot.m_load),
             mode=MODES[int(robot.robot_mode)],
             errors=str(robot.current_errors),
             seconds=time.monotonic(),
@@ -208,6 +212,10 @@ class FrankyDriver:
         return self._wait(
             lambda: self._gripper.grasp_async(0.0, speed, force, epsilon_inner=0.08, epsilon_outer=0.08)
         )
+
+    def set_load(self, mass: float, centre: Sequence[float], inertia: Sequence[float]) -> None:
+        """State the part in the hand, its centre (3,) and inertia (9,) in the flange; mass 0 for none."""
+        self._robot.set_load(mass, centre, inertia)
 
     def stop(self) -> None:
         """End a motion of arm and fingers, and any to come before `recover`."""

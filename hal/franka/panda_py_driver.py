@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
 
 import numpy as np
@@ -72,6 +72,10 @@ class PandaPyDriver:
             f_t_ee=list(robot.F_T_EE),
             width=gripper.width,
             max_width=gripper.max_width,
+            grasped=bool(gripper.is_grasped),
+            ee_mass=robot.m_ee,
+            ee_centre=list(robot.F_x_Cee),
+            load_mass=robot.m_load,
             mode=MODES[int(robot.robot_mode)],
             errors=str(robot.current_errors),
             seconds=time.monotonic(),
@@ -188,6 +192,11 @@ class PandaPyDriver:
         return self._wait(
             lambda: self._gripper.grasp(0.0, speed, force, epsilon_inner=0.08, epsilon_outer=0.08)
         )
+
+    def set_load(self, mass: float, centre: Sequence[float], inertia: Sequence[float]) -> None:
+        """State the part in the hand, its centre (3,) and inertia (9,) in the flange; mass 0 for none."""
+        with self._use:
+            self._robot.set_load(mass, centre, inertia)
 
     def stop(self) -> None:
         """End a motion of arm and fingers, and any to come before `recover`."""

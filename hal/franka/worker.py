@@ -87,6 +87,7 @@ class Worker:
             "home_gripper": driver.home_gripper,
             "move_gripper": lambda: driver.move_gripper(request["width"], request["speed"]),
             "grasp": lambda: driver.grasp(request["speed"], request["force"]),
+            "set_load": lambda: driver.set_load(request["mass"], request["centre"], request["inertia"]),
             "move_joints": lambda: driver.move_joints(_path(request)),
             "move_straight": lambda: driver.move_straight(
                 _path(request), np.array(request["T_base_tcp"]), request.get("until_force")

@@ -11,7 +11,7 @@ from hal.arm import ArmState, GraspOutcome
 from hal.mujoco.world import MujocoWorld
 from hal.simulated import SimulatedArm, contact_fault, joint_motion_s
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import MAX_OPENING, MIN_GAP
+from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.minimum_jerk import minimum_jerk_steps
 from mskgrasp.core.panda_kinematics import forward_pose, track
 
@@ -70,7 +70,8 @@ class MujocoArm(SimulatedArm[MujocoWorld]):
     def _grasp(self, force: float) -> GraspOutcome:
         simulation = self._world.simulation
         simulation.move_fingers(-MAX_OPENING, force=force, stop=self._stop.is_set)
-        return GraspOutcome(width=simulation.width, holding=simulation.width > MIN_GAP)
+        state = self._state()
+        return GraspOutcome(width=state.gripper_width, holding=self.holds(state))
 
     def _wait(self, seconds: float) -> None:
         self._world.simulation.stand(seconds, stop=self._stop.is_set)

@@ -9,13 +9,15 @@ import numpy as np
 
 from hal.arm import HELD_TOLERANCE, STOPPED, Arm, ArmState, GraspOutcome, Held
 from hal.device import SharingDevice
-from hal.errors import NeedsRecovery, NotRecorded, OutOfWorkspace, Stopped
+from hal.errors import LoadTooHeavy, NeedsRecovery, NotRecorded, OutOfWorkspace, Stopped
+from hal.hand import Load
 from hal.replay.config import ReplayArmConfig
 from hal.replay.events import COMMANDS, arm_state, plain, pose
 from hal.replay.playback import Playback
 from hal.replay.reader import read_recording
 from mskgrasp.core.errors import MskgraspError
 from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import MAX_OPENING
 
 
 class ReplayArm(SharingDevice, Arm):
@@ -81,6 +83,20 @@ class ReplayArm(SharingDevice, Arm):
         self._replay("move_gripper", width=width)
         self._held = None
 
+    def open_gripper(self) -> None:
+        """See `Arm.open_gripper`; an older recording has the width that opened the hand instead."""
+        following = self._playback.peek()
+        if following is not None and following.call == "move_gripper":
+            self._replay("move_gripper", width=MAX_OPENING)
+        else:
+            self._replay("open_gripper")
+        self._held = None
+
+    def home(self) -> None:
+        """See `Arm.home`."""
+        self._replay("home")
+        self._held = None
+
     def grasp(self, force: float) -> GraspOutcome:
         """See `Arm.grasp`."""
         outcome = GraspOutcome(**self._replay("grasp", force=force))
@@ -93,9 +109,33 @@ class ReplayArm(SharingDevice, Arm):
         """What the recorded hand held; None also where a person took it, after which the fingers opened."""
         self._require_connection()
         held, values, following = self._held, self._playback.last_state(), self._playback.peek()
-        if held is None or values is None or (following is not None and following.call == "move_gripper"):
+        opened = following is not None and following.call in ("move_gripper", "open_gripper")
+        if held is None or values is None or opened:
             return None
-        return held if abs(values["width"] - held.width) <= HELD_TOLERANCE else None
+        moved = abs(values["width"] - held.width) > HELD_TOLERANCE
+        return None if moved or not self.holds(arm_state(values, 0.0)) else held
+
+    def set_load(self, load: Load | None) -> None:
+        """Accept a load as the recorded arm did, or as any arm where the recording has none at this point.
+
+        Raises:
+            LoadTooHeavy: It is more than the recorded arm carries.
+        """
+        self._require_connection()
+        if load is not None:
+            self.check_load(load.mass)
+        if self._fault is not None:
+            raise NeedsRecovery(f"the arm stopped before ({self._fault}); check the arm, then call recover()")
+        try:
+            self._playback.answer("set_load")
+        except (LoadTooHeavy, NeedsRecovery):
+            raise  # no fault
+        except MskgraspError as error:
+            self._fault = str(error)
+            raise
+
+    def hand(self) -> None:
+        """None: a recording does not hold it."""
 
     def wait(self, seconds: float) -> None:
         """Do not wait; see `Arm.wait`."""

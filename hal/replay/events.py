@@ -10,17 +10,19 @@ import numpy as np
 from hal import errors as hal_errors
 from hal.arm import ArmState, GraspOutcome
 from hal.errors import HalError, Stopped
+from hal.hand import Load
 from hal.keep_out import Box, Capsule, to_plain
 from mskgrasp.core import errors as base_errors
 from mskgrasp.core.errors import MskgraspError
 from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import MAX_OPENING
 
 SCHEMA = 1
 KIND = "mskgrasp cell recording"
 
 Command = Literal[
-    "capture", "present", "move_to_joints", "move_to_pose", "move_until_contact", "move_gripper", "grasp",
-    "wait", "recover",
+    "capture", "present", "move_to_joints", "move_to_pose", "move_until_contact", "move_gripper",
+    "open_gripper", "home", "grasp", "wait", "recover",
 ]  # fmt: skip
 COMMANDS: tuple[str, ...] = get_args(Command)
 """Calls that act, in sequence; the calls between them are queries."""
@@ -66,6 +68,8 @@ def plain(value: Any) -> Any:
                 joints=plain(value.joints),
                 T_base_tcp=plain(value.T_base_tcp),
                 width=float(value.gripper_width),
+                grasped=None if value.grasped is None else bool(value.grasped),
+                max_width=float(value.max_width),
             )
         case Capsule() | Box():
             return to_plain(value)
@@ -73,6 +77,10 @@ def plain(value: Any) -> Any:
             return [to_plain(one) for one in value]
         case GraspOutcome():
             return dict(width=float(value.width), holding=bool(value.holding))
+        case Load():
+            return dict(
+                mass=float(value.mass), centre_tcp=plain(value.centre_tcp), inertia=plain(value.inertia)
+            )
         case np.ndarray() | np.generic():
             return value.tolist()
         case _:
@@ -80,12 +88,14 @@ def plain(value: Any) -> Any:
 
 
 def arm_state(values: dict[str, Any], timestamp_s: float) -> ArmState:
-    """The state that `plain` wrote."""
+    """The state that `plain` wrote; one of an older recording reports neither grasp nor greatest width."""
     return ArmState(
         joints=np.array(values["joints"]),
         T_base_tcp=pose(values["T_base_tcp"]),
         gripper_width=values["width"],
         timestamp_s=timestamp_s,
+        grasped=values.get("grasped"),
+        max_width=values.get("max_width", MAX_OPENING),
     )
 
 

@@ -12,6 +12,7 @@ from hal.camera import Camera, RgbdFrame
 from hal.cell import PartFeeder, PartTracker
 from hal.device import Device, SharingDevice
 from hal.errors import HalError
+from hal.hand import ConfiguredHand, Load
 from hal.replay.events import plain
 from hal.replay.writer import RecordingWriter
 from mskgrasp.core.geometry import Pose
@@ -106,6 +107,14 @@ class RecordingArm(SharingDevice, Arm):
         """See `Arm.move_gripper`."""
         self._record("move_gripper", width=width)
 
+    def open_gripper(self) -> None:
+        """See `Arm.open_gripper`."""
+        self._record("open_gripper")
+
+    def home(self) -> None:
+        """See `Arm.home`."""
+        self._record("home")
+
     def grasp(self, force: float) -> GraspOutcome:
         """See `Arm.grasp`."""
         return self._record("grasp", force=force)
@@ -113,6 +122,16 @@ class RecordingArm(SharingDevice, Arm):
     def in_hand(self) -> Held | None:
         """See `Arm.in_hand`; not recorded, as it follows from what is."""
         return self._arm.in_hand()
+
+    def set_load(self, load: Load | None) -> None:
+        """See `Arm.set_load`; a refusal, which follows from the recorded limits, is not recorded."""
+        if load is not None:
+            self.check_load(load.mass)
+        self._writer.call("set_load", dict(load=load), lambda: self._arm.set_load(load))
+
+    def hand(self) -> ConfiguredHand | None:
+        """See `Arm.hand`; not recorded."""
+        return self._arm.hand()
 
     def wait(self, seconds: float) -> None:
         """See `Arm.wait`."""

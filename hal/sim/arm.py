@@ -15,7 +15,7 @@ from hal.limits import ArmLimits
 from hal.sim.world import SapienWorld
 from hal.simulated import SimulatedArm, contact_fault, joint_motion_s
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import MAX_OPENING, MIN_GAP, PAD_REACH
+from mskgrasp.core.grasp import MAX_OPENING, PAD_REACH
 from mskgrasp.core.minimum_jerk import minimum_jerk_steps
 from mskgrasp.core.panda_kinematics import forward, track
 from tasks.robot.reflex import Reflex
@@ -168,8 +168,8 @@ class SapienArm(SimulatedArm[SapienWorld]):
         self._force = force
         env.motion.move_fingers(-MAX_OPENING / 2, force=force, check=self._stop.is_set)
         env.motion.hold(True)
-        width = self._state().gripper_width
-        return GraspOutcome(width=width, holding=width > MIN_GAP)
+        state = self._state()
+        return GraspOutcome(width=state.gripper_width, holding=self.holds(state))
 
     def _wait(self, seconds: float) -> None:
         in_air = bool(self._in_air(self._target()[None])[0])

@@ -8,9 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hal import Cell, GraspOutcome, capture_at_home, execute_grasp, go_home, let_go, put_down
-from hal.errors import ArmInView, HandFull, NeedsRecovery, NotCalibrated, OutOfWorkspace, Stopped
+from hal import Cell, GraspOutcome, Load, capture_at_home, execute_grasp, go_home, let_go, put_down
+from hal.errors import (
+    ArmInView,
+    HandFull,
+    LoadTooHeavy,
+    NeedsRecovery,
+    NotCalibrated,
+    OutOfWorkspace,
+    Stopped,
+)
 from hal.execute import above_grasp, lower
+from hal.hand import holds
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
 from tests.hal.replay.toy import ToyArm, ToyCamera, toy_cell
@@ -42,6 +51,9 @@ class WritingArm(ToyArm):
         self.log.append(("grasp", force))
         self._width = self.between
         return GraspOutcome(width=self.between, holding=self.between > 0)
+
+    def _set_load(self, load: Load | None) -> None:
+        self.log.append(("load", None if load is None else load.mass))
 
     def _wait(self, seconds: float) -> None:
         self.log.append(("wait", seconds))
@@ -159,6 +171,62 @@ def test_nothing_between_the_pads_is_not_lifted(cell: Cell, arm: WritingArm):
     result = execute_grasp(cell, GRASP)
     assert arm.log[-1] == ("grasp", 20.0)
     assert (result.lifted, result.holding, result.aborted) == (False, False, None)
+
+
+LOAD = Load(mass=0.3, centre_tcp=np.array([0.0, 0.0, 0.01]), inertia=1e-4 * np.eye(3))
+
+
+def test_a_known_part_is_told_between_closing_and_lift_until_the_fingers_open(cell: Cell, arm: WritingArm):
+    execute_grasp(cell, GRASP, load=LOAD)
+    assert arm.log[3:] == [("grasp", 20.0), ("load", 0.3), ("pose", [0.4, 0.1, 0.16]), ("wait", 0.2)]
+    arm.log.clear()
+    put_down(cell, GRASP)
+    assert arm.log[1:] == [("gripper", 0.08), ("load", None), ("pose", [0.4, 0.1, 0.12])]
+    arm.between = 0.0
+    arm.log.clear()
+    execute_grasp(cell, GRASP, load=LOAD)
+    assert [verb for verb, _ in arm.log] == ["gripper", "pose", "pose", "grasp"]  # nothing to tell
+
+
+def test_a_part_that_is_too_heavy_moves_nothing(cell: Cell, arm: WritingArm):
+    with pytest.raises(LoadTooHeavy, match=r"weighs 2.500 kg, this arm carries 2.270 kg") as caught:
+        execute_grasp(cell, GRASP, load=dataclasses.replace(LOAD, mass=2.5))
+    assert arm.log == [] and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("width", "grasped", "holding"), [
+    (0.03, None, True), (0.03, True, True), (0.03, False, False),
+    (0.0008, True, False), (0.0008, None, False),
+])  # fmt: skip
+def test_what_is_held_after_the_lift_follows_the_rule_of_the_closing(
+    cell: Cell, arm: WritingArm, monkeypatch, width: float, grasped: bool | None, holding: bool
+):
+    """The hand's own report counts, and pads nearer than the cell's closed_width hold nothing."""
+    arm.limits = dataclasses.replace(arm.limits, closed_width=1e-3)
+    state = ToyArm._state
+    monkeypatch.setattr(arm, "_wait", lambda _: setattr(arm, "_width", width))
+    monkeypatch.setattr(arm, "_state", lambda: dataclasses.replace(state(arm), grasped=grasped))
+    assert execute_grasp(cell, GRASP).holding is holding
+    assert holds(width, grasped, 1e-3) is holding
+
+
+@pytest.mark.parametrize("values", [
+    {"mass": 0.0}, {"mass": np.nan}, {"centre_tcp": np.zeros(2)}, {"inertia": np.full((3, 3), np.inf)},
+])  # fmt: skip
+def test_what_is_no_load_is_refused(values: dict[str, Any]):
+    with pytest.raises(ValueError, match="load|centre_tcp"):
+        dataclasses.replace(LOAD, **values)
+
+
+def test_a_hand_that_opens_less_far_opens_as_far_as_it_does(cell: Cell, arm: WritingArm, monkeypatch):
+    state = ToyArm._state
+    monkeypatch.setattr(arm, "_state", lambda: dataclasses.replace(state(arm), max_width=0.07))
+    monkeypatch.setattr(arm, "_known_width", lambda: 0.07)
+    execute_grasp(cell, GRASP)
+    let_go(cell, GRASP, opening=0.075)
+    assert [value for verb, value in arm.log if verb == "gripper"] == [0.07, 0.07]
+    with pytest.raises(OutOfWorkspace, match=r"0 .. 0.0700 m, which homing found"):
+        arm.move_gripper(0.08)
 
 
 def test_a_part_lost_on_the_way_up_was_lifted_and_is_not_held(cell: Cell, arm: WritingArm, monkeypatch):

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hal import Arm, Cell, cell_from_yaml, execute_grasp
+from hal import Arm, Cell, Load, cell_from_yaml, execute_grasp
 from hal.arm import JOINT_TOLERANCE, POSITION_TOLERANCE, ROTATION_TOLERANCE
-from hal.errors import MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
+from hal.errors import LoadTooHeavy, MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
 from hal.open_cell import SIMULATED
 from hal.replay import ReplayArm, ReplayArmConfig, recorded_cell
 from hal.replay.recorder import RecordingArm
@@ -222,6 +222,47 @@ def test_grasping_nothing_is_an_outcome(cell: Cell):
     assert not outcome.holding and outcome.width < 1e-3
 
 
+def test_a_hand_opens_as_far_as_it_does_and_knows_how_far(cell: Cell):
+    cell.arm.move_gripper(0.02)
+    cell.arm.open_gripper()
+    state = cell.arm.state()
+    assert 0.078 <= state.max_width <= 0.082
+    assert state.gripper_width == pytest.approx(state.max_width, abs=2e-3)
+    assert state.grasped in (False, None)
+
+
+def test_homing_moves_the_fingers_alone_and_the_hand_works_on(cell: Cell):
+    before = cell.arm.state().joints
+    cell.arm.home()
+    assert cell.arm.state().joints == pytest.approx(before, abs=STILL_RAD)
+    cell.arm.move_gripper(0.03)
+    assert cell.arm.state().gripper_width == pytest.approx(0.03, abs=2e-3)
+
+
+def test_a_closed_hand_holds_by_the_same_rule_at_any_time(cell: Cell):
+    outcome, state = cell.arm.grasp(20.0), cell.arm.state()
+    assert outcome.holding is cell.arm.holds(state) is False
+    held = dataclasses.replace(state, gripper_width=0.03, grasped=None)
+    assert cell.arm.holds(held) and not cell.arm.holds(dataclasses.replace(held, grasped=False))
+
+
+def test_a_part_in_the_hand_may_be_stated_unless_it_is_too_heavy(cell: Cell):
+    arm, load = cell.arm, Load(mass=0.2, centre_tcp=np.zeros(3), inertia=1e-4 * np.eye(3))
+    arm.set_load(load)
+    with pytest.raises(LoadTooHeavy) as caught:
+        arm.set_load(dataclasses.replace(load, mass=20.0))
+    assert "weighs 20.000 kg" in str(caught.value) and "\n" not in str(caught.value)
+    before = arm.state().joints
+    with pytest.raises(LoadTooHeavy):
+        grasp = Grasp.from_vector(np.array([0.45, 0.0, 0.02, 0.0]))
+        execute_grasp(cell, grasp, load=dataclasses.replace(load, mass=20.0))
+    assert arm.state().joints == pytest.approx(before, abs=STILL_RAD)
+    arm.set_load(None)
+    arm.set_load(load)
+    arm.open_gripper()  # which releases it
+    arm.move_gripper(0.06)  # a refusal is no fault
+
+
 def test_a_hand_that_has_closed_is_open_when_it_says_so(cell: Cell):
     cell.arm.grasp(20.0)
     cell.arm.move_gripper(0.08)
@@ -348,7 +389,9 @@ def test_an_interrupted_program_leaves_an_arm_that_must_be_recovered(cell: Cell,
 def test_an_arm_outside_its_context_refuses_and_can_be_opened_again(name: str, tmp_path: Path):
     with backend(name, tmp_path) as path:
         cell = cell_from_yaml(path)
-        for command in (cell.arm.state, cell.arm.recover, lambda: cell.arm.move_gripper(0.05)):
+        arm = cell.arm
+        moves = (arm.home, arm.open_gripper, lambda: arm.move_gripper(0.05), lambda: arm.set_load(None))
+        for command in (arm.state, arm.recover, *moves):
             with pytest.raises(NotConnected):
                 command()
         cell.arm.close()

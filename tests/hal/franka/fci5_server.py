@@ -6,7 +6,8 @@ the tests: it knows external torque control alone, which is what panda_py uses. 
 that the client loads for its dynamics. Faults are commanded on standard input, one a line:
 
     reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | unhomed | flange |
-    table Z SLOPE (a table that pushes the hand up) |
+    table Z SLOPE (a table that pushes the hand up) | hand KG (the end effector's mass in Desk) |
+    fingers M (opening to that width, once homed) | load (answers with what was set) |
     q (answers with the joints) | clock (answers with the robot's time, s)
 """
 
@@ -26,7 +27,7 @@ from mskgrasp.core.panda_kinematics import forward
 from tests.hal.franka.wire import Channel, GripperState, RobotState, Table, ask_for_priority
 
 VERSION, GRIPPER_VERSION = 5, 3
-CONNECT, MOVE, STOP_MOVE, RECOVER, LOAD_MODEL = 0, 1, 2, 12, 13
+CONNECT, MOVE, STOP_MOVE, SET_LOAD, RECOVER, LOAD_MODEL = 0, 1, 2, 10, 12, 13
 IDLE, MOVING, REFLEX, USER_STOPPED = 1, 2, 4, 5
 READY = np.array([0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398])
 INERTIA = np.array([1.0, 1.0, 1.0, 1.0, 0.3, 0.2, 0.1])
@@ -58,6 +59,8 @@ class Robot:
     pose: np.ndarray = field(default_factory=lambda: forward(READY)[0])
     f_t_ee: np.ndarray = field(default_factory=lambda: F_T_EE)
     table: Table | None = None
+    ee_mass: float = 0.73
+    load: tuple[float, ...] = (0.0,) * 13
 
     def step(self) -> None:
         self.tick += 1
@@ -89,6 +92,8 @@ class Robot:
                 mode=self.mode,
                 reflexes=self.reflexes,
                 pushed_up=0.0 if self.table is None else self.table.push(self.pose[0, 3], self.pose[2, 3]),
+                ee_mass=self.ee_mass,
+                load=self.load,
             ).pack()
         )
 
@@ -113,6 +118,10 @@ class Robot:
             if self.mode == REFLEX:
                 self.mode, self.reflexes = IDLE, ()
             reply(command, number, b"\x00")
+        elif command == SET_LOAD:
+            if self.mode == IDLE:
+                self.load = struct.unpack("<d3d9d", payload)
+            reply(command, number, b"\x00" if self.mode == IDLE else b"\x02")  # not possible in this mode
         elif command == LOAD_MODEL:
             reply(command, number, b"\x00" + self.model)
         else:
@@ -147,6 +156,8 @@ class Robot:
                 self.mode = IDLE
             case "table":
                 self.table = Table(z=float(words[1]), slope_x=float(words[2]))
+            case "hand":
+                self.ee_mass = float(words[1])
             case "flange":
                 self.f_t_ee = np.eye(4)  # no end effector is chosen in Desk
 
@@ -164,6 +175,7 @@ class Hand:
     answer: str = "ok"
     pending: tuple[int, int, float] | None = None
     grasped: bool = False
+    homed_width: float = 0.0797
     tick: int = 0
 
     def step(self) -> None:
@@ -177,7 +189,7 @@ class Hand:
             command, number, _ = self.pending
             self.pending = None
             if command == 1:
-                self.max_width = 0.0797
+                self.max_width = self.homed_width
             status = ANSWERS[self.answer] if command == 2 else 0
             self.grasped = command == 2 and status == 0
             if command == 2 and status != 0:
@@ -207,7 +219,9 @@ class Hand:
         if command in (2, 3) and self.max_width == 0:
             self.channel.reply(command, number, struct.pack("<H", ANSWERS["fail"]))
             return
-        values = struct.unpack("<5d" if command == 2 else "<2d", payload) if command != 1 else (0.08, 0.1)
+        self.grasped = False
+        homing = (self.homed_width, 0.1)
+        values = struct.unpack("<5d" if command == 2 else "<2d", payload) if command != 1 else homing
         self.goal, self.speed = values[0], values[-2] if command == 2 else values[1]
         self.pending = (command, number, values[0])
 
@@ -219,6 +233,8 @@ class Hand:
                 self.answer = words[1]
             case "unhomed":
                 self.max_width = 0.0
+            case "fingers":
+                self.homed_width = float(words[1])
 
 
 def main() -> None:
@@ -245,7 +261,11 @@ def main() -> None:
             words = line.split()
             robot.fault(words)
             hand.fault(words)
-            answers = {"q": " ".join(map(str, robot.q)), "clock": f"{robot.tick * TICK}"}
+            answers = {
+                "q": " ".join(map(str, robot.q)),
+                "clock": f"{robot.tick * TICK}",
+                "load": " ".join(map(str, robot.load)),
+            }
             print(answers.get(words[0], "done"), flush=True)
         due = max(due + TICK, time.monotonic() - 0.005)
         # Late or not, its client must get a turn: a server that never sleeps starves it on a busy machine.

@@ -4,7 +4,7 @@ An FR3 over the real wire protocol of server version 10, its dynamics in MuJoCo.
 not have, are commanded on standard input, one a line, as in `tests.hal.franka.fci5_server`:
 
     reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | q | clock |
-    table Z SLOPE (a table that pushes the hand up) |
+    table Z SLOPE (a table that pushes the hand up) | load (answers with what was set) |
     record (the commands of motions from now on) | save FILE (them, as `commands` reads it)
 """
 
@@ -13,6 +13,7 @@ from __future__ import annotations
 import select
 import sys
 import time
+from typing import Any
 
 import franky_sim
 import mujoco
@@ -106,16 +107,18 @@ class Recovery(AutomaticErrorRecoveryCommand):
 
 
 class Answers:
-    """Stands in the way of the gripper's answers to grasps."""
+    """Stands in the way of the gripper's answers to grasps; after a failure it reports no grasp."""
 
     def __init__(self) -> None:
         self.status = GripperCommandStatus.kSuccess
+        self.hand: Any = None
         self._send = BaseCommand.send_response
         BaseCommand.send_response = self.send  # type: ignore[method-assign]
 
     def send(self, sock, command, number, status, payload=b"", **formats) -> None:
         if command is GripperCommand.kGrasp and status is GripperCommandStatus.kSuccess:
             status = self.status
+            self.hand._is_grasping = status is GripperCommandStatus.kSuccess
         self._send(sock, command, number, status, payload, **formats)
 
 
@@ -126,6 +129,7 @@ def main() -> None:
         with franky_sim.SimulationServer(simulator, hostname_candidates=[sys.argv[1]]) as server:
             robot = server.robot_servers[0]
             robot.__class__ = FaultyServer
+            answers.hand = robot.gripper_server
             commands = robot._FrankaServer__command_class_map
             assert commands[RobotCommand.kAutomaticErrorRecovery] is AutomaticErrorRecoveryCommand
             commands[RobotCommand.kAutomaticErrorRecovery] = Recovery
@@ -171,6 +175,9 @@ def obey(words: list[str], simulator: MujocoSimulator, robot: FaultyServer, answ
             for name in ("robot0_finger_joint1", "robot0_finger_joint2"):
                 joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
                 model.jnt_range[joint, 0] = float(width) / 2
+        case ["load"]:
+            inner = robot.robot
+            return " ".join(map(str, [inner.m_load, *inner.F_x_Cload, *inner.I_load]))
         case ["q"]:
             return " ".join(str(value) for value in robot.robot.inner_state.q)
         case ["clock"]:

@@ -61,6 +61,10 @@ class FakeRobot:
         """(7,) where the arm truly is, radians."""
         return np.array([float(value) for value in self.order("q").split()])
 
+    def load(self) -> np.ndarray:
+        """(13,) mass, centre (3,) and inertia (9,) of the load that it was told last."""
+        return np.array([float(value) for value in self.order("load").split()])
+
     def wait(self, seconds: float) -> None:
         """Returns when the robot has lived through so many seconds: a busy machine takes longer for them."""
         end, deadline = float(self.order("clock")) + seconds, time.monotonic() + TIMEOUT_S

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hal import Load
 from hal.arm import JOINT_TOLERANCE
-from hal.errors import MotionAborted, NotConnected
+from hal.errors import LoadTooHeavy, MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace
+from hal.franka.driver import DriverName
 from hal.franka.path import JointPath, joint_path
 from mskgrasp.core.geometry import Pose
 from tests.hal.franka.robots import arm_at, fci5, robot_for
@@ -22,9 +24,90 @@ def test_a_hand_that_was_never_homed_is_homed_by_the_first_command_and_not_by_co
         robot.order("unhomed")
         with arm_at(tmp_path, "panda_py", robot.host) as arm:
             assert arm.state().gripper_width == pytest.approx(0.06)
+            assert arm.state().max_width == 0.08  # not known yet
             arm.move_gripper(0.05)
             arm.move_gripper(0.08)
             assert arm.state().gripper_width == pytest.approx(0.0797)  # all that homing found
+            assert arm.state().max_width == pytest.approx(0.0797)
+
+
+def test_fingers_that_open_less_far_are_opened_as_far_as_they_go(tmp_path: Path):
+    """Changed fingers: until the hand is homed it believes in those before."""
+    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
+        robot.order("fingers 0.062")
+        assert arm.state().max_width == pytest.approx(0.08)
+        arm.home()
+        assert arm.state().max_width == pytest.approx(0.062)
+        arm.move_gripper(0.01)
+        arm.open_gripper()
+        assert arm.state().gripper_width == pytest.approx(0.062, abs=1e-4)
+        with pytest.raises(OutOfWorkspace, match=r"outside 0 .. 0.0620 m, .*python -m hal.home"):
+            arm.move_gripper(0.08)
+        arm.move_gripper(0.06)  # a refusal is no fault
+
+
+LOAD = Load(mass=0.4, centre_tcp=np.array([0.01, 0.02, 0.03]), inertia=np.diag([1e-4, 2e-4, 3e-4]))
+
+
+@pytest.mark.parametrize("driver", ["franky", pytest.param("panda_py", marks=pytest.mark.slow)])
+def test_a_robot_knows_the_part_in_its_hand_until_the_fingers_move(tmp_path: Path, driver: DriverName):
+    with robot_for(driver) as robot:
+        with arm_at(tmp_path, driver, robot.host) as arm:
+            arm.open_gripper()
+            arm.set_load(LOAD)
+            # The flange is turned by 45 degrees from the tcp frame, 103.4 mm behind it.
+            told, half = robot.load(), np.sqrt(0.5)
+            assert told[:4] == pytest.approx([0.4, half * 0.03, half * 0.01, 0.1334], abs=1e-6)
+            inertia = told[4:].reshape(3, 3)
+            assert np.diag(inertia) == pytest.approx([1.5e-4, 1.5e-4, 3e-4], rel=1e-4)
+            assert inertia[0, 1] == inertia[1, 0] == pytest.approx(5e-5, rel=1e-4)
+            hand = arm.hand()
+            assert hand is not None and hand.load_mass == pytest.approx(0.4)
+            assert (hand.mass, hand.centre_flange) == (pytest.approx(0.73), pytest.approx([-0.01, 0, 0.03]))
+            arm.move_gripper(0.05)
+            assert robot.load() == pytest.approx(np.zeros(13))
+            arm.set_load(LOAD)
+        with arm_at(tmp_path, driver, robot.host) as arm:  # of a program before, whose part is unknown
+            assert robot.load()[0] == pytest.approx(0.4)
+            arm.open_gripper()
+            assert robot.load() == pytest.approx(np.zeros(13))
+
+
+def test_a_part_over_what_the_reflex_holds_is_refused(tmp_path: Path):
+    """15 N and 15 N m, four fifths of which may be weight."""
+    with fci5() as robot:
+        with arm_at(tmp_path, "panda_py", robot.host, contact_force=15.0, contact_torque=15.0) as arm:
+            assert arm.limits.max_load == pytest.approx(0.8 * 15 / 9.81)
+            with pytest.raises(LoadTooHeavy, match=r"weighs 1.300 kg, this arm carries 1.223 kg: .*force"):
+                arm.set_load(replace(LOAD, mass=1.3))
+            assert robot.load() == pytest.approx(np.zeros(13))
+            arm.set_load(replace(LOAD, mass=1.2))  # a refusal is no fault
+
+
+def test_a_load_that_the_robot_refuses_is_a_fault(tmp_path: Path):
+    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
+        robot.order("reflex")
+        with pytest.raises(MotionAborted, match="recover"):
+            arm.set_load(LOAD)
+        with pytest.raises(NeedsRecovery):
+            arm.move_gripper(0.05)
+        arm.recover()
+        arm.set_load(LOAD)
+        assert robot.load()[0] == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize("driver", ["franky", pytest.param("panda_py", marks=pytest.mark.slow)])
+def test_a_part_that_slips_away_after_closing_is_not_held(tmp_path: Path, driver: DriverName):
+    """The hand goes on to report its grasp; the fingers close."""
+    with robot_for(driver) as robot, arm_at(tmp_path, driver, robot.host) as arm:
+        arm.open_gripper()
+        robot.order("part 0.03")
+        assert arm.grasp(20.0).holding
+        assert arm.holds(arm.state()) and arm.state().grasped is True
+        robot.order("part 0")
+        robot.wait(2.0)
+        state = arm.state()
+        assert state.gripper_width < 1e-3 and not arm.holds(state)
 
 
 def test_another_end_effector_in_desk_is_reported(tmp_path: Path):

@@ -21,7 +21,8 @@ SETTINGS = DriverSettings(
 )  # fmt: skip
 STATE = DriverState(
     joints=[0.1 * k for k in range(7)], o_t_ee=[float(k) / 3 for k in range(16)], f_t_ee=[0.0] * 16,
-    width=0.04, max_width=0.0797, mode="reflex", errors='["cartesian_reflex"]', seconds=12345.678901,
+    width=0.04, max_width=0.0797, grasped=True, ee_mass=0.73, ee_centre=[-0.01, 0.0, 0.03],
+    load_mass=0.25, mode="reflex", errors='["cartesian_reflex"]', seconds=12345.678901,
 )  # fmt: skip
 
 
@@ -52,7 +53,7 @@ def verbs(kind: type) -> dict[str, list[str]]:
 @pytest.mark.parametrize("kind", [FrankyDriver, PandaPyDriver])
 def test_both_drivers_have_the_verbs_of_the_interface_and_no_other(kind: type):
     assert verbs(kind) == verbs(Driver)
-    assert len(verbs(Driver)) == 9
+    assert len(verbs(Driver)) == 10
 
 
 @pytest.mark.parametrize("message", [SETTINGS, STATE], ids=["settings", "state"])

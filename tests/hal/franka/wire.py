@@ -23,7 +23,10 @@ _STIFFNESS = 2e4
 
 @dataclass(frozen=True, kw_only=True)
 class RobotState:
-    """What a tick of the robot tells; the rest of the message is zero."""
+    """What a tick of the robot tells; the rest of the message is zero.
+
+    A load is as the client states it: mass, centre (3,), inertia (9,).
+    """
 
     tick: int
     pose: np.ndarray
@@ -36,6 +39,8 @@ class RobotState:
     mode: int
     reflexes: tuple[int, ...]
     pushed_up: float = 0.0
+    ee_mass: float = 0.73
+    load: tuple[float, ...] = (0.0,) * 13
 
     def pack(self) -> bytes:
         pose, eye = self.pose.flatten(order="F"), np.eye(4).flatten()
@@ -44,7 +49,9 @@ class RobotState:
         numbers = np.concatenate(
             [
                 *(pose, pose, tool, eye, tool, eye),
-                *(np.zeros(26), np.zeros(4)),
+                # The Franka Hand's mass, inertia and centre as Desk has them; then the load's.
+                *([self.ee_mass], np.diag([0.001, 0.0025, 0.0017]).flatten(), [-0.01, 0.0, 0.03]),
+                *(self.load[:1], self.load[4:], self.load[1:4], np.zeros(4)),
                 # The client limits the change of its torques against the last that it finds here.
                 *(self.torque, self.torque, zeros, self.q, self.q, self.dq, zeros, zeros),
                 *(np.zeros(26), zeros, [0.0, 0.0, self.pushed_up, 0.0, 0.0, 0.0], np.zeros(15), np.zeros(6)),

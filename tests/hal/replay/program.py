@@ -28,6 +28,7 @@ def run_on(cell: Cell, log: list[object]) -> None:
     log.append(cell.camera.capture().depth.tolist())
     log.append(cell.tracker.part_pose().position.tolist())
     result = execute_grasp(cell, Grasp.from_vector(GRASP))
+    cell.arm.move_gripper(0.06)
     log += [result.width, result.holding, result.T_base_tcp.position.tolist()]
     with pytest.raises(MotionAborted, match="contact force"):
         cell.arm.move_to_pose(at(0.03))

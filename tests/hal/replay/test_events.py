@@ -29,13 +29,19 @@ def test_a_pose_survives_json_to_the_bit(position: np.ndarray, quat_wxyz: np.nda
     assert np.array_equal(read.position, position) and np.array_equal(read.quat_wxyz, quat_wxyz)
 
 
-@given(joints=arrays(np.float64, 7, elements=finite), width=st.floats(0, 0.08))
-def test_a_state_survives_json_with_a_time_of_its_own(joints: np.ndarray, width: float):
+@given(
+    joints=arrays(np.float64, 7, elements=finite), width=st.floats(0, 0.08),
+    grasped=st.sampled_from([True, False, None]),
+)  # fmt: skip
+def test_a_state_survives_json_with_a_time_of_its_own(joints: np.ndarray, width: float, grasped: bool | None):
     here = Pose(position=joints[:3], quat_wxyz=np.array([0.0, 1.0, 0.0, 0.0]))
-    state = ArmState(joints=joints, T_base_tcp=here, gripper_width=width, timestamp_s=5.0)
+    state = ArmState(
+        joints=joints, T_base_tcp=here, gripper_width=width, timestamp_s=5.0, grasped=grasped, max_width=0.07
+    )
     read = arm_state(json.loads(json.dumps(plain(state))), 7.5)
     assert np.array_equal(read.joints, joints) and read.gripper_width == width and read.timestamp_s == 7.5
     assert np.array_equal(read.T_base_tcp.as_vector(), here.as_vector())
+    assert read.grasped is grasped and read.max_width == 0.07
 
 
 @pytest.mark.parametrize(
@@ -79,4 +85,6 @@ def test_every_command_is_a_method_of_a_device_and_every_motion_of_an_arm_a_comm
     }
     assert set(COMMANDS) <= methods
     queries = {"state", "in_hand", "check_pose", "part_pose", "stop", "connect", "close"}
+    queries |= {"check_load", "hand", "holds"}
+    queries |= {"set_load"}  # moves nothing: a recording without it accepts one
     assert methods - queries == set(COMMANDS)

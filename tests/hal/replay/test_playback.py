@@ -22,12 +22,12 @@ def test_another_command_is_refused_names_both_and_nothing_follows_before_recove
             cell.feeder.present("nut", 4)
         cell.feeder.present("nut", 3)
         cell.camera.capture()
-        with pytest.raises(NotRecorded, match=r"was move_gripper\(width 0.08\).*grasp\(force 20.0\)"):
+        with pytest.raises(NotRecorded, match=r"was open_gripper\(\).*grasp\(force 20.0\)"):
             cell.arm.grasp(20.0)
         with pytest.raises(NeedsRecovery, match=r"recover\(\)"):
-            cell.arm.move_gripper(0.08)
+            cell.arm.open_gripper()
         cell.arm.recover()
-        cell.arm.move_gripper(0.08)
+        cell.arm.open_gripper()
 
 
 def test_commands_may_differ_by_the_tolerances_and_no_more(recording: Path):
