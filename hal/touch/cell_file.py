@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import yaml
 
-from mskgrasp.core.errors import BadConfig
-from mskgrasp.core.files import write_whole
-
-_DIGITS = 5
+from hal.cell_file import number, with_values, write_values
 
 
 def with_table(text: str, z: float, slope: tuple[float, float] | None) -> str:
@@ -24,29 +20,7 @@ def with_table(text: str, z: float, slope: tuple[float, float] | None) -> str:
     Raises:
         BadConfig: The file has no ``workspace.table_z`` that can be replaced.
     """
-    root = yaml.compose(text, Loader=yaml.SafeLoader)
-    workspace = _value(root, "workspace")
-    height, tilt = _value(workspace, "table_z"), _value(workspace, "table_slope")
-    if height is None:
-        raise BadConfig("the file has no workspace.table_z; write 'table_z: null' there")
-    x, y = slope or (0.0, 0.0)
-    rounded = f"[{_number(x)}, {_number(y)}]"
-    new = _number(z)
-    edits: list[tuple[int, int, str]] = []
-    if tilt is not None:
-        edits.append((tilt.start_mark.index, tilt.end_mark.index, rounded))
-    elif slope is not None and workspace.flow_style:
-        new = f"{new}, table_slope: {rounded}"
-    elif slope is not None:
-        end = text.find("\n", height.end_mark.index)
-        key = next(key for key, _ in workspace.value if key.value == "table_z")
-        line = f"\n{' ' * key.start_mark.column}table_slope: {rounded}"
-        edits.append((end, end, line) if end >= 0 else (len(text), len(text), line))
-    begin, end = height.start_mark.index, height.end_mark.index
-    edits.append((begin, end, new if begin < end else f" {new}"))
-    for begin, end, piece in sorted(edits, reverse=True):
-        text = text[:begin] + piece + text[end:]
-    return text
+    return with_values(text, "workspace", _values(text, z, slope), after="table_z")
 
 
 def write_table(path: Path, z: float, slope: tuple[float, float] | None) -> None:
@@ -55,27 +29,15 @@ def write_table(path: Path, z: float, slope: tuple[float, float] | None) -> None
     Raises:
         BadConfig: The file cannot be rewritten; it is as before.
     """
-    path = path.resolve()  # a link stays a link
-    text = path.read_text(encoding="utf-8")
-    new = with_table(text, z, slope)
-    before, after = yaml.safe_load(text), yaml.safe_load(new)
-    for values in (before, after):
-        for key in ("table_z", "table_slope"):
-            values["workspace"].pop(key, None)
-    if before != after:
-        raise BadConfig(f"{path}: the text cannot be edited; write table_z {z:.5f} there by hand")
-    write_whole(path, new.encode())
+    values = _values(path.read_text(encoding="utf-8"), z, slope)
+    write_values(path, "workspace", values, after="table_z")
 
 
-def _number(value: float) -> str:
-    """A number without an exponent: YAML 1.1 takes 1e-05 for text."""
-    text = f"{value:.{_DIGITS}f}".rstrip("0")
-    text = text + "0" if text.endswith(".") else text
-    return "0.0" if text == "-0.0" else text
-
-
-def _value(mapping: Any, name: str) -> Any:
-    """Node of a key of a mapping's node; None without one."""
-    if not isinstance(mapping, yaml.MappingNode):
-        return None
-    return next((value for key, value in mapping.value if key.value == name), None)
+def _values(text: str, z: float, slope: tuple[float, float] | None) -> dict[str, str]:
+    """Values to write, as YAML; a slope that the file states is replaced also by a level table."""
+    root = yaml.safe_load(text)
+    workspace = root.get("workspace") if isinstance(root, dict) else None
+    stated = isinstance(workspace, dict) and "table_slope" in workspace
+    x, y = slope or (0.0, 0.0)
+    sloping = {"table_slope": f"[{number(x)}, {number(y)}]"} if slope is not None or stated else {}
+    return {"table_z": number(z)} | sloping

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import datetime
 import json
-import os
 from typing import Any
 
 import numpy as np
 
+from hal.cell_file import require_writable
 from hal.open_cell import SIMULATED, cell_from_values
 from hal.operator import Operator, StoppedByOperator
 from hal.touch.cell_file import with_table, write_table
@@ -100,8 +100,7 @@ def _check_kind(values: dict[str, Any], config: TouchConfig) -> float | None:
             raise UsageError(f"--table-at is for a cell with arm and camera; {path} knows where its table is")
         return None
     with_table(path.read_text(encoding="utf-8"), 0.0, None)  # refused before anything moves
-    if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):
-        raise UsageError(f"{path} is not writable; the table is written there: copy the file, give the copy")
+    require_writable(path, "the table")
     stated = workspace.get("table_z")
     if stated is None and config.table_at is None:
         raise UsageError(
