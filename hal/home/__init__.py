@@ -1,0 +1,1 @@
+"""Program: homing of a cell's hand."""
