@@ -32,6 +32,19 @@ def _measured(value: Any) -> Any:
 Slope = Annotated[float, Field(ge=-0.05, le=0.05)]
 
 
+class MeasuredGrip(Config):
+    """What the hand was measured to do; `python -m hal.doctor --gripper` writes it."""
+
+    grasp_force: float = Field(gt=0, le=70)
+    """Commanded gripper force, N."""
+    finger_force: float = Field(gt=0, le=200)
+    """Force of each pad that a scale between them showed, N."""
+    finger_speed: float = Field(gt=0, le=0.2)
+    """Speed of each finger as the hand closes for a grasp, m/s."""
+    max_width: float = Field(gt=0, le=0.2)
+    """Distance of the pads of the open hand, m."""
+
+
 class WorkspaceConfig(Config):
     """Table in front of the arm and limits of the TCP."""
 
@@ -57,6 +70,8 @@ class WorkspaceConfig(Config):
     """Gripper force, N."""
     keep_out: tuple[KeepOutConfig, ...] = ()
     """Spheres, capsules and boxes that no link enters, such as posts; the camera makes its own."""
+    measured_grip: MeasuredGrip | None = None
+    """What the hand truly applies; null: not measured. Simulation can use it, docs/real_cell.md says how."""
 
     @model_validator(mode="after")
     def _check(self) -> WorkspaceConfig:
@@ -80,7 +95,7 @@ class WorkspaceConfig(Config):
 
     def reach(self) -> float:
         """Horizontal distance of the box's farthest corner from the base, m."""
-        corners = np.abs([self.lower()[:2], self.box_upper[:2]]).max(axis=0)
+        corners = np.abs(np.array([self.lower(), self.box_upper]))[:, :2].max(axis=0)
         return float(np.hypot(*corners))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TextIO
@@ -118,6 +119,22 @@ class Operator:
             )
         return self.asks
 
+    def number(self, question: str, lower: float, upper: float) -> float:
+        """A number that the operator reads off an instrument, within bounds; asks again until it is one.
+
+        Raises:
+            StoppedByOperator: The operator ended the run.
+        """
+        while True:
+            line = self._line(question)
+            try:
+                value = float(line.replace(",", "."))
+            except ValueError:
+                value = math.nan
+            if lower <= value <= upper:
+                return value
+            self.inform(f"{line!r} is no number from {lower:g} to {upper:g}.")
+
     def recover(self, cell: Cell, reason: str) -> None:
         """Recover the arm after a contact, once the operator confirms.
 
@@ -140,13 +157,17 @@ class Operator:
 
     def _ask(self, question: str, legal: dict[str, bool]) -> bool:
         while True:
-            print(question, end="", file=self._prompts, flush=True)
-            line = self._answers.readline()
-            word = line.strip().lower()
-            if not line or word in ("q", "quit"):
-                why = "stopped by the operator" if line else "no answer (standard input ended)"
-                raise StoppedByOperator(f"{why}; what was finished is kept, the same command goes on")
+            word = self._line(question)
             answer = legal.get(word if word != "yes" else "y")
             if answer is not None:
                 return answer
             self.inform(f"{word!r} is no valid answer.")
+
+    def _line(self, question: str) -> str:
+        print(question, end="", file=self._prompts, flush=True)
+        line = self._answers.readline()
+        word = line.strip().lower()
+        if not line or word in ("q", "quit"):
+            why = "stopped by the operator" if line else "no answer (standard input ended)"
+            raise StoppedByOperator(f"{why}; what was finished is kept, the same command goes on")
+        return word

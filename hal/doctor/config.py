@@ -14,3 +14,5 @@ class DoctorConfig(Config):
     """YAML file of the cell, for example configs/cells/panda_kinect2.yaml."""
     move: bool = False
     """Also move every joint by 0.03 rad and back, and the fingers (they drop what they hold)."""
+    gripper: bool = False
+    """Instead measure the force and speed of a real hand with its operator, and write them into the file."""

@@ -17,6 +17,8 @@ from hal.doctor.checks import (
     check_calibration,
     check_disk,
     check_drivers,
+    check_grip,
+    check_hand,
     check_motion,
     check_reach,
     check_renderer,
@@ -25,15 +27,21 @@ from hal.doctor.checks import (
     check_view,
 )
 from hal.doctor.config import DoctorConfig
+from hal.doctor.gripper import measure_gripper
 from hal.open_cell import cell_from_values
 from mskgrasp.core.config import read_yaml
-from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.runtime.options import parse
 
 DESCRIPTION = """Checks a cell and prints one line a check: ok, warn or fail, and the remedy.
 
-Drivers, connection, camera stream, calibration, workspace, the table's height in the depth image. Nothing
-moves without --move. The exit code is 0 if nothing failed, else 1."""
+Drivers, connection, camera stream, calibration, workspace, the hand that the robot is configured for, the
+table's height in the depth image. Nothing moves without --move. The exit code is 0 if nothing failed, else 1.
+
+--gripper, on a real cell, measures instead what the hand truly does, for simulation to use: the hand is homed
+and closes three times on nothing, which gives its speed; then it closes three times on a spring scale or load
+cell that you hold between the pads and read, after you have measured with a tape how far it opens. The arm
+stands still. After a question workspace.measured_grip is written into the cell's file; its comments stay."""
 
 
 def examine(path: Path, *, move: bool) -> Iterator[Finding]:
@@ -60,6 +68,9 @@ def examine(path: Path, *, move: bool) -> Iterator[Finding]:
     calibration = check_calibration(values, path, cell.workspace)
     if calibration is not None:
         yield calibration
+    grip = check_grip(values, path, cell.workspace)
+    if grip is not None:
+        yield grip
     if _driver(values, "arm") == "replay":
         yield Finding(level="ok", subject="workspace", text="not checked: a recorded arm repeats its motions")
     else:
@@ -76,6 +87,7 @@ def examine(path: Path, *, move: bool) -> Iterator[Finding]:
                 yield Finding(level="fail", subject="motion", text="not checked: the arm is not connected")
             return
         yield from check_arm(cell.arm, time.monotonic() - begin)
+        yield from check_hand(cell.arm)
         if move:
             yield from check_motion(cell.arm)
 
@@ -104,6 +116,12 @@ def _driver(values: dict[str, Any], section: str) -> Any:
 def main() -> int:
     """Check the cell and print the findings."""
     config = parse(DoctorConfig, prog="python -m hal.doctor", description=DESCRIPTION)
+    if config.gripper:
+        if config.move:
+            raise UsageError(
+                "--gripper measures the hand alone; omit --move, or run both one after the other"
+            )
+        return measure_gripper(config.cell)
     counts = dict.fromkeys(("ok", "warn", "fail"), 0)
     for finding in examine(config.cell, move=config.move):
         counts[finding.level] += 1

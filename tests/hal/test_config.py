@@ -57,3 +57,9 @@ def test_an_error_of_a_table_moves_its_points_as_it_says():
 def test_an_error_of_a_table_is_small(values: dict):
     with pytest.raises(ValueError, match="0.005|0.02"):
         TableError(**values)
+
+
+def test_the_reach_of_a_box_is_its_farthest_corner_seen_from_above():
+    assert WorkspaceConfig(table_z=0.0).reach() == pytest.approx(0.85)
+    box = WorkspaceConfig(table_z=0.0, box_lower=(0.3, -0.6, 0.0), box_upper=(0.8, 0.2, 0.7))
+    assert box.reach() == pytest.approx(1.0)
