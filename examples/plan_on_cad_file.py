@@ -39,7 +39,7 @@ def main(cad_file: str) -> None:
         shift, std = plan.displacement[:3] * 1e3, plan.displacement_std[:3] * 1e3
         print(f"predicted shift in the hand {np.round(shift, 1)} +- {np.round(std, 1)} mm")
 
-        result = execute_grasp(cell, plan.grasp)
+        result = execute_grasp(cell, plan.grasp, load=plan.load_of(part))
         print("lifted" if result.holding else "not lifted")
 
 

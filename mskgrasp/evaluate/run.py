@@ -33,7 +33,7 @@ from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials, rewrite_trials
 from mskgrasp.simulation.versions import versions
-from mskgrasp.trials.cell_file import CellFile, read_cell
+from mskgrasp.trials.cell_file import CellFile, check_loads, read_cell
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import FOLDER
 from mskgrasp.trials.trial_runner import SCENE_VERSION, Setup, TrialTask, run_trials
@@ -62,7 +62,7 @@ def evaluate(config: EvaluateConfig) -> Report:
 
     Raises:
         UsageError: Settings do not fit together, or the folder holds a run with other inputs.
-        MskgraspError: A model, a part or the cell cannot be used.
+        MskgraspError: A model, a part or the cell cannot be used, or the arm cannot carry a part.
     """
     _check(config)
     models = load_models(config.models)
@@ -80,7 +80,9 @@ def evaluate(config: EvaluateConfig) -> Report:
     sources = part_names(words, models.meta.training, config.n_parts)
     if not sources:
         raise UsageError("--parts names no held-out part; name another set or parts")
-    parts = {find_part(source).name: source for source in sources}
+    found = [find_part(source) for source in sources]
+    check_loads(config.cell, found)
+    parts = {part.name: source for part, source in zip(found, sources, strict=True)}
     compared = None
     if config.experiment == "displacement":
         chunk = config.planner.chunk_size

@@ -18,7 +18,7 @@ from mskgrasp.palletize.figures import draw_placement, pallet_image
 from mskgrasp.palletize.height_maps import take_height_maps, write_height_maps
 from mskgrasp.palletize.pallet_slots import SEEN_TOLERANCE, Slot, first_reachable
 from mskgrasp.palletize.placement_records import Correction, Placement
-from mskgrasp.parts import find_part
+from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.footprint import seen_footprint
 from mskgrasp.perception.markers import planar_displacement
 from mskgrasp.planning.place_pose import Target, drop_of, place, place_error, place_pose, turned_by
@@ -106,7 +106,7 @@ class PickAndPlace:
         )
         if not slot.fits(footprint, SEEN_TOLERANCE):
             return replace(known, reason="slot too small")
-        done, target, after = self._carry(frame, plan, slot.targets(footprint), known)
+        done, target, after = self._carry(frame, plan, planned.part, slot.targets(footprint), known)
         if done.placed:
             self._tops[task.index] = float(plan.view.size[2])
         maps = take_height_maps(frame, after, plan, target, slot.theta)
@@ -119,7 +119,12 @@ class PickAndPlace:
         return pallet_image(capture_at_home(self._cell), slots, self._cell.workspace.table_z, self._tops)
 
     def _carry(
-        self, frame: RgbdFrame, plan: GraspPlan, targets: Sequence[Target], known: Placement
+        self,
+        frame: RgbdFrame,
+        plan: GraspPlan,
+        part: Part | None,
+        targets: Sequence[Target],
+        known: Placement,
     ) -> tuple[Placement, Target, RgbdFrame | None]:
         """Grasp, place at the first target that the arm reaches, and measure.
 
@@ -135,7 +140,7 @@ class PickAndPlace:
             first_reachable(self._cell, poses, tallest=tallest)
         except OutOfWorkspace:
             return replace(known, reason="OutOfWorkspace"), target, None
-        grasped = engine.grasp(plan)
+        grasped = engine.grasp(plan, part)
         if grasped.aborted:
             engine.recover(MotionAborted(grasped.aborted))
         if grasped.reason:

@@ -30,6 +30,7 @@ from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import TRIALS, append_trial, file_digest, opened_run, read_trials
 from mskgrasp.runtime.worker_pool import Work, results
+from mskgrasp.trials.cell_file import check_loads
 from mskgrasp.trials.engine import connected_engine
 
 SCENE_VERSION = 2
@@ -67,6 +68,7 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
     Raises:
         UsageError: The folder holds a run with other inputs, a slot cannot be used, or an operator must be
             asked but standard input is not a terminal.
+        LoadTooHeavy: The arm cannot carry a part; nothing moved.
         HalError: The cell was lost; finished placements are stored.
     """
     config = config.model_copy(update={"planner": config.planner.for_motion()})
@@ -79,6 +81,7 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
         raise UsageError(
             f"--parts {' '.join(config.parts)} names no part; `python -m mskgrasp.parts list` does"
         )
+    check_loads(config.cell, map(find_part, names))
     pallets = _pallets(config, names, slots, corrections)
     check_room((find_part(task.part), task.slot) for pallet in pallets for task in pallet)
     inputs = inputs_of(config.cell, config.models, names)

@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from hal.camera import RgbdFrame
+from hal.hand import Load
 from hal.table import HIGHEST_TABLE
 from mskgrasp.core.displacement_covariance import object_displacement_covariance, swing_squared
 from mskgrasp.core.errors import BadModel, GraspRefused, NoGraspFound, TableTooHigh
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
 from mskgrasp.learning.grasp_models import Models
+from mskgrasp.parts import Part
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.refine import fingers_free, grasps_near
@@ -134,6 +136,21 @@ class GraspPlan:
         return (
             to_object_displacement(mean, point_grasp),
             object_displacement_covariance(mean, variance, point_grasp),
+        )
+
+    def load_of(self, part: Part) -> Load:
+        """The part as the hand will hold it, for `hal.execute_grasp`, which tells the arm its weight.
+
+        Its centre of mass is taken for the seen centre, and its inertia for that of a body which is alike in
+        all directions: how the part is turned in the hand is not known.
+
+        Args:
+            part: The part on the table.
+        """
+        return Load(
+            mass=part.mass,
+            centre_tcp=np.asarray(self.grasp.T_base_tcp.inverse().apply(self.view.centre_base)),
+            inertia=float(np.mean(part.principal_inertia)) * np.eye(3),
         )
 
     @property

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import yaml
 
-from hal.open_cell import SIMULATED, cell_from_values
+from hal.errors import LoadTooHeavy
+from hal.open_cell import SIMULATED, cell_from_values, cell_from_yaml
 from hal.sensor_noise import NoiseModel
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.settings import Tape
+from mskgrasp.parts import Part
 
 TAPED = "sapien"
 """Type of the simulated cell that draws tape and fine colour."""
@@ -110,3 +113,18 @@ def read_cell(
         squares = check_config(Tape, squares, "--tape" if tape else f"{path}: tape")
     cell_from_values(values, path)  # refuses an invalid file before any worker starts
     return CellFile(path=path, values=values, tape=squares)
+
+
+def check_loads(cell_file: Path, parts: Iterable[Part]) -> None:
+    """Refuse parts that the arm of a cell cannot carry, without connecting it.
+
+    Raises:
+        BadConfig: The file is missing or not valid.
+        LoadTooHeavy: Names the part, its mass and what the arm carries.
+    """
+    arm = cell_from_yaml(cell_file).arm
+    for part in parts:
+        try:
+            arm.check_load(part.mass)
+        except LoadTooHeavy as error:
+            raise LoadTooHeavy(f"{part.name}: {error}") from error

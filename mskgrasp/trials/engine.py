@@ -36,6 +36,7 @@ from mskgrasp.core.grasp import (
 )
 from mskgrasp.core.settings import Region, Tape
 from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
+from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.markers import Markers, find_markers
 from mskgrasp.perception.tallest import tallest_thing
 from mskgrasp.planning.place_pose import displacement_of_point
@@ -61,6 +62,7 @@ class PlannedGrasp:
     Attributes:
         frame: The part at rest before the grasp.
         plan: None where no grasp was found.
+        part: The part, which the arm is told as it is lifted; None: an unknown one.
         reason: Reason where no grasp was found: `REFUSED`, or the error's name; else empty.
         best_quality: Best predicted quality where all grasps were refused; else None.
         refusal: Why they were, in a line; else empty.
@@ -69,6 +71,7 @@ class PlannedGrasp:
 
     frame: RgbdFrame
     plan: GraspPlan | None
+    part: Part | None = None
     reason: str = ""
     no_tape: str = ""
     best_quality: float | None = None
@@ -216,10 +219,13 @@ class TrialEngine:
 
         Raises:
             NotCalibrated: The camera's pose was measured by hand; nothing moves.
+            LoadTooHeavy: The arm cannot carry the part; nothing moves.
             HalError: The cell was lost.
             StoppedByOperator: The operator ended the run.
         """
         refuse_by_hand(self.cell)
+        known = find_part(part)
+        self.cell.arm.check_load(known.mass)
         while True:
             self.home()
             no_tape = ""
@@ -241,23 +247,29 @@ class TrialEngine:
                         continue
                 reason = type(error).__name__ if quality is None else REFUSED
                 return PlannedGrasp(
-                    frame=frame, plan=None, reason=reason, no_tape=no_tape, best_quality=quality,
+                    frame=frame, plan=None, part=known, reason=reason, no_tape=no_tape, best_quality=quality,
                     refusal="" if quality is None else str(error),
                 )  # fmt: skip
             if self._operator.asks:
                 draw_plan(frame, plan, self._picture)
             if self._operator.may_move(self._picture, f"{plan.summary}; {then}" if then else plan.summary):
-                return PlannedGrasp(frame=frame, plan=plan, no_tape=no_tape)
+                return PlannedGrasp(frame=frame, plan=plan, part=known, no_tape=no_tape)
 
-    def grasp(self, plan: GraspPlan) -> ExecutedGrasp:
+    def grasp(self, plan: GraspPlan, part: Part | None = None) -> ExecutedGrasp:
         """Execute a planned grasp and measure the displacement by the cell's tracker, if it has one.
 
+        Args:
+            plan: The grasp.
+            part: The part, whose weight the arm compensates once it holds it; None where it is not known.
+
         Raises:
+            LoadTooHeavy: The arm cannot carry the part; nothing moved.
             HalError: The cell was lost.
         """
         before = self.part_pose()
         try:
-            result = execute_grasp(self.cell, plan.grasp, tallest=self._tallest)
+            load = None if part is None else plan.load_of(part)
+            result = execute_grasp(self.cell, plan.grasp, tallest=self._tallest, load=load)
         except OutOfWorkspace as error:
             return ExecutedGrasp(reason=type(error).__name__, before=before)
         after = self.part_pose()

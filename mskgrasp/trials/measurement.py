@@ -59,7 +59,7 @@ def run_trial(
     if plan is None:
         trial = replace(trial, quality=planned.best_quality, refusal=planned.refusal)
         return TrialRecord(trial=trial, frame=frame, plan=None)
-    done = engine.grasp(plan)
+    done = engine.grasp(plan, planned.part)
     point = plan.view.centre_base
     if engine.tape is None and done.before is not None:
         point = np.asarray(done.before.position, dtype=np.float64)

@@ -7,10 +7,13 @@ from pathlib import Path
 import pytest
 import yaml
 
+from hal.errors import LoadTooHeavy
 from mskgrasp.core.errors import UsageError
-from mskgrasp.trials.cell_file import read_cell
+from mskgrasp.trials.cell_file import check_loads, read_cell
+from tests.boxes import make_box
 from tests.hal.real_cell import measured_cell
 
+WEIGHTS = (("light", 1.2), ("heavy", 1.4))
 CELLS = Path(__file__).parents[2] / "configs" / "cells"
 
 
@@ -55,3 +58,14 @@ def test_the_mujoco_cell_takes_noise_and_draws_no_tape(tmp_path: Path):
     assert found.simulated and found.noise == "kinect2" and found.write(tmp_path) == tmp_path / "cell.yaml"
     with pytest.raises(UsageError, match="draws no tape.*type sapien"):
         read_cell(path, noise=None, measure="markers", tape=None)
+
+
+def test_parts_that_the_arm_cannot_carry_are_refused_by_name_without_connecting_it(tmp_path: Path):
+    """The documented real cell holds 15 N and 15 N m, of which a part's weight may be four fifths."""
+    cell = measured_cell(tmp_path)
+    light, heavy = (make_box(tmp_path, name, (0.05, 0.05, 0.05), mass) for name, mass in WEIGHTS)
+    check_loads(cell, [light])
+    with pytest.raises(LoadTooHeavy, match=r"^heavy: the part weighs 1.400 kg, this arm carries") as caught:
+        check_loads(cell, [light, heavy])
+    assert "\n" not in str(caught.value) and caught.value.exit_code == 1
+    check_loads(CELLS / "sapien.yaml", [light, heavy])  # the payload of the data sheet

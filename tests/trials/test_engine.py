@@ -8,8 +8,16 @@ import io
 import numpy as np
 import pytest
 
-from hal import Arm, Cell
-from hal.errors import ArmInView, CaptureFailed, MotionAborted, NeedsRecovery, NotCalibrated, Stopped
+from hal import Arm, Cell, Load
+from hal.errors import (
+    ArmInView,
+    CaptureFailed,
+    LoadTooHeavy,
+    MotionAborted,
+    NeedsRecovery,
+    NotCalibrated,
+    Stopped,
+)
 from hal.operator import Operator
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
@@ -148,9 +156,35 @@ def test_an_operator_who_is_asked_sees_the_plan_and_may_have_the_part_placed_aga
 
 def test_a_camera_measured_by_hand_ends_a_trial_before_anything_moves(box_cell: BoxCell, monkeypatch):
     monkeypatch.setattr(type(box_cell.engine.cell.camera), "by_hand", True)
-    monkeypatch.setattr(Arm, "move_gripper", None)  # would fail if it were tried
+    monkeypatch.setattr(Arm, "open_gripper", None)  # would fail if it were tried
     with pytest.raises(NotCalibrated, match="measured by hand"):
         box_cell.engine.present(box_cell.part, box_cell.seed, BesideTheMiddle(box_cell.engine, 0.0, 0.0, 0.0))
+
+
+def test_a_part_over_what_the_arm_carries_ends_a_trial_before_anything_moves(box_cell: BoxCell, monkeypatch):
+    arm = box_cell.engine.cell.arm
+    monkeypatch.setattr(arm, "limits", dataclasses.replace(arm.limits, max_load=0.099))
+    monkeypatch.setattr(Arm, "open_gripper", None)  # would fail if it were tried
+    with pytest.raises(LoadTooHeavy, match=r"weighs 0.100 kg, this arm carries 0.099 kg: leave it out"):
+        box_cell.present()
+
+
+def test_the_arm_is_told_the_part_that_it_lifts_and_forgets_it_as_the_hand_opens(
+    box_cell: BoxCell, monkeypatch
+):
+    told: list[Load | None] = []
+    monkeypatch.setattr(type(box_cell.engine.cell.arm), "_set_load", lambda self, load: told.append(load))
+    planned = box_cell.present(along=0.008, across=0.006, up=0.004)
+    assert planned.plan is not None and planned.part is not None
+    assert box_cell.engine.grasp(planned.plan, planned.part).reason == ""
+    (load,) = told
+    assert load is not None and load.mass == pytest.approx(0.1)
+    # In the tcp frame, whose z points down: the box's centre as seen before the grasp.
+    assert np.abs(load.centre_tcp[:2]) == pytest.approx([0.008, 0.006], abs=1.5e-3)
+    assert load.centre_tcp[2] == pytest.approx(0.004, abs=1.5e-3)
+    assert np.diag(load.inertia) == pytest.approx(np.full(3, planned.part.principal_inertia.mean()))
+    box_cell.engine.home()
+    assert told == [load, None]
 
 
 def test_a_person_who_stops_the_arm_is_not_overruled(box_cell: BoxCell):
