@@ -24,6 +24,7 @@ PROGRAMS = {
         "check the simulation's settings against closed forms and finer settings",
     ),
     "doctor": ("hal.doctor", "check a cell's camera and arm"),
+    "home": ("hal.home", "home a cell's hand after its fingers were changed"),
     "touch": ("hal.touch", "measure the height and tilt of a cell's table by touching it"),
     "calibrate": ("hal.calibrate", "find the camera's pose relative to the robot"),
     "record": ("hal.record", "record a cell's frames, or a whole run, for replay"),
