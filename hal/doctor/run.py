@@ -17,8 +17,6 @@ from hal.doctor.checks import (
     check_calibration,
     check_disk,
     check_drivers,
-    check_grip,
-    check_hand,
     check_motion,
     check_reach,
     check_renderer,
@@ -28,6 +26,7 @@ from hal.doctor.checks import (
 )
 from hal.doctor.config import DoctorConfig
 from hal.doctor.gripper import measure_gripper
+from hal.doctor.hand_checks import check_grip, check_hand
 from hal.open_cell import cell_from_values
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadConfig, UsageError

@@ -107,3 +107,17 @@ def test_an_operator_takes_what_the_hand_holds_before_the_fingers_open(real):
     with pytest.raises(StoppedByOperator):
         operator(real, "q\n")[0].take()
     assert not Operator(cell_from_yaml(real), yes=True).take()
+
+
+def test_a_number_is_asked_for_until_it_is_one_within_its_bounds(real):
+    asked, prompts = operator(real, "thirty\n\n0.5\nnan\n31,5\n")
+    assert asked.number("Reading, N: ", 1, 200) == 31.5
+    assert prompts.getvalue().count("Reading, N: ") == 5
+    assert "'thirty' is no number from 1 to 200." in prompts.getvalue()
+
+
+@pytest.mark.parametrize("answers", ["q\n", ""])
+def test_an_operator_may_stop_instead_of_giving_a_number(real, answers):
+    asked, _ = operator(real, answers)
+    with pytest.raises(StoppedByOperator):
+        asked.number("Reading, N: ", 1, 200)

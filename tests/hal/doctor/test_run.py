@@ -9,6 +9,7 @@ import yaml
 
 from hal.doctor.run import examine
 from mskgrasp.core.errors import BadConfig
+from tests.hal.franka.robots import fci5, write_cell
 
 
 def test_an_arms_driver_in_the_place_of_a_camera_is_a_finding(tmp_path: Path):
@@ -41,3 +42,17 @@ def test_a_wrong_cell_file_is_a_finding_and_a_missing_one_an_error(tmp_path: Pat
     ]
     with pytest.raises(BadConfig, match="No such file"):
         list(examine(tmp_path / "none.yaml", move=False))
+
+
+def test_a_hand_that_desk_does_not_know_is_found_over_the_wire(tmp_path: Path):
+    with fci5() as robot:
+        path = write_cell(tmp_path, "panda_py", robot.host, contact_force=15.0)
+        for order, level, words in (
+            ("hand 0.73", "ok", "Desk states 0.73 kg, centre at [-0.01, 0.0, 0.03] m"),
+            ("hand 0.0", "fail", "Desk states 0.00 kg"),
+        ):
+            robot.order(order)
+            findings = {finding.subject: finding for finding in examine(path, move=False)}
+            assert findings["hand"].level == level and words in findings["hand"].text
+        assert "parts up to 1.22 kg" in findings["payload"].text
+        assert findings["grip"].level == "warn" and "load" not in findings
