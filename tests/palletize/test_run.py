@@ -7,6 +7,7 @@ import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,11 +50,11 @@ def test_a_run_whose_cell_was_lost_is_resumed_and_reported(tmp_path, monkeypatch
     out = tmp_path / "run"
     grasped: list[Grasp] = []
 
-    def pulled_cable(cell: Cell, grasp: Grasp, *, tallest: float) -> GraspResult:
+    def pulled_cable(cell: Cell, grasp: Grasp, **settings: Any) -> GraspResult:
         if grasped:
             raise CommunicationLost("no answer from the arm")
         grasped.append(grasp)
-        return execute_grasp(cell, grasp, tallest=tallest)
+        return execute_grasp(cell, grasp, **settings)
 
     with monkeypatch.context() as patch, pytest.raises(CommunicationLost):
         patch.setattr("mskgrasp.trials.engine.execute_grasp", pulled_cable)
