@@ -307,3 +307,12 @@ def test_nothing_moves_to_what_a_camera_sees_whose_pose_was_measured_by_hand(
         execute_grasp(cell, GRASP)
     assert arm.log == [] and "\n" not in str(caught.value)
     go_home(cell)  # home does not depend on the camera
+
+
+def test_what_the_hand_no_longer_reports_is_not_in_it(cell: Cell, arm: WritingArm, monkeypatch):
+    """The rule of the closing holds on the way home, too: nothing is put down that is not there."""
+    execute_grasp(cell, GRASP)
+    assert arm.in_hand() is not None
+    state = ToyArm._state
+    monkeypatch.setattr(arm, "_state", lambda: dataclasses.replace(state(arm), grasped=False))
+    assert arm.in_hand() is None
