@@ -78,8 +78,8 @@ def other_conditions(source: LabelSource, physics: Physics | None, camera_height
     if camera_height is not None and abs(camera_height - source.camera_height) > SAME_HEIGHT:
         found.append(f"camera {camera_height:.2f} m over the table, not {source.camera_height:.2f}")
     for name, value in ({} if physics is None else physics.model_dump()).items():
-        usual, drawn = source.physics.get(name), source.noise.get(name)
-        low, high = drawn if isinstance(drawn, (list, tuple)) else (usual, usual)
-        if isinstance(value, float) and low is not None and not low <= value <= high:
+        drawn = source.noise.get(name)
+        low, high = drawn if isinstance(drawn, (list, tuple)) else 2 * (source.physics.get(name),)
+        if isinstance(value, float) and low is not None and high is not None and not low <= value <= high:
             found.append(f"{name} {value:g}, not {low:g}" + (f" to {high:g}" if high > low else ""))
     return found

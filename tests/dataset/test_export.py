@@ -2,12 +2,9 @@ from __future__ import annotations
 
 import json
 
-import cv2
 import h5py
 import numpy as np
-import pyarrow.parquet
 import pytest
-import yaml
 
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.grasp import FAILURES
@@ -15,7 +12,6 @@ from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.dataset.commands.command_line import main
 from mskgrasp.dataset.commands.maniskill import export_maniskill
 from mskgrasp.dataset.export import export_npz
-from mskgrasp.dataset.parquet import export_parquet
 from tests import synthetic
 
 
@@ -64,34 +60,3 @@ def test_a_bad_shard_stops_an_export_and_leaves_nothing_behind(tmp_path, export)
     with pytest.raises(BadDataset, match="table_z differs"):
         export(folder, out)
     assert not list(out.parent.iterdir())
-
-
-def test_parquet_holds_every_column_with_units_images_and_a_card(collected, joined, tmp_path):
-    out = tmp_path / "public" / "data.parquet"
-    assert main(["export", str(collected), "--format", "parquet", "--out", str(out)]) == 0
-    table = pyarrow.parquet.read_table(out)
-    assert table.num_rows == 12
-    for name, values in vars(joined).items():
-        rows = table[name].to_pylist()
-        if name == "depth":
-            images = [
-                cv2.imdecode(np.frombuffer(row["bytes"], np.uint8), cv2.IMREAD_UNCHANGED) for row in rows
-            ]
-            assert np.array_equal(images, values)
-        elif name == "failure":
-            assert rows == [FAILURES[code] for code in values]
-        else:
-            empty = np.full(values.shape[1:], np.nan)
-            found = np.array([empty if row is None else row for row in rows], values.dtype)
-            assert np.array_equal(found, values, equal_nan=values.dtype.kind == "f"), name
-    infos = [read_shard(path)[1] for path in list_shards(collected)]
-    shared = json.loads(table.schema.metadata[b"mskgrasp"])
-    assert shared["physics"] == infos[0].physics and shared["seed"] == 5
-    assert np.array_equal(shared["intrinsics"], infos[0].intrinsics)
-    assert table.schema.field("tilt").metadata == {b"unit": b"rad", b"frame": b"grasp"}
-    card = (out.parent / "README.md").read_text()
-    head, rest = card.removeprefix("---\n").split("---\n", 1)
-    assert yaml.safe_load(head)["configs"][0]["data_files"] == "data.parquet"
-    assert "| attempts | 12 |" in rest and "## Layout" in rest
-    with pytest.raises(UsageError, match=r"README\.md exists, and is not overwritten"):
-        export_parquet(collected, out.with_name("other.parquet"))
