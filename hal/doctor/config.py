@@ -14,5 +14,7 @@ class DoctorConfig(Config):
     """YAML file of the cell, for example configs/cells/panda_kinect2.yaml."""
     move: bool = False
     """Also move every joint by 0.03 rad and back, and the fingers (they drop what they hold)."""
+    dry_run: bool = False
+    """Also go the whole way of a grasp of nothing, 5 cm over the table, at a tenth of the file's speeds."""
     gripper: bool = False
     """Instead measure the force and speed of a real hand with its operator, and write them into the file."""

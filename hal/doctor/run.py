@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from hal.doctor.checks import (
     check_view,
 )
 from hal.doctor.config import DoctorConfig
+from hal.doctor.dry_run import check_dry_run, slowed
 from hal.doctor.gripper import measure_gripper
 from hal.doctor.hand_checks import check_grip, check_hand
 from hal.open_cell import cell_from_values
@@ -35,7 +37,8 @@ from mskgrasp.runtime.options import parse
 DESCRIPTION = """Checks a cell and prints one line a check: ok, warn or fail, and the remedy.
 
 Drivers, connection, camera stream, calibration, workspace, the hand that the robot is configured for, the
-table's height in the depth image. Nothing moves without --move. The exit code is 0 if nothing failed, else 1.
+table's height in the depth image. Nothing moves without --move or --dry-run. The last line says what to do
+next. The exit code is 0 if nothing failed, else 1.
 
 --gripper, on a real cell, measures instead what the hand truly does, for simulation to use: the hand is homed
 and closes three times on nothing, which gives its speed; then it closes three times on a spring scale or load
@@ -43,12 +46,13 @@ cell that you hold between the pads and read, after you have measured with a tap
 stands still. After a question workspace.measured_grip is written into the cell's file; its comments stay."""
 
 
-def examine(path: Path, *, move: bool) -> Iterator[Finding]:
-    """Findings of all checks, as they are made.
+def examine(path: Path, *, move: bool, dry_run: bool = False) -> Iterator[Finding]:
+    """Findings of all checks, as they are made, in the order of the first day (docs/real_cell.md).
 
     Args:
         path: The cell file.
         move: Also move the arm by small steps.
+        dry_run: Also go the whole way of a grasp of nothing, at a tenth of the speed.
 
     Raises:
         BadConfig: The file cannot be read.
@@ -59,36 +63,37 @@ def examine(path: Path, *, move: bool) -> Iterator[Finding]:
         yield check_renderer()
     yield check_disk(Path.cwd())
     try:
-        cell = cell_from_values(values, path)
+        cell = cell_from_values(slowed(values) if dry_run else values, path)
     except BadConfig as error:
         yield Finding(level="fail", subject="cell file", text=str(error))
         return
     yield Finding(level="ok", subject="cell file", text=f"{path}, type {values['type']}")
-    calibration = check_calibration(values, path, cell.workspace)
-    if calibration is not None:
-        yield calibration
-    grip = check_grip(values, path, cell.workspace)
-    if grip is not None:
-        yield grip
     if _driver(values, "arm") == "replay":
         yield Finding(level="ok", subject="workspace", text="not checked: a recorded arm repeats its motions")
     else:
         yield check_reach(cell.arm, cell.workspace)
     with contextlib.ExitStack() as devices:
-        devices.callback(cell.camera.close)
-        yield from _check_camera(cell)
         devices.callback(cell.arm.close)
         begin = time.monotonic()
         failed = attempt("arm", cell.arm.connect)
-        if failed is not None:
+        if failed is None:
+            yield from check_arm(cell.arm, time.monotonic() - begin)
+            yield from check_hand(cell.arm)
+        else:
             yield failed
-            if move:
-                yield Finding(level="fail", subject="motion", text="not checked: the arm is not connected")
+        for known in (check_grip, check_calibration):
+            finding = known(values, path, cell.workspace)
+            if finding is not None:
+                yield finding
+        devices.callback(cell.camera.close)
+        yield from _check_camera(cell)
+        if failed is not None and (move or dry_run):
+            yield Finding(level="fail", subject="motion", text="not checked: the arm is not connected")
             return
-        yield from check_arm(cell.arm, time.monotonic() - begin)
-        yield from check_hand(cell.arm)
         if move:
             yield from check_motion(cell.arm)
+        if dry_run:
+            yield from check_dry_run(cell)
 
 
 def _check_camera(cell: Cell) -> Iterator[Finding]:
@@ -116,14 +121,31 @@ def main() -> int:
     """Check the cell and print the findings."""
     config = parse(DoctorConfig, prog="python -m hal.doctor", description=DESCRIPTION)
     if config.gripper:
-        if config.move:
+        if config.move or config.dry_run:
             raise UsageError(
-                "--gripper measures the hand alone; omit --move, or run both one after the other"
+                "--gripper measures the hand alone; omit --move and --dry-run, or run one after the other"
             )
         return measure_gripper(config.cell)
-    counts = dict.fromkeys(("ok", "warn", "fail"), 0)
-    for finding in examine(config.cell, move=config.move):
-        counts[finding.level] += 1
+    found = []
+    for finding in examine(config.cell, move=config.move, dry_run=config.dry_run):
+        found.append(finding)
         print(f"{finding.level:5} {finding.subject:15} {finding.text}", flush=True)
+    counts = Counter(finding.level for finding in found)
     print(f"{counts['ok']} ok, {counts['warn']} warn, {counts['fail']} fail")
+    print(next_step(found, config))
     return 1 if counts["fail"] else 0
+
+
+def next_step(found: Sequence[Finding], config: DoctorConfig) -> str:
+    """The line that ends a diagnosis: what to do next, or that the cell is ready."""
+    for finding in found:
+        if finding.level == "fail":
+            return f"next: repair what failed first: {finding.subject}"
+    warned = [finding.subject for finding in found if finding.level == "warn"]
+    see = f" (see the warnings: {', '.join(dict.fromkeys(warned))})" if warned else ""
+    again = f"python -m hal.doctor --cell {config.cell}"
+    if not (config.move or config.dry_run):
+        return f"next: {again} --move: the joints and the fingers move a little{see}"
+    if not config.dry_run:
+        return f"next: {again} --dry-run: a grasp of nothing at a tenth of the speed{see}"
+    return f"ready for the first grasp{see}"

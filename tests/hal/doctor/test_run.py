@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hal.doctor.run import examine
+from hal.doctor.checks import Finding
+from hal.doctor.config import DoctorConfig
+from hal.doctor.run import examine, next_step
 from mskgrasp.core.errors import BadConfig
 from tests.hal.franka.robots import fci5, write_cell
 
@@ -56,3 +58,17 @@ def test_a_hand_that_desk_does_not_know_is_found_over_the_wire(tmp_path: Path):
             assert findings["hand"].level == level and words in findings["hand"].text
         assert "parts up to 1.22 kg" in findings["payload"].text
         assert findings["grip"].level == "warn" and "load" not in findings
+
+
+def test_the_last_line_says_what_to_do_next():
+    cell = Path("cell.yaml")
+    ok, poor, bad = (Finding(level=level, subject=level, text="") for level in ("ok", "warn", "fail"))
+    still, moved, dry = (
+        DoctorConfig(cell=cell, move=move, dry_run=dry)
+        for move, dry in ((False, False), (True, False), (True, True))
+    )
+    assert next_step([ok, bad, Finding(level="fail", subject="later", text="")], dry).endswith("first: fail")
+    assert "hal.doctor --cell cell.yaml --move:" in next_step([ok], still)
+    assert "hal.doctor --cell cell.yaml --dry-run:" in next_step([ok], moved)
+    assert next_step([ok], dry) == "ready for the first grasp"
+    assert next_step([ok, poor, poor], dry) == "ready for the first grasp (see the warnings: warn)"
