@@ -50,13 +50,13 @@ class ArmState:
     """State of an arm.
 
     Attributes:
-        joints: (7,) radians.
+        joints: (n,) radians.
         T_base_tcp: Measured pose of the TCP in the base.
         gripper_width: Distance between the pads, metres.
         timestamp_s: Time of the measurement, seconds on the monotonic clock of this machine.
         grasped: Whether the hand itself reports a grasp; None where it reports nothing. `Arm.holds` decides.
-        max_width: Greatest distance between the pads that this hand reaches, metres; 0.08 where the hand does
-            not know its own before homing.
+        max_width: Greatest distance between the pads that this hand reaches, metres; that of its
+            `GripperSpec` where it does not know its own before homing.
     """
 
     joints: np.ndarray
@@ -94,7 +94,7 @@ class Held:
 
 
 class Arm(Device):
-    """A seven-axis arm with a parallel gripper; SI units, poses in the base frame.
+    """An arm of any number of joints with a parallel gripper; SI units, poses in the base frame.
 
     Commands block until the motion is over; a command of another thread waits for that, too. The
     base class checks limits before a motion and arrival after it; a backend only moves. A command that is
@@ -129,7 +129,7 @@ class Arm(Device):
         return self._state()
 
     def move_to_joints(self, joints: np.ndarray, *, speed: float = 0.3) -> None:
-        """Move all joints to (7,) radians at a fraction ``speed`` of their greatest speeds.
+        """Move all joints to (n,) radians at a fraction ``speed`` of their greatest speeds.
 
         Raises:
             OutOfWorkspace: A joint limit would be passed, or a link would come too near to the table or a
@@ -208,12 +208,13 @@ class Arm(Device):
         A load that was set is cleared: what the hand held, it has released.
 
         Raises:
-            OutOfWorkspace: The width is outside 0 .. 0.08 m, or more than the hand opens; nothing moved.
+            OutOfWorkspace: The width is outside the hand's stroke, or more than it opens; nothing moved.
             MotionAborted: Stopped, or an obstacle blocks the fingers.
             NeedsRecovery: An earlier error was not acknowledged.
         """
-        if not 0 <= width <= MAX_OPENING:
-            raise OutOfWorkspace(f"gripper width {width:g} m is outside 0 .. {MAX_OPENING} m")
+        stroke = self.limits.gripper.stroke
+        if not 0 <= width <= stroke:
+            raise OutOfWorkspace(f"gripper width {width:g} m is outside 0 .. {stroke:g} m")
         with self._motion():
             most = self._known_width()
             if width > most + WIDTH_TOLERANCE:
@@ -447,10 +448,10 @@ class Arm(Device):
 
     @abstractmethod
     def _forward(self, joints: np.ndarray) -> Pose:
-        """``T_base_tcp`` at joints (7,)."""
+        """``T_base_tcp`` at joints (n,)."""
 
     def _forward_all(self, joints: np.ndarray) -> Pose:
-        """``T_base_tcp`` (k,) at joints (k, 7); a backend may do it faster."""
+        """``T_base_tcp`` (k,) at joints (k, n); a backend may do it faster."""
         poses = [self._forward(one) for one in joints]
         return Pose(
             position=np.stack([pose.position for pose in poses]),
@@ -479,7 +480,7 @@ class Arm(Device):
 
     def _known_width(self) -> float:
         """Greatest distance of the pads, metres; a hand that does not know it yet is homed first."""
-        return MAX_OPENING
+        return self.limits.gripper.stroke
 
     def _home(self) -> None:
         """Home the fingers; a hand that needs no homing opens them."""

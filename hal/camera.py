@@ -42,6 +42,9 @@ class RgbdFrame:
 class Camera(Device):
     """A calibrated depth camera. Construction neither connects nor captures; ``with`` does."""
 
+    rendered: bool = False
+    """Whether frames come from SAPIEN's renderer, which `hal.doctor` then checks."""
+
     @property
     def exposures(self) -> int:
         """Exposures of a frame; with several, depth is their median and the timestamp that of the first."""

@@ -23,7 +23,7 @@ class Workspace:
     Attributes:
         table_z: Height of the table in the region's middle, base frame, metres.
         region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
-        home: (7,) joints at which the arm is out of the camera's sight, radians.
+        home: (n,) joints at which the arm is out of the camera's sight, radians.
         min_height: Points lower than this over the table count as table, metres.
         lift_height: Height by which a grasped part is lifted, metres.
         grasp_force: Gripper force, N.
@@ -101,6 +101,9 @@ class Cell:
         feeder: Places parts on the table; None if an operator does.
         tracker: Measures the part's pose; None if nothing does.
         board_holder: Attaches a calibration board to the hand; None if an operator does.
+        simulated: The cell is a simulation of its own, so that several may run at once.
+        draws_tape: The file may ask for tape on parts (``tape``) and fine colour (``colour_scale``).
+        recorded: Its calls are recorded or replayed: a program asks it nothing that a run does not need.
     """
 
     camera: Camera
@@ -109,6 +112,9 @@ class Cell:
     feeder: PartFeeder | None = None
     tracker: PartTracker | None = None
     board_holder: BoardHolder | None = None
+    simulated: bool = False
+    draws_tape: bool = False
+    recorded: bool = False
 
     @contextmanager
     def connected(self) -> Iterator[Cell]:

@@ -54,7 +54,7 @@ class Clearances:
         return cls(links=links, limits=limits, pairs=tuple(pairs), required=np.array(required))
 
     def at(self, joints: np.ndarray) -> np.ndarray:
-        """Distances (n, p) at joints (n, 7), metres; negative where they overlap."""
+        """Distances (k, p) at joints (k, n), metres; negative where they overlap."""
         limits, radii = self.limits, self.links.radii
         first, second = self.links.segments(joints)
         over = [i for i, k in self.pairs if k < 0]
@@ -79,12 +79,12 @@ class Clearances:
 
 
 def check_joints(links: Links, limits: ArmLimits, joints: np.ndarray, *, margin: float | None = None) -> None:
-    """Refuse joints (7,) at which a link is too near to table or keep-out.
+    """Refuse joints (n,) at which a link is too near to table or keep-out.
 
     Args:
         links: The arm's links.
         limits: Table and keep-outs.
-        joints: (7,) radians.
+        joints: (n,) radians.
         margin: Least distance, metres; None: `MARGIN` and `TABLE_MARGIN`.
 
     Raises:
@@ -109,7 +109,7 @@ def check_path(links: Links, limits: ArmLimits, path: np.ndarray, what: str) -> 
     Args:
         links: The arm's links.
         limits: Table and keep-outs.
-        path: (k, 7) joints, passed in straight lines of joint space, radians.
+        path: (k, n) joints, passed in straight lines of joint space, radians.
         what: The motion in words.
 
     Raises:
@@ -140,7 +140,7 @@ def check_path(links: Links, limits: ArmLimits, path: np.ndarray, what: str) -> 
 
 
 def line_joints(links: Links, start: np.ndarray, here: Pose, goal: Pose) -> np.ndarray:
-    """Joints (k, 7) along the straight line from ``here``, where the joints are ``start`` (7,), to a pose.
+    """Joints (k, n) along the straight line from ``here``, where the joints are ``start`` (n,), to a pose.
 
     Raises:
         OutOfWorkspace: The arm does not reach all of it.

@@ -8,7 +8,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from hal.arm import POSITION_TOLERANCE
-from hal.keep_out_config import KeepOutConfig
+from hal.keep_out_config import KeepOutConfig, keep_outs
+from hal.limits import ArmLimits
 from hal.sensor_noise import SensorNoise
 from mskgrasp.core.config import Config
 from mskgrasp.core.geometry import Pose
@@ -56,8 +57,8 @@ class WorkspaceConfig(Config):
     """Least distance of the pads from the table, m; more than the arm's tolerance of arrival."""
     region: tuple[float, float, float, float] = (0.38, 0.62, -0.12, 0.12)
     """x_min, x_max, y_min, y_max where parts lie, base frame, m."""
-    home: Seven = READY
-    """Joints at which the arm is out of the camera's sight, rad."""
+    home: tuple[float, ...] = READY
+    """Joints at which the arm is out of the camera's sight, rad; as many as it has."""
     box_lower: Three | None = None
     """The TCP stays inside this box, base frame, m; by default 0.25, -0.4 and the table."""
     box_upper: Three = (0.75, 0.4, 0.75)
@@ -66,8 +67,8 @@ class WorkspaceConfig(Config):
     """Points lower than this over the table count as table, m: real tables are not level, cameras drift."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
     """Height by which a grasped part is lifted, m."""
-    grasp_force: float = Field(default=30.0, gt=0, le=70)
-    """Gripper force, N."""
+    grasp_force: float = Field(default=30.0, gt=0)
+    """Gripper force, N; at most the arm's."""
     keep_out: tuple[KeepOutConfig, ...] = ()
     """Spheres, capsules and boxes that no link enters, such as posts; the camera makes its own."""
     measured_grip: MeasuredGrip | None = None
@@ -92,6 +93,28 @@ class WorkspaceConfig(Config):
     def lower(self) -> np.ndarray:
         """(3,) lower corner of the box, base frame, m."""
         return np.array(self.box_lower if self.box_lower is not None else (0.25, -0.4, self.table_z))
+
+    def limits(self, *, joint_lower: np.ndarray, joint_upper: np.ndarray, **of_arm: Any) -> ArmLimits:
+        """Limits of an arm at this table.
+
+        Args:
+            joint_lower: (n,) radians.
+            joint_upper: (n,) radians.
+            of_arm: Further ones of the arm: ``max_force``, ``gripper``, ``closed_width``, ``max_load``.
+        """
+        x_min, x_max, y_min, y_max = self.region
+        return ArmLimits(
+            joint_lower=joint_lower,
+            joint_upper=joint_upper,
+            box_lower=self.lower(),
+            box_upper=np.array(self.box_upper),
+            table_z=self.table_z,
+            clearance=self.clearance,
+            table_slope=np.array(self.table_slope),
+            table_centre=np.array([(x_min + x_max) / 2, (y_min + y_max) / 2]),
+            keep_out=keep_outs(self.keep_out),
+            **of_arm,
+        )
 
     def reach(self) -> float:
         """Horizontal distance of the box's farthest corner from the base, m."""

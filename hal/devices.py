@@ -9,15 +9,14 @@ from typing import Any, Literal, assert_never, get_args
 import numpy as np
 
 from hal.arm import Arm
+from hal.backends import build, find_backend
 from hal.camera import Camera
 from hal.camera_calibration import calibration_path
 from hal.cell import Cell, PartFeeder, Workspace
-from hal.config import DevicesConfig, WorkspaceConfig
+from hal.config import READY, DevicesConfig, WorkspaceConfig
 from hal.errors import OutOfWorkspace
 from hal.execute import APPROACH
 from hal.keep_out import camera_keep_out
-from hal.keep_out_config import keep_outs
-from hal.limits import ArmLimits
 from mskgrasp.core.config import check_config
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.grasp import pose_base_tcp
@@ -44,58 +43,51 @@ def devices_cell(values: dict[str, Any], path: Path) -> Cell:
         clearance=table.clearance,
         table_slope=table.table_slope,
     )
-    arm = _arm(config.arm, table, workspace, path)
+    arm = _arm(config.arm, table, path)
+    replayed = config.arm.get("driver") == "replay"
+    if not replayed:  # whose fit was checked when it was recorded: it accepts the recorded poses alone
+        _check_fit(arm, workspace, path)
     camera, feeder = _camera(config.camera, workspace, path)
     if arm.links is not None and camera.T_base_camera is not None:
         body = camera_keep_out(camera.T_base_camera)
         arm.limits = replace(arm.limits, keep_out=(body, *arm.limits.keep_out))
-    return Cell(camera=camera, arm=arm, workspace=workspace, feeder=feeder)
+    return Cell(camera=camera, arm=arm, workspace=workspace, feeder=feeder, recorded=replayed)
 
 
-def _driver(values: dict[str, Any], legal: tuple[str, ...], section: str, path: Path) -> Any:
-    if values.get("driver") not in legal:
-        raise BadConfig(f"{path}: '{section}.driver' is {values.get('driver')!r}; legal: {', '.join(legal)}")
-    return values["driver"]
-
-
-def _arm(values: dict[str, Any], table: WorkspaceConfig, workspace: Workspace, path: Path) -> Arm:
-    driver: ArmDriver = _driver(values, get_args(ArmDriver), "arm", path)
+def _arm(values: dict[str, Any], table: WorkspaceConfig, path: Path) -> Arm:
     source = f"{path}, arm"
+    entry = find_backend(values.get("driver"), "arms", get_args(ArmDriver), f"{path}: 'arm.driver'")
+    if entry is not None:
+        return build(entry, Arm, values, source, table)
+    driver: ArmDriver = values["driver"]
     match driver:
         case "franky" | "panda_py":
             from hal.franka import FrankaArm, FrankyArmConfig, PandaPyArmConfig
 
             kind = FrankyArmConfig if driver == "franky" else PandaPyArmConfig
             config = check_config(kind, values, source)
-            limits = ArmLimits(
+            limits = table.limits(
                 joint_lower=config.joint_lower(),
                 joint_upper=config.joint_upper(),
-                box_lower=table.lower(),
-                box_upper=np.array(table.box_upper),
-                table_z=table.table_z,
                 max_force=config.max_grasp_force,
-                clearance=table.clearance,
-                table_slope=np.array(table.table_slope),
-                table_centre=workspace.centre,
-                keep_out=keep_outs(table.keep_out),
                 closed_width=config.closed_width,
                 max_load=config.max_load(table.reach()),
             )
-            arm = FrankaArm(config, limits)
-            _check_fit(arm, workspace, path)
-            return arm
+            return FrankaArm(config, limits)
         case "replay":
             from hal.replay import ReplayArm, ReplayArmConfig
 
-            # The fit was checked when it was recorded; a replay accepts the recorded poses alone.
             return ReplayArm(check_config(ReplayArmConfig, values, source))
         case _:
             assert_never(driver)
 
 
 def _camera(values: dict[str, Any], workspace: Workspace, path: Path) -> tuple[Camera, PartFeeder | None]:
-    driver: CameraDriver = _driver(values, get_args(CameraDriver), "camera", path)
     source = f"{path}, camera"
+    entry = find_backend(values.get("driver"), "cameras", get_args(CameraDriver), f"{path}: 'camera.driver'")
+    if entry is not None:
+        return build(entry, Camera, values, source, path), None
+    driver: CameraDriver = values["driver"]
     match driver:
         case "kinect2":
             from hal.kinect2 import Kinect2Camera, Kinect2Config
@@ -111,8 +103,10 @@ def _camera(values: dict[str, Any], workspace: Workspace, path: Path) -> tuple[C
             from hal.sim import SapienCameraConfig, sapien_camera
 
             config = check_config(SapienCameraConfig, values, source)
+            # A Panda is rendered, out of sight, whatever the arm.
+            rendered = workspace.home if len(workspace.home) == len(READY) else np.array(READY)
             try:
-                return sapien_camera(config, region=workspace.region, home=workspace.home)
+                return sapien_camera(config, region=workspace.region, home=rendered)
             except ValueError as error:
                 raise BadConfig(f"{source}: {error}") from error
         case _:
@@ -125,6 +119,11 @@ def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
         raise BadConfig(
             f"{path}: workspace.grasp_force {workspace.grasp_force:g} N is over the arm's "
             f"{arm.limits.max_force:g} N (arm.max_grasp_force)"
+        )
+    if len(workspace.home) != arm.limits.n_joints:
+        raise BadConfig(
+            f"{path}: workspace.home has {len(workspace.home)} joints, the arm has {arm.limits.n_joints}; "
+            "state joints at which it is out of the camera's sight"
         )
     outside = np.flatnonzero(
         (workspace.home < arm.limits.joint_lower) | (workspace.home > arm.limits.joint_upper)

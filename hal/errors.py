@@ -15,6 +15,10 @@ class DriverMissing(HalError):
     """The vendor's package is not installed; the message names the extra."""
 
 
+class BadBackend(HalError):
+    """An installed package's arm, camera or cell fails, breaks the contract, or shares its name."""
+
+
 class IncompatibleDriver(HalError):
     """The installed driver speaks another version than the device."""
 

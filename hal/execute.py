@@ -13,7 +13,7 @@ from hal.cell import Cell
 from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, Stopped
 from hal.hand import Load
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import HOLD_S, MAX_OPENING, PAD_REACH, Grasp
+from mskgrasp.core.grasp import HOLD_S, PAD_REACH, Grasp
 
 APPROACH = 0.12
 """Least height over the table from which the straight descent begins, m; tall things raise it."""
@@ -149,7 +149,7 @@ def put_down(
     grasp: Grasp,
     *,
     height: float = PUT_DOWN,
-    opening: float = MAX_OPENING,
+    opening: float | None = None,
     tallest: float = 0.0,
 ) -> None:
     """Lower a lifted part to where it was grasped, open the fingers and rise.
@@ -158,7 +158,7 @@ def put_down(
         cell: The hand holds the part over the table.
         grasp: Grasp of the lifted part, base frame.
         height: Height of the release above the grasp, metres; a part that falls 2 mm may shift by 1 mm.
-        opening: As in `let_go`.
+        opening: As in `let_go`; None: as far as the hand does.
         tallest: As in `let_go`.
 
     Raises:
@@ -166,7 +166,8 @@ def put_down(
             hand touched something as it released the part and rose.
     """
     lower(cell, grasp, height=height)
-    let_go(cell, grasp, opening=opening, tallest=tallest)
+    stroke = cell.arm.limits.gripper.stroke
+    let_go(cell, grasp, opening=stroke if opening is None else opening, tallest=tallest)
 
 
 def lower(cell: Cell, grasp: Grasp, *, height: float = 0.0) -> None:
@@ -194,8 +195,9 @@ def let_go(cell: Cell, place: Grasp, *, opening: float, tallest: float = 0.0) ->
         MotionAborted: The hand touched something.
         ValueError: The hand does not open so far.
     """
-    if not 0 <= opening <= MAX_OPENING:
-        raise ValueError(f"opening {opening} m is outside 0 .. {MAX_OPENING} m")
+    stroke = cell.arm.limits.gripper.stroke
+    if not 0 <= opening <= stroke:
+        raise ValueError(f"opening {opening} m is outside 0 .. {stroke} m")
     state = cell.arm.state()
     width = max(opening, state.gripper_width + RELEASE)
     if width < state.max_width:

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hal.errors import OutOfWorkspace
+from hal.gripper import FRANKA_HAND, GripperSpec
 from hal.hand import HAND_MASS, PAYLOAD
 from hal.keep_out import KeepOut
 from mskgrasp.core.geometry import Pose, pose_distance, quat_rotate, straight_line
-from mskgrasp.core.grasp import MIN_GAP, PAD_REACH, TABLE_CLEARANCE
+from mskgrasp.core.grasp import MIN_GAP, TABLE_CLEARANCE
 
 _STEP = 0.01
 """Greatest distance between two checked points of a straight motion, metres."""
@@ -24,15 +25,6 @@ TOUCH_DEPTH = 0.05
 _SLACK = 1e-3
 """Tolerance along a path, metres: an arm rests as exactly as its drives hold it."""
 _UNIT = 1e-3
-# Corners of the pads and of the palm in the tcp frame, metres (collision boxes of the Panda's hand).
-_HAND_CORNERS = np.array(
-    [
-        [x * half_x, y * half_y, z]
-        for half_x, half_y, z in ((0.011, 0.056, PAD_REACH), (0.032, 0.102, -0.0375))
-        for x in (-1, 1)
-        for y in (-1, 1)
-    ]
-)
 
 PAD_CORNER = 0.0575
 """Distance of the open pads' farthest corner from the hand's axis, metres."""
@@ -43,8 +35,8 @@ class ArmLimits:
     """Limits that every command is checked against before anything moves.
 
     Attributes:
-        joint_lower: (7,) radians.
-        joint_upper: (7,) radians.
+        joint_lower: (n,) radians; the arm has n joints.
+        joint_upper: (n,) radians.
         box_lower: (3,) the TCP stays inside this box, base frame, metres.
         box_upper: (3,) the other corner.
         table_z: Height of the table at `table_centre`, base frame, metres; the hand stays clear of it.
@@ -55,6 +47,7 @@ class ArmLimits:
         keep_out: Space that no link enters, for an arm whose links are known (`hal.collisions`).
         closed_width: Pads at this distance or less hold nothing, metres.
         max_load: Greatest mass of a part in the hand, kg.
+        gripper: Dimensions and ranges of the hand.
     """
 
     joint_lower: np.ndarray
@@ -69,13 +62,19 @@ class ArmLimits:
     keep_out: tuple[KeepOut, ...] = ()
     closed_width: float = MIN_GAP
     max_load: float = PAYLOAD - HAND_MASS
+    gripper: GripperSpec = FRANKA_HAND
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return len(self.joint_lower)
 
     def over_table(self, T_base_tcp: Pose) -> np.ndarray:
         """Distances (...) of the open hand's lowest corner from the table, metres; negative below it."""
         position, quat_wxyz = (
             np.asarray(value)[..., None, :] for value in (T_base_tcp.position, T_base_tcp.quat_wxyz)
         )
-        corners = quat_rotate(quat_wxyz, _HAND_CORNERS) + position
+        corners = quat_rotate(quat_wxyz, self.gripper.corners) + position
         table = plane_height(corners[..., :2], self.table_z, self.table_slope, self.table_centre)
         return (corners[..., 2] - table).min(axis=-1)
 
@@ -88,19 +87,19 @@ def plane_height(
 
 
 def lowest_point(T_base_tcp: Pose) -> float:
-    """Height of the lowest corner of the open hand, base frame, metres."""
-    return float(T_base_tcp.apply(_HAND_CORNERS)[:, 2].min())
+    """Height of the lowest corner of the open Franka Hand, base frame, metres."""
+    return float(T_base_tcp.apply(FRANKA_HAND.corners)[:, 2].min())
 
 
 def check_target_joints(limits: ArmLimits, joints: np.ndarray) -> None:
-    """Refuse joints (7,) outside their limits.
+    """Refuse joints (n,) outside their limits.
 
     Raises:
         OutOfWorkspace: Names the joint and its limits.
     """
     lower, upper = limits.joint_lower, limits.joint_upper
-    if joints.shape != (7,) or not np.isfinite(joints).all():
-        raise OutOfWorkspace(f"joints must be 7 finite numbers, got {joints.tolist()}")
+    if joints.shape != lower.shape or not np.isfinite(joints).all():
+        raise OutOfWorkspace(f"joints must be {limits.n_joints} finite numbers, got {joints.tolist()}")
     outside = np.flatnonzero((joints < lower) | (joints > upper))
     if len(outside):
         i = outside[0]
@@ -160,9 +159,9 @@ def check_joint_path(
 
     Args:
         limits: Limits of the arm.
-        forward: ``T_base_tcp`` (k,) at joints (k, 7).
-        start: (7,) current joints, radians.
-        goal: (7,) radians, within their limits.
+        forward: ``T_base_tcp`` (k,) at joints (k, n).
+        start: (n,) current joints, radians.
+        goal: (n,) radians, within their limits.
 
     Raises:
         OutOfWorkspace: Names the place.

@@ -1,4 +1,4 @@
-"""Cells from YAML files; the only module that knows all backends."""
+"""Cells from YAML files; the only module that knows all built-in types."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, assert_never, get_args
 
+from hal.backends import build, find_backend
 from hal.cell import Cell
 from hal.collisions import check_joints
 from hal.errors import OutOfWorkspace
@@ -14,10 +15,6 @@ from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import BadConfig
 
 CellType = Literal["sapien", "mujoco", "devices", "recorded", "replay"]
-SIMULATED: tuple[CellType, ...] = ("sapien", "mujoco")
-"""Types of which several may run at once."""
-BUILT_HERE: tuple[CellType, ...] = (*SIMULATED, "devices")
-"""Types that do not stand for another cell."""
 
 
 @contextmanager
@@ -40,6 +37,7 @@ def cell_from_yaml(path: Path) -> Cell:
 
     Raises:
         BadConfig: The file is missing or not valid.
+        BadBackend: An installed package's backend cannot be used.
     """
     return cell_from_values(read_yaml(path), path)
 
@@ -51,7 +49,7 @@ def cell_from_values(values: dict[str, Any], path: Path) -> Cell:
         BadConfig: The values are not valid.
     """
     cell = _build(values, path)
-    if values["type"] in BUILT_HERE:
+    if not cell.recorded:
         _check_keep_out(cell, values, path)
     return cell
 
@@ -64,8 +62,7 @@ def _check_keep_out(cell: Cell, values: dict[str, Any], path: Path) -> None:
     """
     arm = cell.arm
     if arm.links is None:
-        given = "workspace" in values and values["workspace"].get("keep_out")
-        if given and values["arm"].get("driver") != "replay":  # which checks nothing
+        if arm.limits.keep_out:
             raise BadConfig(f"{path}: the links of this arm are unknown, so that it cannot keep out; omit it")
         return
     try:
@@ -77,9 +74,9 @@ def _check_keep_out(cell: Cell, values: dict[str, Any], path: Path) -> None:
 
 
 def _build(values: dict[str, Any], path: Path) -> Cell:
-    if values.get("type") not in get_args(CellType):
-        legal = ", ".join(get_args(CellType))
-        raise BadConfig(f"{path}: 'type' is {values.get('type')!r}; legal: {legal}")
+    entry = find_backend(values.get("type"), "cells", get_args(CellType), f"{path}: 'type'")
+    if entry is not None:
+        return build(entry, Cell, values, str(path), path)
     kind: CellType = values["type"]
     match kind:
         case "sapien":

@@ -276,4 +276,5 @@ def simulated_cell(
         feeder=world,
         tracker=world,
         board_holder=board_holder,
+        simulated=True,
     )

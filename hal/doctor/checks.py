@@ -13,13 +13,13 @@ from typing import Any, Literal
 import numpy as np
 
 from hal.arm import JOINT_TOLERANCE, Arm
+from hal.backends import Group, package_of
 from hal.camera import Camera, RgbdFrame
 from hal.camera_calibration import Calibration, calibration_path, read_calibration
 from hal.cell import Workspace
 from hal.charuco import project
 from hal.errors import HalError, OutOfWorkspace
 from hal.execute import APPROACH
-from hal.open_cell import SIMULATED
 from hal.table import HIGHEST_TABLE, fit_table
 from mskgrasp.core.errors import BadConfig, MskgraspError
 from mskgrasp.core.geometry import Pose
@@ -50,6 +50,7 @@ _PACKAGES = {
     "sapien": ("sapien", "mskgrasp"),
     "mujoco": ("mujoco", "mskgrasp[mujoco]"),
 }
+_SECTIONS: tuple[tuple[str, Group], ...] = (("arm", "arms"), ("camera", "cameras"))
 _LOW_DISK = 2e9
 _MAX_AGE_S = 0.5
 _GOOD_RATE = 5.0
@@ -70,14 +71,19 @@ _STEP = 0.03
 def check_drivers(values: dict[str, Any]) -> Iterator[Finding]:
     """Whether the packages that the cell file names are installed, and which versions."""
     kind = str(values.get("type"))
-    drivers: dict[str, dict[str, Any]] = {kind: {}} if kind in SIMULATED else {}
-    for section in ("arm", "camera"):
+    drivers: dict[str, dict[str, Any]] = {kind: {}}
+    packages = {kind: package_of(kind, "cells")}
+    for section, group in _SECTIONS:
         part = values.get(section)
-        if values.get("type") == "devices" and isinstance(part, dict):
-            drivers.setdefault(str(part.get("driver")), part)
+        if isinstance(part, dict) and "driver" in part:
+            name = str(part["driver"])
+            drivers.setdefault(name, part)
+            packages.setdefault(name, package_of(name, group))
     for name, settings in drivers.items():
         if name not in _PACKAGES:
-            continue  # a recording needs no package
+            if packages[name] is not None:  # a recording needs no package
+                yield Finding(level="ok", subject=f"driver {name}", text=f"package {packages[name]}")
+            continue
         package, install = _PACKAGES[name]
         subject = f"driver {name}"
         try:

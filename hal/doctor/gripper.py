@@ -7,7 +7,6 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from hal.arm import Arm, ArmState
 from hal.cell import Cell
 from hal.cell_file import number, require_writable, with_values, write_values
 from hal.errors import HalError
-from hal.open_cell import SIMULATED, cell_from_values
+from hal.open_cell import cell_from_values
 from hal.operator import Operator, StoppedByOperator
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import UsageError
@@ -105,8 +104,8 @@ def measure_gripper(path: Path) -> int:
         StoppedByOperator: The operator ended it; nothing was written.
     """
     values = read_yaml(path)
-    _check_kind(values, path)
     cell = cell_from_values(values, path)
+    _check_kind(cell, path)
     with_values(path.read_text(encoding="utf-8"), SECTION, {KEY: "null"}, after=ANCHOR)
     require_writable(path, "the measurement")
     operator = Operator(cell)
@@ -213,12 +212,11 @@ def closing_speed(states: list[ArmState]) -> float:
     )
 
 
-def _check_kind(values: dict[str, Any], path: Path) -> None:
-    kind, arm = values.get("type"), values.get("arm")
-    if kind in SIMULATED:
+def _check_kind(cell: Cell, path: Path) -> None:
+    if cell.simulated:
         raise UsageError(
             f"{path}: a simulated hand applies what its settings say (grasp_force, physics.finger_speed); "
             "--gripper is for a real one"
         )
-    if kind in ("replay", "recorded") or (isinstance(arm, dict) and arm.get("driver") == "replay"):
+    if cell.recorded:
         raise UsageError(f"{path}: a recording has no hand to measure; give the file of the cell itself")

@@ -66,8 +66,6 @@ def check_grip(values: dict[str, Any], cell_file: Path, workspace: Workspace) ->
     arm, table = values.get("arm"), values.get("workspace")
     if values.get("type") != "devices" or not isinstance(arm, dict) or not isinstance(table, dict):
         return None
-    if arm.get("driver") == "replay":
-        return None
     remedy = f"measure it: python -m hal.doctor --cell {cell_file} --gripper"
     measured = table.get("measured_grip")
     if measured is None:

@@ -7,7 +7,6 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from hal.camera import RgbdFrame
 from hal.cell import Cell
@@ -29,6 +28,7 @@ from hal.doctor.config import DoctorConfig
 from hal.doctor.dry_run import check_dry_run, slowed
 from hal.doctor.gripper import measure_gripper
 from hal.doctor.hand_checks import check_grip, check_hand
+from hal.errors import BadBackend
 from hal.open_cell import cell_from_values
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadConfig, UsageError
@@ -59,16 +59,16 @@ def examine(path: Path, *, move: bool, dry_run: bool = False) -> Iterator[Findin
     """
     values = read_yaml(path)
     yield from check_drivers(values)
-    if values.get("type") == "sapien" or _driver(values, "camera") == "sapien":
-        yield check_renderer()
     yield check_disk(Path.cwd())
     try:
         cell = cell_from_values(slowed(values) if dry_run else values, path)
-    except BadConfig as error:
+    except (BadConfig, BadBackend) as error:
         yield Finding(level="fail", subject="cell file", text=str(error))
         return
+    if cell.camera.rendered:
+        yield check_renderer()
     yield Finding(level="ok", subject="cell file", text=f"{path}, type {values['type']}")
-    if _driver(values, "arm") == "replay":
+    if cell.recorded:
         yield Finding(level="ok", subject="workspace", text="not checked: a recorded arm repeats its motions")
     else:
         yield check_reach(cell.arm, cell.workspace)
@@ -81,8 +81,8 @@ def examine(path: Path, *, move: bool, dry_run: bool = False) -> Iterator[Findin
             yield from check_hand(cell.arm)
         else:
             yield failed
-        for known in (check_grip, check_calibration):
-            finding = known(values, path, cell.workspace)
+        grip = None if cell.recorded else check_grip(values, path, cell.workspace)
+        for finding in (grip, check_calibration(values, path, cell.workspace)):
             if finding is not None:
                 yield finding
         devices.callback(cell.camera.close)
@@ -110,11 +110,6 @@ def _check_camera(cell: Cell) -> Iterator[Finding]:
         return
     yield from check_view(frames[-1], cell.workspace)
     yield from check_table(frames[-1], cell.workspace)
-
-
-def _driver(values: dict[str, Any], section: str) -> Any:
-    part = values.get(section)
-    return part.get("driver") if isinstance(part, dict) else None
 
 
 def main() -> int:

@@ -27,6 +27,8 @@ def recorded_cell(cell: Cell, out: Path) -> Cell:
     writer = RecordingWriter(out, cell.workspace, cell.arm)
     return replace(
         cell,
+        simulated=False,
+        recorded=True,
         camera=RecordingCamera(cell.camera, writer),
         arm=RecordingArm(cell.arm, writer),
         feeder=None if cell.feeder is None else RecordingFeeder(cell.feeder, writer),
@@ -49,6 +51,7 @@ def replay_cell(config: ReplayCellConfig) -> Cell:
         workspace=recording.workspace,
         feeder=ReplayFeeder(playback) if "present" in calls else None,
         tracker=ReplayTracker(playback) if "part_pose" in calls else None,
+        recorded=True,
     )
 
 

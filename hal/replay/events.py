@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from hal import errors as hal_errors
 from hal.arm import ArmState, GraspOutcome
 from hal.errors import HalError, Stopped
+from hal.gripper import GripperSpec
 from hal.hand import Load
 from hal.keep_out import Box, Capsule, to_plain
 from mskgrasp.core import errors as base_errors
@@ -75,6 +76,8 @@ def plain(value: Any) -> Any:
             return to_plain(value)
         case tuple() if value and all(isinstance(one, Capsule | Box) for one in value):
             return [to_plain(one) for one in value]
+        case GripperSpec():
+            return asdict(value)
         case GraspOutcome():
             return dict(width=float(value.width), holding=bool(value.holding))
         case Load():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from hal.camera import RgbdFrame
 from hal.cell import Workspace
 from hal.errors import BadRecording, MissingRecording
+from hal.gripper import FRANKA_HAND, GripperSpec
 from hal.keep_out import from_plain
 from hal.limits import ArmLimits
 from hal.replay.events import KIND, SCHEMA, Event, pose
@@ -89,6 +90,11 @@ def _read(path: Path, file: Any) -> Recording:
     stored: dict[str, Any] = json.loads(file.attrs["limits"])
     # A recording made before there were keep-outs has none.
     keep_out = tuple(from_plain(one) for one in stored.pop("keep_out", ()))
+    # One made before arms stated their gripper is of the Franka Hand.
+    gripper = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in stored.pop("gripper", asdict(FRANKA_HAND)).items()
+    }
     limits: dict[str, Any] = {
         key: np.array(value) if isinstance(value, list) else value for key, value in stored.items()
     }
@@ -103,7 +109,7 @@ def _read(path: Path, file: Any) -> Recording:
         path=path,
         made=str(file.attrs["made"]),
         workspace=Workspace(**{**table, **tuples, "home": np.array(table["home"])}),
-        limits=ArmLimits(**limits, keep_out=keep_out),
+        limits=ArmLimits(**limits, keep_out=keep_out, gripper=GripperSpec(**gripper)),
         events=events,
         n_frames=n_frames,
     )

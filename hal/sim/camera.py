@@ -13,6 +13,7 @@ class SapienCamera(SimulatedCamera[SapienWorld]):
     """Rendered camera over the table; it sees the arm, too."""
 
     serial = "sapien"
+    rendered = True
 
     def _render(self) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
         colour, depth = self._world.env.capture_rgbd(with_robot=True)

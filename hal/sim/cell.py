@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hal.cell import Cell
@@ -26,4 +28,4 @@ def sapien_cell(config: SapienCellConfig) -> Cell:
         colour_scale=config.colour_scale,
     )
     camera, arm = SapienCamera(world, config.noise), SapienArm(world, cell_limits(config, world))
-    return simulated_cell(config, world, camera, arm, board_holder=world)
+    return replace(simulated_cell(config, world, camera, arm, board_holder=world), draws_tape=True)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hal.cell_file import require_writable
-from hal.open_cell import SIMULATED, cell_from_values
+from hal.open_cell import cell_from_values
 from hal.operator import Operator, StoppedByOperator
 from hal.touch.cell_file import with_table, write_table
 from hal.touch.config import TouchConfig
@@ -49,11 +49,15 @@ def measure(config: TouchConfig) -> tuple[TableReport, Operator]:
         StoppedByOperator: The operator does not want the arm to move.
     """
     values = read_yaml(config.cell)
-    stated = _check_kind(values, config)
+    stated = _stated_height(values, config)
     at = config.table_at
     if at is not None:
         values = {**values, "workspace": {**values["workspace"], "table_z": at}}
     cell = cell_from_values(values, config.cell)
+    if cell.recorded:
+        raise UsageError(
+            f"{config.cell}: a recording has no table to touch; give the file of the cell itself"
+        )
     operator = Operator(cell, yes=config.yes)
     check_folder(config.out)
     if not operator.confirm(
@@ -76,7 +80,7 @@ def measure(config: TouchConfig) -> tuple[TableReport, Operator]:
         cell=str(config.cell),
         made=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         region=region,
-        stated_z=cell.workspace.table_z if values.get("type") in SIMULATED else stated,
+        stated_z=cell.workspace.table_z if cell.simulated else stated,
         points=points,
         plane=fit_plane(points, region, config.flatness),
         force=config.force,
@@ -89,13 +93,10 @@ def measure(config: TouchConfig) -> tuple[TableReport, Operator]:
     return report, operator
 
 
-def _check_kind(values: dict[str, Any], config: TouchConfig) -> float | None:
+def _stated_height(values: dict[str, Any], config: TouchConfig) -> float | None:
     """Height that the file of a real cell states, metres; None for none."""
-    path, kind = config.cell, values.get("type")
-    arm, workspace = values.get("arm"), values.get("workspace")
-    if kind in ("replay", "recorded") or (isinstance(arm, dict) and arm.get("driver") == "replay"):
-        raise UsageError(f"{path}: a recording has no table to touch; give the file of the cell itself")
-    if kind != "devices" or not isinstance(workspace, dict):
+    path, workspace = config.cell, values.get("workspace")
+    if not isinstance(workspace, dict):
         if config.table_at is not None:
             raise UsageError(f"--table-at is for a cell with arm and camera; {path} knows where its table is")
         return None
@@ -116,7 +117,7 @@ def main() -> int:
     report, operator = measure(config)
     print("\n".join(report.lines()))
     print(f"wrote table.json and table.png in {config.out}")
-    if read_yaml(config.cell).get("type") in SIMULATED:
+    if "workspace" not in read_yaml(config.cell):
         return 0
     slope = None if report.plane.level else report.plane.slope
     if not operator.confirm(f"Write this into {config.cell}? y: yes, n: no: "):

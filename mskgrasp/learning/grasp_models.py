@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,8 @@ PRETRAINED = Path(__file__).parent / "pretrained"
 """Folder of the model that ships."""
 
 SCHEMA_VERSION = 1
+SAME_HAND = 2e-4
+"""Dimensions of a hand may differ by this much, metres: drawings are rounded."""
 WEIGHTS = "model.safetensors"
 DESCRIPTION = "model.json"
 _FORMER_FIELDS = {
@@ -193,7 +196,7 @@ def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -
     folder = Path(folder)
     require_model(folder)
     meta = _read_meta(folder / DESCRIPTION)
-    _check_hand(meta, folder)
+    require_hand(meta, HAND_GEOMETRY, folder)
     path = folder / WEIGHTS
     try:
         weights = load_file(path)
@@ -248,11 +251,24 @@ def _read_meta(path: Path) -> ModelMeta:
         raise BadModel(f"{path}: '{key}': {first['msg'].lower()}; copy it again or train again") from error
 
 
-def _check_hand(meta: ModelMeta, folder: Path) -> None:
-    for source in meta.labels:
-        other = [name for name, size in source.hand.items() if abs(HAND_GEOMETRY.get(name, 0) - size) > 1e-6]
+def require_hand(meta: ModelMeta, hand: Mapping[str, float], folder: Path) -> None:
+    """Refuse a model that was made for another hand.
+
+    Args:
+        meta: The model's description; where it records no hand, it is that which grasps are sampled for.
+        hand: Dimensions as in `mskgrasp.core.grasp.HAND_GEOMETRY`, metres.
+        folder: The model's folder, for the message.
+
+    Raises:
+        BadModel: A dimension differs by more than `SAME_HAND`.
+    """
+    for model_hand in (HAND_GEOMETRY, *(source.hand for source in meta.labels)):
+        other = [name for name, size in model_hand.items() if abs(hand.get(name, 0) - size) > SAME_HAND]
         if other:
-            sizes = ", ".join(f"{name} {1e3 * source.hand[name]:.1f} mm" for name in other)
+            sizes = ", ".join(
+                f"{name} {1e3 * model_hand[name]:.1f} mm, this one's {1e3 * hand.get(name, 0):.1f} mm"
+                for name in other
+            )
             raise BadModel(
                 f"the model in {folder} was trained for another hand ({sizes}); train on data of this hand"
             )

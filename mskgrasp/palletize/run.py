@@ -10,9 +10,7 @@ from dataclasses import dataclass, replace
 import cv2
 
 from hal import cell_from_yaml
-from hal.open_cell import SIMULATED
 from hal.operator import Operator
-from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.learning.grasp_models import load_models
@@ -103,11 +101,10 @@ def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[tuple[Correction
         The corrections, and whether an operator will be asked.
     """
     cell = cell_from_yaml(config.cell)
-    kind = read_yaml(config.cell).get("type")
-    if config.workers > 1 and kind not in SIMULATED:
+    if config.workers > 1 and not cell.simulated:
         raise UsageError(f"--workers {config.workers}: {config.cell} is one cell; omit --workers")
     asks = Operator(cell, yes=config.yes).asks
-    if kind in (*SIMULATED, "devices"):  # a recording replays queries in its order only
+    if not cell.recorded:  # a recording replays queries in its order only
         check_slots_in_reach(cell, slots)
     can: tuple[Correction, ...] = CORRECTIONS if cell.tracker is not None else CORRECTIONS[:2]
     wanted = tuple(dict.fromkeys(config.corrections)) or can

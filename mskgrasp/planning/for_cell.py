@@ -9,7 +9,7 @@ import torch
 from hal.cell import Cell
 from hal.errors import HalError
 from mskgrasp.core.shipped import config_file, example_file
-from mskgrasp.learning.grasp_models import load_models
+from mskgrasp.learning.grasp_models import load_models, require_hand
 from mskgrasp.parts.importing.mesh_files import Unit
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
@@ -21,12 +21,14 @@ def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
     """Make the planner for a cell: loaded networks, and the cell's table.
 
     Raises:
-        BadModel: The model cannot be used.
+        BadModel: The model cannot be used, or was made for another hand than the arm's.
     """
     device = "cuda" if torch.cuda.is_available() else "cpu"
     workspace = cell.workspace
+    loaded = load_models(models, device)
+    require_hand(loaded.meta, cell.arm.limits.gripper.geometry, models)
     return Planner(
-        load_models(models, device),
+        loaded,
         config,
         table_z=workspace.table_z,
         region=workspace.region,

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import yaml
 
 from hal.errors import LoadTooHeavy
-from hal.open_cell import SIMULATED, cell_from_values, cell_from_yaml
+from hal.open_cell import cell_from_values, cell_from_yaml
 from hal.sensor_noise import NoiseModel
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import UsageError
@@ -19,8 +19,6 @@ from mskgrasp.core.files import write_whole
 from mskgrasp.core.settings import Tape
 from mskgrasp.parts import Part
 
-TAPED = "sapien"
-"""Type of the simulated cell that draws tape and fine colour."""
 FINE = 3
 """Colour pixels per depth pixel along one axis where tape is measured, about as a Kinect v2 has."""
 
@@ -33,16 +31,13 @@ class CellFile:
         path: The user's file.
         values: Its contents with the overrides.
         tape: Sizes of the tape squares that measure; None where a tracker measures.
+        simulated: Whether the cell is simulated, so that several can run in parallel.
     """
 
     path: Path
     values: dict[str, Any]
     tape: Tape | None
-
-    @property
-    def simulated(self) -> bool:
-        """Whether the cell is simulated, so that several can run in parallel."""
-        return self.values.get("type") in SIMULATED
+    simulated: bool
 
     @property
     def noise(self) -> str:
@@ -89,11 +84,11 @@ def read_cell(
         UsageError: An override does not apply to this cell.
     """
     values = read_yaml(path)
-    simulated = values.get("type") in SIMULATED
     if tape is not None and measure != "markers":
         raise UsageError("--tape needs --measure markers; add it")
+    cell = cell_from_values(values, path)
     if noise is not None:
-        if not simulated:
+        if not cell.simulated:
             raise UsageError(
                 f"--noise is for a simulated cell; {path} is of type {values.get('type')!r}: omit --noise"
             )
@@ -102,17 +97,17 @@ def read_cell(
     squares = None
     if measure == "markers":
         squares = dict(zip(("large", "small"), tape, strict=True)) if tape else {}
-        if simulated and values["type"] != TAPED:
+        if cell.simulated and not cell.draws_tape:
             raise UsageError(
                 f"--measure markers: {path} is of type {values['type']!r}, which draws no "
                 "tape on parts; measure by its tracker (--measure truth), or use a cell of type sapien"
             )
-        if simulated:
+        if cell.simulated:
             squares = squares or values.get("tape") or {}
             values |= {"tape": squares, "colour_scale": max(FINE, values.get("colour_scale", 1))}
         squares = check_config(Tape, squares, "--tape" if tape else f"{path}: tape")
     cell_from_values(values, path)  # refuses an invalid file before any worker starts
-    return CellFile(path=path, values=values, tape=squares)
+    return CellFile(path=path, values=values, tape=squares, simulated=cell.simulated)
 
 
 def check_loads(cell_file: Path, parts: Iterable[Part]) -> None:

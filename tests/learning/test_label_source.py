@@ -49,7 +49,7 @@ def test_a_model_tells_its_source_and_its_card_shows_what_differs(tmp_path: Path
 
 def test_a_model_of_another_hand_is_refused(tmp_path: Path, collected: Path):
     folder = described(tmp_path, collected, max_opening=0.1)
-    with pytest.raises(BadModel, match=r"another hand \(max_opening 100\.0 mm\)"):
+    with pytest.raises(BadModel, match=r"another hand \(max_opening 100\.0 mm, this one's 80\.0 mm\)"):
         load_models(folder)
 
 
