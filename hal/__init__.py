@@ -16,5 +16,6 @@ from mskgrasp.core.config import Config as BackendConfig
 __all__ = [
     "Arm", "ArmLimits", "ArmState", "Backend", "BackendConfig", "Camera", "Cell", "GraspOutcome",
     "GraspResult", "GripperSpec", "HalError", "Load", "PartFeeder", "PartTracker", "RgbdFrame", "SensorNoise",
-    "Workspace", "capture_at_home", "cell_from_yaml", "execute_grasp", "go_home", "let_go", "lower", "open_cell", "put_down",
+    "Workspace", "capture_at_home", "cell_from_yaml", "execute_grasp", "go_home", "let_go", "lower",
+    "open_cell", "put_down",
 ]  # fmt: skip

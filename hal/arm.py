@@ -276,8 +276,9 @@ class Arm(Device):
             OutOfWorkspace: The force is outside the gripper's range; nothing moved.
             NeedsRecovery: An earlier error was not acknowledged.
         """
-        if not 0 < force <= self.limits.max_force:
-            raise OutOfWorkspace(f"grasp force {force:g} N is outside 0 .. {self.limits.max_force:g} N")
+        least, most = self.limits.gripper.force[0], self.limits.max_force
+        if not (0 < force and least <= force <= most):
+            raise OutOfWorkspace(f"grasp force {force:g} N is outside {least:g} .. {most:g} N")
         with self._motion():
             outcome = self._grasp(force)
             at = self._state().T_base_tcp

@@ -114,7 +114,7 @@ def package_of(name: str, group: Group) -> str | None:
 def _check(device: Any, kind: type, named: str) -> None:
     """Refuse what breaks the contract in a way that shows before anything is connected."""
     if not isinstance(device, kind):
-        raise BadBackend(f"{named} must build a hal.{kind.__name__}, and builds {_shown(device)}")
+        raise BadBackend(f"{named} must build a hal.{kind.__name__}, and builds one {_shown(device)}")
     if isinstance(device, Cell):
         _check(device.arm, Arm, f"the arm of {named}")
         _check(device.camera, Camera, f"the camera of {named}")

@@ -115,10 +115,11 @@ def _camera(values: dict[str, Any], workspace: Workspace, path: Path) -> tuple[C
 
 def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
     """Refuse a workspace whose grasps or home the arm would refuse later, with a part in its hand."""
-    if workspace.grasp_force > arm.limits.max_force:
+    least, most = arm.limits.gripper.force[0], arm.limits.max_force
+    if not least <= workspace.grasp_force <= most:
         raise BadConfig(
-            f"{path}: workspace.grasp_force {workspace.grasp_force:g} N is over the arm's "
-            f"{arm.limits.max_force:g} N (arm.max_grasp_force)"
+            f"{path}: workspace.grasp_force {workspace.grasp_force:g} N is outside {least:g} .. {most:g} N, "
+            "which gripper and section 'arm' allow (arm.max_grasp_force of a Franka arm)"
         )
     if len(workspace.home) != arm.limits.n_joints:
         raise BadConfig(

@@ -16,6 +16,7 @@ from hal.cell import BoardHolder, Cell, Workspace
 from hal.config import SimulatedCellConfig, TableError
 from hal.device import SharingDevice
 from hal.errors import MotionAborted, NotConnected, OutOfWorkspace
+from hal.gripper import FRANKA_HAND
 from hal.keep_out import KeepOut, camera_keep_out
 from hal.keep_out_config import keep_outs
 from hal.limits import ArmLimits, shown
@@ -241,7 +242,7 @@ def panda_limits(clearance: float = TABLE_CLEARANCE, keep_out: tuple[KeepOut, ..
         box_lower=np.array([0.25, -0.4, TABLE_Z]),
         box_upper=np.array([0.75, 0.4, 0.75]),
         table_z=TABLE_Z,
-        max_force=70.0,
+        max_force=FRANKA_HAND.force[1],
         clearance=clearance,
         keep_out=keep_out,
     )

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from hal.gripper import FRANKA_HAND
 from hal.hand import HAND_MASS, PAYLOAD
 from mskgrasp.core.config import Config
 from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER
@@ -53,9 +54,9 @@ class FrankaArmConfig(Config):
     """External torque on a joint at which the robot's reflex stops the arm, N m."""
     contact_force: float = Field(default=20.0, gt=0, le=80)
     """External force at the TCP at which the reflex stops the arm, N."""
-    max_grasp_force: float = Field(default=40.0, gt=0, le=70)
+    max_grasp_force: float = Field(default=40.0, gt=0, le=FRANKA_HAND.force[1])
     """Greatest gripper force, N (Franka Hand: 70 N continuously)."""
-    gripper_speed: float = Field(default=0.05, gt=0, le=0.1)
+    gripper_speed: float = Field(default=0.05, gt=0, le=FRANKA_HAND.speed[1])
     """Speed at which the pads' distance changes, twice that of each finger, m/s."""
     closed_width: float = Field(default=1e-3, ge=0, le=0.01)
     """Pads at this distance or less hold nothing, m: as they close, and after the lift."""

@@ -91,7 +91,7 @@ def _read(path: Path, file: Any) -> Recording:
     # A recording made before there were keep-outs has none.
     keep_out = tuple(from_plain(one) for one in stored.pop("keep_out", ()))
     # One made before arms stated their gripper is of the Franka Hand.
-    gripper = {
+    gripper: dict[str, Any] = {
         key: tuple(value) if isinstance(value, list) else value
         for key, value in stored.pop("gripper", asdict(FRANKA_HAND)).items()
     }

@@ -1,0 +1,1 @@
+"""Example backends: a six-axis arm and a depth device."""
