@@ -13,8 +13,10 @@ from hal import ArmState
 from hal.config import MeasuredGrip
 from hal.doctor import run as doctor
 from hal.doctor.gripper import Grip, NotMeasured, closing_speed
+from hal.replay import recorded_cell
 from mskgrasp.core.geometry import Pose
 from tests.hal.franka.robots import FakeRobot, robot_for, write_cell
+from tests.hal.replay.toy import toy_cell
 from tests.programs import run_here
 
 
@@ -82,13 +84,21 @@ camera: {driver: kinect2, calibration: a}
 """
 
 
+REPLAYED = """\
+type: devices
+arm: {driver: replay, recording: a.h5}
+camera: {driver: replay, recording: a.h5}
+workspace: {table_z: 0.0}
+"""
+
+
 @pytest.mark.parametrize(
     ("text", "arguments", "message"),
     [
         (None, (), "No such file"),
         ("type: sapien\n", (), "a simulated hand applies what its settings say"),
         ("type: replay\nrecording: a.h5\n", (), "a recording has no hand to measure"),
-        ("type: devices\narm: {driver: replay}\n", (), "a recording has no hand to measure"),
+        (REPLAYED, (), "a recording has no hand to measure"),
         ("type: sapien\n", ("--move",), "omit --move"),
         (REAL + "workspace: {table_z: 0.0}\n", (), "standard input is no terminal"),
         (REAL + "workspace: {table_z: null}\n", (), "run hal.touch"),
@@ -106,6 +116,9 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     monkeypatch.setattr("sys.stdin", io.StringIO())
     if text is not None:
         Path("cell.yaml").write_text(text)
+    if "a.h5" in (text or ""):
+        with recorded_cell(toy_cell(), Path("a.h5")).connected() as cell:
+            cell.arm.state()
     done = run_here(doctor.main, "--cell", "cell.yaml", "--gripper", *arguments)
     assert done.returncode == 2 and message in done.stderr
     assert done.stderr.startswith("program: ") and done.stderr.count("\n") == 1

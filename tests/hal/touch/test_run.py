@@ -15,9 +15,11 @@ import yaml
 from hal import Cell
 from hal.franka.arm import FrankaArm
 from hal.operator import Operator
+from hal.replay import recorded_cell
 from hal.touch import run as touch
 from hal.touch import touches
 from tests.hal.franka.robots import robot_for, write_cell
+from tests.hal.replay.toy import toy_cell
 from tests.hal.touch.tables import CELLS, feeling_cell, simulated_file, tilted
 from tests.programs import run_here
 
@@ -127,14 +129,22 @@ camera: {driver: kinect2, calibration: a}
 """
 
 
+REPLAYED = """\
+type: devices
+arm: {driver: replay, recording: a.h5}
+camera: {driver: replay, recording: a.h5}
+workspace: {table_z: 0.0}
+"""
+
+
 @pytest.mark.parametrize(
     ("text", "arguments", "message"),
     [
         (None, (), "No such file"),
         ("", (), "'type' is None; legal: sapien"),
         ("type: replay\nrecording: a.h5\n", (), "a recording has no table to touch"),
-        ("type: recorded\ncell: a\nout: b\n", (), "a recording has no table to touch"),
-        ("type: devices\narm: {driver: replay}\n", (), "a recording has no table to touch"),
+        (f"type: recorded\ncell: {CELLS}/sapien.yaml\nout: b.h5\n", (), "a recording has no table to touch"),
+        (REPLAYED, (), "a recording has no table to touch"),
         (REAL + "workspace: {table_z: null}\n", (), "give it as --table-at Z"),
         (REAL + "workspace: {}\n", ("--table-at", "0"), "no workspace.table_z"),
         (REAL + "workspace: {table_z: null}\n", ("--table-at", "0"), "standard input is no terminal"),
@@ -154,10 +164,14 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     monkeypatch.setattr("sys.stdin", io.StringIO())
     if text is not None:
         Path("cell.yaml").write_text(text)
+    if "a.h5" in (text or ""):
+        with recorded_cell(toy_cell(), Path("a.h5")).connected() as cell:
+            cell.arm.state()
+    before = sorted(tmp_path.iterdir())
     done = run_here(touch.main, "--cell", "cell.yaml", *arguments)
     assert done.returncode == 2 and message in done.stderr
     assert done.stderr.startswith("program: ") and done.stderr.count("\n") == 1
-    assert [path.name for path in tmp_path.iterdir()] == ([] if text is None else ["cell.yaml"])
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def felt(monkeypatch: pytest.MonkeyPatch, folder: Path, answers: list[bool]) -> Path:
