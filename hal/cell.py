@@ -12,6 +12,7 @@ import numpy as np
 from hal.arm import Arm
 from hal.camera import Camera
 from hal.limits import PAD_CORNER, plane_height
+from mskgrasp.core.config import Config
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import PAD_REACH, TABLE_CLEARANCE
 
@@ -103,6 +104,7 @@ class Cell:
         board_holder: Attaches a calibration board to the hand; None if an operator does.
         simulated: The cell is a simulation of its own, so that several may run at once.
         draws_tape: The file may ask for tape on parts (``tape``) and fine colour (``colour_scale``).
+        physics: Settings of a simulation; None: of a real cell, or not told.
         recorded: Its calls are recorded or replayed: a program asks it nothing that a run does not need.
     """
 
@@ -112,6 +114,7 @@ class Cell:
     feeder: PartFeeder | None = None
     tracker: PartTracker | None = None
     board_holder: BoardHolder | None = None
+    physics: Config | None = None
     simulated: bool = False
     draws_tape: bool = False
     recorded: bool = False

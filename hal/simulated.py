@@ -21,6 +21,7 @@ from hal.keep_out import KeepOut, camera_keep_out
 from hal.keep_out_config import keep_outs
 from hal.limits import ArmLimits, shown
 from hal.sensor_noise import SensorNoise, add_noise
+from mskgrasp.core.config import Config
 from mskgrasp.core.geometry import Pose, pose_distance, straight_line
 from mskgrasp.core.grasp import TABLE_CLEARANCE
 from mskgrasp.core.minimum_jerk import minimum_jerk_duration
@@ -259,6 +260,7 @@ def simulated_cell(
     world: SimulatedWorld,
     camera: Camera,
     arm: Arm,
+    physics: Config,
     board_holder: BoardHolder | None = None,
 ) -> Cell:
     """Cell of devices in one simulated world, which places parts and measures their poses."""
@@ -277,5 +279,6 @@ def simulated_cell(
         feeder=world,
         tracker=world,
         board_holder=board_holder,
+        physics=physics,
         simulated=True,
     )

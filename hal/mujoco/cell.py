@@ -24,4 +24,4 @@ def mujoco_cell(config: MujocoCellConfig) -> Cell:
         table_error=config.table_error,
     )
     camera, arm = MujocoCamera(world, config.noise), MujocoArm(world, cell_limits(config, world))
-    return simulated_cell(config, world, camera, arm)
+    return simulated_cell(config, world, camera, arm, config.physics)

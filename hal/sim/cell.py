@@ -28,4 +28,6 @@ def sapien_cell(config: SapienCellConfig) -> Cell:
         colour_scale=config.colour_scale,
     )
     camera, arm = SapienCamera(world, config.noise), SapienArm(world, cell_limits(config, world))
-    return replace(simulated_cell(config, world, camera, arm, board_holder=world), draws_tape=True)
+    return replace(
+        simulated_cell(config, world, camera, arm, config.physics, board_holder=world), draws_tape=True
+    )

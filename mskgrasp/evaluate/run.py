@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
+from hal.open_cell import cell_from_values
 from mskgrasp.core.errors import BadModel, UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.dataset import list_shards
@@ -27,6 +28,7 @@ from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise_
 from mskgrasp.learning.grasp_models import load_models, require_model
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
+from mskgrasp.planning.for_cell import tell_model
 from mskgrasp.planning.run_inputs import model_digests, part_digests
 from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
@@ -89,6 +91,7 @@ def evaluate(config: EvaluateConfig) -> Report:
         compared = load_compared(config.compare, config.models, config.lowess_data, list(parts), chunk)
     inputs = {"cell": cell.digest} | model_digests(config.models) | part_digests(parts.values())
     inputs |= compared.inputs if compared is not None else {}
+    tell_model(models, cell_from_values(cell.values, cell.path))
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=MAY_CHANGE):
         tasks = scenes(parts, config.trials, config.seed, config.planner, compared)
         trials = _make_trials(config, cell, compared, tasks)

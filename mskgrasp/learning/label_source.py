@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from typing import Any
 
 from mskgrasp.core.config import Config
-from mskgrasp.core.settings import Physics
 from mskgrasp.dataset import ShardInfo
 
 SAME_HEIGHT = 0.05
@@ -66,7 +65,7 @@ def source_text(source: LabelSource) -> str:
     )
 
 
-def other_conditions(source: LabelSource, physics: Physics | None, camera_height: float | None) -> list[str]:
+def other_conditions(source: LabelSource, physics: Config | None, camera_height: float | None) -> list[str]:
     """Conditions of a cell that the labels were not made under, in words.
 
     Args:

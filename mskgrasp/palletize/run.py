@@ -22,7 +22,7 @@ from mskgrasp.palletize.report import write_report
 from mskgrasp.palletize.summary import PlacementSummary
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
-from mskgrasp.planning.for_cell import make_planner
+from mskgrasp.planning.for_cell import make_planner, tell_model
 from mskgrasp.planning.run_inputs import inputs_of
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
@@ -88,6 +88,7 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
     may_change = ["out", "trials", "corrections", "workers", "yes"]
     # The parts determine which of them fills which slot.
     may_change += ["parts", "n_parts"] if config.slots is None else []
+    tell_model(models, cell_from_yaml(config.cell))
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
         make_folder(config.out / "placements")
         placements = _place_all(config, pallets, asks)

@@ -10,7 +10,7 @@ from hal import Cell, capture_at_home, go_home, open_cell
 from hal.operator import Operator, StoppedByOperator
 from mskgrasp.plan.config import PlanConfig
 from mskgrasp.planning.config import MIN_QUALITY
-from mskgrasp.planning.for_cell import make_planner, part_name, present
+from mskgrasp.planning.for_cell import make_planner, part_name, present, tell_model
 from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.runtime.cli import make_folder
@@ -62,6 +62,7 @@ def plan_grasp(config: PlanConfig) -> GraspPlan:
     make_folder(config.out)
     with open_cell(config.cell) as cell:
         planner = make_planner(config.models, config.planner, cell)
+        tell_model(planner.models, cell)
         if part is not None:
             present(cell, part, config.seed)
         if config.go_home:

@@ -9,10 +9,12 @@ import torch
 from hal.cell import Cell
 from hal.errors import HalError
 from mskgrasp.core.shipped import config_file, example_file
-from mskgrasp.learning.grasp_models import load_models, require_hand
+from mskgrasp.learning.grasp_models import Models, load_models, require_hand
+from mskgrasp.learning.label_source import other_conditions, source_text
 from mskgrasp.parts.importing.mesh_files import Unit
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
+from mskgrasp.runtime.progress import note
 
 SIMULATED_CELL = config_file("cells/sapien.yaml")
 
@@ -35,6 +37,19 @@ def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
         min_height=workspace.min_height,
         lowest_grasp_z=workspace.lowest_grasp_z,
     )
+
+
+def tell_model(models: Models, cell: Cell) -> None:
+    """Print the conditions of the labels that a model learned, and warn of those of a cell that differ."""
+    if not models.meta.labels:
+        print("model: it does not tell under which conditions its labels were made")
+    pose = cell.camera.T_base_camera
+    height = None if pose is None else float(pose.position[2]) - cell.workspace.table_z
+    for source in models.meta.labels:
+        print(f"model: labels of {source_text(source)}")
+        other = other_conditions(source, cell.physics, height)
+        if other:
+            note(f"warning: the model's labels were made under other conditions: here {'; '.join(other)}")
 
 
 def present(cell: Cell, part: str, seed: int) -> None:

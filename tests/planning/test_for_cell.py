@@ -9,10 +9,12 @@ import trimesh
 from hal import cell_from_yaml
 from hal.errors import HalError
 from mskgrasp.core.errors import BadPart
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.settings import Physics
+from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.learning.label_source import LabelSource
 from mskgrasp.parts import find_part
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL, make_planner, part_name, present
+from mskgrasp.planning.for_cell import SIMULATED_CELL, make_planner, part_name, present, tell_model
 
 
 def test_a_planner_samples_over_the_cells_own_table():
@@ -20,6 +22,25 @@ def test_a_planner_samples_over_the_cells_own_table():
     workspace = replace(cell.workspace, table_z=0.1)
     planner = make_planner(PRETRAINED, PlannerConfig(), replace(cell, workspace=workspace))
     assert planner.table_z == 0.1 and planner.region == workspace.region
+
+
+def test_a_model_tells_its_labels_and_warns_of_a_cell_unlike_theirs(capsys):
+    models, cell = load_models(PRETRAINED), cell_from_yaml(SIMULATED_CELL)
+    tell_model(models, cell)
+    assert "does not tell" in capsys.readouterr().out
+    source = LabelSource(
+        simulation="4", fidelity="cpu", physics=Physics().model_dump(), noise={}, hand={}, camera_height=0.8,
+        seed=0,
+    )  # fmt: skip
+    told = replace(models, meta=models.meta.model_copy(update={"labels": (source,)}))
+    tell_model(told, cell)
+    out, warned = capsys.readouterr()
+    assert "model: labels of simulation version 4" in out and not warned
+    tell_model(told, replace(cell, physics=Physics(friction_pad_part=0.9)))
+    assert "here friction_pad_part 0.9, not 0.5" in capsys.readouterr().err
+    high = told.meta.model_copy(update={"labels": (source.model_copy(update={"camera_height": 1.2}),)})
+    tell_model(replace(told, meta=high), cell)
+    assert "camera 0.80 m over the table, not 1.20" in capsys.readouterr().err
 
 
 def test_a_part_cannot_be_presented_without_a_feeder():
