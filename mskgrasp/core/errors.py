@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 
 class MskgraspError(Exception):
     """Base class; the message is one line with the value, the legal values and the remedy."""
@@ -69,19 +67,9 @@ class GraspRefused(NoGraspFound):
     """The best candidate is not worth trying: its predicted quality is under the bound.
 
     Attributes:
-        quality: The best predicted quality.
+        quality: The best predicted quality; None: not told.
     """
 
-    def __init__(self, quality: float, reason: str):
-        super().__init__(f"no grasp found (best quality {quality:.2f}): {reason}")
+    def __init__(self, message: str, quality: float | None = None):
+        super().__init__(message)
         self.quality = quality
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Keep the message as it is in another process."""
-        return _refused, (self.quality, str(self))
-
-
-def _refused(quality: float, message: str) -> GraspRefused:
-    error = GraspRefused(quality, "")
-    error.args = (message,)
-    return error

@@ -285,7 +285,7 @@ class Planner:
                 region=self.region,
                 min_height=self.min_height,
             )
-            raise GraspRefused(best, reason)
+            raise GraspRefused(f"no grasp found (best quality {best:.2f}): {reason}", best)
 
     def _shortlist(self, scene: Scene, candidates: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Find the best candidates; with ``check_fingers`` the best whose fingers are free.
@@ -406,7 +406,10 @@ def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> 
     """
     good = np.flatnonzero(qualities >= config.least_quality)
     if not len(good):
+        best = float(qualities.max())
         raise GraspRefused(
-            float(qualities.max()), f"min_quality is {config.least_quality:g}; move the part, or lower it"
+            f"no grasp found (best quality {best:.2f}): min_quality is {config.least_quality:g}; move the "
+            "part, or lower it",
+            best,
         )
     return int(good[0] if config.policy == "quality" else good[np.argmin(scores[good])])

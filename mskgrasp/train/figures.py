@@ -65,8 +65,8 @@ def _coverage(axes: Axes, mean: np.ndarray, variance: np.ndarray, target: np.nda
     levels = np.linspace(0.05, 0.95, 19)
     covered = np.stack([metrics.coverage(mean, variance, target, level) for level in levels])
     axes.plot([0, 1], [0, 1], color=FAINT, lw=1, ls="--")
-    for k, name in enumerate(AXES):
-        axes.plot(levels, covered[:, k], color=_COLOURS[k], lw=1.5, label=name)
+    for k, name in enumerate(AXES[: covered.shape[1]]):
+        axes.plot(levels, covered[:, k], color=_COLOURS[k % 4], lw=1.5, ls="-" if k < 4 else ":", label=name)
     axes.set(xlabel="central interval of the prediction", ylabel="share of truth inside", aspect="equal")
     axes.set_title("Displacement: coverage of predicted intervals")
     axes.legend()

@@ -43,9 +43,8 @@ def test_shipped_settings_are_of_production_physics_and_collect_into_a_folder_of
     config = read_config(CollectConfig, SHIPPED[name])
     assert config.parts == (() if name == "demo" else ("catalogue",))  # empty: the starter set
     assert config.attempts_per_part % config.shard_size == 0  # no shard of a few attempts
-    assert (
-        config.physics == Physics() and config.noise == ExecutionNoise()
-    )  # production, no errors of the cell
+    drawn = dict(friction_pad_part=(0.3, 0.8), finger_force=(30.0, 70.0)) if name == "training" else {}
+    assert config.physics == Physics() and config.noise == ExecutionNoise(**drawn)
     others = [read_config(CollectConfig, path).out for stem, path in SHIPPED.items() if stem != name]
     assert config.out not in others
 

@@ -38,7 +38,7 @@ def test_the_program_builds_lists_and_draws(capsys, tmp_path):
     assert out.splitlines()[-1] == "4 parts"
     assert "hex_nut" in out and "longest axis: 20-40 mm 1, 40-60 mm 0, 60-80 mm 2" in out
     rows = (tmp_path / "catalogue.csv").read_text().splitlines()
-    assert len(rows) == 5 and rows[1].startswith("hex_nut_m20,hex_nut,ISO 4032,Apache-2.0,test,hex_nut_m20")
+    assert len(rows) == 5 and rows[1].startswith("hex_nut_m20,hex_nut,ISO 4032,Apache-2.0,train,hex_nut_m20")
     assert main(["list", "--family", "washer"]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "1 parts"
     assert main(["sheet", "--out", str(tmp_path / "new" / "sheet.png"), "--parts", "4"]) == 0
