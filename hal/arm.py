@@ -164,8 +164,10 @@ class Arm(Device):
         if not 0 < speed <= 1:
             raise OutOfWorkspace(f"speed {speed:g} m/s is outside 0 .. 1 m/s")
         with self._motion():
-            self._check_line(self.limits, T_base_tcp)
-            self._move_to_pose(T_base_tcp, speed)
+            legs = self._legs(T_base_tcp)
+            self._check_line(self.limits, *legs)
+            for leg in legs:
+                self._move_to_pose(leg, speed)
             self._check_arrival(T_base_tcp)
 
     def move_until_contact(self, T_base_tcp: Pose, *, force: float = 5.0, speed: float = 0.01) -> Pose | None:
@@ -395,12 +397,16 @@ class Arm(Device):
             # Where it is exactly depends on the way there: what touches nowhere is left to the motion.
             check_joints(self.links, limits, self.links.joints_at(T_base_tcp), margin=0.0)
 
-    def _check_line(self, limits: ArmLimits, T_base_tcp: Pose) -> None:
-        here = self._state()
-        check_line(limits, here.T_base_tcp, T_base_tcp)
-        if self.links is not None:
-            path = line_joints(self.links, here.joints, here.T_base_tcp, T_base_tcp)
-            check_path(self.links, limits, path, "the straight line to this pose")
+    def _check_line(self, limits: ArmLimits, *legs: Pose) -> None:
+        state = self._state()
+        here, joints = state.T_base_tcp, state.joints
+        for leg in legs:
+            check_line(limits, here, leg)
+            if self.links is not None:
+                path = line_joints(self.links, joints, here, leg)
+                check_path(self.links, limits, path, "the straight line to this pose")
+                joints = path[-1]
+            here = leg
 
     def _check_arrival(self, T_base_tcp: Pose) -> None:
         distance, angle = pose_distance(self._state().T_base_tcp, T_base_tcp)
@@ -465,6 +471,10 @@ class Arm(Device):
 
     @abstractmethod
     def _move_to_joints(self, joints: np.ndarray, speed: float) -> None: ...
+
+    def _legs(self, T_base_tcp: Pose) -> list[Pose]:
+        """Ends of the straight motions that lead to a pose, which is the last of them."""
+        return [T_base_tcp]
 
     @abstractmethod
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None: ...

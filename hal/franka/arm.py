@@ -10,6 +10,7 @@ from dataclasses import asdict
 from typing import Any, NoReturn
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from hal.arm import (
     JOINT_TOLERANCE,
@@ -29,7 +30,7 @@ from hal.franka.link import DriverLink
 from hal.franka.path import JointPath, joint_path, straight_path
 from hal.hand import ConfiguredHand, Load
 from hal.limits import ArmLimits
-from mskgrasp.core.geometry import Pose, pose_distance
+from mskgrasp.core.geometry import Pose, pose_distance, quat_conjugate, quat_multiply
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.panda_body import PANDA_LINKS
 from mskgrasp.core.panda_kinematics import forward_pose, reachable
@@ -41,6 +42,10 @@ _GRIPPER_S = 10.0
 _RECOVERY_S = 2.0
 """The robot's mode may lag behind its recovery by this, s."""
 _STILL_WIDTH = 1e-4
+_NO_SHIFT, _NO_TURN = 1e-3, 0.01
+"""Shift and turn under which a motion is only the other, metres and radians."""
+_ALIGNED = 0.02
+"""Cosine between shift and axis of the turn under which they are across each other; 1 less it: along."""
 _STILL_JOINT, _STANDING_S = 1e-4, 0.4
 """An arm whose joints move by less than this angle, rad, in this time, s, is at rest."""
 _STILL_ERROR = 0.02
@@ -155,6 +160,25 @@ class FrankaArm(Arm):
                 acceleration=np.full(7, config.joint_acceleration),
             )
         )
+
+    def _legs(self, T_base_tcp: Pose) -> list[Pose]:
+        """With franky a line aslant to the axis of its turn is two motions: turned in place, then shifted.
+
+        It gives the turn along the line and across it profiles of their own, and with both the joints
+        accelerate by more than twice what is planned.
+        """
+        here = self._state().T_base_tcp
+        shift = T_base_tcp.position - here.position
+        turn = Rotation.from_quat(
+            quat_multiply(T_base_tcp.quat_wxyz, quat_conjugate(here.quat_wxyz)), scalar_first=True
+        ).as_rotvec()
+        way, angle = np.linalg.norm(shift), np.linalg.norm(turn)
+        if not isinstance(self._config, FrankyArmConfig) or way < _NO_SHIFT or angle < _NO_TURN:
+            return [T_base_tcp]
+        along = abs(float(shift @ turn)) / (way * angle)
+        if along < _ALIGNED or along > 1 - _ALIGNED:
+            return [T_base_tcp]
+        return [Pose(position=here.position, quat_wxyz=T_base_tcp.quat_wxyz), T_base_tcp]
 
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
         self._travel_straight(T_base_tcp, speed)

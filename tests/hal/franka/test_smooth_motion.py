@@ -13,12 +13,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hal.franka import FrankyArmConfig
+from hal.franka.arm import TURN_SPEED
 from hal.franka.config import JOINT_SPEED
 from hal.franka.link import DriverLink
 from hal.franka.path import JointPath, joint_path, straight_path
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.panda_kinematics import forward, forward_pose, track
-from tests.hal.franka.robots import TIMEOUT_S, FakeRobot, fci5, franky_sim, linked, plain_path
+from tests.hal.franka.robots import TIMEOUT_S, FakeRobot, arm_at, fci5, franky_sim, linked, plain_path
 
 GREATEST_RATIO = 1.5
 """Commanded over planned acceleration; chained waypoints made it 4 to 14."""
@@ -178,3 +179,46 @@ def test_panda_py_is_commanded_along_a_straight_line_as_smooth_as_planned(
     # The commanded speeds are those of the commanded joints.
     moved = (speeds[1:] + speeds[:-1]) / 2 * np.diff(seconds)[:, None]
     assert np.diff(joints, axis=0) == pytest.approx(moved, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("shift", "turn", "motions"),
+    [
+        ((-0.05, 0.06, 0.06), 0.4, 2),  # aslant to the axis of the turn
+        ((0.05, -0.06, 0.0), -0.4, 1),  # across it
+        ((0.0, 0.0, -0.06), 0.2, 1),  # along it
+        ((0.02, 0.02, 0.02), 0.0, 1),
+    ],
+)
+def test_with_franky_a_line_aslant_to_its_turn_is_two_motions_as_smooth_as_planned(
+    robot: FakeRobot, tmp_path: Path, shift, turn: float, motions: int
+):
+    with arm_at(tmp_path, "franky", robot.host) as arm:
+        state, config = arm.state(), arm._config
+        matrix = state.T_base_tcp.as_matrix()
+        matrix[:3, 3] += shift
+        matrix[:3, :3] = matrix[:3, :3] @ Rotation.from_euler("z", turn).as_matrix()
+        legs = arm._legs(Pose.from_matrix(matrix))
+        robot.order("record")
+        arm.move_to_pose(legs[-1], speed=0.1)
+        robot.order(f"save {tmp_path / 'commands.npz'}")
+        assert np.linalg.norm(arm.state().T_base_tcp.position - legs[-1].position) < 2e-3
+    with np.load(tmp_path / "commands.npz") as file:
+        ticks, poses = file["ticks"].astype(int), file["poses"]
+    found = np.split(poses, 1 + np.flatnonzero(np.diff(ticks) > 1))
+    assert len(found) == len(legs) == motions
+    joints = state.joints
+    for leg, poses in zip(legs, found, strict=True):
+        path = straight_path(
+            joints, leg, speed=min(0.1, config.max_speed), turn_speed=TURN_SPEED,
+            acceleration=config.acceleration, turn_acceleration=config.joint_acceleration,
+            joint_speed=config.max_joint_speed * JOINT_SPEED, lower=arm.limits.joint_lower,
+            upper=arm.limits.joint_upper,
+        )  # fmt: skip
+        # The frame may be turned: at the end it is that of the leg.
+        poses[:, :3, :3] = poses[:, :3, :3] @ poses[-1, :3, :3].T @ leg.as_matrix()[:3, :3]
+        commanded = np.repeat(track(poses[::10], joints)[0], 10, axis=0)
+        assert (np.abs(acceleration(commanded, 10)) < allowed_acceleration(path)).all()
+        if motions == 1:
+            assert off_line(poses[:, :3, 3], poses[0, :3, 3], leg.position) < STRAIGHT_M
+        joints = commanded[-1]
