@@ -21,7 +21,7 @@ from hal.arm import (
     ArmState,
     GraspOutcome,
 )
-from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery, Stopped
+from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery, OutOfWorkspace, Stopped
 from hal.franka.config import JOINT_SPEED, FrankyArmConfig, PandaPyArmConfig
 from hal.franka.driver import DriverSettings, DriverState
 from hal.franka.faults import NoTrajectory
@@ -184,6 +184,12 @@ class FrankaArm(Arm):
         self._travel_straight(T_base_tcp, speed)
 
     def _move_until_contact(self, T_base_tcp: Pose, force: float, speed: float) -> Pose | None:
+        reflex = self._config.contact_force
+        if force >= reflex:
+            raise OutOfWorkspace(
+                f"contact force {force:g} N is not under arm.contact_force {reflex:g} N, at which the robot "
+                "stops by its own reflex: use less"
+            )
         met = self._travel_straight(T_base_tcp, speed, force)
         if met is None:
             return None

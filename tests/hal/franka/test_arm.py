@@ -110,6 +110,14 @@ def test_a_part_that_slips_away_after_closing_is_not_held(tmp_path: Path, driver
         assert state.gripper_width < 1e-3 and not arm.holds(state)
 
 
+def test_a_touch_that_the_reflex_would_end_is_refused_and_is_no_fault(tmp_path: Path):
+    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host, contact_force=8.0) as arm:
+        here = arm.state().T_base_tcp
+        with pytest.raises(OutOfWorkspace, match=r"10 N is not under arm.contact_force 8 N"):
+            arm.move_until_contact(here, force=10.0)
+        assert arm.move_until_contact(here, force=5.0) is None
+
+
 def test_another_end_effector_in_desk_is_reported(tmp_path: Path):
     """Our server alone: franky-sim's hand cannot be taken off."""
     with fci5() as robot:
