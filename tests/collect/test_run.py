@@ -199,7 +199,7 @@ def test_parts_that_the_first_shard_shows_outside_the_filter_get_no_further_shar
         bound = (f"--part-filter.{side}-success", f"{min(rates.values()) - 0.01:.6f}")
         passing = PARTS if side == "min" else ()
         for _ in range(2):  # the second run finds all that is needed
-            done = collect(out, "--labels", str(tmp_path / "all.labels"), *bound)
+            done = run_here(main, *arguments(out, "--labels", str(tmp_path / "all.labels"), *bound))
             assert done.returncode == 0, done.stderr
             assert f"{len(passing)} parts pass the part filter" in done.stdout
             assert [path.name for path in list_shards(out)] == [
