@@ -25,9 +25,10 @@ def slowed(values: dict[str, Any]) -> dict[str, Any]:
     """A cell's values with a tenth of the speeds of its arm; a simulated arm has none."""
     slow = copy.deepcopy(values)
     arm = slow.get("arm")
-    for name in _SPEEDS if isinstance(arm, dict) else ():
-        if isinstance(arm.get(name), (int, float)):
-            arm[name] *= SLOWNESS
+    if isinstance(arm, dict):
+        for name in _SPEEDS:
+            if isinstance(arm.get(name), (int, float)):
+                arm[name] *= SLOWNESS
     return slow
 
 
