@@ -60,7 +60,7 @@ def execute_grasp(cell: Cell, grasp: Grasp, *, tallest: float = 0.0, load: Load 
         cell: Connected, without an error in force.
         grasp: A single one, base frame.
         tallest: Height of the tallest thing over the table, which the open hand passes over, metres.
-        load: The part, which the arm is told between closing and lift; None where it is not known.
+        load: Mass and centre of the part, stated to the arm between closing and lift; None where unknown.
 
     Raises:
         NotCalibrated: The camera's pose was measured by hand; nothing moves.

@@ -36,6 +36,6 @@ def object_displacement_covariance(
 def swing_squared(mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """Expected squared swing (...), radians squared, of predictions (..., k): 0 where k = 4, without swing.
 
-    The mean counts, too: a part that hangs askew cannot be placed flat.
+    The mean counts, too: a tilted part cannot be placed flat.
     """
     return (mean[..., 4:] ** 2 + variance[..., 4:]).sum(axis=-1)

@@ -60,8 +60,8 @@ HOLD_S = 0.2
 """Time for which a lifted part is held before it is judged, seconds."""
 MAX_DISPLACEMENT = 0.05
 """Largest displacement of a held part in the hand, metres; a row with a larger one is not used as a label."""
-ASKEW = float(np.radians(2.0))
-"""A part that tilts by more in the hand hangs askew, radians."""
+TILT_LIMIT = float(np.radians(2.0))
+"""A part that tilts by more in the hand counts as tilted, radians."""
 EJECTED_DISTANCE = 0.05
 """A part that ends this far from its initial position, and not in the hand, was ejected, metres."""
 FAILURES = ("none", "missed", "slipped", "ejected", "collided", "unsettled", "unreachable")

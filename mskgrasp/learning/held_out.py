@@ -11,7 +11,7 @@ from scipy.stats import norm
 from mskgrasp.core import metrics
 from mskgrasp.core.displacement_covariance import object_displacement_covariance, swing_squared
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.grasp import ASKEW, to_object_displacement
+from mskgrasp.core.grasp import TILT_LIMIT, to_object_displacement
 from mskgrasp.learning.grasp_models import ModelCalibration, Models
 from mskgrasp.learning.model_metrics import (
     DisplacementMetrics,
@@ -217,7 +217,7 @@ def _uncertainty_metrics(
     shift, turn, expected = _centroid_errors(samples, rows, mean, variance)
     target = _targets(samples, rows, mean)
     score = expected[:, :3].sum(axis=1) + _RADIUS**2 * (expected[:, 3] + swing_squared(mean, variance))
-    tilted = samples.swing[rows].norm(dim=1).numpy() > ASKEW
+    tilted = samples.swing[rows].norm(dim=1).numpy() > TILT_LIMIT
     axes = {
         "crps": metrics.crps(mean, variance, target),
         "calibration_error": metrics.calibration_error(mean, variance, target),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from mskgrasp.core.grasp import ASKEW
+from mskgrasp.core.grasp import TILT_LIMIT
 from mskgrasp.core.settings import Physics
 from mskgrasp.learning.grasp_models import ModelMeta
 from mskgrasp.learning.label_source import LabelSource, source_text
@@ -119,7 +119,7 @@ def _displacement_rows(gdn: dict[str, Any]) -> list[tuple[str, ...]]:
         rows.append((f"the most confident {share}", *values, *(f"{one:.1%}" for one in tilted)))
     head = (
         f"displacement of {gdn['n']} successes", "translation RMSE, mm", "rotation RMSE, degrees",
-        f"tilt over {math.degrees(ASKEW):.0f} degrees",
+        f"tilt over {math.degrees(TILT_LIMIT):.0f} degrees",
     )  # fmt: skip
     n_columns = max(map(len, rows))  # earlier models do not tell the tilt
     return [head[:n_columns], *((*row, "", "")[:n_columns] for row in rows)]

@@ -96,8 +96,8 @@ class UncertaintyMetrics:
             swing where it is predicted, by axis.
         ause_translation: Area under the sparsification error, as a share of random order's.
         ause_rotation: The same.
-        least_uncertain: RMSE of translation, metres, and rotation, radians, and share of parts that hang
-            askew, over the shares of least variance score.
+        least_uncertain: RMSE of translation, metres, and rotation, radians, and share of tilted parts,
+            over the shares of least variance score.
     """
 
     axes: dict[str, dict[str, float]]

@@ -25,9 +25,9 @@ def plan_text(plan: GraspPlan) -> str:
         for name, value, deviation in zip(("dx", "dy", "dz"), mean[:3], std[:3], strict=True)
     )
     turn = f"dtheta {np.degrees(mean[3]):+.1f} +- {np.degrees(std[3]):.1f} deg"
-    askew = float(np.degrees(np.linalg.norm(plan.swing)))
+    tilt = float(np.degrees(np.linalg.norm(plan.swing)))
     spread = float(np.degrees(np.sqrt(plan.swing_var.sum())))
-    tilt = f"by {askew:.1f} +- {spread:.1f} deg"
+    tilted = f"{tilt:.1f} +- {spread:.1f} deg"
     stages = ", ".join(f"{name} {value:.2f} s" for name, value in plan.seconds.items() if name != "total")
     return "\n".join(
         [
@@ -35,7 +35,7 @@ def plan_text(plan: GraspPlan) -> str:
             f"quality       {plan.quality:.3f} (best of {len(plan.candidates)}: {plan.qualities.max():.3f})"
             + ("" if plan.quality >= MIN_QUALITY else f"; under {MIN_QUALITY:g}, not worth trying"),
             f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
-            *([] if np.isnan(plan.swing).any() else [f"hangs askew   {tilt}"]),
+            *([] if np.isnan(plan.swing).any() else [f"tilt          {tilted}"]),
             f"planned in    {plan.seconds['total']:.2f} s ({stages})",
         ]
     )

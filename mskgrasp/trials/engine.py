@@ -62,7 +62,7 @@ class PlannedGrasp:
     Attributes:
         frame: The part at rest before the grasp.
         plan: None where no grasp was found.
-        part: The part, which the arm is told as it is lifted; None: an unknown one.
+        part: The part, whose mass and centre are stated to the arm; None: an unknown one.
         reason: Reason where no grasp was found: `REFUSED`, or the error's name; else empty.
         best_quality: Best predicted quality where all grasps were refused; else None.
         refusal: Why they were, in a line; else empty.

@@ -146,7 +146,7 @@ def score(samples: Samples, config: LearningConfig, share: float) -> dict[str, f
         "AUSE": gdn["ause_translation"],
         "surest 10 %, mm": 1e3 * surest[0],
         "surest 10 %, deg": float(np.degrees(surest[1])),
-        "surest 10 %, askew %": 100 * surest[2],
+        "surest 10 %, tilted %": 100 * surest[2],
     }
 
 

@@ -107,7 +107,7 @@ def seen_box(yaw: float, height: float) -> PartView:
 
 
 @given(angle, st.floats(-0.6, 0.6), st.floats(-0.6, 0.6), st.floats(-0.5, 0.5), st.floats(0.005, 0.06))
-def test_a_part_that_hangs_askew_is_let_go_where_its_lowest_corner_nearly_touches(yaw, sx, sy, turn, height):
+def test_a_tilted_part_is_let_go_where_its_lowest_corner_nearly_touches(yaw, sx, sy, turn, height):
     view, grasp = seen_box(yaw, height), Grasp.from_vector(np.array([0.51, 0.02, 0.03, 0.3]))
     displacement = np.array([0.001, 0.0, -0.002, turn])
     drop = drop_of(grasp, view, turn, np.array([sx, sy]))

@@ -151,12 +151,19 @@ def test_physx_takes_every_hull_as_it_is_and_mass_and_inertia_too(family_parts, 
         assert sum(hull.volume for hull in cooked) == pytest.approx(volume, rel=2e-3), name
 
 
+LEFT_OUT = {
+    "beam_coupling_24x50", "beam_coupling_30x64", "beam_coupling_60x70", "cast_angle_45x40",
+    "clamp_collar_42x22x15", "pipe_clamp_20x50", "spacer_block", "two_piece_collar_60x35x18",
+    "two_piece_collar_76x48x20", "yoke_80x28", "yoke_90x40",
+}  # fmt: skip
+"""Recipes whose hulls are too far from the mesh, or whose part is another one's; the build says which."""
+
+
 def test_the_published_table_is_that_of_these_parts(family_parts):
     with open(Path(__file__).parents[3] / "docs" / "catalogue.csv", encoding="utf-8", newline="") as file:
         rows = {row["name"]: row for row in csv.DictReader(file)}
     assert len(rows) >= 1011
-    missing = set(builtin_names()) - set(rows)
-    assert set(rows) <= set(builtin_names()) and len(missing) <= 12  # left out, with the reason, when built
+    assert set(rows) | LEFT_OUT == set(builtin_names()) and not set(rows) & LEFT_OUT
     for name, part in family_parts.items():
         edges = [float(rows[name][f"edge_{number}_mm"]) for number in (1, 2, 3)]
         assert sorted(1e3 * part.extents) == pytest.approx(sorted(edges), abs=0.02), name
