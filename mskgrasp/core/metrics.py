@@ -124,6 +124,14 @@ def reliability(probability: np.ndarray, success: np.ndarray, bins: int = 10) ->
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
+def expected_calibration_error(probability: np.ndarray, success: np.ndarray, bins: int = 10) -> float:
+    """Mean |predicted probability - share of successes| over bins, by their counts (Naeini et al. 2015)."""
+    rows = reliability(probability, success, bins)
+    if not len(rows):
+        return float("nan")
+    return float(np.average(np.abs(rows[:, 0] - rows[:, 1]), weights=rows[:, 2]))
+
+
 def bootstrap_interval(
     values: Sequence[np.ndarray],
     statistic: Callable[[np.ndarray], float],

@@ -20,6 +20,8 @@ class StageConfig(Config):
     schedule: Literal["constant", "cosine"] = "cosine"
     """cosine: the rate falls to zero at the end, after a linear rise over the first 5 % of the steps."""
     epochs: int = Field(default=15, ge=1)
+    patience: int | None = Field(default=None, ge=1)
+    """Training ends after this many epochs without a lower validation loss; null: after all epochs."""
     batch_size: int = Field(default=32, ge=1)
 
 

@@ -108,7 +108,7 @@ class Models:
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
             height: (n,) of the grasps above the table, metres.
         """
-        self._check(patches, self.meta.network.quality_shape)
+        self._check(patches, (1, *self.meta.network.quality_shape))
         return self._probability(self.gqn(patches, centre_grasp.to(patches.dtype), height.to(patches.dtype)))
 
     @torch.inference_mode()
@@ -126,7 +126,7 @@ class Models:
             height: (n,) of the grasps above the table, metres.
             theta: (n,) the grasps' angles, for ``image: object``.
         """
-        self._check(patches, self.meta.network.patch_shape)
+        self._check(patches, (self.gdn.features.n_images, *self.meta.network.patch_shape))
         centre_grasp, height = (values.to(patches.dtype) for values in (centre_grasp, height))
         if not self.meta.network.symmetric_views:
             return self._calibrated(*self.gdn(patches, centre_grasp, height, theta))
@@ -150,12 +150,10 @@ class Models:
         scale = self.meta.calibration.variance_scale
         return mean, variance * mean.new_tensor(scale) if scale and variance is not None else variance
 
-    def _check(self, patches: Tensor, shape: tuple[int, int]) -> None:
-        rows, columns = shape
-        if tuple(patches.shape[1:]) != (1, rows, columns):
-            raise BadModel(
-                f"patches have shape {tuple(patches.shape)}, this model takes (n, 1, {rows}, {columns})"
-            )
+    def _check(self, patches: Tensor, shape: tuple[int, int, int]) -> None:
+        if tuple(patches.shape[1:]) != shape:
+            wanted = ", ".join(map(str, ("n", *shape)))
+            raise BadModel(f"patches have shape {tuple(patches.shape)}, this model takes ({wanted})")
 
 
 def build_models(meta: ModelMeta, device: torch.device | str = "cpu") -> Models:

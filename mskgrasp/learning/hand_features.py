@@ -33,6 +33,9 @@ def image_autocast(features: nn.Module) -> torch.autocast:
 class HandFeatures(nn.Module):
     """Feature vector of the heights around a grasp and the part's centre relative to it."""
 
+    n_images = 1
+    """Images in a patch: the heights alone."""
+
     def __init__(
         self,
         config: HandNetworkConfig,

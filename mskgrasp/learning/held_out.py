@@ -191,21 +191,42 @@ def _rmse_intervals(
     samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
 ) -> dict[str, Interval]:
     """Compute 95 % intervals over parts of the RMSE of translation and rotation."""
-    shift, turn, _ = _centroid_errors(samples, rows, mean, variance)
+    shift, turn, _ = centroid_errors(samples, rows, mean, variance)
     return {
         f"{name}_rmse": metrics.bootstrap_interval(_by_part(samples, rows, error**2), _root_mean)
         for name, error in (("translation", shift), ("rotation", turn))
     }
 
 
-def _centroid_errors(
+def centroid_errors(
     samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute the centroid's errors (n,), metres, and (n,), radians, and their predicted variances (n, 4)."""
+    """Compute the errors of predicted grasp displacements over the displacement of the parts' true centroids.
+
+    Args:
+        samples: The dataset.
+        rows: n rows of successful grasps.
+        mean: (n, k) of the grasp displacement.
+        variance: (n, k) the same; NaN where none is predicted.
+
+    Returns:
+        Distances (n,), metres, angles (n,), radians, not negative, and the predicted variances (n, 4).
+    """
     displacement = samples.displacement[rows].double().numpy()
     predicted, expected = centroid_displacement(samples, rows, mean, variance)
     shift = np.linalg.norm(predicted[:, :3] - displacement[:, :3], axis=1)
     return shift, np.abs(wrap_angle(predicted[:, 3] - displacement[:, 3])), expected
+
+
+def variance_score(mean: np.ndarray, variance: np.ndarray, expected: np.ndarray) -> np.ndarray:
+    """Compute the expected squared distance (n,) of a part's points from where they are predicted, m^2.
+
+    Args:
+        mean: (n, k) predicted grasp displacement and, with k = 6, swing.
+        variance: (n, k) the same.
+        expected: (n, 4) variances of the displacement of the centroid (`centroid_errors`).
+    """
+    return expected[:, :3].sum(axis=1) + _RADIUS**2 * (expected[:, 3] + swing_squared(mean, variance))
 
 
 def _uncertainty_metrics(
@@ -214,9 +235,9 @@ def _uncertainty_metrics(
     """Compute metrics of the predicted variances; None without variances or rows."""
     if not np.isfinite(variance).all() or not len(rows):
         return None
-    shift, turn, expected = _centroid_errors(samples, rows, mean, variance)
+    shift, turn, expected = centroid_errors(samples, rows, mean, variance)
     target = _targets(samples, rows, mean)
-    score = expected[:, :3].sum(axis=1) + _RADIUS**2 * (expected[:, 3] + swing_squared(mean, variance))
+    score = variance_score(mean, variance, expected)
     tilted = samples.swing[rows].norm(dim=1).numpy() > TILT_LIMIT
     axes = {
         "crps": metrics.crps(mean, variance, target),

@@ -29,6 +29,9 @@ def standardise(patches: Tensor) -> Tensor:
 class PatchFeatures(nn.Module):
     """Feature vector of a patch and an action (paper, figure 3)."""
 
+    n_images = 1
+    """Images in a patch: the heights alone."""
+
     def __init__(self, config: PatchNetworkConfig, normalisation: Normalisation, n_action: int = 3):
         super().__init__()
         width = config.channels

@@ -17,7 +17,13 @@ from torch import Tensor
 
 from mskgrasp.core.errors import BadDataset, NoPartFound
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import FAILURES, centre_in_grasp_frame, swing_in_hand, to_grasp_displacement
+from mskgrasp.core.grasp import (
+    FAILURES,
+    centre_in_grasp_frame,
+    pose_base_grasp,
+    swing_in_hand,
+    to_grasp_displacement,
+)
 from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard, u16_to_depth
 from mskgrasp.learning.label_source import LabelSource, distinct, source_of
 from mskgrasp.learning.network_config import NetworkConfig
@@ -46,6 +52,7 @@ class Samples:
         centre_grasp: (n, 3) float32 object centre, estimated from the image, in the grasp frame, metres:
             the networks' input for the part's position.
         origin_grasp: (n, 3) float32 the part's true centroid, the origin of obj, in the grasp frame, metres.
+        quat_grasp_obj: (n, 4) float32 wxyz, the part's true orientation in the grasp frame.
         height: (n,) float32 of the grasp above the table, metres.
         success: (n,) bool.
         displacement: (n, 4) float32 true displacement of the centroid, NaN where the grasp failed.
@@ -65,6 +72,7 @@ class Samples:
     theta: Tensor
     centre_grasp: Tensor
     origin_grasp: Tensor
+    quat_grasp_obj: Tensor
     height: Tensor
     success: Tensor
     displacement: Tensor
@@ -122,6 +130,7 @@ class Samples:
             theta=self.theta[rows],
             centre_grasp=self.centre_grasp[rows],
             origin_grasp=self.origin_grasp[rows],
+            quat_grasp_obj=self.quat_grasp_obj[rows],
             height=self.height[rows],
             success=self.success[rows],
             displacement=self.displacement[rows],
@@ -272,7 +281,9 @@ def _shard_samples(
         Pose.from_vector(poses[rows].astype(np.float64))
         for poses in (attempts.pose_tcp_obj_before, attempts.pose_tcp_obj_after)
     )
-    origin_grasp = centre_in_grasp_frame(attempts.pose_base_obj[rows, :3].astype(np.float64), grasp)
+    T_base_obj = Pose.from_vector(attempts.pose_base_obj[rows].astype(np.float64))
+    T_grasp_obj = pose_base_grasp(grasp).inverse() @ T_base_obj
+    origin_grasp = T_grasp_obj.position
     table_z = info.table_z + np.array(offsets)
     heights = height_image(torch.from_numpy(depth[rows]), info.intrinsics, info.T_base_camera, table_z)
 
@@ -295,6 +306,7 @@ def _shard_samples(
         "theta": grasp[:, 3].astype(np.float32),
         "centre_grasp": centre_in_grasp_frame(np.array(centres), grasp).astype(np.float32),
         "origin_grasp": origin_grasp.astype(np.float32),
+        "quat_grasp_obj": T_grasp_obj.quat_wxyz.astype(np.float32),
         "height": (grasp[:, 2] - info.table_z).astype(np.float32),
         "success": attempts.success[rows],
         "displacement": displacement.astype(np.float32),

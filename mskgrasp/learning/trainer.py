@@ -25,7 +25,7 @@ from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.network_config import Normalisation
-from mskgrasp.learning.networks import displacement_loss, with_noise
+from mskgrasp.learning.networks import GraspQualityNetwork, displacement_loss, with_noise
 from mskgrasp.learning.samples import SAMPLES_VERSION, Samples, part_sides
 from mskgrasp.learning.symmetry import mirror_and_turn
 from mskgrasp.parts.catalogue import SPLITS
@@ -277,6 +277,11 @@ class Stage:
         }
 
 
+def _epochs_since_best(losses: list[float]) -> int:
+    """Epochs after that of the lowest validation loss; the first of equal ones counts."""
+    return len(losses) - 1 - losses.index(min(losses)) if losses else 0
+
+
 def train(
     samples: Samples,
     config: LearningConfig,
@@ -285,6 +290,7 @@ def train(
     device: torch.device | str = "cpu",
     reporter: Reporter | None = None,
     sides: Sides | None = None,
+    quality: GraspQualityNetwork | None = None,
 ) -> tuple[Models, list[EpochMetrics]]:
     """Train both networks, from a checkpoint if there is one.
 
@@ -295,6 +301,7 @@ def train(
         device: Device of the networks.
         reporter: Receives the progress.
         sides: Split of the samples; None: according to the settings.
+        quality: A trained quality network of the same settings, which is copied; None: one is trained.
 
     Returns:
         The networks with their metrics on held-out parts, and those of each epoch.
@@ -326,6 +333,9 @@ def train(
     for name, network in networks.items():
         if saved is not None and saved.stage == "gdn" and name == "gqn":
             continue
+        if quality is not None and name == "gqn":
+            network.load_state_dict(quality.state_dict())
+            continue
         stage = Stage(name, models, samples, sides, config)
         best: dict[str, Tensor] = {}
         done = 0
@@ -336,8 +346,10 @@ def train(
             models.gdn.start_from(models.gqn)
         reporter.stage(name, epochs=stage.settings.epochs, batches=stage.batches, done=done * stage.batches)
         for number in range(done, stage.settings.epochs):
-            found = stage.epoch(number, reporter)
             earlier = [one.validation_loss for one in history if one.stage == name]
+            if stage.settings.patience is not None and _epochs_since_best(earlier) >= stage.settings.patience:
+                break
+            found = stage.epoch(number, reporter)
             history.append(found)
             if not config.keep_best or found.validation_loss <= min(earlier, default=math.inf):
                 best = {key: value.detach().clone() for key, value in network.state_dict().items()}
