@@ -2,35 +2,36 @@
 
 Every line trains both networks anew on the same attempts, with one choice of configs/train/default.yaml
 undone, and scores them on the validation parts, which training never saw; test parts are not looked at.
+Every training is stored in --out as soon as it is finished; started again, the command goes on.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import tempfile
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-from rich.console import Console
-from rich.table import Table
 
 from mskgrasp.core.config import read_config
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.network_config import PatchNetworkConfig
-from mskgrasp.learning.samples import Samples, read_samples
-from mskgrasp.learning.trainer import Sides, split, train
-from mskgrasp.runtime.progress import progress
-
-REPOSITORY = Path(__file__).parents[2]
+from mskgrasp.learning.samples import Samples
+from mskgrasp.learning.trainer import Sides, split
+from mskgrasp.runtime import cli
+from tests.benchmarks.choice import Choice, Looks
+from tests.benchmarks.models import CONFIGS, OURS
+from tests.benchmarks.report import show
+from tests.benchmarks.score_details import detail_table, details_of
+from tests.benchmarks.scores import change_table, changes, coverage_table, errors_of, score_table, scores_of
+from tests.benchmarks.trainings import make_trainings
 
 
 def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
     """Our configuration, and the same with one choice undone."""
-    paper = read_config(LearningConfig, REPOSITORY / "configs" / "train" / "paper.yaml").network
+    paper = read_config(LearningConfig, CONFIGS / "paper.yaml").network
 
     def with_(**changes: Any) -> LearningConfig:
         network = changes.pop("network", {})
@@ -39,7 +40,7 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
     assert isinstance(paper, PatchNetworkConfig)
     paper = paper.model_copy(update={"symmetric_views": ours.network.symmetric_views})
     return {
-        "ours": ours,
+        OURS: ours,
         "the paper's network, trained as ours": ours.model_copy(update={"network": paper}),
         "quality sees all pixels": with_(network={"quality_stride": 1, "layers": (8, 32, 32)}),
         "displacement sees as far across as along": with_(
@@ -70,10 +71,60 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
     }
 
 
-def main() -> None:
-    """Prints a row a choice and, last, one JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+def main() -> int:
+    """Trains what is missing, prints the tables and writes report.json and report.md."""
+    options = _options()
+    torch.set_num_threads(options.threads)
+    ours = read_config(LearningConfig, CONFIGS / "default.yaml")
+    epochs = {"gqn": options.gqn_epochs, "gdn": options.gdn_epochs}
+    ours = ours.model_copy(
+        update={name: getattr(ours, name).model_copy(update={"epochs": n}) for name, n in epochs.items()}
+    )
+    share = partial(_some, share=options.share)
+    choices = [
+        Choice(name=name, config=config, sides=share)
+        for name, config in variants(ours).items()
+        if name == OURS or not options.only or name.startswith(tuple(options.only))
+    ]
+    looks = Looks(options.data, ours.success_range)
+    samples = looks.of(ours.network)
+    sides = split(samples, ours)
+    none = sides.training[:0]
+    sides = replace(sides, test=none, new_sizes=none)
+    rows, name = sides.validation, "validation"
+    trained = make_trainings(
+        choices, seeds=options.seeds, looks=looks, sides=sides, groups={name: rows}, out=options.out
+    )
+    each = {choice: [one[name] for one in found] for choice, found in trained.items()}
+    rate = float(samples.success[sides.training].double().mean())
+    scores = {choice: scores_of(samples, rows, found, rate) for choice, found in each.items()}
+    errors = {choice: errors_of(samples, rows, found) for choice, found in each.items()}
+    relative = {choice: changes(one, errors[OURS]) for choice, one in errors.items() if choice != OURS}
+    details = {choice: details_of(samples, rows, found) for choice, found in each.items()}
+    title = f"Validation parts: {len(rows)} grasps of {scores[OURS].parts} parts, {options.seeds} seeds"
+    tables = [
+        score_table(scores, bold=OURS, caption=title),
+        detail_table(details),
+        coverage_table(scores),
+        change_table(relative, f"Change of the error relative to {OURS}"),
+    ]
+    values = {choice: one.to_json() | details[choice] for choice, one in scores.items()}
+    show(tables, options.out, {"scores": values, "seeds": options.seeds})
+    return 0
+
+
+def _some(samples: Samples, sides: Sides, *, share: float) -> Sides:  # noqa: ARG001
+    drawn = torch.randperm(len(sides.training), generator=torch.Generator().manual_seed(0))
+    return replace(sides, training=sides.training[drawn[: round(share * len(drawn))].sort().values])
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks.ablation",
+        description="Train our networks with one choice of configs/train/default.yaml undone at a time.",
+    )
     parser.add_argument("--data", type=Path, required=True, help="dataset folder")
+    parser.add_argument("--out", type=Path, required=True, help="folder of trainings, report.json, report.md")
     parser.add_argument("--gqn-epochs", type=int, default=8)
     parser.add_argument("--gdn-epochs", type=int, default=16)
     parser.add_argument(
@@ -81,74 +132,9 @@ def main() -> None:
     )
     parser.add_argument("--seeds", type=int, default=1, help="trainings of each choice")
     parser.add_argument("--only", nargs="*", help="how the names of the wanted choices begin")
-    options = parser.parse_args()
-    torch.set_num_threads(min(2, os.cpu_count() or 1))
-    ours = read_config(LearningConfig, REPOSITORY / "configs" / "train" / "default.yaml")
-    ours = ours.model_copy(
-        update={
-            "gqn": ours.gqn.model_copy(update={"epochs": options.gqn_epochs}),
-            "gdn": ours.gdn.model_copy(update={"epochs": options.gdn_epochs}),
-        }
-    )
-    chosen = {
-        name: config
-        for name, config in variants(ours).items()
-        if not options.only or name.startswith(tuple(options.only))
-    }
-    known: dict[tuple[int, int, float], Samples] = {}
-    found, spread = {}, {}
-    for name, config in progress(chosen.items(), unit="choice"):
-        look = (*config.network.patch_shape, config.network.patch_side)
-        if look not in known:
-            known[look] = read_samples(options.data, config.network).of_parts_between(*config.success_range)
-        each = [
-            score(known[look], config.model_copy(update={"seed": seed}), options.share)
-            for seed in range(options.seeds)
-        ]
-        found[name] = {key: float(np.mean([one[key] for one in each])) for key in each[0]}
-        spread[name] = {key: float(np.std([one[key] for one in each])) for key in each[0]}
-        Console(width=150, stderr=True).print(name, found[name])
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("choice")
-    for column in next(iter(found.values())):
-        table.add_column(column, justify="right")
-    for name, values in found.items():
-        table.add_row(name, *(_cell(value, spread[name][key]) for key, value in values.items()))
-    Console(width=190).print(table)
-    print(json.dumps({"mean": found, "deviation over seeds": spread}))
-
-
-def _cell(value: float, spread: float) -> str:
-    if not np.isfinite(value):
-        return "-"
-    return f"{value:.3g} +- {spread:.2g}" if spread > 0 else f"{value:.3g}"
-
-
-def score(samples: Samples, config: LearningConfig, share: float) -> dict[str, float]:
-    """Metrics on the validation parts of networks freshly trained on a share of the others."""
-    sides = split(samples, config)
-    drawn = torch.randperm(len(sides.training), generator=torch.Generator().manual_seed(0))
-    training = sides.training[drawn[: round(share * len(drawn))].sort().values]
-    none = training[:0]
-    sides = Sides(training=training, validation=sides.validation, test=none, new_sizes=none)
-    with tempfile.TemporaryDirectory() as folder:
-        models, _ = train(samples, config, checkpoint_path=Path(folder) / "checkpoint", sides=sides)
-    gqn, gdn = models.meta.metrics["gqn"], models.meta.metrics["gdn"]
-    surest = gdn["least_uncertain"]["10%"]
-    return {
-        "accuracy %": 100 * gqn["balanced_accuracy"],
-        "AUROC": gqn["auroc"],
-        "Brier": gqn["brier"],
-        "mm": 1e3 * gdn["translation_rmse"],
-        "deg": float(np.degrees(gdn["rotation_rmse"])),
-        "NLL": gdn["nll"],
-        "90 % holds": 100 * float(np.mean(list(gdn["coverage_90"].values()))),
-        "AUSE": gdn["ause_translation"],
-        "surest 10 %, mm": 1e3 * surest[0],
-        "surest 10 %, deg": float(np.degrees(surest[1])),
-        "surest 10 %, tilted %": 100 * surest[2],
-    }
+    parser.add_argument("--threads", type=int, default=1, help="of this process (default 1)")
+    return parser.parse_args()
 
 
 if __name__ == "__main__":
-    main()
+    cli.run("ablation", main)

@@ -27,7 +27,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -48,19 +47,19 @@ from mskgrasp.parts.catalogue import SPLITS
 from mskgrasp.parts.commands.rate import Rate
 from mskgrasp.parts.versions import PART_VERSION
 from mskgrasp.reports.section import Section
-from mskgrasp.runtime.console_table import Table, cell_text
+from mskgrasp.runtime.console_table import Table
 from mskgrasp.simulation.versions import SIMULATION_VERSION
 from mskgrasp.validate.engines import engine_sections
 from mskgrasp.validate.tables import label_error_section, validation_sections
+from tests.benchmarks.report import markdown_rows
 from tests.docs.pages import ROOT
 from tests.docs.readme_table import README, ROWS, rendered_readme
 from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored
+from tests.docs.uses_of_test_parts import commit, log_use
 from tests.sim_in_the_loop.regression import Row, stored_figures
 
 FACTS = ("command", "split", "n", "intervals", "model", "simulation", "recorded", "machine")
 """Rows of the table above the figures of a run."""
-TEST_PARTS = RESULTS / "test_parts.csv"
-"""Log of every use of the test parts."""
 _BLOCK = re.compile(r"(<!-- run: ([a-z0-9_]+) -->\n).*?(<!-- end -->)", re.S)
 
 
@@ -81,7 +80,7 @@ def block(name: str) -> str:
         for paragraph in section.text:
             lines += [paragraph, ""]
         for table in section.tables:
-            lines += [*_markdown(table), ""]
+            lines += [*([table.caption, ""] if table.caption else []), *markdown_rows(table), ""]
     for note in facts.get("notes", []):
         lines += [note, ""]
     return "\n".join(lines) + "\n"
@@ -126,15 +125,6 @@ def _rating(path: Path) -> Table:
     return Table(header=("rated parts", "parts", "attempts"), rows=rows)
 
 
-def _markdown(table: Table) -> Iterator[str]:
-    if table.caption:
-        yield from (table.caption, "")
-    yield "| " + " | ".join(table.header) + " |"
-    yield "|" + "".join("--:|" if kind == "number" else "---|" for kind in table.kinds())
-    for row in table.rows:
-        yield "| " + " | ".join(cell_text(cell).replace("|", "\\|") or " " for cell in row) + " |"
-
-
 def record(name: str) -> None:
     """Runs a command and stores its report with commit, date and machine.
 
@@ -144,7 +134,7 @@ def record(name: str) -> None:
         CalledProcessError: The command failed.
     """
     facts = read_yaml(RUNS)[name]
-    recorded = f"commit {_commit()}, {datetime.date.today().isoformat()}"
+    recorded = f"commit {commit()}, {datetime.date.today().isoformat()}"
     out = ROOT / "out" / "results" / name
     shutil.rmtree(out, ignore_errors=True)  # results of an earlier state of the code must not count
     command = [sys.executable, *shlex.split(facts["command"])[1:], "--out", str(out)]
@@ -176,16 +166,15 @@ def record(name: str) -> None:
 
 
 def log_test_parts(name: str) -> None:
-    """Adds a line to the log of the uses of test parts, if the stored run used them."""
+    """Adds a line to the log of the uses of test parts, if the stored run used them and has added none."""
     stored = read_stored(name)
-    if not stored.facts["split"].startswith("test"):
+    logged = isinstance(stored.report, dict) and "test_parts_logged" in stored.report
+    if logged or not stored.facts["split"].startswith("test"):
         return
     rows = dict(ROWS)[name if name in dict(ROWS) else name.partition("_")[0]](stored)
-    commit, _, date = stored.facts["recorded"].removeprefix("commit ").partition(", ")
+    recorded_by, _, date = stored.facts["recorded"].removeprefix("commit ").partition(", ")
     figures = "; ".join(row.text for row in rows)
-    with open(TEST_PARTS, "a", encoding="utf-8", newline="") as file:
-        line = (date, commit, stored.facts["command"].strip("`"), stored.facts["split"], figures)
-        csv.writer(file, lineterminator="\n").writerow(line)
+    log_use(date, recorded_by, stored.facts["command"].strip("`"), stored.facts["split"], figures)
 
 
 def _size(report: dict[str, Any]) -> str:
@@ -214,20 +203,6 @@ def _size(report: dict[str, Any]) -> str:
         return f"{len(report['rows'])} grasps of {len({row['part'] for row in report['rows']})} parts"
     tried = sum(row["tried"] for row in report["corrections"].values())
     return f"{tried} placements of {len(report['parts'])} parts; the same grasps for all corrections"
-
-
-def _commit() -> str:
-    def git(*words: str) -> str:
-        return subprocess.run(["git", *words], cwd=ROOT, check=True, capture_output=True, text=True).stdout
-
-    # What an earlier run of the same recording wrote is no change of the program.
-    written = ("regression.json", LABEL_ERROR.name)
-    changed = [
-        line
-        for line in git("status", "--porcelain").splitlines()
-        if " docs/" not in line and not line.endswith(written)
-    ]
-    return git("rev-parse", "--short", "HEAD").strip() + (" with local changes" if changed else "")
 
 
 def _machine() -> str:

@@ -1,0 +1,296 @@
+"""The paper's models beside ours, trained on the same attempts: python -m tests.benchmarks.models --help.
+
+Trains every network with every seed, from nothing, and scores all on held-out grasps of known parts and on
+novel parts. Every training is stored in --out as soon as it is finished; started again, the command goes on,
+and started twice it trains two networks at a time. All stop after the same number of epochs without a lower
+validation loss, and keep the epoch of the lowest. The four networks of the paper share one quality network.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from mskgrasp.core.config import read_config
+from mskgrasp.core.errors import UsageError
+from mskgrasp.learning.config import LearningConfig, StageConfig
+from mskgrasp.learning.network_config import PatchNetworkConfig
+from mskgrasp.learning.samples import Samples
+from mskgrasp.learning.trainer import Sides, split
+from mskgrasp.runtime import cli
+from mskgrasp.runtime.console_table import Table
+from tests.benchmarks.choice import Choice, Looks, Predictions
+from tests.benchmarks.known_parts import evenly, held_out_rows, lowess_predictions
+from tests.benchmarks.report import show
+from tests.benchmarks.scores import (
+    change_table,
+    changes,
+    coverage_table,
+    errors_of,
+    score_table,
+    scores_of,
+)
+from tests.benchmarks.training_cost import cost_table
+from tests.benchmarks.trainings import make_trainings
+from tests.docs.uses_of_test_parts import commit, log_use
+
+CONFIGS = Path(__file__).parents[2] / "configs" / "train"
+PAPER = "GCIP-M+V"
+"""The paper's model: patches around the grasp, mean and variance."""
+OURS = "ours"
+LOWESS = "LOWESS"
+NOTHING = "predicting zero"
+POOLED_NOVEL = 35
+"""Novel parts of the pooled group; the paper pools 50 known and 35 novel objects."""
+_QUICK_ATTEMPTS = 1000
+
+
+def paper_choices(patience: int) -> list[Choice]:
+    """The paper's four networks by its own recipe, its best one by our recipe, and ours.
+
+    Args:
+        patience: Epochs without a lower validation loss after which any of them stops.
+    """
+    paper, ours = (read_config(LearningConfig, CONFIGS / f"{name}.yaml") for name in ("paper", "pretrained"))
+    same = {"sides": "catalogue", "success_range": paper.success_range, "keep_best": True}
+    paper, ours = (with_stages(config.model_copy(update=same), patience=patience) for config in (paper, ours))
+    assert isinstance(paper.network, PatchNetworkConfig)
+    found = []
+    for name, image, variance in (
+        (PAPER, "grasp", True), ("GCIP-M", "grasp", False),
+        ("OCFI-M+V", "object", True), ("OCFI-M", "object", False),
+    ):  # fmt: skip
+        network = paper.network.model_copy(update={"image": image, "variance": variance})
+        config = paper.model_copy(update={"network": network})
+        found.append(Choice(name=name, config=config, quality_of="" if name == PAPER else PAPER))
+    views = paper.network.model_copy(update={"symmetric_views": ours.network.symmetric_views})
+    trained_as_ours = ours.model_copy(update={"network": views})
+    return [
+        *found,
+        Choice(name=f"{PAPER}, our recipe", config=trained_as_ours),
+        Choice(name=OURS, config=ours),
+    ]
+
+
+def with_stages(config: LearningConfig, **changes: object) -> LearningConfig:
+    """A configuration with changed optimisation of both networks."""
+    stages: dict[str, StageConfig] = {name: getattr(config, name) for name in ("gqn", "gdn")}
+    return config.model_copy(
+        update={name: stage.model_copy(update=changes) for name, stage in stages.items()}
+    )
+
+
+def quick(choice: Choice) -> Choice:
+    """A choice with two epochs on few attempts, to try the command: its figures mean nothing."""
+    return replace(choice, config=with_stages(choice.config, epochs=2), sides=_few)
+
+
+def _few(samples: Samples, sides: Sides) -> Sides:  # noqa: ARG001
+    training, validation = (
+        rows[:: max(1, len(rows) // _QUICK_ATTEMPTS)] for rows in (sides.training, sides.validation)
+    )
+    return replace(sides, training=training, validation=validation)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Groups:
+    """Attempts to train on, and those to measure.
+
+    Attributes:
+        sides: To train on and to select epochs.
+        known: Held-out attempts at training parts.
+        novel: Attempts at parts of families that are not trained on.
+        pooled: The known ones and as many of each of some novel parts.
+    """
+
+    sides: Sides
+    known: Tensor
+    novel: Tensor
+    pooled: Tensor
+
+    @classmethod
+    def of(cls, samples: Samples, config: LearningConfig, *, novel: str, n_known: int) -> Groups:
+        """Split the samples; ``novel`` is validation or test."""
+        sides = split(samples, config)
+        known = held_out_rows(samples, sides.training, n_known)
+        training = sides.training[~torch.isin(sides.training, known)]
+        rows = {"validation": sides.validation, "test": sides.test}[novel]
+        if not len(known) or not bool(samples.success[rows].any()):
+            raise UsageError(
+                f"no success at {'novel' if len(known) else 'known'} parts to measure; collect more attempts"
+            )
+        some = evenly(torch.unique(samples.part[rows]).tolist(), POOLED_NOVEL)
+        most = int(torch.bincount(samples.part[known]).max())
+        pooled = torch.cat([known, *(rows[samples.part[rows] == number][:most] for number in some)])
+        none = training[:0]
+        used = Sides(training=training, validation=sides.validation, test=none, new_sizes=none)
+        return cls(sides=used, known=known, novel=rows, pooled=pooled)
+
+
+def main() -> int:
+    """Trains what is missing, prints the tables and writes report.json and report.md."""
+    options = _options()
+    if options.split == "test" and options.quick:
+        raise UsageError("--quick trains too little for the test parts; leave out --split test")
+    torch.set_num_threads(options.threads)
+    choices = paper_choices(options.patience)
+    unknown = set(options.only or ()) - {one.name for one in choices}
+    if unknown:
+        raise UsageError(
+            f"--only {', '.join(sorted(unknown))}; legal: {', '.join(one.name for one in choices)}"
+        )
+    if options.only:
+        wanted = {PAPER, *options.only}  # its quality network is the others', its errors the reference
+        choices = [one for one in choices if one.name in wanted]
+    seeds = 1 if options.quick else options.seeds
+    choices = [quick(one) for one in choices] if options.quick else choices
+    looks = Looks(options.data, choices[0].config.success_range)
+    # The reading that holds patches around parts serves the patches around grasps, too.
+    samples = looks.of(next((c for c in choices if c.config.network.sees_object), choices[0]).config.network)
+    groups = Groups.of(samples, choices[0].config, novel=options.split, n_known=options.known_parts)
+    options.out.mkdir(parents=True, exist_ok=True)
+    names = [samples.parts[number] for number in torch.unique(samples.part[groups.known]).tolist()]
+    (options.out / "known_parts.txt").write_text("\n".join(names) + "\n", encoding="utf-8")
+    if options.estimate:
+        show([cost_table(choices, looks, groups.sides, seconds=options.measure)], None)
+        return 0
+    tables, scores = compare(
+        choices,
+        looks=looks,
+        groups=groups,
+        novel=options.split,
+        seeds=seeds,
+        out=options.out,
+        lowess_data=options.lowess_data,
+        measure_s=0.1 if options.quick else 2.0,
+    )
+    values = {"scores": scores, "seeds": seeds, "quick": options.quick}
+    if options.split == "test":
+        n_parts = len(torch.unique(samples.part[groups.novel]))
+        log_use(
+            datetime.date.today().isoformat(),
+            commit(),
+            " ".join(["python -m tests.benchmarks.models", *sys.argv[1:]]),
+            f"test: {n_parts} held-out parts of the catalogue",
+            "; ".join(_figures(name, one) for name, one in scores["novel"].items()),
+        )
+        values["test_parts_logged"] = True
+    show(tables, options.out, values)
+    return 0
+
+
+def _figures(name: str, scores: dict[str, Any]) -> str:
+    translation, rotation = (scores[error]["mean"] for error in ("translation", "rotation"))
+    return f"{name} {1e3 * translation:.1f} mm, {np.degrees(rotation):.1f} degrees"
+
+
+def compare(
+    choices: Sequence[Choice],
+    *,
+    looks: Looks,
+    groups: Groups,
+    novel: str,
+    seeds: int,
+    out: Path,
+    lowess_data: Path | None,
+    measure_s: float = 2.0,
+) -> tuple[list[Table], dict[str, dict[str, dict[str, Any]]]]:
+    """Train what is missing, and score everything.
+
+    Args:
+        choices: Networks; the others' errors are compared with those of the first.
+        looks: The samples.
+        groups: Their split.
+        novel: Name of the novel parts' side.
+        seeds: Trainings of each network.
+        out: Folder of the trainings.
+        lowess_data: Dataset that LOWESS is fitted to; None: that of the networks.
+        measure_s: Seconds for which a network's steps are measured to predict the time left.
+
+    Returns:
+        Tables, and `Scores` by group and model as plain values.
+    """
+    measured = {"known": groups.known, novel: groups.novel}
+    trained = make_trainings(
+        choices,
+        seeds=seeds,
+        looks=looks,
+        sides=groups.sides,
+        groups=measured,
+        out=out,
+        measure_s=measure_s,
+    )
+    samples = looks.of(choices[0].config.network)
+    kept, success = torch.isin(groups.novel, groups.pooled), samples.success[groups.novel].numpy()
+    rows = {
+        "known": groups.known,
+        "novel": groups.novel,
+        "pooled": torch.cat([groups.known, groups.novel[kept]]),
+    }
+    each: dict[str, dict[str, list[Predictions]]] = {name: {} for name in rows}
+    each["known"][LOWESS] = [lowess_predictions(samples, groups.known, groups.sides.training, lowess_data)]
+    for name, found in trained.items():
+        each["known"][name] = [one["known"] for one in found]
+        each["novel"][name] = [one[novel] for one in found]
+        each["pooled"][name] = [one["known"] + one[novel].only(kept.numpy(), success) for one in found]
+    base_rate = float(samples.success[groups.sides.training].double().mean())
+    tables, scores = [], {}
+    for group, title in (
+        ("known", "Known parts, held-out grasps"), ("novel", f"Novel parts ({novel})"),
+        ("pooled", "Known and novel parts pooled, as in the paper"),
+    ):  # fmt: skip
+        nothing = np.zeros((int(samples.success[rows[group]].sum()), 4))
+        each[group][NOTHING] = [Predictions(quality=np.zeros(0), mean=nothing, variance=nothing * np.nan)]
+        of_group = {
+            name: scores_of(samples, rows[group], one, base_rate) for name, one in each[group].items()
+        }
+        scores[group] = {name: one.to_json() for name, one in of_group.items()}
+        n_parts = of_group[NOTHING].parts
+        caption = f"{title}: {len(rows[group])} grasps of {n_parts} parts"
+        tables += [score_table(of_group, bold=OURS, caption=caption), coverage_table(of_group)]
+    reference = errors_of(samples, groups.novel, each["novel"][choices[0].name])
+    relative = {
+        choice.name: changes(errors_of(samples, groups.novel, each["novel"][choice.name]), reference)
+        for choice in choices[1:]
+    }
+    caption = f"Change of the error on novel parts relative to {choices[0].name}"
+    return [*tables, change_table(relative, caption)], scores
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks.models",
+        description="Train the paper's models and ours on the same attempts, and compare them.",
+    )
+    parser.add_argument("--data", type=Path, required=True, help="dataset folder")
+    parser.add_argument("--out", type=Path, required=True, help="folder of trainings, report.json, report.md")
+    parser.add_argument("--seeds", type=int, default=3, help="trainings of each network (default 3)")
+    parser.add_argument(
+        "--split", choices=("validation", "test"), default="validation",
+        help="novel parts; test for final tables only, which is logged (default validation)",
+    )  # fmt: skip
+    parser.add_argument("--only", nargs="+", metavar="NAME", help=f"networks, besides {PAPER}")
+    parser.add_argument("--patience", type=int, default=10, help="epochs without improvement (default 10)")
+    parser.add_argument("--known-parts", type=int, default=50, help="known parts to measure (default 50)")
+    parser.add_argument(
+        "--lowess-data", type=Path,
+        help="dataset of 1000 attempts at each of the parts in known_parts.txt; default: those of --data",
+    )  # fmt: skip
+    parser.add_argument("--threads", type=int, default=1, help="of this process (default 1)")
+    parser.add_argument("--quick", action="store_true", help="one seed, two epochs: tries the command")
+    parser.add_argument("--estimate", action="store_true", help="print how long each network takes, and end")
+    parser.add_argument("--measure", type=float, default=10.0, help="seconds a network for --estimate")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    cli.run("models", main)

@@ -1,0 +1,197 @@
+"""Trainings of several choices and seeds on the same attempts, each stored as soon as it is finished.
+
+A folder of a training holds its networks and its predictions for each group of attempts that was asked for.
+It is not made again. Two processes started on the same folder share the trainings between them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from mskgrasp.core.errors import UsageError
+from mskgrasp.core.files import exclusive_lock, write_whole
+from mskgrasp.learning import held_out
+from mskgrasp.learning.config import LearningConfig
+from mskgrasp.learning.grasp_models import DESCRIPTION, ModelMeta, Models, load_models, save_model
+from mskgrasp.learning.samples import SAMPLES_VERSION, Samples
+from mskgrasp.learning.trainer import Reporter, Sides, Stage, describe_networks, train
+from mskgrasp.runtime.progress import progress
+from tests.benchmarks.choice import Choice, Looks, Predictions
+from tests.benchmarks.training_cost import TimeLeft, cost_of
+
+_CHECKPOINT = "checkpoint.safetensors"
+_MADE_OF = "made_of.json"
+
+
+def make_trainings(
+    choices: Sequence[Choice],
+    *,
+    seeds: int,
+    looks: Looks,
+    sides: Sides,
+    groups: dict[str, Tensor],
+    out: Path,
+    measure_s: float = 2.0,
+) -> dict[str, list[dict[str, Predictions]]]:
+    """Train every choice with every seed, unless it is stored, and predict for each group of attempts.
+
+    Args:
+        choices: What to train; a choice comes after that of ``quality_of``.
+        seeds: Trainings of each, with seeds from 0.
+        looks: The samples.
+        sides: Attempts to train on, and those that select the epoch.
+        groups: Rows of the samples by the name of the group.
+        out: Folder of all trainings.
+        measure_s: Seconds for which a network's steps are measured to predict the time left.
+
+    Returns:
+        Predictions by the choice's name, seed and group.
+
+    Raises:
+        UsageError: A folder holds a training of other settings or data, or another process is still at one.
+    """
+    jobs = [(choice, seed) for seed in range(seeds) for choice in choices]
+    missing = [job for job in jobs if not all(_path(out, *job, name).exists() for name in groups)]
+    costs = {}
+    for choice, _ in missing:
+        if choice.name not in costs:
+            samples = choice.samples(looks.of(choice.config.network))
+            costs[choice.name] = cost_of(choice, samples, choice.sides(samples, sides), measure_s)
+    total = sum(costs[choice.name].total_s for choice, _ in missing)
+    busy = []
+    with progress(unit="s", total=math.ceil(total), keep=bool(missing), hidden=not missing) as bar:
+        for choice, seed in missing:
+            bar.set_description(f"{choice.name}, seed {seed}")
+            folder = choice.folder(out, seed)
+            folder.mkdir(parents=True, exist_ok=True)
+            reporter = TimeLeft(bar, costs[choice.name])
+            with exclusive_lock(folder) as alone:
+                if not alone or not _make(choice, seed, looks, sides, groups, out, reporter):
+                    busy.append(f"{choice.name} with seed {seed}")
+            reporter.close()
+    if busy:
+        raise UsageError(f"another process trains {', '.join(busy)}; when it is done, run this again")
+    return {
+        choice.name: [
+            {name: Predictions.read(_path(out, choice, seed, name)) for name in groups}
+            for seed in range(seeds)
+        ]
+        for choice in choices
+    }
+
+
+def _path(out: Path, choice: Choice, seed: int, group: str) -> Path:
+    return choice.folder(out, seed) / f"{group}.npz"
+
+
+def _make(
+    choice: Choice,
+    seed: int,
+    looks: Looks,
+    sides: Sides,
+    groups: dict[str, Tensor],
+    out: Path,
+    reporter: Reporter,
+) -> bool:
+    """Make one training; False if the quality network that it needs is still being trained."""
+    folder = choice.folder(out, seed)
+    if all((folder / f"{name}.npz").exists() for name in groups):
+        return True  # made by another process in the meantime
+    if choice.quality_of and not (_quality_folder(choice, out, seed) / DESCRIPTION).exists():
+        return False
+    config = choice.config.model_copy(update={"seed": seed})
+    samples = choice.samples(looks.of(config.network))
+    sides = choice.sides(samples, sides)
+    _check_origin(folder, _origin(config, samples, sides))
+    models = _trained(choice, config, samples, sides, out, reporter)
+    for name, rows in groups.items():
+        if not (path := folder / f"{name}.npz").exists():
+            predicted(models, samples, rows, quality=choice.has_quality).write(path)
+    return True
+
+
+def _quality_folder(choice: Choice, out: Path, seed: int) -> Path:
+    return replace(choice, name=choice.quality_of).folder(out, seed)
+
+
+def predicted(models: Models, samples: Samples, rows: Tensor, *, quality: bool) -> Predictions:
+    """Predict for some rows: the quality of all, if wanted, and the displacement of the successful ones."""
+    mean, variance = held_out.predict_grasp_displacement(models, samples, rows[samples.success[rows]])
+    probability = held_out.predict_quality(models, samples, rows) if quality else np.zeros(0)
+    return Predictions(quality=probability, mean=mean, variance=variance)
+
+
+def _trained(
+    choice: Choice, config: LearningConfig, samples: Samples, sides: Sides, out: Path, reporter: Reporter
+) -> Models:
+    """Stored networks, or those that are trained now, from a checkpoint if there is one."""
+    folder = choice.folder(out, config.seed)
+    if choice.build is not None:
+        return _displacement_trained(choice.build, config, samples, sides, reporter)
+    if (folder / DESCRIPTION).exists():
+        return load_models(folder)
+    quality = None
+    if choice.quality_of:
+        quality = load_models(_quality_folder(choice, out, config.seed)).gqn
+    models, _ = train(
+        samples, config, checkpoint_path=folder / _CHECKPOINT, reporter=reporter, sides=sides, quality=quality
+    )
+    save_model(folder, models)
+    (folder / _CHECKPOINT).unlink(missing_ok=True)
+    return models
+
+
+def _displacement_trained(
+    build: Callable[[ModelMeta], Models],
+    config: LearningConfig,
+    samples: Samples,
+    sides: Sides,
+    reporter: Reporter,
+) -> Models:
+    """A displacement network at the epoch of its lowest validation loss."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(config.seed)
+        models = build(describe_networks(samples, sides.training, config))
+    stage = Stage("gdn", models, samples, sides, config)
+    reporter.stage("gdn", epochs=config.gdn.epochs, batches=stage.batches, done=0)
+    least, best = math.inf, {}
+    for number in range(config.gdn.epochs):
+        found = stage.epoch(number, reporter)
+        reporter.epoch([found])
+        if found.validation_loss <= least:
+            least = found.validation_loss
+            best = {key: value.detach().clone() for key, value in models.gdn.state_dict().items()}
+    models.gdn.load_state_dict(best)
+    return models
+
+
+def _origin(config: LearningConfig, samples: Samples, sides: Sides) -> dict[str, Any]:
+    rows = np.concatenate([sides.training.numpy(), sides.validation.numpy()])
+    return {
+        "settings": config.model_dump(mode="json"),
+        "data": samples.fingerprint,
+        "samples_version": SAMPLES_VERSION,
+        "rows": hashlib.sha256(np.ascontiguousarray(rows).tobytes()).hexdigest(),
+    }
+
+
+def _check_origin(folder: Path, origin: dict[str, Any]) -> None:
+    """Refuse a folder with a training of other settings or data."""
+    path = folder / _MADE_OF
+    if path.exists():
+        before = json.loads(path.read_text(encoding="utf-8"))
+        if changed := [name for name, value in origin.items() if before.get(name) != value]:
+            raise UsageError(
+                f"{folder} holds a training of other {' and '.join(changed)}; choose another --out"
+            )
+    write_whole(path, (json.dumps(origin, indent=1) + "\n").encode())
