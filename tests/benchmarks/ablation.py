@@ -22,7 +22,7 @@ from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.trainer import Sides, split
 from mskgrasp.runtime import cli
 from tests.benchmarks.choice import Choice, Looks
-from tests.benchmarks.models import CONFIGS, OURS
+from tests.benchmarks.paper_choices import CONFIGS, OURS
 from tests.benchmarks.report import show
 from tests.benchmarks.score_details import detail_table, details_of
 from tests.benchmarks.scores import change_table, changes, coverage_table, errors_of, score_table, scores_of

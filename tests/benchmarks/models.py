@@ -12,7 +12,7 @@ import argparse
 import datetime
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +20,16 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mskgrasp.core.config import read_config
 from mskgrasp.core.errors import UsageError
-from mskgrasp.learning.config import LearningConfig, StageConfig
-from mskgrasp.learning.network_config import PatchNetworkConfig
+from mskgrasp.learning.config import LearningConfig
+from mskgrasp.learning.label_source import source_text
 from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.trainer import Sides, split
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.console_table import Table
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.known_parts import evenly, held_out_rows, lowess_predictions
+from tests.benchmarks.paper_choices import OURS, PAPER, paper_choices, quick
 from tests.benchmarks.report import show
 from tests.benchmarks.scores import (
     change_table,
@@ -43,62 +43,10 @@ from tests.benchmarks.training_cost import cost_table
 from tests.benchmarks.trainings import make_trainings
 from tests.docs.uses_of_test_parts import commit, log_use
 
-CONFIGS = Path(__file__).parents[2] / "configs" / "train"
-PAPER = "GCIP-M+V"
-"""The paper's model: patches around the grasp, mean and variance."""
-OURS = "ours"
 LOWESS = "LOWESS"
 NOTHING = "predicting zero"
 POOLED_NOVEL = 35
 """Novel parts of the pooled group; the paper pools 50 known and 35 novel objects."""
-_QUICK_ATTEMPTS = 1000
-
-
-def paper_choices(patience: int) -> list[Choice]:
-    """The paper's four networks by its own recipe, its best one by our recipe, and ours.
-
-    Args:
-        patience: Epochs without a lower validation loss after which any of them stops.
-    """
-    paper, ours = (read_config(LearningConfig, CONFIGS / f"{name}.yaml") for name in ("paper", "pretrained"))
-    same = {"sides": "catalogue", "success_range": paper.success_range, "keep_best": True}
-    paper, ours = (with_stages(config.model_copy(update=same), patience=patience) for config in (paper, ours))
-    assert isinstance(paper.network, PatchNetworkConfig)
-    found = []
-    for name, image, variance in (
-        (PAPER, "grasp", True), ("GCIP-M", "grasp", False),
-        ("OCFI-M+V", "object", True), ("OCFI-M", "object", False),
-    ):  # fmt: skip
-        network = paper.network.model_copy(update={"image": image, "variance": variance})
-        config = paper.model_copy(update={"network": network})
-        found.append(Choice(name=name, config=config, quality_of="" if name == PAPER else PAPER))
-    views = paper.network.model_copy(update={"symmetric_views": ours.network.symmetric_views})
-    trained_as_ours = ours.model_copy(update={"network": views})
-    return [
-        *found,
-        Choice(name=f"{PAPER}, our recipe", config=trained_as_ours),
-        Choice(name=OURS, config=ours),
-    ]
-
-
-def with_stages(config: LearningConfig, **changes: object) -> LearningConfig:
-    """A configuration with changed optimisation of both networks."""
-    stages: dict[str, StageConfig] = {name: getattr(config, name) for name in ("gqn", "gdn")}
-    return config.model_copy(
-        update={name: stage.model_copy(update=changes) for name, stage in stages.items()}
-    )
-
-
-def quick(choice: Choice) -> Choice:
-    """A choice with two epochs on few attempts, to try the command: its figures mean nothing."""
-    return replace(choice, config=with_stages(choice.config, epochs=2), sides=_few)
-
-
-def _few(samples: Samples, sides: Sides) -> Sides:  # noqa: ARG001
-    training, validation = (
-        rows[:: max(1, len(rows) // _QUICK_ATTEMPTS)] for rows in (sides.training, sides.validation)
-    )
-    return replace(sides, training=training, validation=validation)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,7 +121,7 @@ def main() -> int:
         lowess_data=options.lowess_data,
         measure_s=0.1 if options.quick else 2.0,
     )
-    values = {"scores": scores, "seeds": seeds, "quick": options.quick}
+    values = {"scores": scores, "seeds": seeds, "quick": options.quick} | facts(samples, groups.sides)
     if options.split == "test":
         n_parts = len(torch.unique(samples.part[groups.novel]))
         log_use(
@@ -186,6 +134,18 @@ def main() -> int:
         values["test_parts_logged"] = True
     show(tables, options.out, values)
     return 0
+
+
+def facts(samples: Samples, sides: Sides) -> dict[str, str]:
+    """Size and origin of the data that networks were trained on, for the head of a table."""
+    n_parts = len(torch.unique(samples.part[sides.training]))
+    n_validation = len(torch.unique(samples.part[sides.validation]))
+    n_success = int(samples.success[sides.training].sum())
+    return {
+        "n": f"trained on {len(sides.training)} attempts at {n_parts} parts, {n_success} of them successes; "
+        f"early stopping on {n_validation} parts",
+        "labels": "; ".join(map(source_text, samples.sources)),
+    }
 
 
 def _figures(name: str, scores: dict[str, Any]) -> str:

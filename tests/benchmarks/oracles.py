@@ -29,9 +29,10 @@ from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import progress
 from tests.benchmarks.choice import Choice, Looks
 from tests.benchmarks.known_parts import evenly
-from tests.benchmarks.models import CONFIGS, with_stages
+from tests.benchmarks.models import facts
 from tests.benchmarks.oracle_images import images
 from tests.benchmarks.oracle_networks import OracleSamples, builder
+from tests.benchmarks.paper_choices import CONFIGS, with_stages
 from tests.benchmarks.report import show
 from tests.benchmarks.scores import change_table, changes, errors_of, score_table, scores_of
 from tests.benchmarks.training_cost import cost_table
@@ -258,7 +259,12 @@ def main() -> int:
         change_table(relative, "Change of the error relative to what a camera sees"),
     ]
     values = {name: one.to_json() for name, one in scores.items()}
-    show(tables, options.out, {"scores": values, "seeds": seeds, "quick": options.quick})
+    n_parts = len(torch.unique(samples.part[sides.training]))
+    n_success = int(samples.success[sides.training].sum())
+    about = facts(samples, sides) | {
+        "n": f"trained on {n_success} successes at {n_parts} parts; {title.lower()}"
+    }
+    show(tables, options.out, {"scores": values, "seeds": seeds, "quick": options.quick} | about)
     return 0
 
 

@@ -102,3 +102,11 @@ def test_bootstrap_draws_whole_objects():
     objects = [np.full(100, float(value)) for value in np.random.default_rng(0).normal(0, 1, 25)]
     low, high = metrics.bootstrap_interval(objects, lambda drawn: float(drawn.mean()))
     assert 0.5 < high - low < 1.1 and low < np.mean(objects) < high
+
+
+def test_the_expected_calibration_error_is_the_mean_gap_of_the_bins():
+    probability = np.array([0.1] * 10 + [0.9] * 30)
+    success = np.array([True] * 3 + [False] * 7 + [True] * 24 + [False] * 6)
+    expected = (10 * 0.2 + 30 * 0.1) / 40
+    assert metrics.expected_calibration_error(probability, success) == pytest.approx(expected)
+    assert np.isnan(metrics.expected_calibration_error(np.zeros(0), np.zeros(0)))

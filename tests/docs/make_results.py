@@ -12,7 +12,8 @@ rendered from ``reports/NAME.json``:
     report   what the command wrote, or the path of a file in the repository that holds it
 
 Reports of evaluate, palletize and validate are shown as their programs show them. Any other report has
-``tables``, each with a header, rows and perhaps a title; tests.benchmarks write theirs with ``--out``.
+``tables``, each with a header, rows and perhaps a title; tests.benchmarks write theirs with ``--out``. A run
+whose entry has a ``page`` adds its block to that page with its first record.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ from mskgrasp.simulation.versions import SIMULATION_VERSION
 from mskgrasp.validate.engines import engine_sections
 from mskgrasp.validate.tables import label_error_section, validation_sections
 from tests.benchmarks.report import markdown_rows
+from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT
 from tests.docs.readme_table import README, ROWS, rendered_readme
 from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored
@@ -135,8 +137,9 @@ def record(name: str) -> None:
     """
     facts = read_yaml(RUNS)[name]
     recorded = f"commit {commit()}, {datetime.date.today().isoformat()}"
-    out = ROOT / "out" / "results" / name
-    shutil.rmtree(out, ignore_errors=True)  # results of an earlier state of the code must not count
+    out = ROOT / facts.get("out", f"out/results/{name}")
+    if "out" not in facts:  # a folder of its own checks what it holds
+        shutil.rmtree(out, ignore_errors=True)  # results of an earlier state of the code must not count
     command = [sys.executable, *shlex.split(facts["command"])[1:], "--out", str(out)]
     subprocess.run(command, cwd=ROOT, check=not facts.get("may_fail"))
     path = ROOT / facts["stored"] if "stored" in facts else out / facts.get("report", "report.json")
@@ -147,7 +150,8 @@ def record(name: str) -> None:
     values = dict(
         record=dict(
             n=facts.get("n") or _size(report),
-            simulation=(
+            simulation=report.get("labels")
+            or (
                 f"{physics.rate_hz} Hz, {physics.position_iterations} iterations; simulation version "
                 f"{SIMULATION_VERSION}, parts of version {PART_VERSION}"
             ),
@@ -163,6 +167,8 @@ def record(name: str) -> None:
         values["report"] = {key: report[key] for key in ("settings", "versions", "label_error")}
     REPORTS.mkdir(exist_ok=True)
     (REPORTS / f"{name}.json").write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+    if "page" in facts:
+        add_to_page(name, facts["page"], RESULTS)
 
 
 def log_test_parts(name: str) -> None:
@@ -178,6 +184,8 @@ def log_test_parts(name: str) -> None:
 
 
 def _size(report: dict[str, Any]) -> str:
+    if "n" in report:
+        return report["n"]
     if "engines" in report:
         settings = report["settings"]
         grasps = settings["grasps_per_part"]

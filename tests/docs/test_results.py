@@ -9,6 +9,7 @@ import pytest
 
 from mskgrasp.core.config import read_yaml
 from tests.docs.make_results import FACTS, rendered
+from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT, without_code
 from tests.docs.readme_table import HEADER, README, ROWS, rendered_readme, table
 from tests.docs.stored_reports import REPORTS, RUNS, StoredReport, read_stored
@@ -41,7 +42,30 @@ def test_every_figure_of_a_page_comes_from_a_report(page: Path):
 def test_every_stored_report_is_on_a_page_and_every_run_has_one():
     stored = {path.stem for path in REPORTS.glob("*.json")}
     shown = {name for page in RESULTS for name in re.findall(r"<!-- run: (\w+) -->", page.read_text())}
-    assert stored == shown >= set(read_yaml(RUNS))
+    # A run with a page of its own has none before its first record.
+    assert stored == shown >= {name for name, run in read_yaml(RUNS).items() if "page" not in run}
+
+
+def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
+    index = tmp_path / "README.md"
+    index.write_text("# Results\n\n| page | measured |\n|---|---|\n| [Speed](speed.md) | speed |\n\nMore.\n")
+    runs = {name: run["page"] for name, run in read_yaml(RUNS).items() if "page" in run}
+    assert list(runs) == ["model_baselines", "oracles"]
+    for name in (*runs, "oracles"):
+        add_to_page(name, runs[name], tmp_path)
+    text = (tmp_path / "models.md").read_text()
+    assert re.findall(r"^<!-- (.*) -->$", text, flags=re.M) == [
+        "run: model_baselines",
+        "end",
+        "run: oracles",
+        "end",
+    ]
+    assert text.startswith("# Results: models\n\n## The paper's models beside ours\n")
+    words = re.sub(r"<!-- run: .*?<!-- end -->", "", text, flags=re.S)
+    assert not re.findall(NUMBER, words)
+    rows = [line for line in index.read_text().splitlines() if line.startswith("| [")]
+    assert rows[0] == "| [Speed](speed.md) | speed |" and rows[1].startswith("| [Models](models.md) | ")
+    assert len(rows) == 2 and index.read_text().endswith("\n\nMore.\n")
 
 
 def test_the_index_links_every_results_page():

@@ -35,6 +35,8 @@ def test_the_target_is_the_hands_motion_seen_from_the_part_whatever_centre_was_s
     np.testing.assert_allclose(samples.grasp_displacement[held, :3], motion, atol=2e-6)
     np.testing.assert_allclose(samples.grasp_displacement[held, 3], -turn, atol=1e-6)
     np.testing.assert_allclose(samples.origin_grasp, before.position, atol=1e-6)
+    same = np.abs((samples.quat_grasp_obj.numpy() * before.quat_wxyz).sum(axis=1))  # either sign
+    np.testing.assert_allclose(same, 1.0, atol=1e-6)
     assert float((samples.origin_grasp - samples.centre_grasp)[:, :2].norm(dim=1).max()) > 3e-4
 
 

@@ -179,3 +179,31 @@ def uncalibrated(models: Models) -> Models:
     return dataclasses.replace(
         models, meta=models.meta.model_copy(update={"calibration": ModelCalibration()})
     )
+
+
+def test_training_ends_when_the_validation_loss_stops_falling_and_resumes_to_the_same_end(samples, tmp_path):
+    # A rate this high does not improve for long.
+    stage = StageConfig(learning_rate=0.05, schedule="constant", epochs=40, batch_size=32, patience=2)
+    config = SHORT.model_copy(update={"gqn": stage, "gdn": stage})
+    whole, history = learn(samples, config, checkpoint_path=tmp_path / "whole")
+    for name in ("gqn", "gdn"):
+        losses = [one.validation_loss for one in history if one.stage == name]
+        assert len(losses) < 40
+        assert losses.index(min(losses)) == len(losses) - 1 - 2
+    path = tmp_path / "checkpoint"
+    with pytest.raises(KeyboardInterrupt):
+        learn(samples, config, checkpoint_path=path, reporter=StopAfter(len(history) - 1))
+    resumed, again = learn(samples, config, checkpoint_path=path)
+    assert [one.train_loss for one in again] == [one.train_loss for one in history]
+    assert torch.equal(whole.gdn.mean_head[0].weight, resumed.gdn.mean_head[0].weight)
+
+
+def test_a_trained_quality_network_is_taken_over(samples, tmp_path):
+    first, history = learn(samples, SHORT, checkpoint_path=tmp_path / "a")
+    other, again = learn(samples, SHORT, checkpoint_path=tmp_path / "b", quality=first.gqn)
+    assert {one.stage for one in again} == {"gdn"}
+    pairs = [(first.gqn, other.gqn), (first.gdn, other.gdn)]  # the same start, the same displacement network
+    for one, same in pairs:
+        for a, b in zip(one.state_dict().values(), same.state_dict().values(), strict=True):
+            assert torch.equal(a, b)
+    assert [one.train_loss for one in again] == [one.train_loss for one in history if one.stage == "gdn"]

@@ -1,0 +1,66 @@
+"""The paper's networks and ours as choices of one comparison."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from mskgrasp.core.config import read_config
+from mskgrasp.learning.config import LearningConfig, StageConfig
+from mskgrasp.learning.network_config import PatchNetworkConfig
+from mskgrasp.learning.samples import Samples
+from mskgrasp.learning.trainer import Sides
+from tests.benchmarks.choice import Choice
+
+CONFIGS = Path(__file__).parents[2] / "configs" / "train"
+PAPER = "GCIP-M+V"
+"""The paper's model: patches around the grasp, mean and variance."""
+OURS = "ours"
+_QUICK_ATTEMPTS = 1000
+
+
+def paper_choices(patience: int) -> list[Choice]:
+    """The paper's four networks by its own recipe, its best one by our recipe, and ours.
+
+    Args:
+        patience: Epochs without a lower validation loss after which any of them stops.
+    """
+    paper, ours = (read_config(LearningConfig, CONFIGS / f"{name}.yaml") for name in ("paper", "pretrained"))
+    same = {"sides": "catalogue", "success_range": paper.success_range, "keep_best": True}
+    paper, ours = (with_stages(config.model_copy(update=same), patience=patience) for config in (paper, ours))
+    assert isinstance(paper.network, PatchNetworkConfig)
+    found = []
+    for name, image, variance in (
+        (PAPER, "grasp", True), ("GCIP-M", "grasp", False),
+        ("OCFI-M+V", "object", True), ("OCFI-M", "object", False),
+    ):  # fmt: skip
+        network = paper.network.model_copy(update={"image": image, "variance": variance})
+        config = paper.model_copy(update={"network": network})
+        found.append(Choice(name=name, config=config, quality_of="" if name == PAPER else PAPER))
+    views = paper.network.model_copy(update={"symmetric_views": ours.network.symmetric_views})
+    trained_as_ours = ours.model_copy(update={"network": views})
+    return [
+        *found,
+        Choice(name=f"{PAPER}, our recipe", config=trained_as_ours),
+        Choice(name=OURS, config=ours),
+    ]
+
+
+def with_stages(config: LearningConfig, **changes: object) -> LearningConfig:
+    """A configuration with changed optimisation of both networks."""
+    stages: dict[str, StageConfig] = {name: getattr(config, name) for name in ("gqn", "gdn")}
+    return config.model_copy(
+        update={name: stage.model_copy(update=changes) for name, stage in stages.items()}
+    )
+
+
+def quick(choice: Choice) -> Choice:
+    """A choice with two epochs on few attempts, to try the command: its figures mean nothing."""
+    return replace(choice, config=with_stages(choice.config, epochs=2), sides=_few)
+
+
+def _few(samples: Samples, sides: Sides) -> Sides:  # noqa: ARG001
+    training, validation = (
+        rows[:: max(1, len(rows) // _QUICK_ATTEMPTS)] for rows in (sides.training, sides.validation)
+    )
+    return replace(sides, training=training, validation=validation)
