@@ -22,7 +22,7 @@ from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.trainer import Sides, split
 from mskgrasp.runtime import cli
 from tests.benchmarks.choice import Choice, Looks
-from tests.benchmarks.paper_choices import CONFIGS, OURS
+from tests.benchmarks.paper_choices import CONFIGS, OURS, some_rows
 from tests.benchmarks.report import show
 from tests.benchmarks.score_details import detail_table, details_of
 from tests.benchmarks.scores import change_table, changes, coverage_table, errors_of, score_table, scores_of
@@ -114,8 +114,7 @@ def main() -> int:
 
 
 def _some(samples: Samples, sides: Sides, *, share: float) -> Sides:  # noqa: ARG001
-    drawn = torch.randperm(len(sides.training), generator=torch.Generator().manual_seed(0))
-    return replace(sides, training=sides.training[drawn[: round(share * len(drawn))].sort().values])
+    return replace(sides, training=some_rows(sides.training, share))
 
 
 def _options() -> argparse.Namespace:

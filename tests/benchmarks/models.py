@@ -29,7 +29,7 @@ from mskgrasp.runtime import cli
 from mskgrasp.runtime.console_table import Table
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.known_parts import evenly, held_out_rows, lowess_predictions
-from tests.benchmarks.paper_choices import OURS, PAPER, paper_choices, quick
+from tests.benchmarks.paper_choices import OURS, PAPER, paper_choices, quick, some_rows
 from tests.benchmarks.report import show
 from tests.benchmarks.scores import (
     change_table,
@@ -66,11 +66,24 @@ class Groups:
     pooled: Tensor
 
     @classmethod
-    def of(cls, samples: Samples, config: LearningConfig, *, novel: str, n_known: int) -> Groups:
-        """Split the samples; ``novel`` is validation or test."""
+    def of(
+        cls, samples: Samples, config: LearningConfig, *, novel: str, n_known: int, share: float = 1.0
+    ) -> Groups:
+        """Split the samples.
+
+        Args:
+            samples: The dataset.
+            config: Says how parts are split.
+            novel: Side of the novel parts, validation or test.
+            n_known: Number of known parts.
+            share: Share of the training attempts that is used.
+
+        Raises:
+            UsageError: There is no success to measure.
+        """
         sides = split(samples, config)
         known = held_out_rows(samples, sides.training, n_known)
-        training = sides.training[~torch.isin(sides.training, known)]
+        training = some_rows(sides.training[~torch.isin(sides.training, known)], share)
         rows = {"validation": sides.validation, "test": sides.test}[novel]
         if not len(known) or not bool(samples.success[rows].any()):
             raise UsageError(
@@ -90,7 +103,7 @@ def main() -> int:
     if options.split == "test" and options.quick:
         raise UsageError("--quick trains too little for the test parts; leave out --split test")
     torch.set_num_threads(options.threads)
-    choices = paper_choices(options.patience)
+    choices = paper_choices(options.patience, mixed_precision=options.mixed_precision)
     unknown = set(options.only or ()) - {one.name for one in choices}
     if unknown:
         raise UsageError(
@@ -104,7 +117,13 @@ def main() -> int:
     looks = Looks(options.data, choices[0].config.success_range)
     # The reading that holds patches around parts serves the patches around grasps, too.
     samples = looks.of(next((c for c in choices if c.config.network.sees_object), choices[0]).config.network)
-    groups = Groups.of(samples, choices[0].config, novel=options.split, n_known=options.known_parts)
+    groups = Groups.of(
+        samples,
+        choices[0].config,
+        novel=options.split,
+        n_known=options.known_parts,
+        share=options.share,
+    )
     options.out.mkdir(parents=True, exist_ok=True)
     names = [samples.parts[number] for number in torch.unique(samples.part[groups.known]).tolist()]
     (options.out / "known_parts.txt").write_text("\n".join(names) + "\n", encoding="utf-8")
@@ -121,7 +140,9 @@ def main() -> int:
         lowess_data=options.lowess_data,
         measure_s=0.1 if options.quick else 2.0,
     )
-    values = {"scores": scores, "seeds": seeds, "quick": options.quick} | facts(samples, groups.sides)
+    values = {"scores": scores, "seeds": seeds, "quick": options.quick, "share": options.share} | facts(
+        samples, groups.sides
+    )
     if options.split == "test":
         n_parts = len(torch.unique(samples.part[groups.novel]))
         log_use(
@@ -240,6 +261,11 @@ def _options() -> argparse.Namespace:
     )  # fmt: skip
     parser.add_argument("--only", nargs="+", metavar="NAME", help=f"networks, besides {PAPER}")
     parser.add_argument("--patience", type=int, default=10, help="epochs without improvement (default 10)")
+    parser.add_argument("--share", type=float, default=1.0, help="of the attempts to train on (default 1)")
+    parser.add_argument(
+        "--mixed-precision", action="store_true",
+        help="the paper's networks train in bfloat16: faster on a CPU that computes with it",
+    )  # fmt: skip
     parser.add_argument("--known-parts", type=int, default=50, help="known parts to measure (default 50)")
     parser.add_argument(
         "--lowess-data", type=Path,

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import torch
+from torch import Tensor
+
 from mskgrasp.core.config import read_config
 from mskgrasp.learning.config import LearningConfig, StageConfig
 from mskgrasp.learning.network_config import PatchNetworkConfig
@@ -19,15 +22,18 @@ OURS = "ours"
 _QUICK_ATTEMPTS = 1000
 
 
-def paper_choices(patience: int) -> list[Choice]:
+def paper_choices(patience: int, *, mixed_precision: bool = False) -> list[Choice]:
     """The paper's four networks by its own recipe, its best one by our recipe, and ours.
 
     Args:
         patience: Epochs without a lower validation loss after which any of them stops.
+        mixed_precision: The image layers of the paper's architecture train in bfloat16, which is faster on
+            a CPU that computes with it.
     """
     paper, ours = (read_config(LearningConfig, CONFIGS / f"{name}.yaml") for name in ("paper", "pretrained"))
     same = {"sides": "catalogue", "success_range": paper.success_range, "keep_best": True}
     paper, ours = (with_stages(config.model_copy(update=same), patience=patience) for config in (paper, ours))
+    paper = paper.model_copy(update={"mixed_precision": mixed_precision})
     assert isinstance(paper.network, PatchNetworkConfig)
     found = []
     for name, image, variance in (
@@ -38,7 +44,7 @@ def paper_choices(patience: int) -> list[Choice]:
         config = paper.model_copy(update={"network": network})
         found.append(Choice(name=name, config=config, quality_of="" if name == PAPER else PAPER))
     views = paper.network.model_copy(update={"symmetric_views": ours.network.symmetric_views})
-    trained_as_ours = ours.model_copy(update={"network": views})
+    trained_as_ours = ours.model_copy(update={"network": views, "mixed_precision": mixed_precision})
     return [
         *found,
         Choice(name=f"{PAPER}, our recipe", config=trained_as_ours),
@@ -64,3 +70,9 @@ def _few(samples: Samples, sides: Sides) -> Sides:  # noqa: ARG001
         rows[:: max(1, len(rows) // _QUICK_ATTEMPTS)] for rows in (sides.training, sides.validation)
     )
     return replace(sides, training=training, validation=validation)
+
+
+def some_rows(rows: Tensor, share: float) -> Tensor:
+    """A random share of rows, the same every time, in order."""
+    drawn = torch.randperm(len(rows), generator=torch.Generator().manual_seed(0))
+    return rows[drawn[: round(share * len(rows))].sort().values]

@@ -55,8 +55,20 @@ def test_all_models_stop_and_select_alike_and_the_papers_keep_their_own_recipe()
         assert config.network.variance == name.endswith("V")
         assert (config.gdn.optimiser, config.gdn.learning_rate, config.gdn.epochs) == ("rmsprop", 1e-5, 100)
         assert not config.calibrate and not config.symmetric
+    fast = paper_choices(7, mixed_precision=True)
+    assert [one.config.mixed_precision for one in fast] == 5 * [True] + [False]
     recipe, ours = choices[f"{PAPER}, our recipe"].config, choices[OURS].config
     assert recipe.model_copy(update={"network": ours.network}) == ours
+
+
+def test_a_share_of_the_attempts_leaves_what_is_measured_alone(boxes, groups):
+    config = paper_choices(1)[0].config
+    samples = Looks(boxes.data, (0.0, 1.0)).of(config.network)
+    half = Groups.of(samples, config, novel="test", n_known=4, share=0.5)
+    assert len(half.sides.training) == round(0.5 * len(groups.sides.training))
+    assert torch.isin(half.sides.training, groups.sides.training).all()
+    assert torch.equal(half.known, groups.known) and torch.equal(half.novel, groups.novel)
+    assert torch.equal(half.sides.validation, groups.sides.validation)
 
 
 def small(choice: Choice, epochs: int) -> Choice:
