@@ -21,6 +21,7 @@ from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.trainer import Sides, split
 from mskgrasp.runtime import cli
+from mskgrasp.runtime.progress import progress
 from tests.benchmarks.choice import Choice, Looks
 from tests.benchmarks.paper_choices import CONFIGS, OURS, some_rows
 from tests.benchmarks.report import show
@@ -97,11 +98,13 @@ def main() -> int:
     )
     each = {choice: [one[name] for one in found] for choice, found in trained.items()}
     rate = float(samples.success[sides.training].double().mean())
-    scores = {choice: scores_of(samples, rows, found, rate) for choice, found in each.items()}
+    scores = {
+        choice: scores_of(samples, rows, each[choice], rate) for choice in progress(list(each), unit="choice")
+    }
     errors = {choice: errors_of(samples, rows, found) for choice, found in each.items()}
     relative = {choice: changes(one, errors[OURS]) for choice, one in errors.items() if choice != OURS}
     details = {choice: details_of(samples, rows, found) for choice, found in each.items()}
-    title = f"Validation parts: {len(rows)} grasps of {scores[OURS].parts} parts, {options.seeds} seeds"
+    title = f"Validation parts: {len(rows)} grasps of {scores[OURS].parts} parts, seeds: {options.seeds}"
     tables = [
         score_table(scores, bold=OURS, caption=title),
         detail_table(details),

@@ -27,6 +27,7 @@ from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.trainer import Sides, split
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.console_table import Table
+from mskgrasp.runtime.progress import progress
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.known_parts import evenly, held_out_rows, lowess_predictions
 from tests.benchmarks.paper_choices import OURS, PAPER, paper_choices, quick, some_rows
@@ -144,14 +145,7 @@ def main() -> int:
         samples, groups.sides
     )
     if options.split == "test":
-        n_parts = len(torch.unique(samples.part[groups.novel]))
-        log_use(
-            datetime.date.today().isoformat(),
-            commit(),
-            " ".join(["python -m tests.benchmarks.models", *sys.argv[1:]]),
-            f"test: {n_parts} held-out parts of the catalogue",
-            "; ".join(_figures(name, one) for name, one in scores["novel"].items()),
-        )
+        log_test_parts(len(torch.unique(samples.part[groups.novel])), scores["novel"])
         values["test_parts_logged"] = True
     show(tables, options.out, values)
     return 0
@@ -169,9 +163,19 @@ def facts(samples: Samples, sides: Sides) -> dict[str, str]:
     }
 
 
-def _figures(name: str, scores: dict[str, Any]) -> str:
-    translation, rotation = (scores[error]["mean"] for error in ("translation", "rotation"))
-    return f"{name} {1e3 * translation:.1f} mm, {np.degrees(rotation):.1f} degrees"
+def log_test_parts(n_parts: int, scores: dict[str, dict[str, Any]]) -> None:
+    """Add a line to the log of the uses of test parts, with the errors of each model."""
+    errors = (
+        f"{name} {1e3 * one['translation']['mean']:.1f} mm, {np.degrees(one['rotation']['mean']):.1f} degrees"
+        for name, one in scores.items()
+    )
+    log_use(
+        datetime.date.today().isoformat(),
+        commit(),
+        " ".join(["python -m tests.benchmarks.models", *sys.argv[1:]]),
+        f"test: {n_parts} held-out parts of the catalogue",
+        "; ".join(errors),
+    )
 
 
 def compare(
@@ -232,7 +236,8 @@ def compare(
         nothing = np.zeros((int(samples.success[rows[group]].sum()), 4))
         each[group][NOTHING] = [Predictions(quality=np.zeros(0), mean=nothing, variance=nothing * np.nan)]
         of_group = {
-            name: scores_of(samples, rows[group], one, base_rate) for name, one in each[group].items()
+            name: scores_of(samples, rows[group], each[group][name], base_rate)
+            for name in progress(list(each[group]), unit="model", title=f"score {group} parts")
         }
         scores[group] = {name: one.to_json() for name, one in of_group.items()}
         n_parts = of_group[NOTHING].parts

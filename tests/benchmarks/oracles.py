@@ -249,11 +249,13 @@ def main() -> int:
     rows = sides.validation
     each = {name: [one["validation"] for one in found] for name, found in trained.items()}
     rate = float(samples.success[sides.training].double().mean())
-    scores = {name: scores_of(samples, rows, found, rate) for name, found in each.items()}
+    scores = {
+        name: scores_of(samples, rows, each[name], rate) for name in progress(list(each), unit="choice")
+    }
     errors = {name: errors_of(samples, rows, found) for name, found in each.items()}
     relative = {name: changes(one, errors[BASELINE]) for name, one in errors.items() if name != BASELINE}
     first = scores[BASELINE]
-    title = f"Errors on validation parts: {first.successes} successes of {first.parts} parts, {seeds} seeds"
+    title = f"Errors on validation parts: {first.successes} successes of {first.parts} parts, seeds: {seeds}"
     tables = [
         score_table(scores, caption=title),
         change_table(relative, "Change of the error relative to what a camera sees"),

@@ -216,7 +216,7 @@ def changes(one: Errors, reference: Errors) -> dict[str, Value]:
 
 
 def score_table(scores: dict[str, Scores], *, bold: str = "", caption: str = "") -> Table:
-    """The table of accuracy and errors of one group, a row a choice."""
+    """The table of accuracy and errors of one group, a row a choice, without columns that none has."""
     header = (
         "", "successes", "accuracy", "ECE", "mm", "degrees",
         f"most confident {MOST_CONFIDENT:.0%}: mm", "degrees",
@@ -234,7 +234,10 @@ def score_table(scores: dict[str, Scores], *, bold: str = "", caption: str = "")
         )
         for name, one in scores.items()
     ]
-    return Table(header=header, rows=rows, caption=caption)
+    known = [k for k in range(len(header)) if any(row[k] is not None for row in rows)]
+    return Table(
+        header=[header[k] for k in known], rows=[[row[k] for k in known] for row in rows], caption=caption
+    )
 
 
 def coverage_table(scores: dict[str, Scores]) -> Table:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 
@@ -146,3 +149,18 @@ def test_what_cannot_be_is_refused_in_one_line(boxes, tmp_path):
     assert done.returncode == 2 and "--only GCIP; legal: GCIP-M+V," in done.stderr
     done = run_here(models.main, *base, "--quick", "--split", "test")
     assert done.returncode == 2 and "leave out --split test" in done.stderr
+
+
+def test_a_use_of_the_test_parts_is_logged_with_its_figures(tmp_path, monkeypatch):
+    log = tmp_path / "test_parts.csv"
+    monkeypatch.setattr("tests.docs.uses_of_test_parts.TEST_PARTS", log)
+    monkeypatch.setattr("sys.argv", ["models", "--data", "data/training", "--split", "test"])
+    error = {"translation": {"mean": 0.0042}, "rotation": {"mean": np.pi / 36}}
+    models.log_test_parts(170, {OURS: error, PAPER: error})
+    (row,) = csv.reader(log.read_text().splitlines())
+    assert row[2:] == [
+        "python -m tests.benchmarks.models --data data/training --split test",
+        "test: 170 held-out parts of the catalogue",
+        "ours 4.2 mm, 5.0 degrees; GCIP-M+V 4.2 mm, 5.0 degrees",
+    ]
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d", row[0]) and re.match(r"[0-9a-f]{7}", row[1])

@@ -1,7 +1,8 @@
 """Trainings of several choices and seeds on the same attempts, each stored as soon as it is finished.
 
 A folder of a training holds its networks and its predictions for each group of attempts that was asked for.
-It is not made again. Two processes started on the same folder share the trainings between them.
+It is not made again; one that was stopped goes on at its last epoch, or from its start where networks that do
+not ship are built. Two processes started on the same folder share the trainings between them.
 """
 
 from __future__ import annotations
