@@ -51,6 +51,10 @@ class NoPartFound(MskgraspError):
     """The depth image shows no part that could be grasped."""
 
 
+class PartNotRecognised(MskgraspError):
+    """What lies on the table is not the part whose CAD is known, or does not rest flat and alone."""
+
+
 class TableTooHigh(MskgraspError):
     """The table is seen higher over its stated height than the fingers' clearance allows."""
 

@@ -1,0 +1,266 @@
+"""What the search for a part's pose must know of the part: its looks from above, and its symmetries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from mskgrasp.core.geometry import Pose, quat_about_z, quat_rotate
+from mskgrasp.parts import Part
+from mskgrasp.perception.part_pose.surface import HeightMap, heights_from, on_plane, sample_surface
+
+MOST_POINTS = 150e3
+"""Greatest number of points on a part's surface, about."""
+LEAST_SPACING = 0.2e-3
+"""Least distance of neighbouring points, metres: a twentieth of the pixel of a Kinect v2 at 0.8 m, halved."""
+SAME_HEIGHT = 0.3e-3
+"""Heights that differ by less, beside a step between neighbouring cells, are the same, metres."""
+SAME_AREA = 3e-6
+"""A turned part that differs over less than this, square metres, looks the same: a pixel covers 4.8 mm^2."""
+SAME_SHARE = 0.003
+"""The same, as a share of the part's area."""
+SIMILAR_HEIGHT, SIMILAR_AREA, SIMILAR_SHARE = 0.5e-3, 6e-6, 0.03
+"""The same for resting poses that are looked for together at first."""
+MOST_ORDERS = 72
+"""Greatest order of symmetry other than a full one."""
+MOST_COMPARED = 12
+"""Resting poses with similar looks that are told apart; more of them are facets of a body of revolution."""
+FEW_POINTS = 20000
+"""Points of a look for a first fit."""
+_CONE = 0.25
+"""Tangent of the greatest angle between ray and vertical: at 0.8 m a part is at most 0.2 m off the axis."""
+_SIDES = np.arange(8) * np.pi / 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lying:
+    """A part in one of its resting poses.
+
+    Its frame is on the table under the origin of obj, with the axes of the table in ``T_table_obj``.
+
+    Attributes:
+        resting: Index of the resting pose.
+        probability: Of the resting pose.
+        turn: The first of those that look alike must be turned by this to look like this one, radians.
+        points: (n, 3) float32 on the surface that a camera above may see, metres.
+        order: Number of turns that look the same; 0: all.
+    """
+
+    resting: int
+    probability: float
+    turn: float
+    points: np.ndarray
+    order: int
+
+    @property
+    def period(self) -> float:
+        """Angle by which the part must be turned to look the same again, radians; 0 where any turn does."""
+        return 2 * np.pi / self.order if self.order else 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """Resting poses that look alike from above, up to a turn.
+
+    Attributes:
+        poses: The most probable first; its frame and points are those of the look.
+        few: (m, 3) some of its points.
+        from_above: Heights of it as seen from straight above.
+        top: Height of the highest point, metres.
+        radius: Greatest distance of a point from the vertical through the part's origin, metres.
+    """
+
+    poses: tuple[Lying, ...]
+    few: np.ndarray
+    from_above: HeightMap
+    top: float
+    radius: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownPart:
+    """A part whose pose can be found.
+
+    Attributes:
+        part: The part.
+        cell: Edge of the cells of height maps of its points, metres.
+        looks: Its resting poses, by how they look from above.
+    """
+
+    part: Part
+    cell: float
+    looks: tuple[Look, ...]
+
+    @classmethod
+    def of(cls, part: Part, stands: Sequence[bool] | None = None) -> KnownPart:
+        """Prepare a part; takes up to some seconds.
+
+        Args:
+            part: The part.
+            stands: Of each resting pose, whether it is looked for (`mskgrasp.simulation.resting.resting_of`);
+                None: all are.
+        """
+        mesh = trimesh.load_mesh(part.mesh_path)
+        spacing = max(LEAST_SPACING, float(np.sqrt(mesh.area / MOST_POINTS)))
+        points_obj = sample_surface(np.asarray(mesh.triangles, dtype=float), spacing)
+        cell = spacing / 0.7
+        groups: list[list[tuple[_Seen, float]]] = []
+        chosen = [i for i in range(len(part.resting_probability)) if stands is None or stands[i]]
+        for index in chosen:
+            seen = _Seen.of(part, index, points_obj, cell)
+            for group in groups:
+                turn = group[0][0].turn_to(seen)
+                if turn is not None:
+                    group.append((seen, turn))
+                    break
+            else:
+                groups.append([(seen, 0.0)])
+        return cls(part=part, cell=cell, looks=tuple(map(_look, groups)))
+
+    def pose(self, lying: Lying, x: float, y: float, turn: float, table_z: float) -> Pose:
+        """``T_base_obj`` of the part at a place and turn of the frame of a resting pose."""
+        resting = Pose(
+            position=np.array([0.0, 0.0, self.part.resting.position[lying.resting, 2]]),
+            quat_wxyz=self.part.resting.quat_wxyz[lying.resting],
+        )
+        place = Pose(position=np.array([x, y, table_z]), quat_wxyz=quat_about_z(np.asarray(turn)))
+        return place @ resting
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Seen:
+    """A resting pose before it is known which others look alike."""
+
+    resting: int
+    probability: float
+    points: np.ndarray
+    from_above: HeightMap
+    lower: np.ndarray
+    upper: np.ndarray
+    cells: np.ndarray
+    levels: np.ndarray
+
+    @classmethod
+    def of(cls, part: Part, index: int, points_obj: np.ndarray, cell: float) -> _Seen:
+        points = quat_rotate(part.resting.quat_wxyz[index], points_obj)
+        points[:, 2] += part.resting.position[index, 2]
+        # Stored by coordinate, so that each is contiguous.
+        points = np.ascontiguousarray(points.T.astype(np.float32)).T
+        from_above = heights_from(points, None, plane=0.0, cell=cell, margin=3 * cell)
+        lower, upper = from_above.bounds(cell)
+        rows, columns = np.mgrid[: lower.shape[0], : lower.shape[1]]
+        return cls(
+            resting=index,
+            probability=float(part.resting_probability[index]),
+            points=points,
+            from_above=from_above,
+            lower=lower,
+            upper=upper,
+            cells=np.stack([columns.ravel(), rows.ravel()], axis=-1) * cell + from_above.corner,
+            levels=from_above.heights.ravel(),
+        )
+
+    @property
+    def area(self) -> float:
+        return float(np.count_nonzero(self.levels)) * self.from_above.cell**2
+
+    def differs(self, other: _Seen, turn: float, tolerance: float, every: int = 1) -> float:
+        """Area of another's cells whose height is not found here after a turn, square metres."""
+        at, levels = self._where(other, turn, every), other.levels[::every]
+        bad = (levels < self.lower[at] - tolerance) | (levels > self.upper[at] + tolerance)
+        return float(np.count_nonzero(bad)) * every * other.from_above.cell**2
+
+    def distance(self, other: _Seen, turn: float, every: int) -> float:
+        """Mean difference of heights after a turn, metres, large ones clipped."""
+        off = np.abs(self.from_above.heights[self._where(other, turn, every)] - other.levels[::every])
+        return float(np.minimum(off, 2e-3).mean())
+
+    def _where(self, other: _Seen, turn: float, every: int) -> tuple[np.ndarray, np.ndarray]:
+        """Row and column here of another's cells after a turn."""
+        cos, sin = np.cos(turn), np.sin(turn)
+        cells = other.cells[::every]
+        x, y = cos * cells[:, 0] + sin * cells[:, 1], cos * cells[:, 1] - sin * cells[:, 0]
+        column = np.rint((x - self.from_above.corner[0]) / self.from_above.cell).astype(int)
+        row = np.rint((y - self.from_above.corner[1]) / self.from_above.cell).astype(int)
+        inside = (column >= 0) & (row >= 0) & (column < self.lower.shape[1]) & (row < self.lower.shape[0])
+        return np.where(inside, row, 0), np.where(inside, column, 0)  # the border is empty
+
+    def turn_to(self, other: _Seen) -> float | None:
+        """The turn after which this looks like another; None where there is none."""
+        if abs(self.levels.max() - other.levels.max()) > SIMILAR_HEIGHT:
+            return None
+        allowed = self.allowed(True)
+        if abs(self.area - other.area) > 2 * allowed:
+            return None
+        every = max(1, len(other.levels) // 700)
+        turns = np.arange(0, 2 * np.pi, np.radians(2))
+        areas = np.array([self.differs(other, turn, SIMILAR_HEIGHT, every) for turn in turns])
+        for best in turns[np.argsort(areas)[:4]]:
+            for step in np.radians([0.4, 0.08]):
+                near = best + step * np.arange(-6, 7)
+                best = near[np.argmin([self.distance(other, turn, max(1, every // 6)) for turn in near])]
+            if self.differs(other, best, SIMILAR_HEIGHT) <= allowed:
+                return float(best)
+        return None
+
+    def order(self, similar: bool) -> int:
+        """Number of turns that look the same, or similar; 0: all."""
+        every = max(1, len(self.levels) // 3000)
+        if all(self._same_at(turn, similar, every) for turn in np.radians(4 * np.arange(1, 90) + 0.5)):
+            return 0
+        return next((n for n in range(MOST_ORDERS, 1, -1) if self._repeats(n, similar, every)), 1)
+
+    def _repeats(self, order: int, similar: bool, every: int) -> bool:
+        turns = np.arange(1, order // 2 + 1) * 2 * np.pi / order
+        return all(self._same_at(t, similar, every, 2.0) for t in turns) and all(
+            self._same_at(t, similar, 1) for t in turns
+        )
+
+    def _same_at(self, turn: float, similar: bool, every: int, slack: float = 1.0) -> bool:
+        height = SIMILAR_HEIGHT if similar else SAME_HEIGHT
+        return self.differs(self, turn, height, every) <= slack * self.allowed(similar)
+
+    def allowed(self, similar: bool) -> float:
+        """Area over which what looks the same, or similar, may differ, square metres."""
+        if similar:
+            return max(SIMILAR_AREA, SIMILAR_SHARE * self.area)
+        return max(SAME_AREA, SAME_SHARE * self.area)
+
+    def visible(self) -> np.ndarray:
+        """The points that a camera above may see, from any side."""
+        kept = np.zeros(len(self.points), bool)
+        far, cell = 10.0, 2 * self.from_above.cell
+        for side in (np.zeros(2), *(_CONE * np.stack([np.cos(_SIDES), np.sin(_SIDES)], axis=-1))):
+            eye = np.array([*(far * side), far])
+            shown = heights_from(self.points, eye, plane=0.0, cell=cell, margin=2 * cell)
+            x, y = on_plane(self.points, eye, 0.0)
+            column = np.rint((x - shown.corner[0]) / cell).astype(int)
+            row = np.rint((y - shown.corner[1]) / cell).astype(int)
+            # On the steepest walls a cell spans this height.
+            kept |= self.points[:, 2] >= shown.heights[row, column] - cell / _CONE
+        return np.ascontiguousarray(self.points[kept].T).T
+
+
+def _look(group: list[tuple[_Seen, float]]) -> Look:
+    first, poses = group[0][0], []
+    for seen, turn in group:
+        poses.append(
+            Lying(
+                resting=seen.resting,
+                probability=seen.probability,
+                turn=turn,
+                points=seen.visible(),
+                order=seen.order(similar=len(group) > MOST_COMPARED),
+            )
+        )
+    points = poses[0].points
+    return Look(
+        poses=tuple(poses),
+        few=np.ascontiguousarray(points[:: max(1, len(points) // FEW_POINTS)].T).T,
+        from_above=first.from_above,
+        top=float(points[:, 2].max()),
+        radius=float(np.linalg.norm(points[:, :2], axis=1).max()),
+    )

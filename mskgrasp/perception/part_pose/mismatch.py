@@ -1,0 +1,136 @@
+"""What of an image a fitted pose does not explain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from mskgrasp.perception.part_pose.known_part import KnownPart
+from mskgrasp.perception.part_pose.likelihood import HeightTable, Pixels, Seen, view
+from mskgrasp.perception.part_pose.search import Fit
+
+UNEXPLAINED, UNEXPLAINED_SIGMAS = 0.7e-3, 3.5
+"""A height farther from all of the model's within a pixel is unexplained: metres, and deviations of noise."""
+EVEN = 2e-3
+"""Range of heights within a pixel up to which a surface counts as even, metres."""
+_LEVER = 2e-3
+"""A surface whose points deviate less from their middle, metres, shows no tilt in that direction."""
+LARGE = 2.5
+"""Mean excess of 3 x 3 pixels that is large: chance exceeds it once in a million."""
+MOST_PATCH, MOST_PATCH_SHARE = 5, 0.02
+"""Greatest patch of large excess: pixels, and in an exact image a share of the part's pixels more."""
+MOST_EXCESS = 0.8
+"""Greatest mean excess of an exact image."""
+MOST_NOISY_EXCESS, EXCESS_SPREAD = 0.6, 4.0
+"""The same of a noisy one, and what is added to it over the root of the number of pixels."""
+MOST_RISE, MOST_TILT = 0.4e-3, np.radians(1.2)
+"""Greatest rise, metres, and tilt, radians: hulls in a simulation lean by up to a degree."""
+SIGNIFICANT = 4.0
+"""Deviations of noise by which rise and tilt must exceed them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mismatch:
+    """Differences between an image and the heights that a pose would show.
+
+    Attributes:
+        pixels: Number of pixels of the part, or where the model shows it.
+        excess: Mean cost of a pixel of the part above the least possible: about 0.5 where all is noise.
+        patch: Area of the largest connected patch in which the mean excess of 3 x 3 pixels is large, pixels.
+        unexplained: Share of the part's pixels whose height is seen nowhere within a pixel in the model.
+        rise: Mean height of the part's even surfaces above the model's, metres.
+        rise_sigma: Its standard deviation, metres.
+        tilt: Tilt of the part against the model, radians.
+        tilt_sigma: Its standard deviation, radians.
+        residual: Root of the mean squared difference of explained heights, metres.
+    """
+
+    pixels: int
+    excess: float
+    patch: int
+    unexplained: float
+    rise: float
+    rise_sigma: float
+    tilt: float
+    tilt_sigma: float
+    residual: float
+
+    @classmethod
+    def of(cls, fit: Fit, seen: Seen, known: KnownPart) -> Mismatch:
+        """Compare an image with a fitted pose."""
+        plane = fit.look.top / 2
+        seen_map = view(fit.lying.points, fit.pose, seen.eye, plane=plane, cell=known.cell)
+        table = HeightTable(
+            seen_map, sigma=seen.sigma, soft=known.cell, flying=seen.pitch if seen.noisy else 0.0
+        )
+        pixels = Pixels.of(seen, plane, fit.pose[:2])
+        cells = table.cells(pixels, fit.pose[None])[0].numpy()
+        excess = table.excess(pixels, fit.pose[None])[0].numpy()
+        near_low, near_high = (bound.reshape(-1)[cells] for bound in seen_map.bounds(seen.pitch))
+        predicted = seen_map.heights.reshape(-1)[cells]
+        part = seen.on_part | (predicted > 0)
+        off = np.maximum(near_low - seen.heights, seen.heights - near_high)
+        missed = off > UNEXPLAINED_SIGMAS * seen.sigma + UNEXPLAINED
+        even = part & ~missed & (predicted > 0) & (near_high - near_low < EVEN)
+        residual = (seen.heights - predicted)[even]
+        rise, tilt, rise_sigma, tilt_sigma = _plane(
+            seen.points[even, :2] - fit.pose[:2], residual, seen.sigma
+        )
+        return cls(
+            pixels=int(np.count_nonzero(part)),
+            excess=float(excess[part].mean()),
+            patch=_largest_patch(excess, seen.window),
+            unexplained=float(missed[part].mean()),
+            rise=rise,
+            rise_sigma=rise_sigma,
+            tilt=tilt,
+            tilt_sigma=tilt_sigma,
+            residual=float(np.sqrt((residual**2).mean())) if len(residual) else 0.0,
+        )
+
+
+def _largest_patch(excess: np.ndarray, window: np.ndarray) -> int:
+    """Number of neighbouring pixels around which the mean of 3 x 3 is large."""
+    image, weight = np.zeros(window.shape, np.float32), window.astype(np.float32)
+    image[window] = excess
+    mean = cv2.blur(image, (3, 3)) / np.maximum(cv2.blur(weight, (3, 3)), 0.3)
+    _, labels = cv2.connectedComponents((window & (mean > LARGE)).astype(np.uint8), connectivity=4)
+    sizes = np.bincount(labels.ravel(), minlength=2)[1:]
+    return int(sizes.max())
+
+
+def _plane(xy: np.ndarray, heights: np.ndarray, sigma: float) -> tuple[float, float, float, float]:
+    """Fit a plane to heights: rise in the middle, tilt, and standard deviations of both."""
+    if len(heights) < 6:
+        return 0.0, 0.0, np.inf, np.inf
+    centred = xy - xy.mean(axis=0)
+    moments = centred.T @ centred
+    values, vectors = np.linalg.eigh(moments)
+    rise = float(np.median(heights)) if sigma < 1e-3 else float(heights.mean())
+    slopes = (vectors.T @ (centred.T @ (heights - heights.mean()))) / np.maximum(values, 1e-12)
+    wide = values > len(heights) * _LEVER**2
+    if not wide.any():
+        return rise, 0.0, sigma / np.sqrt(len(heights)), np.inf
+    sigmas = sigma / np.sqrt(values[wide])
+    worst = int(np.argmax(np.abs(slopes[wide]) / np.maximum(sigmas, 1e-3)))
+    return rise, float(abs(slopes[wide][worst])), sigma / np.sqrt(len(heights)), float(sigmas[worst])
+
+
+def reason_to_refuse(mismatch: Mismatch, seen: Seen) -> str:
+    """Why an image does not show the part in a resting pose; empty if it does."""
+    if seen.noisy:
+        most_excess = MOST_NOISY_EXCESS + EXCESS_SPREAD / np.sqrt(mismatch.pixels)
+        most_patch = MOST_PATCH
+    else:
+        most_excess, most_patch = MOST_EXCESS, MOST_PATCH + MOST_PATCH_SHARE * mismatch.pixels
+    if mismatch.excess > most_excess:
+        return f"{mismatch.unexplained:.0%} of its pixels are far from the part's surface"
+    if mismatch.patch > most_patch:
+        return f"a patch of {mismatch.patch} pixels is far from the part's surface"
+    if abs(mismatch.rise) > MOST_RISE + SIGNIFICANT * mismatch.rise_sigma:
+        return f"its surfaces are {1e3 * mismatch.rise:+.1f} mm from where they would be"
+    if mismatch.tilt > MOST_TILT + SIGNIFICANT * mismatch.tilt_sigma:
+        return f"it leans by {np.degrees(mismatch.tilt):.1f} degrees"
+    return ""

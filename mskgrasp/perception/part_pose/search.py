@@ -1,0 +1,218 @@
+"""Search for the poses whose heights, seen by the camera, fit those of an image best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import qmc
+
+from mskgrasp.perception.part_pose.known_part import MOST_COMPARED, KnownPart, Look, Lying
+from mskgrasp.perception.part_pose.likelihood import HeightTable, Pixels, Seen, view
+from mskgrasp.perception.part_pose.surface import HeightMap
+
+MODES = 16
+"""Turns and looks that are fitted roughly."""
+LOOK_MODES = 6
+"""The most of one look."""
+MOST_REFINED, NEAR_COST = 3, 30.0
+"""So many resting poses of a look are refined at the end, if their cost exceeds the least by less."""
+_NORMALS = qmc.MultivariateNormalQMC(np.zeros(3), rng=np.random.default_rng(0)).random(64)
+_NORMALS[0] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """A pose with its cost.
+
+    Attributes:
+        look: The look of the resting pose.
+        lying: The resting pose.
+        pose: (3,) x, y in base, metres, and turn of the resting pose's frame, radians.
+        covariance: (3, 3) of them.
+        cost: Negative logarithm of the likelihood of all pixels.
+    """
+
+    look: Look
+    lying: Lying
+    pose: np.ndarray
+    covariance: np.ndarray
+    cost: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How thoroughly a fit is improved.
+
+    Attributes:
+        rounds: Number of times that poses are drawn, around the mean of those before.
+        draws: Number of poses a round, at most 64.
+        pixels: Greatest number of pixels.
+        reach: Deviation of the first poses of a round, metres.
+        fine: Whether all points of the surface are used.
+    """
+
+    rounds: int
+    draws: int
+    pixels: int
+    reach: float
+    fine: bool
+
+
+ROUGH = Effort(rounds=2, draws=24, pixels=200, reach=1.5e-3, fine=False)
+CLOSER = Effort(rounds=2, draws=32, pixels=400, reach=0.8e-3, fine=False)
+CLOSE = Effort(rounds=2, draws=48, pixels=600, reach=0.5e-3, fine=True)
+FINAL = Effort(rounds=3, draws=64, pixels=1000, reach=0.2e-3, fine=True)
+
+
+def search(seen: Seen, known: KnownPart) -> list[Fit]:
+    """Find the poses that fit an image, the best first."""
+    fits = _best(_coarse(seen, known), MODES)
+    for effort, n in ((ROUGH, 6), (CLOSER, 3), (CLOSE, 2)):
+        fits = _best([improve(fit, seen, known, effort) for fit in fits], n)
+    found = []
+    for fit in fits:
+        likely = _resting_poses(fit, seen, known)
+        near = [one for one in likely[:MOST_REFINED] if one.cost < likely[0].cost + NEAR_COST]
+        found += [improve(one, seen, known, FINAL) for one in near]
+    return _best(found, len(found))
+
+
+def _coarse(seen: Seen, known: KnownPart) -> list[Fit]:
+    """All looks at all turns, the middle of the part where its pixels' is, as if seen from straight above."""
+    chosen = np.concatenate([_some(np.flatnonzero(which), 120) for which in (seen.on_part, ~seen.on_part)])
+    pixels = Pixels.of(seen, None, seen.centre).take(chosen)
+    found = []
+    for look in known.looks:
+        turns = np.arange(0, look.poses[0].period or 1.0, _turn_step(look) if look.poses[0].order else 1.0)
+        cos, sin = np.cos(turns)[:, None], np.sin(turns)[:, None]
+        x, y, _ = look.few[::5].T
+        along, across = cos * x - sin * y, sin * x + cos * y
+        low = np.stack([along.min(axis=1), across.min(axis=1)], axis=-1)
+        high = np.stack([along.max(axis=1), across.max(axis=1)], axis=-1)
+        # Of a narrow part in a noisy image an end may be missing, so that the other ends coincide.
+        shifts = np.maximum(seen.pitch, np.abs(high - low - seen.size) / 2)
+        steps = np.linspace(-1, 1, 3 if shifts.max() < 4 * seen.pitch else 5)
+        grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        places = seen.centre + grid * shifts[:, None] - (low + high)[:, None] / 2
+        poses = np.concatenate(
+            [places, np.broadcast_to(turns[:, None, None], (*places.shape[:2], 1))], axis=-1
+        )
+        table = HeightTable(look.from_above, sigma=max(seen.sigma, 1e-3), soft=seen.pitch, flying=0.0)
+        costs = table.costs(pixels, poses.reshape(-1, 3)).sum(dim=1).numpy().reshape(len(turns), -1)
+        best = costs.argmin(axis=1)
+        found += [
+            Fit(
+                look=look,
+                lying=look.poses[0],
+                pose=poses[i, k],
+                covariance=np.zeros((3, 3)),
+                cost=float(costs[i, k]),
+            )
+            for i, k in enumerate(best)
+        ]
+    return found
+
+
+def _some(index: np.ndarray, most: int) -> np.ndarray:
+    return index[:: max(1, int(np.ceil(len(index) / most)))]
+
+
+def _turn_step(look: Look) -> float:
+    """Turn between neighbouring tries, radians: two pixels at the part's end."""
+    return float(np.clip(4e-3 / look.radius, np.radians(3), np.radians(8)))
+
+
+def _best(fits: list[Fit], n: int) -> list[Fit]:
+    """The best fits of which no two are nearly the same."""
+    kept: list[Fit] = []
+    for fit in sorted(fits, key=lambda fit: fit.cost):
+        rivals = [other for other in kept if other.look is fit.look]
+        if len(rivals) < LOOK_MODES and not any(_near(fit, other) for other in rivals):
+            kept.append(fit)
+        if len(kept) == n:
+            break
+    return kept
+
+
+def _near(a: Fit, b: Fit) -> bool:
+    if a.lying is not b.lying:
+        return False
+    if not a.lying.order:
+        return True
+    period = a.lying.period
+    apart = abs((a.pose[2] - b.pose[2] + period / 2) % period - period / 2)
+    return apart < 1.6 * _turn_step(a.look)
+
+
+def improve(fit: Fit, seen: Seen, known: KnownPart, effort: Effort) -> Fit:
+    """Draw poses around a fit, and move it to their mean weighted by likelihood, round by round.
+
+    The cross-entropy method (Rubinstein, 1999); the poses of the last round are weighted as in importance
+    sampling, so that their mean and covariance are those of the distribution of the pose given the image.
+    """
+    look, turns = fit.look, bool(fit.lying.order)
+    points = fit.lying.points if effort.fine else look.few
+    cell = known.cell * (1.0 if effort.fine else max(1.0, np.sqrt(len(look.poses[0].points) / len(points))))
+    plane = look.top / 2
+    pixels = Pixels.of(seen, plane, fit.pose[:2])
+    seen_map = view(points, fit.pose, seen.eye, plane=plane, cell=cell)
+    table = HeightTable(seen_map, sigma=seen.sigma, soft=cell, flying=seen.pitch if seen.noisy else 0.0)
+    chosen, weight = _informative(table, seen_map, pixels, fit.pose, seen, effort.pixels)
+    some = pixels.take(chosen)
+    normals = _NORMALS[: effort.draws]
+    reach = np.array([effort.reach, effort.reach, turns * min(1.5 * effort.reach / look.radius, 0.1)])
+    least = 0.02e-3 / np.array([1.0, 1.0, look.radius])
+    root, mean, covariance = np.diag(reach), fit.pose, np.diag(reach**2)
+    for number in range(effort.rounds):
+        steps = normals @ root.T
+        costs = weight * table.costs(some, mean + steps).sum(dim=1).numpy().astype(float)
+        if number == effort.rounds - 1:
+            costs -= (normals**2).sum(axis=1) / 2
+        weights = _weights(costs)
+        shift = weights @ steps
+        covariance = (weights[:, None] * (steps - shift)).T @ (steps - shift)
+        mean = mean + shift
+        values, vectors = np.linalg.eigh(covariance + np.diag(least**2))
+        root = 1.5 * vectors * np.sqrt(values)
+        root[2] *= turns
+    cost = float(table.costs(pixels, mean[None]).sum()) - np.log(max(fit.lying.probability, 0.01))
+    return replace(fit, pose=mean, covariance=covariance, cost=cost)
+
+
+def _informative(
+    table: HeightTable, seen_map: HeightMap, pixels: Pixels, pose: np.ndarray, seen: Seen, most: int
+) -> tuple[np.ndarray, int]:
+    """Pixels near edges and slopes, whose height depends on the pose, and how many each stands for."""
+    low, high = seen_map.bounds(1.5 * seen.pitch)
+    cells = table.cells(pixels, pose[None])[0].numpy()
+    depends = np.flatnonzero((high - low).reshape(-1)[cells] > max(0.5e-3, 0.3 * seen.sigma))
+    if not len(depends):
+        depends = np.arange(len(cells))
+    step = max(1, int(np.ceil(len(depends) / max(most, 1))))
+    return depends[::step], step
+
+
+def _weights(costs: np.ndarray) -> np.ndarray:
+    """Weights by likelihood, at the least temperature at which a fifth of the draws count."""
+    above, heat = costs - costs.min(), 1.0
+    while True:
+        weights = np.exp(-above / heat)
+        weights /= weights.sum()
+        if 1 / (weights**2).sum() >= 0.2 * len(costs):
+            return weights
+        heat *= 1.3
+
+
+def _resting_poses(fit: Fit, seen: Seen, known: KnownPart) -> list[Fit]:
+    """The resting poses of a look, the best first."""
+    if len(fit.look.poses) == 1 or len(fit.look.poses) > MOST_COMPARED:
+        return [fit]
+    compared = Effort(rounds=0, draws=0, pixels=0, reach=0.0, fine=True)
+    tries = [improve(_as(fit, lying, fit.pose), seen, known, compared) for lying in fit.look.poses]
+    return sorted(tries, key=lambda one: one.cost)
+
+
+def _as(fit: Fit, lying: Lying, pose: np.ndarray) -> Fit:
+    """A pose of a fit's resting pose, for another that looks alike."""
+    return replace(fit, lying=lying, pose=pose + [0.0, 0.0, fit.lying.turn - lying.turn])

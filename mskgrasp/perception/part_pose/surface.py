@@ -1,0 +1,96 @@
+"""Surface of a part as points, and the heights of it that an eye above the table sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+
+def sample_surface(triangles: np.ndarray, spacing: float) -> np.ndarray:
+    """Sample triangles (n, 3, 3) in rows along their longest edges; neighbours are at most ``spacing`` apart.
+
+    Returns:
+        (k, 3) points, those of neighbouring triangles merged.
+    """
+    sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=-1)
+    first = np.argmax(sides, axis=1)
+    order = (first[:, None] + np.arange(3)) % 3
+    a, b, c = np.moveaxis(np.take_along_axis(triangles, order[..., None], axis=1), 1, 0)
+    length = sides[np.arange(len(sides)), first]
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=-1) / 2
+    height = 2 * area / np.maximum(length, 1e-12)
+    which, share = _fractions(np.ceil(height / spacing).astype(int) + 1)
+    starts = a[which] + share[:, None] * (c - a)[which]
+    ends = b[which] + share[:, None] * (c - b)[which]
+    row, along = _fractions(np.ceil(length[which] * (1 - share) / spacing).astype(int) + 1)
+    points = starts[row] + along[:, None] * (ends - starts)[row]
+    cell = np.round(points / (0.6 * spacing)).astype(np.int64)
+    _, kept = np.unique(cell @ np.array([1, 1 << 20, 1 << 40]), return_index=True)
+    return points[kept]
+
+
+def _fractions(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Number ``counts[i]`` items of every i from 0 to 1: i, and the fraction, of every item."""
+    which = np.repeat(np.arange(len(counts)), counts)
+    number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return which, number / np.maximum(counts[which] - 1, 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeightMap:
+    """Heights that an eye sees, over the plane at ``plane`` through which its rays pass.
+
+    Attributes:
+        heights: (h, w) metres over the table, 0 where the ray ends on the table; row along y, column along x.
+        corner: (2,) x, y of the middle of cell (0, 0), metres.
+        cell: Edge of a cell, metres.
+        plane: Height of the plane, metres; an eye at infinity has none.
+    """
+
+    heights: np.ndarray
+    corner: np.ndarray
+    cell: float
+    plane: float
+
+    def bounds(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest height (h, w) within a square of ``reach`` around each cell."""
+        size = 2 * max(1, round(reach / self.cell)) + 1
+        square = np.ones((size, size), np.uint8)
+        return cv2.erode(self.heights, square), cv2.dilate(self.heights, square)
+
+
+def heights_from(
+    points: np.ndarray, eye: np.ndarray | None, *, plane: float, cell: float, margin: float
+) -> HeightMap:
+    """Compute the heights of a part that an eye sees.
+
+    Args:
+        points: (n, 3) float32 on its surface, z from the table, metres.
+        eye: (3,) place of the eye in the same frame; None: straight above, infinitely far.
+        plane: Height of the plane in which the map lies, metres.
+        cell: Edge of a cell, metres, not less than the distance of neighbouring points.
+        margin: Empty border around the part, metres.
+    """
+    x, y = on_plane(points, eye, plane)
+    low = np.array([x.min(), y.min()]) - margin
+    width, height = (int(n) + 1 for n in (np.array([x.max(), y.max()]) + margin - low) / cell + 0.5)
+    scale, first = np.float32(1 / cell), (low / cell).astype(np.float32)
+    column = (x * scale - (first[0] - np.float32(0.5))).astype(np.int32)
+    row = (y * scale - (first[1] - np.float32(0.5))).astype(np.int32)
+    heights = np.zeros(width * height, np.float32)
+    np.maximum.at(heights, row * width + column, points[:, 2])
+    # Between points that are nearly a cell apart a cell may be missed.
+    heights = cv2.morphologyEx(heights.reshape(height, width), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    return HeightMap(heights=heights, corner=low, cell=cell, plane=plane)
+
+
+def on_plane(points: np.ndarray, eye: np.ndarray | None, plane: float) -> tuple[np.ndarray, np.ndarray]:
+    """Compute x and y (n,) where the rays from an eye through points (n, 3) pass a height, metres."""
+    x, y, z = points.T
+    if eye is None:
+        return x, y
+    eye = np.asarray(eye, points.dtype)
+    scale = (eye[2] - points.dtype.type(plane)) / (eye[2] - z)
+    return eye[0] + (x - eye[0]) * scale, eye[1] + (y - eye[1]) * scale

@@ -1,0 +1,325 @@
+"""Poses of parts with known CAD, in a simulated cell. Run: python -m tests.benchmarks.part_pose --help.
+
+Places parts at random in their resting poses, finds them in the rendered image with and without noise, and
+compares with the simulator's pose. Then shows what must be refused: other parts, at random and of the nearest
+size in the family, parts that lean, parts with a block under an edge, and parts that touch another.
+
+A turn counts up to the symmetry of the resting pose, and between resting poses that look alike (`Look`).
+Times are those of the whole call, on the given number of threads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import torch
+
+from hal.camera import RgbdFrame
+from hal.cell import Cell
+from hal.open_cell import open_cell
+from hal.sensor_noise import NoiseModel, SensorNoise, add_noise
+from mskgrasp.core.errors import NoPartFound, PartNotRecognised
+from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing, wrap_angle
+from mskgrasp.parts import chosen_names, find_part
+from mskgrasp.parts.catalogue import Entry, read_index, representative_entries
+from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
+from mskgrasp.runtime.console_table import Table
+from mskgrasp.runtime.progress import progress
+from tests.benchmarks.report import show
+
+BOUNDS = {
+    "off": (0.5e-3, np.radians(0.7)),
+    "iid": (1e-3, np.radians(1.5)),
+    "kinect2": (1e-3, np.radians(1.5)),
+}
+"""Errors that count as right, metres and radians, by noise."""
+LEANS = (2.0, 4.0, 8.0)
+"""Degrees by which parts lean that must be refused."""
+CHI_SQUARED_95 = {2: 5.99, 3: 7.81}
+"""What the squared error over the covariance exceeds in 5 %, by the number of unknowns."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """A part in an image.
+
+    Attributes:
+        frame: Without noise.
+        T_base_obj: The simulator's pose.
+        seed: Of the placement, and of the noise.
+    """
+
+    part: str
+    frame: RgbdFrame
+    T_base_obj: Pose
+    seed: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """What was found in an image of the right part; lengths in metres, angles in radians.
+
+    Attributes:
+        refused: Whether it was taken for no pose of the part.
+        resting: Whether the resting pose is right.
+        look: Whether it looks like the right one.
+        offset: (2,) error of the place.
+        turn: Error of the turn, up to symmetry.
+        squared: Squared error over the covariance.
+        seconds: Time of the call, and of all processors for it.
+        unknowns: 3; 2 where any turn looks the same.
+        among: Whether the right resting pose is the one found or an alternative.
+    """
+
+    part: str
+    seconds: tuple[float, float]
+    refused: bool = False
+    resting: bool = False
+    look: bool = False
+    among: bool = False
+    offset: np.ndarray | None = None
+    turn: float = 0.0
+    squared: float = 0.0
+    unknowns: int = 3
+
+    def within(self, bounds: tuple[float, float]) -> bool:
+        """Whether it is right within bounds of place and turn."""
+        if self.offset is None or not self.look:
+            return False
+        return bool(np.linalg.norm(self.offset) < bounds[0] and abs(self.turn) < bounds[1])
+
+
+def shown_parts(cell: Cell, names: Sequence[str], poses: int) -> Iterator[Shown]:
+    """Every part at ``poses`` random places, in resting poses by their probability."""
+    assert cell.feeder is not None and cell.tracker is not None
+    for name in names:
+        for seed in range(poses):
+            cell.feeder.present(name, seed)
+            yield Shown(
+                part=name, frame=cell.camera.capture(), T_base_obj=cell.tracker.part_pose(), seed=seed
+            )
+
+
+def with_noise(shown: Shown, model: NoiseModel) -> tuple[RgbdFrame, float]:
+    """The frame with noise, and the least height of a part in it."""
+    noise = SensorNoise(model=model)
+    seed = [shown.seed, *shown.part.encode()]
+    depth = add_noise(shown.frame.depth, shown.frame.intrinsics, noise, np.random.default_rng(seed))
+    return replace(shown.frame, depth=depth), noise.least_height
+
+
+def find(
+    cell: Cell, shown: Shown, model: NoiseModel, known: KnownPart
+) -> tuple[PartPose | None, tuple[float, float]]:
+    """The pose found, None if the part was refused, and the time by the clock and of the processors."""
+    frame, min_height = with_noise(shown, model)
+    start = time.perf_counter(), time.process_time()
+    try:
+        found = find_part_pose(
+            frame, known, table_z=cell.workspace.table_z, region=cell.workspace.region, min_height=min_height
+        )
+    except (PartNotRecognised, NoPartFound):
+        found = None
+    return found, (time.perf_counter() - start[0], time.process_time() - start[1])
+
+
+def result(shown: Shown, found: PartPose | None, seconds: tuple[float, float], known: KnownPart) -> Result:
+    """Compare what was found with the simulator's pose."""
+    if found is None:
+        return Result(part=shown.part, seconds=seconds, refused=True)
+    true_resting, true_turn = resting_of(shown.T_base_obj, known)
+    offset = np.asarray(found.T_base_obj.position - shown.T_base_obj.position)[:2]
+    lying = {one.resting: (one, look) for look in known.looks for one in look.poses}
+    one, look = lying[found.resting]
+    if true_resting not in lying or lying[true_resting][1] is not look:
+        return Result(part=shown.part, seconds=seconds, offset=offset)
+    true = lying[true_resting][0]
+    turn = 0.0
+    if found.symmetry:
+        _, found_turn = resting_of(found.T_base_obj, known)
+        period = 2 * np.pi / found.symmetry
+        turn = (found_turn + one.turn - true_turn - true.turn + period / 2) % period - period / 2
+    unknowns = 3 if found.symmetry else 2
+    error = np.array([*offset, turn])[:unknowns]
+    squared = float(error @ np.linalg.solve(found.covariance[:unknowns, :unknowns], error))
+    others = [found.resting, *(other.resting for other in found.alternatives)]
+    return Result(
+        part=shown.part,
+        seconds=seconds,
+        resting=found.resting == true_resting,
+        look=True,
+        among=true_resting in others,
+        offset=offset,
+        turn=float(turn),
+        squared=squared,
+        unknowns=unknowns,
+    )
+
+
+def resting_of(T_base_obj: Pose, known: KnownPart) -> tuple[int, float]:  # noqa: N803 (a pose's name)
+    """The resting pose nearest to a pose, and the turn from it about the vertical."""
+    between = quat_multiply(T_base_obj.quat_wxyz, quat_conjugate(known.part.resting.quat_wxyz))
+    twist, swing = twist_and_swing(between)
+    nearest = int(np.argmin(swing))
+    return nearest, float(wrap_angle(twist[nearest]))
+
+
+def accuracy_row(model: NoiseModel, results: Sequence[Result]) -> list[str]:
+    """Shares and errors of the right parts, for the table."""
+    accepted = [one for one in results if not one.refused]
+    right = [one for one in accepted if one.look and one.offset is not None]
+    place = 1e3 * np.array([np.linalg.norm(one.offset) for one in right if one.offset is not None])
+    turn = np.degrees(np.abs([one.turn for one in right]))
+    wall, processor = 1e3 * np.array([one.seconds for one in results]).T
+    inside = [one.squared < CHI_SQUARED_95[one.unknowns] for one in right]
+    bounds = BOUNDS[model]
+
+    def share(values: Sequence[bool]) -> str:
+        return f"{np.mean(values):.1%}"
+
+    return [
+        model, str(len(results)), str(len(results) - len(accepted)),
+        share([one.look for one in accepted]), share([one.among for one in accepted]),
+        share([one.resting for one in accepted]),
+        share([one.within(bounds) for one in results]), share([one.within(bounds) for one in accepted]),
+        f"{np.median(place):.2f}", f"{np.percentile(place, 95):.2f}",
+        f"{np.median(turn):.2f}", f"{np.percentile(turn, 95):.2f}",
+        share(inside), f"{np.median(wall):.0f}", f"{np.percentile(wall, 95):.0f}",
+        f"{np.median(processor):.0f}", f"{np.percentile(processor, 95):.0f}",
+    ]  # fmt: skip
+
+
+def wrong_parts(names: Sequence[str], rng: np.random.Generator) -> dict[str, dict[str, str]]:
+    """Of every part, another one at random, and that of its family whose edges are nearest."""
+    index = read_index().parts
+    kinds: dict[str, dict[str, str]] = {"another part": {}, "the nearest size": {}}
+    for name in names:
+        kinds["another part"][name] = str(rng.choice([one for one in names if one != name]))
+        family = [one for one in index.values() if one.family == index[name].family and one.name != name]
+        if family:
+            kinds["the nearest size"][name] = min(family, key=lambda one: _unlike(one, index[name])).name
+    return kinds
+
+
+def _unlike(a: Entry, b: Entry) -> float:
+    return float(np.abs(np.log(np.array(a.extents) / np.array(b.extents))).max())
+
+
+def leaning(cell: Cell, shown: Shown, degrees: float, known: KnownPart) -> Shown:
+    """A part tilted about a random horizontal axis, its lowest point on the table (the MuJoCo cell)."""
+    angle = np.random.default_rng(shown.seed).uniform(-np.pi, np.pi)
+    half = np.radians(degrees) / 2
+    tilt = np.array([np.cos(half), np.sin(half) * np.cos(angle), np.sin(half) * np.sin(angle), 0.0])
+    pose = Pose(position=shown.T_base_obj.position, quat_wxyz=quat_multiply(tilt, shown.T_base_obj.quat_wxyz))
+    lying = next(one for look in known.looks for one in look.poses)
+    T_table_obj = Pose(  # noqa: N806
+        position=known.part.resting.position[lying.resting],
+        quat_wxyz=known.part.resting.quat_wxyz[lying.resting],
+    )
+    surface = T_table_obj.inverse().apply(lying.points.astype(float))
+    lift = cell.workspace.table_z - pose.apply(surface)[:, 2].min()
+    return show_at(cell, shown, Pose(position=pose.position + [0, 0, lift], quat_wxyz=pose.quat_wxyz))
+
+
+def show_at(cell: Cell, shown: Shown, T_base_obj: Pose) -> Shown:  # noqa: N803 (a pose's name)
+    """The part at any pose, held by nothing (the MuJoCo cell: its camera simulates no physics)."""
+    feeder: Any = cell.feeder
+    feeder.present(shown.part, shown.seed)
+    feeder.simulation.data.joint("part0").qpos[:] = T_base_obj.as_vector()
+    return replace(shown, frame=cell.camera.capture(), T_base_obj=T_base_obj)
+
+
+def touching(shown: Shown, table_z: float) -> Shown:
+    """The part with a copy of its pixels beside it."""
+    frame = shown.frame
+    table = float(np.nanmax(frame.depth))
+    mask = (frame.depth < table - 0.002).astype(np.uint8)
+    columns = np.flatnonzero(mask.any(axis=0))
+    width = columns[-1] - columns[0] + 1
+    side = -1 if columns[0] > frame.depth.shape[1] - columns[-1] else 1
+    moved = np.full_like(frame.depth, table)
+    # Pixels of an overhead image: the copy's sides are seen as the part's.
+    rows, columns = np.nonzero(mask)
+    inside = (columns + side * width >= 0) & (columns + side * width < mask.shape[1])
+    rows, columns = rows[inside], columns[inside]
+    moved[rows, columns + side * width] = frame.depth[rows, columns]
+    return replace(shown, frame=replace(frame, depth=np.fmin(frame.depth, moved)))
+
+
+def main() -> None:
+    """Prints a table of the right parts, and one of what must be refused."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument(
+        "--parts", nargs="+", default=["validation"], help="names or sets (default: validation)"
+    )
+    parser.add_argument(
+        "--n-parts", type=int, default=45, help="about so many of a catalogue's set (default 45)"
+    )
+    parser.add_argument("--poses", type=int, default=6, help="placements of each part (default 6)")
+    parser.add_argument(
+        "--cell", type=Path, default=Path("configs/cells/sapien.yaml"), help="cell of the right parts"
+    )
+    parser.add_argument(
+        "--mujoco", type=Path, default=Path("configs/cells/mujoco.yaml"), help="cell of leaning parts"
+    )
+    parser.add_argument("--noise", nargs="+", choices=get_args(NoiseModel), default=["off", "kinect2"])
+    parser.add_argument("--threads", type=int, default=2, help="of torch (default 2; 1 on a busy machine)")
+    parser.add_argument("--out", type=Path, help="folder for report.json")
+    options = parser.parse_args()
+    torch.set_num_threads(options.threads)
+    names = chosen_names(options.parts)
+    index = read_index().parts
+    if len(names) > options.n_parts:
+        names = [one.name for one in representative_entries([index[name] for name in names], options.n_parts)]
+    known = {name: KnownPart.of(find_part(name)) for name in progress(names, unit="part", title="prepare")}
+    results: dict[NoiseModel, list[Result]] = {model: [] for model in options.noise}
+    refused: dict[tuple[str, NoiseModel], list[bool]] = {}
+    kinds = wrong_parts(names, np.random.default_rng(0))
+    extra = {other for pairs in kinds.values() for other in pairs.values()} - set(known)
+    known |= {
+        name: KnownPart.of(find_part(name)) for name in progress(sorted(extra), unit="part", title="others")
+    }
+    with open_cell(options.cell) as cell:
+        every = shown_parts(cell, names, options.poses)
+        for shown in progress(every, unit="image", total=len(names) * options.poses, title="right parts"):
+            for model in options.noise:
+                found, seconds = find(cell, shown, model, known[shown.part])
+                results[model].append(result(shown, found, seconds, known[shown.part]))
+                if shown.seed >= 2:
+                    continue
+                for kind, pairs in kinds.items():
+                    if shown.part in pairs:
+                        other, _ = find(cell, shown, model, known[pairs[shown.part]])
+                        refused.setdefault((kind, model), []).append(other is None)
+                other, _ = find(cell, touching(shown, cell.workspace.table_z), model, known[shown.part])
+                refused.setdefault(("two that touch", model), []).append(other is None)
+    with open_cell(options.mujoco) as cell:
+        for shown in progress(
+            shown_parts(cell, names, 1), unit="image", total=len(names), title="leaning parts"
+        ):
+            for degrees in LEANS:
+                tilted = leaning(cell, shown, degrees, known[shown.part])
+                for model in options.noise:
+                    other, _ = find(cell, tilted, model, known[shown.part])
+                    refused.setdefault((f"leans by {degrees:g} degrees", model), []).append(other is None)
+    header = (
+        "noise", "images", "refused", "look right", "resting among those given", "resting right",
+        "within bounds, of all", "of those accepted", "mm", "95 %", "deg", "95 %", "inside 95 % ellipse",
+        "ms", "95 %", "processor ms", "95 %",
+    )  # fmt: skip
+    rows = [accuracy_row(model, found) for model, found in results.items()]
+    wrong = [(kind, model, str(len(one)), f"{np.mean(one):.1%}") for (kind, model), one in refused.items()]
+    show(
+        [Table(header=header, rows=rows), Table(header=("shown", "noise", "images", "refused"), rows=wrong)],
+        options.out,
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,60 @@
+"""Frames of simulated cells with a part in a known pose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hal.camera import RgbdFrame
+from hal.cell import Cell
+from hal.sensor_noise import SensorNoise, add_noise
+from mskgrasp.core.geometry import Pose, quat_about_z
+from mskgrasp.parts import find_part
+from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
+
+_KNOWN: dict[str, KnownPart] = {}
+
+
+def known(name: str) -> KnownPart:
+    """A part of the starter set, prepared once."""
+    if name not in _KNOWN:
+        _KNOWN[name] = KnownPart.of(find_part(name))
+    return _KNOWN[name]
+
+
+def presented(cell: Cell, name: str, seed: int) -> tuple[RgbdFrame, Pose]:
+    """A frame of a part that the cell's feeder placed, and the simulator's pose."""
+    assert cell.feeder is not None and cell.tracker is not None
+    cell.feeder.present(name, seed)
+    return cell.camera.capture(), cell.tracker.part_pose()
+
+
+def resting_at(name: str, resting: int, x: float, y: float, turn: float) -> Pose:
+    """``T_base_obj`` of a part in one of its resting poses."""
+    poses = find_part(name).resting
+    place = Pose(position=np.array([x, y, 0.0]), quat_wxyz=quat_about_z(np.array(turn)))
+    return place @ Pose(position=poses.position[resting], quat_wxyz=poses.quat_wxyz[resting])
+
+
+def posed(cell: Cell, name: str, T_base_obj: Pose) -> RgbdFrame:  # noqa: N803 (a pose's name)
+    """A frame of a part at any pose in the MuJoCo cell, whose camera simulates no physics."""
+    feeder: Any = cell.feeder
+    feeder.present(name, 0)
+    feeder.simulation.data.joint("part0").qpos[:] = T_base_obj.as_vector()
+    return cell.camera.capture()
+
+
+def kinect2(frame: RgbdFrame, seed: int) -> RgbdFrame:
+    """The frame with the noise of a Kinect v2."""
+    rng = np.random.default_rng(seed)
+    return replace(frame, depth=add_noise(frame.depth, frame.intrinsics, SensorNoise(model="kinect2"), rng))
+
+
+def find(cell: Cell, frame: RgbdFrame, name: str, min_height: float = 0.002) -> PartPose:
+    """The pose of a part of the starter set in a frame."""
+    space = cell.workspace
+    return find_part_pose(
+        frame, known(name), table_z=space.table_z, region=space.region, min_height=min_height
+    )
