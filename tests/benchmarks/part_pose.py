@@ -212,18 +212,20 @@ def _unlike(a: Entry, b: Entry) -> float:
 
 
 def leaning(cell: Cell, shown: Shown, degrees: float, known: KnownPart) -> Shown:
-    """A part tilted about a random horizontal axis, its lowest point on the table (the MuJoCo cell)."""
-    angle = np.random.default_rng(shown.seed).uniform(-np.pi, np.pi)
-    half = np.radians(degrees) / 2
-    tilt = np.array([np.cos(half), np.sin(half) * np.cos(angle), np.sin(half) * np.sin(angle), 0.0])
-    pose = Pose(position=shown.T_base_obj.position, quat_wxyz=quat_multiply(tilt, shown.T_base_obj.quat_wxyz))
-    lying = next(one for look in known.looks for one in look.poses)
-    T_table_obj = Pose(  # noqa: N806
-        position=known.part.resting.position[lying.resting],
-        quat_wxyz=known.part.resting.quat_wxyz[lying.resting],
+    """A part with one end raised, its lowest point on the table (the MuJoCo cell)."""
+    resting, _ = resting_of(shown.T_base_obj, known)
+    lying = next(one for look in known.looks for one in look.poses if one.resting == resting)
+    T_table_obj = Pose(  # noqa: N806 (a pose's name)
+        position=known.part.resting.position[resting], quat_wxyz=known.part.resting.quat_wxyz[resting]
     )
-    surface = T_table_obj.inverse().apply(lying.points.astype(float))
-    lift = cell.workspace.table_z - pose.apply(surface)[:, 2].min()
+    surface = shown.T_base_obj.apply(T_table_obj.inverse().apply(lying.points.astype(float)))
+    _, axes = np.linalg.eigh(np.cov(surface[:, :2].T))
+    half = np.radians(degrees) / 2
+    # About the short axis: a round part that turns about its long one rolls to where it rests as well.
+    tilt = np.array([np.cos(half), *(np.sin(half) * axes[:, 0]), 0.0])
+    pose = Pose(position=shown.T_base_obj.position, quat_wxyz=quat_multiply(tilt, shown.T_base_obj.quat_wxyz))
+    moved = pose.apply(shown.T_base_obj.inverse().apply(surface))
+    lift = cell.workspace.table_z - moved[:, 2].min()
     return show_at(cell, shown, Pose(position=pose.position + [0, 0, lift], quat_wxyz=pose.quat_wxyz))
 
 
@@ -241,8 +243,9 @@ def touching(shown: Shown, table_z: float) -> Shown:
     table = float(np.nanmax(frame.depth))
     mask = (frame.depth < table - 0.002).astype(np.uint8)
     columns = np.flatnonzero(mask.any(axis=0))
-    width = columns[-1] - columns[0] + 1
     side = -1 if columns[0] > frame.depth.shape[1] - columns[-1] else 1
+    widest = int(columns[-1] - columns[0])
+    width = 1 + max(n for n in range(widest + 1) if (mask & np.roll(mask, side * n, axis=1)).any())
     moved = np.full_like(frame.depth, table)
     # Pixels of an overhead image: the copy's sides are seen as the part's.
     rows, columns = np.nonzero(mask)

@@ -1,4 +1,4 @@
-"""What the search for a part's pose must know of the part: its looks from above, and its symmetries."""
+"""Part prepared for the search for its pose: points of its surface, looks from above, and symmetries."""
 
 from __future__ import annotations
 
@@ -102,6 +102,9 @@ class KnownPart:
             part: The part.
             stands: Of each resting pose, whether it is looked for (`mskgrasp.simulation.resting.resting_of`);
                 None: all are.
+
+        Raises:
+            ValueError: None is.
         """
         mesh = trimesh.load_mesh(part.mesh_path)
         spacing = max(LEAST_SPACING, float(np.sqrt(mesh.area / MOST_POINTS)))
@@ -109,6 +112,8 @@ class KnownPart:
         cell = spacing / 0.7
         groups: list[list[tuple[_Seen, float]]] = []
         chosen = [i for i in range(len(part.resting_probability)) if stands is None or stands[i]]
+        if not chosen:
+            raise ValueError(f"none of the {len(part.resting_probability)} resting poses of {part.name} counts")
         for index in chosen:
             seen = _Seen.of(part, index, points_obj, cell)
             for group in groups:

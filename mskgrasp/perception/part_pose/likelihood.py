@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 
 from mskgrasp.perception.part_pose.surface import HeightMap, heights_from, on_plane
 
@@ -52,22 +51,25 @@ class Seen:
 class Pixels:
     """Pixels by where their rays pass a plane: (n,) float32 x, y from ``origin``, and heights, metres."""
 
-    x: torch.Tensor
-    y: torch.Tensor
-    heights: torch.Tensor
+    x: np.ndarray
+    y: np.ndarray
+    heights: np.ndarray
     origin: np.ndarray
 
     @classmethod
     def of(cls, seen: Seen, plane: float | None, origin: np.ndarray) -> Pixels:
         """Pixels in a plane; None: where they are seen, as from straight above."""
         x, y = on_plane(seen.points, None if plane is None else seen.eye, plane or 0.0)
-        x, y = (torch.from_numpy((v - o).astype(np.float32)) for v, o in zip((x, y), origin, strict=True))
-        return cls(x=x, y=y, heights=torch.from_numpy(seen.heights.astype(np.float32)), origin=origin)
+        return cls(
+            x=(x - origin[0]).astype(np.float32),
+            y=(y - origin[1]).astype(np.float32),
+            heights=seen.heights.astype(np.float32),
+            origin=origin,
+        )
 
     def take(self, which: np.ndarray) -> Pixels:
         """Some of the pixels."""
-        index = torch.from_numpy(which)
-        return Pixels(x=self.x[index], y=self.y[index], heights=self.heights[index], origin=self.origin)
+        return Pixels(x=self.x[which], y=self.y[which], heights=self.heights[which], origin=self.origin)
 
 
 class HeightTable:
@@ -85,57 +87,74 @@ class HeightTable:
 
     def __init__(self, seen_map: HeightMap, *, sigma: float, soft: float, flying: float):
         self._corner, self._cell, self._shape = seen_map.corner, seen_map.cell, seen_map.heights.shape
-        self._scale = 1 / (np.sqrt(2) * sigma)
+        self._scale = np.float32(1 / (np.sqrt(2) * sigma))
         width = np.float32(sigma * np.sqrt(2 * np.pi))
         low, high = seen_map.bounds(soft)
         # At a cliff a height is one of both ends, between which the chances are even.
-        columns = [low, high, (1 - OUTLIERS) / (width + np.minimum(high - low, width))]
+        usual = np.float32(1 - OUTLIERS) / (width + np.minimum(high - low, width))
+        columns = [low, high, usual]
         if flying:
             least, most = seen_map.bounds(flying)
             share = np.where(most - least > FLYING_FROM, np.float32(FLYING), np.float32(0))
             columns[2] *= 1 - share
             columns += [least, most, share / (most - least + width)]
-        self._table = torch.from_numpy(np.stack(columns, axis=-1).reshape(-1, len(columns)))
+        self._columns = [column.reshape(-1) for column in columns]
 
-    def cells(self, pixels: Pixels, poses: np.ndarray) -> torch.Tensor:
+    def cells(self, pixels: Pixels, poses: np.ndarray) -> np.ndarray:
         """Index (m, n) of the cell that every pixel sees of the part at poses (m, 3)."""
         cos, sin = np.cos(poses[:, 2]) / self._cell, np.sin(poses[:, 2]) / self._cell
         x, y = (poses[:, :2] - pixels.origin).T
         # Half a cell is added, because numbers are rounded towards zero.
         first = 0.5 - self._corner / self._cell
-        to_column = np.stack([cos, sin, first[0] - cos * x - sin * y], axis=-1).astype(np.float32)
-        to_row = np.stack([-sin, cos, first[1] + sin * x - cos * y], axis=-1).astype(np.float32)
-        points = torch.stack([pixels.x, pixels.y, torch.ones_like(pixels.x)])
-        column = (torch.from_numpy(to_column) @ points).clamp_(0, self._shape[1] - 1).to(torch.int32)
-        row = (torch.from_numpy(to_row) @ points).clamp_(0, self._shape[0] - 1).to(torch.int32)
-        return row.mul_(self._shape[1]).add_(column)
+        column = self._along(pixels, cos, sin, first[0] - cos * x - sin * y, self._shape[1])
+        row = self._along(pixels, -sin, cos, first[1] + sin * x - cos * y, self._shape[0])
+        row *= self._shape[1]
+        row += column
+        return row
 
-    def costs(self, pixels: Pixels, poses: np.ndarray) -> torch.Tensor:
+    @staticmethod
+    def _along(pixels: Pixels, x: np.ndarray, y: np.ndarray, first: np.ndarray, n: int) -> np.ndarray:
+        place = np.multiply.outer(x.astype(np.float32), pixels.x)
+        place += np.multiply.outer(y.astype(np.float32), pixels.y)
+        place += first.astype(np.float32)[:, None]
+        return np.clip(place, 0, n - 1, out=place).astype(np.int32)
+
+    def costs(self, pixels: Pixels, poses: np.ndarray) -> np.ndarray:
         """Negative logarithm (m, n) of the likelihood of every pixel at poses (m, 3): x, y in base, turn."""
         cells = self.cells(pixels, poses)
-        found = self._table.index_select(0, cells.view(-1)).view(*cells.shape, -1)
-        likely = self._bell(pixels.heights, found[..., 0], found[..., 1]).mul_(found[..., 2])
-        if found.shape[-1] > 3:
-            likely += self._bell(pixels.heights, found[..., 3], found[..., 4]).mul_(found[..., 5])
-        return likely.add_(OUTLIERS / OUTLIER_RANGE).log_().neg_()
+        likely = self._bell(pixels.heights, cells, 0)
+        if len(self._columns) > 3:
+            likely += self._bell(pixels.heights, cells, 3)
+        likely += np.float32(OUTLIERS / OUTLIER_RANGE)
+        return np.negative(np.log(likely, out=likely), out=likely)
 
-    def excess(self, pixels: Pixels, poses: np.ndarray) -> torch.Tensor:
-        """By how much the costs (m, n) exceed those of the most likely height at the same cell.
+    def excess(self, pixels: Pixels, pose: np.ndarray) -> np.ndarray:
+        """By how much the costs (n,) at a pose exceed those of the most likely heights at the same cells.
 
         What pixels that float near an edge cost on average is subtracted.
         """
-        found = self._table[self.cells(pixels, poses).long()]
-        usual, least = found[..., 2], OUTLIERS / OUTLIER_RANGE
-        if found.shape[-1] == 3:
-            return self.costs(pixels, poses) + (usual + least).log()
-        floating = found[..., 5]
-        share = torch.where(floating > 0, FLYING, 0.0)
-        expected = share * ((usual + floating + least) / (floating + least)).log()
-        return self.costs(pixels, poses) + (usual + floating + least).log() - expected
+        cells = self.cells(pixels, pose[None])[0]
+        usual, least = self._columns[2][cells], OUTLIERS / OUTLIER_RANGE
+        costs = self.costs(pixels, pose[None])[0]
+        if len(self._columns) == 3:
+            return costs + np.log(usual + least)
+        floating = self._columns[5][cells]
+        share = np.where(floating > 0, FLYING, 0.0)
+        best = np.log(usual + floating + least)
+        return costs + best - share * (best - np.log(floating + least))
 
-    def _bell(self, heights: torch.Tensor, low: torch.Tensor, high: torch.Tensor) -> torch.Tensor:
-        off = torch.maximum(low - heights, heights - high).clamp_(min=0).mul_(self._scale)
-        return off.square_().neg_().exp_()
+    def _bell(self, heights: np.ndarray, cells: np.ndarray, first: int) -> np.ndarray:
+        low, high, factor = self._columns[first : first + 3]
+        off = low.take(cells)
+        off -= heights
+        np.maximum(off, heights - high.take(cells), out=off)
+        np.maximum(off, 0, out=off)
+        off *= self._scale
+        np.square(off, out=off)
+        np.negative(off, out=off)
+        np.exp(off, out=off)
+        off *= factor.take(cells)
+        return off
 
 
 def view(points: np.ndarray, pose: np.ndarray, eye: np.ndarray, *, plane: float, cell: float) -> HeightMap:

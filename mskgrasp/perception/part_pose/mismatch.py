@@ -1,4 +1,4 @@
-"""What of an image a fitted pose does not explain."""
+"""Differences between an image and a fitted pose, and which of them refuse the part."""
 
 from __future__ import annotations
 
@@ -15,16 +15,21 @@ UNEXPLAINED, UNEXPLAINED_SIGMAS = 0.7e-3, 3.5
 """A height farther from all of the model's within a pixel is unexplained: metres, and deviations of noise."""
 EVEN = 2e-3
 """Range of heights within a pixel up to which a surface counts as even, metres."""
+FARTHEST = 5e-3
+"""Heights that differ by more are of something else, metres; deviations of noise are added."""
 _LEVER = 2e-3
 """A surface whose points deviate less from their middle, metres, shows no tilt in that direction."""
 LARGE = 2.5
 """Mean excess of 3 x 3 pixels that is large: chance exceeds it once in a million."""
-MOST_PATCH, MOST_PATCH_SHARE = 5, 0.02
-"""Greatest patch of large excess: pixels, and in an exact image a share of the part's pixels more."""
+MOST_PATCH, MOST_PATCH_SHARE = 5, 0.03
+"""Greatest patch of large excess: pixels, and in an exact image a share of the part's pixels more: there a
+facet of a body of revolution differs from the next by more than the noise."""
 MOST_EXCESS = 0.8
 """Greatest mean excess of an exact image."""
-MOST_NOISY_EXCESS, EXCESS_SPREAD = 0.6, 4.0
+MOST_NOISY_EXCESS, EXCESS_SPREAD = 0.45, 3.5
 """The same of a noisy one, and what is added to it over the root of the number of pixels."""
+MOST_UNEXPLAINED = 0.1
+"""Greatest share of pixels that are unexplained."""
 MOST_RISE, MOST_TILT = 0.4e-3, np.radians(1.2)
 """Greatest rise, metres, and tilt, radians: hulls in a simulation lean by up to a degree."""
 SIGNIFICANT = 4.0
@@ -44,7 +49,7 @@ class Mismatch:
         rise_sigma: Its standard deviation, metres.
         tilt: Tilt of the part against the model, radians.
         tilt_sigma: Its standard deviation, radians.
-        residual: Root of the mean squared difference of explained heights, metres.
+        residual: Root of the mean squared difference of heights on even surfaces, metres.
     """
 
     pixels: int
@@ -66,15 +71,17 @@ class Mismatch:
             seen_map, sigma=seen.sigma, soft=known.cell, flying=seen.pitch if seen.noisy else 0.0
         )
         pixels = Pixels.of(seen, plane, fit.pose[:2])
-        cells = table.cells(pixels, fit.pose[None])[0].numpy()
-        excess = table.excess(pixels, fit.pose[None])[0].numpy()
+        cells = table.cells(pixels, fit.pose[None])[0]
+        excess = table.excess(pixels, fit.pose)
         near_low, near_high = (bound.reshape(-1)[cells] for bound in seen_map.bounds(seen.pitch))
         predicted = seen_map.heights.reshape(-1)[cells]
         part = seen.on_part | (predicted > 0)
         off = np.maximum(near_low - seen.heights, seen.heights - near_high)
         missed = off > UNEXPLAINED_SIGMAS * seen.sigma + UNEXPLAINED
-        even = part & ~missed & (predicted > 0) & (near_high - near_low < EVEN)
-        residual = (seen.heights - predicted)[even]
+        residual = seen.heights - predicted
+        even = part & (predicted > 0) & (near_high - near_low < EVEN)
+        even &= np.abs(residual) < FARTHEST + UNEXPLAINED_SIGMAS * seen.sigma
+        residual = residual[even]
         rise, tilt, rise_sigma, tilt_sigma = _plane(
             seen.points[even, :2] - fit.pose[:2], residual, seen.sigma
         )
@@ -125,12 +132,14 @@ def reason_to_refuse(mismatch: Mismatch, seen: Seen) -> str:
         most_patch = MOST_PATCH
     else:
         most_excess, most_patch = MOST_EXCESS, MOST_PATCH + MOST_PATCH_SHARE * mismatch.pixels
-    if mismatch.excess > most_excess:
-        return f"{mismatch.unexplained:.0%} of its pixels are far from the part's surface"
-    if mismatch.patch > most_patch:
-        return f"a patch of {mismatch.patch} pixels is far from the part's surface"
+    if mismatch.unexplained > MOST_UNEXPLAINED:
+        return f"{mismatch.unexplained:.0%} of its pixels are where the part has no surface"
     if abs(mismatch.rise) > MOST_RISE + SIGNIFICANT * mismatch.rise_sigma:
         return f"its surfaces are {1e3 * mismatch.rise:+.1f} mm from where they would be"
     if mismatch.tilt > MOST_TILT + SIGNIFICANT * mismatch.tilt_sigma:
-        return f"it leans by {np.degrees(mismatch.tilt):.1f} degrees"
+        return f"it is tilted by {np.degrees(mismatch.tilt):.1f} degrees"
+    if mismatch.patch > most_patch:
+        return f"a patch of {mismatch.patch} pixels differs"
+    if mismatch.excess > most_excess:
+        return f"its heights differ by more than noise (cost {mismatch.excess:.2f}, at most {most_excess:.2f})"
     return ""

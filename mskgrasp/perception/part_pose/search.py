@@ -99,7 +99,7 @@ def _coarse(seen: Seen, known: KnownPart) -> list[Fit]:
             [places, np.broadcast_to(turns[:, None, None], (*places.shape[:2], 1))], axis=-1
         )
         table = HeightTable(look.from_above, sigma=max(seen.sigma, 1e-3), soft=seen.pitch, flying=0.0)
-        costs = table.costs(pixels, poses.reshape(-1, 3)).sum(dim=1).numpy().reshape(len(turns), -1)
+        costs = table.costs(pixels, poses.reshape(-1, 3)).sum(axis=1).reshape(len(turns), -1)
         best = costs.argmin(axis=1)
         found += [
             Fit(
@@ -166,7 +166,7 @@ def improve(fit: Fit, seen: Seen, known: KnownPart, effort: Effort) -> Fit:
     root, mean, covariance = np.diag(reach), fit.pose, np.diag(reach**2)
     for number in range(effort.rounds):
         steps = normals @ root.T
-        costs = weight * table.costs(some, mean + steps).sum(dim=1).numpy().astype(float)
+        costs = weight * table.costs(some, mean + steps).sum(axis=1, dtype=float)
         if number == effort.rounds - 1:
             costs -= (normals**2).sum(axis=1) / 2
         weights = _weights(costs)
@@ -185,7 +185,7 @@ def _informative(
 ) -> tuple[np.ndarray, int]:
     """Pixels near edges and slopes, whose height depends on the pose, and how many each stands for."""
     low, high = seen_map.bounds(1.5 * seen.pitch)
-    cells = table.cells(pixels, pose[None])[0].numpy()
+    cells = table.cells(pixels, pose[None])[0]
     depends = np.flatnonzero((high - low).reshape(-1)[cells] > max(0.5e-3, 0.3 * seen.sigma))
     if not len(depends):
         depends = np.arange(len(cells))

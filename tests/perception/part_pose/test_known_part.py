@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from mskgrasp.parts import find_part
+from mskgrasp.perception.part_pose import KnownPart
+from tests.perception.part_pose.cells import known, resting_at
+
+
+def orders(name: str) -> dict[int, int]:
+    return {one.resting: one.order for look in known(name).looks for one in look.poses}
+
+
+def test_a_nut_has_six_turns_flat_and_two_on_a_side():
+    found = orders("hex_nut_m30")
+    heights = find_part("hex_nut_m30").resting.position[:, 2]
+    flat = set(np.flatnonzero(np.isclose(heights, heights.min(), atol=1e-4)).tolist())
+    assert flat and {found[i] for i in flat} == {6}
+    assert {found[i] for i in set(found) - flat} == {2}
+
+
+def test_a_washer_has_any_turn_and_a_bracket_one():
+    assert orders("washer_m36")[0] == 0
+    assert orders("l_bracket_60x40")[0] == 1
+
+
+def test_both_sides_of_a_nut_look_alike():
+    looks = known("hex_nut_m30").looks
+    assert {one.resting for one in looks[0].poses} == {0, 1}
+
+
+def test_every_resting_pose_is_looked_for_once():
+    for name in ("hex_nut_m30", "l_bracket_60x40", "spur_gear_m3_z17"):
+        found = [one.resting for look in known(name).looks for one in look.poses]
+        assert sorted(found) == list(range(len(find_part(name).resting_probability)))
+
+
+def test_resting_poses_that_do_not_stand_are_left_out():
+    part = find_part("l_bracket_60x40")
+    stands = [i == 1 for i in range(len(part.resting_probability))]
+    found = KnownPart.of(part, stands)
+    assert [one.resting for look in found.looks for one in look.poses] == [1]
+
+
+def test_a_part_without_a_resting_pose_is_refused():
+    part = find_part("washer_m36")
+    with pytest.raises(ValueError, match="none of the"):
+        KnownPart.of(part, [False] * len(part.resting_probability))
+
+
+@pytest.mark.parametrize("turn", [0.0, 2.5])
+def test_the_pose_at_a_place_and_turn_is_the_resting_pose_moved_there(turn):
+    part = known("l_bracket_60x40")
+    for look in part.looks:
+        for one in look.poses:
+            found = part.pose(one, 0.5, -0.1, turn, table_z=0.0)
+            true = resting_at("l_bracket_60x40", one.resting, 0.5, -0.1, turn)
+            assert np.allclose(found.as_matrix(), true.as_matrix(), atol=1e-9)
+
+
+def test_points_are_on_and_above_the_table():
+    for look in known("spur_gear_m3_z17").looks:
+        for one in look.poses:
+            assert one.points[:, 2].min() > -1e-5
+            assert one.points[:, 2].max() == pytest.approx(look.top, abs=0.5e-3)

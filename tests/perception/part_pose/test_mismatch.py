@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+
+from mskgrasp.core.geometry import Pose, quat_multiply
+from mskgrasp.perception.part_detection import find_part_pixels
+from mskgrasp.perception.part_pose.mismatch import Mismatch, reason_to_refuse
+from mskgrasp.perception.part_pose.part_pose import see
+from mskgrasp.perception.part_pose.search import search
+from tests.perception.part_pose.cells import kinect2, known, posed, resting_at
+
+NAME = "pillow_block_80x32"
+
+
+def mismatch(cell, pose: Pose, *, noisy: bool = False) -> tuple[Mismatch, str]:
+    frame = posed(cell, NAME, pose)
+    frame = kinect2(frame, seed=0) if noisy else frame
+    found = find_part_pixels(
+        frame.depth, frame.intrinsics, frame.T_base_camera,
+        table_z=0.0, region=cell.workspace.region, min_height=0.003,
+    )  # fmt: skip
+    seen = see(found, frame, known(NAME), 0.0)
+    one = Mismatch.of(search(seen, known(NAME))[0], seen, known(NAME))
+    return one, reason_to_refuse(one, seen)
+
+
+@pytest.mark.parametrize("noisy", [False, True])
+def test_a_part_in_a_resting_pose_is_explained(mujoco_cell, noisy):
+    found, reason = mismatch(mujoco_cell, resting_at(NAME, 0, 0.48, 0.03, 0.3), noisy=noisy)
+    assert not reason
+    assert found.patch <= 5
+    assert abs(found.rise) < 0.5e-3
+    assert found.residual < (2e-3 if noisy else 0.3e-3)
+
+
+@pytest.mark.parametrize(("noisy", "rise"), [(False, 0.6e-3), (True, 1.5e-3)])
+def test_the_rise_of_a_raised_part_is_measured(mujoco_cell, noisy, rise):
+    flat = resting_at(NAME, 0, 0.48, 0.03, 0.3)
+    raised = Pose(position=flat.position + [0, 0, rise], quat_wxyz=flat.quat_wxyz)
+    found, reason = mismatch(mujoco_cell, raised, noisy=noisy)
+    assert found.rise == pytest.approx(rise, abs=0.3e-3)
+    assert "mm from where they would be" in reason
+
+
+def test_the_tilt_of_a_leaning_part_is_measured(mujoco_cell):
+    flat = resting_at(NAME, 0, 0.48, 0.03, 0.3)
+    half = np.radians(2.0) / 2
+    tilt = np.array([np.cos(half), 0.0, np.sin(half), 0.0])
+    leaning = Pose(position=flat.position, quat_wxyz=quat_multiply(tilt, flat.quat_wxyz))
+    found, reason = mismatch(mujoco_cell, leaning)
+    assert np.degrees(found.tilt) == pytest.approx(2.0, abs=0.5)
+    assert "it is tilted by" in reason

@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from mskgrasp.perception.part_detection import find_part_pixels
+from mskgrasp.perception.part_pose.part_pose import see
+from mskgrasp.perception.part_pose.search import CLOSE, Effort, Fit, improve, search
+from tests.perception.part_pose.cells import kinect2, known, posed, resting_at
+
+NAME = "l_bracket_60x40"
+
+
+@pytest.fixture(scope="module", params=[False, True])
+def image(mujoco_cell, request):
+    true = resting_at(NAME, 0, 0.5, 0.02, 0.8)
+    frame = posed(mujoco_cell, NAME, true)
+    frame = kinect2(frame, seed=2) if request.param else frame
+    found = find_part_pixels(
+        frame.depth, frame.intrinsics, frame.T_base_camera,
+        table_z=0.0, region=mujoco_cell.workspace.region, min_height=0.003,
+    )  # fmt: skip
+    return see(found, frame, known(NAME), 0.0)
+
+
+def start(offset: tuple[float, float, float]) -> Fit:
+    look = next(look for look in known(NAME).looks if look.poses[0].resting == 0)
+    pose = np.array([0.5, 0.02, 0.8]) + offset
+    return Fit(look=look, lying=look.poses[0], pose=pose, covariance=np.zeros((3, 3)), cost=0.0)
+
+
+def test_a_fit_beside_the_truth_is_moved_to_it(image):
+    fit = start((1e-3, -0.8e-3, 0.03))
+    for _ in range(4):
+        fit = improve(fit, image, known(NAME), CLOSE)
+    assert np.linalg.norm(fit.pose[:2] - [0.5, 0.02]) < 0.5e-3
+    assert abs(fit.pose[2] - 0.8) < np.radians(0.7)
+
+
+def test_the_truth_costs_less_than_poses_around_it(image):
+    look_only = Effort(rounds=0, draws=0, pixels=0, reach=0.0, fine=True)
+    true = improve(start((0, 0, 0)), image, known(NAME), look_only).cost
+    for offset in ((3e-3, 0, 0), (0, -3e-3, 0), (0, 0, 0.1), (0, 0, np.pi)):
+        assert improve(start(offset), image, known(NAME), look_only).cost > true + 5
+
+
+def test_the_best_fit_comes_first_and_the_search_is_repeatable(image):
+    fits = search(image, known(NAME))
+    assert [fit.cost for fit in fits] == sorted(fit.cost for fit in fits)
+    assert np.array_equal(search(image, known(NAME))[0].pose, fits[0].pose)
