@@ -19,6 +19,7 @@ from typing import Any, get_args
 
 import numpy as np
 import torch
+import trimesh
 
 from hal.camera import RgbdFrame
 from hal.cell import Cell
@@ -213,19 +214,14 @@ def _unlike(a: Entry, b: Entry) -> float:
 
 def leaning(cell: Cell, shown: Shown, degrees: float, known: KnownPart) -> Shown:
     """A part with one end raised, its lowest point on the table (the MuJoCo cell)."""
-    resting, _ = resting_of(shown.T_base_obj, known)
-    lying = next(one for look in known.looks for one in look.poses if one.resting == resting)
-    T_table_obj = Pose(  # noqa: N806 (a pose's name)
-        position=known.part.resting.position[resting], quat_wxyz=known.part.resting.quat_wxyz[resting]
-    )
-    surface = shown.T_base_obj.apply(T_table_obj.inverse().apply(lying.points.astype(float)))
+    corners = np.asarray(trimesh.load_mesh(known.part.mesh_path).vertices)
+    surface = shown.T_base_obj.apply(corners)
     _, axes = np.linalg.eigh(np.cov(surface[:, :2].T))
     half = np.radians(degrees) / 2
     # About the short axis: a round part that turns about its long one rolls to where it rests as well.
     tilt = np.array([np.cos(half), *(np.sin(half) * axes[:, 0]), 0.0])
     pose = Pose(position=shown.T_base_obj.position, quat_wxyz=quat_multiply(tilt, shown.T_base_obj.quat_wxyz))
-    moved = pose.apply(shown.T_base_obj.inverse().apply(surface))
-    lift = cell.workspace.table_z - moved[:, 2].min()
+    lift = cell.workspace.table_z - pose.apply(corners)[:, 2].min()
     return show_at(cell, shown, Pose(position=pose.position + [0, 0, lift], quat_wxyz=pose.quat_wxyz))
 
 

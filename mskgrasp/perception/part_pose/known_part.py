@@ -27,12 +27,14 @@ SIMILAR_HEIGHT, SIMILAR_AREA, SIMILAR_SHARE = 0.5e-3, 6e-6, 0.03
 MOST_ORDERS = 72
 """Greatest order of symmetry other than a full one."""
 MOST_COMPARED = 12
-"""Resting poses with similar looks that are told apart; more of them are facets of a body of revolution."""
+"""Resting poses with similar looks that are distinguished; more of them are facets of a body of revolution."""
 FEW_POINTS = 20000
 """Points of a look for a first fit."""
-_CONE = 0.25
-"""Tangent of the greatest angle between ray and vertical: at 0.8 m a part is at most 0.2 m off the axis."""
+_TANGENTS = (0.1, 0.18, 0.25)
+"""Tangents of angles between ray and vertical: at 0.8 m a part is at most 0.2 m off the axis, and the walls of
+a deep bore are seen from near the axis only."""
 _SIDES = np.arange(8) * np.pi / 4
+_FAR = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +47,8 @@ class Lying:
         resting: Index of the resting pose.
         probability: Of the resting pose.
         turn: The first of those that look alike must be turned by this to look like this one, radians.
-        points: (n, 3) float32 on the surface that a camera above may see, metres.
+        points: (n, 3) float32 on the surface that a camera above may see, metres; empty where it is not
+            compared with others that look alike.
         order: Number of turns that look the same; 0: all.
     """
 
@@ -104,7 +107,7 @@ class KnownPart:
                 None: all are.
 
         Raises:
-            ValueError: None is.
+            ValueError: No resting pose is looked for.
         """
         mesh = trimesh.load_mesh(part.mesh_path)
         spacing = max(LEAST_SPACING, float(np.sqrt(mesh.area / MOST_POINTS)))
@@ -236,29 +239,29 @@ class _Seen:
 
     def visible(self) -> np.ndarray:
         """The points that a camera above may see, from any side."""
-        kept = np.zeros(len(self.points), bool)
-        far, cell = 10.0, 2 * self.from_above.cell
-        for side in (np.zeros(2), *(_CONE * np.stack([np.cos(_SIDES), np.sin(_SIDES)], axis=-1))):
-            eye = np.array([*(far * side), far])
+        kept, cell = np.zeros(len(self.points), bool), 1.2 * self.from_above.cell
+        for tangent, side in [(0.0, 0.0), *((t, side) for t in _TANGENTS for side in _SIDES)]:
+            eye = _FAR * np.array([tangent * np.cos(side), tangent * np.sin(side), 1.0])
             shown = heights_from(self.points, eye, plane=0.0, cell=cell, margin=2 * cell)
             x, y = on_plane(self.points, eye, 0.0)
             column = np.rint((x - shown.corner[0]) / cell).astype(int)
             row = np.rint((y - shown.corner[1]) / cell).astype(int)
-            # On the steepest walls a cell spans this height.
-            kept |= self.points[:, 2] >= shown.heights[row, column] - cell / _CONE
+            # A cell on a wall spans this height.
+            kept |= self.points[:, 2] >= shown.heights[row, column] - cell / (tangent or 0.5)
         return np.ascontiguousarray(self.points[kept].T).T
 
 
 def _look(group: list[tuple[_Seen, float]]) -> Look:
     first, poses = group[0][0], []
+    compared = len(group) <= MOST_COMPARED
     for seen, turn in group:
         poses.append(
             Lying(
                 resting=seen.resting,
                 probability=seen.probability,
                 turn=turn,
-                points=seen.visible(),
-                order=seen.order(similar=len(group) > MOST_COMPARED),
+                points=seen.visible() if compared or seen is first else seen.points[:0],
+                order=seen.order(similar=not compared) if compared or seen is first else poses[0].order,
             )
         )
     points = poses[0].points

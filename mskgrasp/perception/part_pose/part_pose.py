@@ -57,7 +57,7 @@ class PartPose:
         symmetry: Number of turns of the part that look the same; 0: all do, and the turn means nothing.
         residual: Root of the mean squared difference of heights on even surfaces, metres.
         alternatives: Other poses that explain the image nearly as well, the most likely first. Resting poses
-            of a body of revolution, on its facets, are not told apart and not listed.
+            of a body of revolution, on its facets, are not distinguished and not listed.
     """
 
     resting: int

@@ -58,7 +58,16 @@ def test_the_pose_at_a_place_and_turn_is_the_resting_pose_moved_there(turn):
 
 
 def test_points_are_on_and_above_the_table():
-    for look in known("spur_gear_m3_z17").looks:
-        for one in look.poses:
-            assert one.points[:, 2].min() > -1e-5
-            assert one.points[:, 2].max() == pytest.approx(look.top, abs=0.5e-3)
+    for name in ("spur_gear_m3_z17", "l_bracket_60x40"):
+        for look in known(name).looks:
+            for one in (one for one in look.poses if len(one.points)):
+                assert one.points[:, 2].min() > -1e-5
+                assert one.points[:, 2].max() == pytest.approx(look.top, abs=0.5e-3)
+
+
+def test_facets_of_a_body_of_revolution_are_not_distinguished():
+    looks = known("shaft_collar_25").looks
+    assert any(len(look.poses) > 12 for look in looks)
+    for look in looks:
+        assert len(look.poses[0].points) > 0
+        assert all(bool(len(one.points)) == (len(look.poses) <= 12) for one in look.poses[1:])
