@@ -251,11 +251,15 @@ class GraspDisplacementEnv(BaseEnv):
                 self._errors[i] = self.noise.draw(self._batched_episode_rng[i])
             self._apply_error(self._errors[0])
 
-    def begin_episode(self, seed: int) -> None:
+    def begin_episode(self, seed: int, pose_base_obj: np.ndarray | None = None) -> None:
         """Begin the episode of ``reset(seed=seed)`` for `try_grasp`, without its other work.
 
         A reset takes as long as twenty steps of the simulation. No observation is made, the controllers of
         the other control modes are not reset, nor is torch's generator seeded: nothing here is drawn from it.
+
+        Args:
+            seed: Determines the parts' poses and the errors of execution.
+            pose_base_obj: (n, 7) poses of the parts, x y z qw qx qy qz; None: drawn at random.
         """
         everywhere = torch.arange(self.num_envs, device=self.device)
         if self.num_envs == 1:  # reseeds the generator: a new one takes half as long as a step
@@ -264,7 +268,7 @@ class GraspDisplacementEnv(BaseEnv):
         else:
             self._set_episode_rng(seed, everywhere)
         self._clear_sim_state()
-        self._initialize_episode(everywhere, {})
+        self._initialize_episode(everywhere, {"pose_base_obj": pose_base_obj})
         if self.gpu_sim_enabled:
             self.scene._gpu_apply_all()
             self.scene.px.gpu_update_articulation_kinematics()

@@ -37,11 +37,13 @@ class StandingPoses:
     Attributes:
         poses: k of them, (k, 3) and (k, 4); their heights over the table count, metres.
         probability: (k,) sums to 1.
+        numbers: (k,) their indices among the part's resting poses.
         toppled: Probability of the resting poses that the engine does not hold, which are left out.
     """
 
     poses: Pose
     probability: np.ndarray
+    numbers: tuple[int, ...]
     toppled: float
 
 
@@ -58,11 +60,12 @@ def standing_poses(part: Part, physics: Physics) -> StandingPoses:
     Raises:
         BadPart: The engine holds none of the resting poses.
     """
-    poses, probability = [], []
-    for settled, share in zip(settled_poses(part, physics), part.resting_probability, strict=True):
+    poses, probability, numbers = [], [], []
+    for number, settled in enumerate(settled_poses(part, physics)):
         if settled is not None:
             poses.append(settled.as_vector())
-            probability.append(share)
+            probability.append(part.resting_probability[number])
+            numbers.append(number)
     if not poses:
         raise BadPart(
             f"part '{part.name}': none of its {len(part.resting_probability)} resting poses stands in the "
@@ -72,6 +75,7 @@ def standing_poses(part: Part, physics: Physics) -> StandingPoses:
     return StandingPoses(
         poses=Pose.from_vector(np.stack(poses)),
         probability=np.array(probability) / kept,
+        numbers=tuple(numbers),
         toppled=float(max(0.0, 1 - kept)),
     )
 
