@@ -51,7 +51,7 @@ class NoPartFound(MskgraspError):
     """The depth image shows no part that could be grasped."""
 
 
-class PartNotRecognised(MskgraspError):
+class PartNotRecognised(NoPartFound):
     """What lies on the table is not the part whose CAD is known, or does not rest flat and alone."""
 
 
