@@ -18,7 +18,18 @@ def object_displacement_covariance(
         centre_grasp: (..., 3) the point in the grasp frame before the grasp, metres.
 
     Returns:
-        (..., 4, 4) J diag(variance) J', J the derivative of `grasp.to_object_displacement`.
+        (..., 4, 4) J diag(variance) J', J of `displacement_jacobian`.
+    """
+    jacobian = displacement_jacobian(grasp_displacement, centre_grasp)
+    return jacobian * variance[..., None, :] @ np.swapaxes(jacobian, -1, -2)
+
+
+def displacement_jacobian(grasp_displacement: np.ndarray, centre_grasp: np.ndarray) -> np.ndarray:
+    """Derivative (..., 4, 4) of `grasp.to_object_displacement` by the grasp displacement (..., 4).
+
+    Args:
+        grasp_displacement: (..., 4) metres and radians.
+        centre_grasp: (..., 3) the point in the grasp frame before the grasp, metres.
     """
     turn = -wrap_angle(grasp_displacement[..., 3])
     cos, sin = np.cos(turn), np.sin(turn)
@@ -30,7 +41,7 @@ def object_displacement_covariance(
     jacobian[..., 0, 3] = sin * arm[..., 0] + cos * arm[..., 1]
     jacobian[..., 1, 3] = -cos * arm[..., 0] + sin * arm[..., 1]
     jacobian[..., 3, 3] = -1.0
-    return jacobian * variance[..., None, :] @ np.swapaxes(jacobian, -1, -2)
+    return jacobian
 
 
 def swing_squared(mean: np.ndarray, variance: np.ndarray) -> np.ndarray:

@@ -16,12 +16,17 @@ import numpy as np
 from hal.camera import RgbdFrame
 from hal.hand import Load
 from hal.table import HIGHEST_TABLE
-from mskgrasp.core.displacement_covariance import object_displacement_covariance, swing_squared
+from mskgrasp.core.displacement_covariance import (
+    displacement_jacobian,
+    object_displacement_covariance,
+    swing_squared,
+)
 from mskgrasp.core.errors import BadModel, GraspRefused, NoGraspFound, TableTooHigh
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps, to_object_displacement
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.parts import Part
 from mskgrasp.perception.part_detection import view_part
+from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.refine import fingers_free, grasps_near
 from mskgrasp.planning.refusal import refusal_reason
@@ -57,7 +62,7 @@ class GraspPlan:
         quality: Predicted probability of success.
         grasp_displacement: (4,) expected grasp displacement, predicted by the network: the rigid motion, from
             which `displacement_of` gives that of a point.
-        grasp_displacement_var: (4,) its variances; NaN if the network predicts none.
+        grasp_displacement_cov: (4, 4) its covariance; NaN if the network predicts none.
         swing: (2,) expected swing of the part in the hand, a rotation vector about x and y of the grasp
             frame, radians; NaN if the network predicts none.
         swing_var: (2,) its variances; NaN likewise.
@@ -68,12 +73,14 @@ class GraspPlan:
         shortlist: (k,) indices of the candidates of best quality, best first.
         shortlist_scores: (k,) their variance scores, square metres.
         seconds: Time spent in each stage.
+        pose: The part's pose as found with its CAD; None where it was planned from the image alone.
+        certified: The grasp and its outcome are those of repeated simulation, not predicted by networks.
     """
 
     grasp: Grasp
     quality: float
     grasp_displacement: np.ndarray
-    grasp_displacement_var: np.ndarray
+    grasp_displacement_cov: np.ndarray
     swing: np.ndarray
     swing_var: np.ndarray
     score: float
@@ -83,6 +90,8 @@ class GraspPlan:
     shortlist: np.ndarray
     shortlist_scores: np.ndarray
     seconds: dict[str, float]
+    pose: PartPose | None = None
+    certified: bool = False
 
     @classmethod
     def of(
@@ -102,7 +111,7 @@ class GraspPlan:
             grasp=candidates[row],
             quality=float(qualities[row]),
             grasp_displacement=mean[:4],
-            grasp_displacement_var=variance[:4],
+            grasp_displacement_cov=np.diag(variance[:4]),
             swing=mean[4:] if len(mean) > 4 else unknown,
             swing_var=variance[4:] if len(mean) > 4 else unknown,
             score=float(best.scores[chosen]),
@@ -132,10 +141,11 @@ class GraspPlan:
             first order.
         """
         point_grasp = self.grasp.T_base_grasp.inverse().apply(np.asarray(point_base, dtype=np.float64))
-        mean, variance = self.grasp_displacement, self.grasp_displacement_var
+        mean = self.grasp_displacement
+        jacobian = displacement_jacobian(mean, point_grasp)
         return (
             to_object_displacement(mean, point_grasp),
-            object_displacement_covariance(mean, variance, point_grasp),
+            jacobian @ self.grasp_displacement_cov @ jacobian.T,
         )
 
     def load_of(self, part: Part) -> Load:
@@ -177,7 +187,7 @@ class GraspPlan:
             "displacement_std": _plain(self.displacement_std),
             "displacement_cov": _plain(self.displacement_cov),
             "grasp_displacement": _plain(self.grasp_displacement),
-            "grasp_displacement_var": _plain(self.grasp_displacement_var),
+            "grasp_displacement_cov": _plain(self.grasp_displacement_cov),
             "swing": _plain(self.swing),
             "swing_var": _plain(self.swing_var),
             "score": _plain(np.asarray(self.score)),
@@ -186,6 +196,7 @@ class GraspPlan:
                 "size": _plain(self.view.size),
                 "gyration_radius": float(self.view.gyration_radius),
             },
+            "certified": self.certified,
             "n_candidates": len(self.candidates),
             "n_shortlist": len(self.shortlist),
             "seconds": {stage: round(value, 4) for stage, value in self.seconds.items()},
@@ -330,7 +341,7 @@ class Planner:
         for number in range(self.config.refinements):
             loss = -found[best.rows] if self.config.policy == "quality" else best.scores
             elite = candidates[best.rows[np.argsort(loss, kind="stable")[: max(1, n_best // 4)]]]
-            drawn = self._clear(grasps_near(elite, 4 * n_best, scene.view, rng, width=0.5 ** (number + 1)))
+            drawn = self.cleared(grasps_near(elite, 4 * n_best, scene.view, rng, width=0.5 ** (number + 1)))
             if self.config.check_fingers:
                 drawn = drawn[fingers_free(scene, drawn)]
             quality = qualities(self.models, scene, drawn, self.config.chunk_size)
@@ -363,10 +374,10 @@ class Planner:
                 f"than {1e3 * HIGHEST_TABLE:g} mm: the fingers could press on it; run hal.touch, and if "
                 "table_z holds, correct camera.depth_offset"
             )
-        grasps = self._clear(sample_grasps(view, self.config.n_candidates, rng))
+        grasps = self.cleared(sample_grasps(view, self.config.n_candidates, rng))
         return view, Grasp.from_vector(grasps)
 
-    def _clear(self, grasps: np.ndarray) -> np.ndarray:
+    def cleared(self, grasps: np.ndarray) -> np.ndarray:
         """Raise grasps (n, 4) whose pads would be too near the table."""
         if self._lowest_grasp_z is not None:
             grasps[:, 2] = np.maximum(grasps[:, 2], self._lowest_grasp_z(grasps[:, :2]))

@@ -18,10 +18,10 @@ from mskgrasp.core.grasp import Grasp, PartView
 from mskgrasp.dataset import depth_to_u16, u16_to_depth
 from mskgrasp.planning.planner import GraspPlan
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 FOLDER = "trials"
 _ARRAYS = (
-    "grasp_displacement", "grasp_displacement_var", "swing", "swing_var", "qualities", "shortlist",
+    "grasp_displacement", "grasp_displacement_cov", "swing", "swing_var", "qualities", "shortlist",
     "shortlist_scores",
 )  # fmt: skip
 _NUMBERS = ("quality", "score")

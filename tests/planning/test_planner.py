@@ -36,7 +36,7 @@ def test_the_quality_policy_takes_the_best_and_needs_no_variance():
     config = PlannerConfig(n_candidates=600, policy="quality")
     plan = planner(config, hand_made_models(variance=False)).plan(FRAME, np.random.default_rng(0))
     assert plan.quality == plan.qualities.max()
-    assert np.isnan(plan.grasp_displacement_var).all() and plan.to_json()["score"] is None
+    assert np.isnan(np.diag(plan.grasp_displacement_cov)).all() and plan.to_json()["score"] is None
     with pytest.raises(BadModel, match="policy: quality"):
         planner(PlannerConfig(), hand_made_models(variance=False))
 
@@ -72,7 +72,7 @@ def test_a_plan_is_plain_json_and_a_picture(tmp_path):
     values = json.loads(json.dumps(plan.to_json(), allow_nan=False))
     assert np.allclose(values["grasp"], plan.grasp.as_vector()) and len(values["displacement_std"]) == 4
     for number, drawn in enumerate(
-        (plan, dataclasses.replace(plan, grasp_displacement_var=np.full(4, np.nan)))
+        (plan, dataclasses.replace(plan, grasp_displacement_cov=np.full((4, 4), np.nan)))
     ):
         draw_plan(FRAME, drawn, tmp_path / f"{number}.png")
         assert (tmp_path / f"{number}.png").read_bytes().startswith(b"\x89PNG")

@@ -81,6 +81,6 @@ def test_the_hand_opens_as_far_as_the_displaced_part_leaves_room(aside, deviatio
     plan = dataclasses.replace(
         planner(PlannerConfig(n_candidates=20)).plan(FRAME, np.random.default_rng(0)),
         grasp_displacement=np.array([0.0, -aside, 0.0, 0.0]),
-        grasp_displacement_var=np.array([0.0, deviation**2, 0.0, 0.0]),
+        grasp_displacement_cov=np.diag([0.0, deviation**2, 0.0, 0.0]),
     )
     assert safe_opening(plan) == pytest.approx(opening, abs=1e-6)

@@ -1,0 +1,249 @@
+"""Certified grasps of a known part: their outcome is measured by repeated simulation, not predicted.
+
+A certified grasp belongs to a resting pose of the part and is given in the part's rest frame (`rest_frame`).
+Of its displacement a mean is stored, the way in which it follows an error of the seen pose, and the
+covariance of what remains, all in the axes of the grasp, with the closing direction along y.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mskgrasp.core.errors import BadPart
+from mskgrasp.core.files import write_whole
+from mskgrasp.core.geometry import (
+    Pose,
+    quat_about_z,
+    quat_conjugate,
+    quat_multiply,
+    twist_and_swing,
+    wrap_half_turn,
+)
+from mskgrasp.core.grasp import HAND_GEOMETRY
+from mskgrasp.core.metrics import wilson_interval
+from mskgrasp.parts import Part, parts_folder
+
+SCHEMA_VERSION = 1
+FILE = "grasps.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CertifiedGrasp:
+    """A grasp with its measured outcome, over simulations that had no part in its selection.
+
+    Attributes:
+        resting: Index of the part's resting pose.
+        grasp: (4,) x y z theta in the rest frame of that pose, metres over the table and radians.
+        n: Number of simulations.
+        lifted: Number of those that lifted the part.
+        mean: (4,) displacement of the part's origin in the hand from its seen pose, axes of the grasp,
+            metres and radians.
+        slope: (4, 3) change of the displacement with the true pose less the seen one: x and y along the axes
+            of the grasp, metres, and turn, radians.
+        residual: (4, 4) covariance of the displacement about that line.
+        swing: (2,) mean swing of the part in the hand, radians about x and y of the grasp.
+        swing_cov: (2, 2) its covariance.
+    """
+
+    resting: int
+    grasp: np.ndarray
+    n: int
+    lifted: int
+    mean: np.ndarray
+    slope: np.ndarray
+    residual: np.ndarray
+    swing: np.ndarray
+    swing_cov: np.ndarray
+
+    def covariance(self, pose_cov: np.ndarray) -> np.ndarray:
+        """Covariance (4, 4) of the displacement, given that of the seen pose (3, 3), axes of the grasp."""
+        return self.slope @ pose_cov @ self.slope.T + self.residual
+
+    def score(self, pose_cov: np.ndarray, radius: float) -> float:
+        """Expected squared distance, m^2, by which the part's points miss their predicted places, laid flat.
+
+        The variance score of `mskgrasp.planning.planner.variance_score`.
+
+        Args:
+            pose_cov: (3, 3) of the seen pose.
+            radius: The part's radius of gyration about the vertical, metres.
+        """
+        spread = np.diag(self.covariance(pose_cov))
+        turned = spread[3] + self.swing @ self.swing + np.trace(self.swing_cov)
+        return float(spread[:3].sum() + radius**2 * turned)
+
+    @property
+    def lifted_interval(self) -> tuple[float, float]:
+        """95 % interval of the share lifted (Wilson)."""
+        return wilson_interval(self.lifted, self.n)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: np.asarray(value).tolist() for name, value in values.items()}
+
+
+_SHAPES = {
+    "grasp": (4,), "mean": (4,), "slope": (4, 3), "residual": (4, 4), "swing": (2,), "swing_cov": (2, 2),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class CertifiedGrasps:
+    """Certified grasps of a part.
+
+    Attributes:
+        part: Name of the part.
+        part_hash: Its content hash.
+        grasps: The grasps, those of a resting pose in the order of their expected error.
+        without: For resting poses without a certified grasp the reason, by index.
+        like: For resting poses that look and behave as another one, its index and the turn (radians) by which
+            their rest frame is turned against its, by index.
+        stands: Of each resting pose, whether the simulation holds it.
+        conditions: Settings that the grasps were certified under: physics, noise, errors of the seen pose,
+            hand, versions, seed, number of simulations.
+    """
+
+    part: str
+    part_hash: str
+    grasps: tuple[CertifiedGrasp, ...]
+    without: dict[int, str]
+    like: dict[int, tuple[int, float]]
+    stands: tuple[bool, ...]
+    conditions: dict[str, Any]
+
+    def of(self, resting: int) -> tuple[list[CertifiedGrasp], float]:
+        """Grasps of a resting pose, and the turn of the rest frame they are given in against the pose's."""
+        which, turn = self.like.get(resting, (resting, 0.0))
+        return [grasp for grasp in self.grasps if grasp.resting == which], turn
+
+    def write(self, folder: Path) -> None:
+        """Write ``grasps.json`` into a folder, atomically.
+
+        Raises:
+            OSError: The disk is full or not writable.
+        """
+        values = dict(
+            schema_version=SCHEMA_VERSION,
+            part=self.part,
+            part_hash=self.part_hash,
+            hand=HAND_GEOMETRY,
+            units="metres, radians; grasp: x y z theta in the rest frame of the resting pose",
+            grasps=[grasp.to_json() for grasp in self.grasps],
+            without={str(number): reason for number, reason in self.without.items()},
+            like={str(number): list(other) for number, other in self.like.items()},
+            stands=list(self.stands),
+            conditions=self.conditions,
+        )
+        write_whole(folder / FILE, (json.dumps(values, indent=1, allow_nan=False) + "\n").encode())
+
+
+def certified_folder(part: Part) -> Path:
+    """Folder of a part's certified grasps in the cache; it need not exist."""
+    return parts_folder().with_name("certified") / part.content_hash[:32]
+
+
+def read_certified(part: Part, folder: Path | None = None) -> CertifiedGrasps:
+    """Read a part's certified grasps, from the cache unless another folder is given.
+
+    Raises:
+        BadPart: There are none, the file is damaged, or it belongs to another part or hand.
+    """
+    path = (folder or certified_folder(part)) / FILE
+    remedy = f"make them: python -m mskgrasp.assess {part.name}"
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        if values["schema_version"] != SCHEMA_VERSION:
+            raise ValueError(f"schema version {values['schema_version']}, legal: {SCHEMA_VERSION}")
+        found = CertifiedGrasps(
+            part=str(values["part"]),
+            part_hash=str(values["part_hash"]),
+            grasps=tuple(grasp_from_json(one, len(part.resting_probability)) for one in values["grasps"]),
+            without={int(number): str(reason) for number, reason in values["without"].items()},
+            like={int(number): (int(other), float(turn)) for number, (other, turn) in values["like"].items()},
+            stands=tuple(map(bool, values["stands"])),
+            conditions=dict(values["conditions"]),
+        )
+        hand = values["hand"]
+    except FileNotFoundError as error:
+        raise BadPart(f"no certified grasps of '{part.name}'; {remedy}") from error
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise BadPart(f"{path} is damaged ({' '.join(str(error).split())}); {remedy}") from error
+    if found.part_hash != part.content_hash:
+        raise BadPart(f"{path} belongs to another version of '{part.name}'; {remedy}")
+    if hand != HAND_GEOMETRY:
+        raise BadPart(f"{path} was made for another hand; {remedy}")
+    return found
+
+
+def grasp_from_json(values: dict[str, Any], n_resting: int) -> CertifiedGrasp:
+    """The grasp that `CertifiedGrasp.to_json` converted, of a part with so many resting poses.
+
+    Raises:
+        ValueError: A value is missing, not finite, or out of range.
+    """
+    arrays: dict[str, Any] = {name: np.array(values[name], dtype=np.float64) for name in _SHAPES}
+    for name, array in arrays.items():
+        if array.shape != _SHAPES[name] or not np.isfinite(array).all():
+            raise ValueError(f"{name} must be finite and of shape {_SHAPES[name]}")
+    counts: dict[str, Any] = {name: int(values[name]) for name in ("resting", "n", "lifted")}
+    if not (0 <= counts["resting"] < n_resting and 0 <= counts["lifted"] <= counts["n"]):
+        raise ValueError("resting, lifted or n is out of range")
+    return CertifiedGrasp(**arrays, **counts)
+
+
+def rest_frame(T_base_obj: Pose, quat_table_obj: np.ndarray) -> Pose:
+    """Frame of a part at rest: under the part's origin at z = 0 of the base, z up, turned with the part.
+
+    Args:
+        T_base_obj: Pose of the part.
+        quat_table_obj: (4,) wxyz, its orientation at turn 0 in the resting pose in which it lies.
+    """
+    turn, _ = twist_and_swing(quat_multiply(T_base_obj.quat_wxyz, quat_conjugate(quat_table_obj)))
+    x, y, _ = T_base_obj.position
+    return Pose(position=np.array([x, y, 0.0]), quat_wxyz=quat_about_z(np.asarray(turn)))
+
+
+def turned(T_base_rest: Pose, turn: float) -> Pose:
+    """A rest frame turned about its z by ``turn`` radians."""
+    return T_base_rest @ Pose(position=np.zeros(3), quat_wxyz=quat_about_z(np.asarray(turn)))
+
+
+def to_base(T_base_rest: Pose, grasps: np.ndarray, table_z: float = 0.0) -> np.ndarray:
+    """Grasps (..., 4) of a part's rest frame in the base frame, over a table at ``table_z``, metres."""
+    return _moved(T_base_rest, grasps, table_z)
+
+
+def to_rest(T_base_rest: Pose, grasps: np.ndarray, table_z: float = 0.0) -> np.ndarray:
+    """Grasps (..., 4) of the base frame in a part's rest frame; the inverse of `to_base`."""
+    return _moved(T_base_rest.inverse(), grasps, -table_z)
+
+
+def half_turned(T_base_rest: Pose, grasp: np.ndarray, in_base: np.ndarray) -> float:
+    """-1 where the axes of a grasp (4,) of `to_base` are turned by half a turn against its own, else 1.
+
+    A jaw is the same after half a turn, so that theta is wrapped; vectors along x and y change their signs.
+    """
+    turn, _ = twist_and_swing(T_base_rest.quat_wxyz)
+    return 1.0 if np.cos(in_base[3] - turn - grasp[3]) > 0 else -1.0
+
+
+def _moved(pose: Pose, grasps: np.ndarray, up: float) -> np.ndarray:
+    turn, _ = twist_and_swing(pose.quat_wxyz)
+    found = np.array(grasps, dtype=np.float64)
+    found[..., :3] = pose.apply(found[..., :3])
+    found[..., 2] += up
+    found[..., 3] = wrap_half_turn(found[..., 3] + turn)
+    return found
+
+
+def radius_about_vertical(part: Part, resting: int) -> float:
+    """Radius of gyration of a part about the vertical through its centroid in a resting pose, metres."""
+    pose = Pose(position=np.zeros(3), quat_wxyz=part.resting.quat_wxyz[resting])
+    up = pose.inverse().apply(np.array([0.0, 0.0, 1.0]))
+    return float(np.sqrt(up @ part.inertia @ up / part.mass))
