@@ -1,0 +1,103 @@
+"""Rounds of the certification, and what is concluded from them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from mskgrasp.parts import find_part
+from mskgrasp.simulation.certify import CertifyConfig, measured, round_sizes, select_certified
+from mskgrasp.simulation.repeats import Repeat
+from tests.planning.test_certified import certified_grasp
+
+PART = find_part("hex_nut_m20")
+GRASP = np.array([0.0, 0.0, 0.0105, 0.0])
+
+
+@pytest.mark.parametrize("simulations", [24, 40, 100, 200, 500])
+def test_the_rounds_use_up_the_simulations(simulations):
+    n_first, n_second, n_last, last = round_sizes(simulations)
+    used = 2 * n_first + 4 * n_second + last * n_last
+    assert 0.9 * simulations <= used <= simulations + 4
+    assert n_second <= 2 * n_first and n_last >= 1
+
+
+def outcomes(rng: np.random.Generator, n: int, slope: np.ndarray, mean: np.ndarray, std: np.ndarray):
+    found = []
+    for _ in range(n):
+        error = rng.normal(size=4) * [3e-4, 3e-4, 2e-4, 5e-3]
+        moved = mean + slope @ error[[0, 1, 3]] + std * rng.normal(size=4)
+        found.append(Repeat(reason="", error=error, displacement=moved, swing=np.array([0.001, 0.0])))
+    return found
+
+
+def test_the_outcome_follows_the_error_of_the_pose_along_the_line_that_made_it():
+    rng = np.random.default_rng(0)
+    slope = np.array([[1.0, 0.1, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 5.0, 1.0]])
+    mean, std = np.array([1e-3, -2e-3, 1e-4, 0.05]), np.array([5e-5, 1e-5, 5e-5, 1e-3])
+    last = outcomes(rng, 400, slope, mean, std)
+    failed = Repeat(reason="slipped", error=np.zeros(4), displacement=np.full(4, np.nan), swing=np.zeros(2))
+    grasp = measured(0, GRASP, [*last, failed], outcomes(rng, 20, slope, mean, std))
+    assert (grasp.n, grasp.lifted) == (401, 400)
+    assert grasp.mean == pytest.approx(mean, abs=3e-4)
+    assert grasp.slope[0] == pytest.approx(slope[0], abs=0.05)
+    assert np.sqrt(np.diag(grasp.residual)) == pytest.approx(std, rel=0.15)
+    assert grasp.swing == pytest.approx([0.001, 0.0])
+
+
+def test_the_residual_of_few_outcomes_is_not_too_small():
+    rng = np.random.default_rng(1)
+    std = np.array([1e-4, 1e-4, 1e-4, 1e-3])
+    found = [
+        np.diag(
+            measured(
+                0, GRASP, outcomes(rng, 24, np.zeros((4, 3)), np.zeros(4), std),
+                outcomes(rng, 6, np.zeros((4, 3)), np.zeros(4), std),
+            ).residual
+        )
+        for _ in range(200)
+    ]  # fmt: skip
+    assert np.mean(found, axis=0) == pytest.approx(std**2, rel=0.1)
+
+
+def test_a_grasp_that_never_lifts_has_no_outcome():
+    failed = Repeat(
+        reason="missed", error=np.zeros(4), displacement=np.full(4, np.nan), swing=np.full(2, np.nan)
+    )
+    grasp = measured(0, GRASP, [failed] * 5)
+    assert (grasp.lifted, grasp.n) == (0, 5)
+    assert np.isfinite(grasp.mean).all() and not grasp.mean.any()
+
+
+def test_grasps_are_certified_by_lifting_by_hanging_flat_and_by_their_spread():
+    config = CertifyConfig()
+    good = certified_grasp()
+    reasons = {}
+    for name, changes in (
+        ("lifts", dict(lifted=20)),
+        ("tilts", dict(swing=np.array([0.05, 0.0]))),
+        ("spreads", dict(residual=np.diag(np.square([5e-3, 0.0, 0.0, 0.0])))),
+    ):
+        bad = dataclasses.replace(good, **changes)
+        assert select_certified(PART, 0, [bad, good], config)[0] == [good]
+        kept, reasons[name] = select_certified(PART, 0, [bad], config)
+        assert kept == []
+    assert select_certified(PART, 0, [], config) == ([], "the camera does not see it over the table")
+    assert "no grasp lifts it in 95%" in reasons["lifts"] and "83%" in reasons["lifts"]
+    assert "2 degrees" in reasons["tilts"]
+    assert "spreads by more than 2 mm" in reasons["spreads"]
+
+
+def test_certified_grasps_are_spread_over_the_part():
+    config = CertifyConfig(kept=2)
+    near = [
+        certified_grasp(
+            grasp=GRASP + [1e-4 * k, 0, 0, 0], residual=np.diag([(1e-4 + 1e-6 * k) ** 2, 0, 0, 0])
+        )
+        for k in range(3)
+    ]
+    far = certified_grasp(grasp=GRASP + [0.01, 0, 0, 0], residual=np.diag([(3e-4) ** 2, 0, 0, 0]))
+    kept, reason = select_certified(PART, 0, [*near, far], config)
+    assert kept == [near[0], far] and reason == ""

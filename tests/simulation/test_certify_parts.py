@@ -1,0 +1,51 @@
+"""Certified grasps of whole parts: the same whatever the workers, and resumed where they were stopped."""
+
+from __future__ import annotations
+
+import pytest
+
+from mskgrasp.core.settings import Physics
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.planning.certified import FILE, certified_folder, read_certified
+from mskgrasp.simulation import certify_parts
+from mskgrasp.simulation.certify import CertifyConfig
+from mskgrasp.simulation.certify_parts import certify
+from tests.boxes import make_box
+
+CONFIG = CertifyConfig(simulations=48, per_stream=24, physics=Physics(rate_hz=500, position_iterations=15))
+
+
+@pytest.fixture
+def box(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return make_box(tmp_path, "box", (0.07, 0.03, 0.02), 0.1)
+
+
+def test_a_stopped_certification_goes_on_and_gives_the_bytes_of_two_workers(box, monkeypatch):
+    folder = str(box.folder)
+    written = []
+    whole = certify_parts._write_stream
+
+    def once(*arguments):
+        if written:
+            raise KeyboardInterrupt
+        written.append(whole(*arguments))
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(certify_parts, "_write_stream", once)
+        certify([folder], CONFIG, PRETRAINED, 1, hidden=True)
+    (first,) = (certified_folder(box)).glob("*/*.json")
+    stamp = first.stat().st_mtime_ns
+    found = certify([folder], CONFIG, PRETRAINED, 1, hidden=True)[box.name]
+    assert first.stat().st_mtime_ns == stamp  # not made again
+    by_one = (certified_folder(box) / FILE).read_bytes()
+    for path in certified_folder(box).glob("*/*.json"):
+        path.unlink()
+    certify([folder], CONFIG, PRETRAINED, 2, hidden=True)
+    assert (certified_folder(box) / FILE).read_bytes() == by_one
+    # A box lies on its largest side nearly always, and four such poses are one.
+    assert {grasp.resting for grasp in found.grasps} | set(found.without) >= {0}
+    assert found.grasps, found.without
+    assert read_certified(box).grasps[0].to_json() == found.grasps[0].to_json()
+    best = found.grasps[0]
+    assert best.lifted == best.n
