@@ -23,7 +23,8 @@ class PlanConfig(Config):
     out: Path = Path("out/plan")
     """Folder for plan.png and plan.json."""
     part: str | None = None
-    """Place this part (a name, a folder or a CAD file) on the table first; the cell needs a feeder."""
+    """Place this part (a name, a folder or a CAD file) on the table first; the cell needs a feeder. With
+    --planner.policy certified on a cell without one: the part that lies there."""
     unit: Unit | None = None
     """Unit of a CAD file's coordinates, where the format states none; mm if not given."""
     go_home: bool = False

@@ -8,7 +8,11 @@ import numpy as np
 
 from hal import Cell, capture_at_home, go_home, open_cell
 from hal.operator import Operator, StoppedByOperator
+from mskgrasp.core.errors import UsageError
+from mskgrasp.parts import find_part
+from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.plan.config import PlanConfig
+from mskgrasp.planning.certified_planner import planner_of_part
 from mskgrasp.planning.config import MIN_QUALITY
 from mskgrasp.planning.for_cell import make_planner, part_name, present, tell_model
 from mskgrasp.planning.planner import GraspPlan
@@ -29,15 +33,28 @@ def plan_text(plan: GraspPlan) -> str:
     spread = float(np.degrees(np.sqrt(plan.swing_var.sum())))
     tilted = f"{tilt:.1f} +- {spread:.1f} deg"
     stages = ", ".join(f"{name} {value:.2f} s" for name, value in plan.seconds.items() if name != "total")
+    pose = [] if plan.pose is None else [_pose_text(plan.pose)]
+    n = len(plan.candidates)
+    of = f"{n} certified grasps" if plan.certified else f"best of {n}: {plan.qualities.max():.3f}"
     return "\n".join(
         [
+            *pose,
             f"grasp         x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, theta {np.degrees(theta):.1f} deg (base)",
-            f"quality       {plan.quality:.3f} (best of {len(plan.candidates)}: {plan.qualities.max():.3f})"
+            f"quality       {plan.quality:.3f} ({of})"
             + ("" if plan.quality >= MIN_QUALITY else f"; under {MIN_QUALITY:g}, not worth trying"),
             f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
             *([] if np.isnan(plan.swing).any() else [f"tilt          {tilted}"]),
             f"planned in    {plan.seconds['total']:.2f} s ({stages})",
         ]
+    )
+
+
+def _pose_text(pose: PartPose) -> str:
+    x, y, _ = pose.T_base_obj.position
+    std = np.sqrt(np.diag(pose.covariance))
+    return (
+        f"part          resting pose {pose.resting} at x {x:.4f} +- {std[0]:.4f} m, "
+        f"y {y:.4f} +- {std[1]:.4f} m, its turn known to +- {np.degrees(std[2]):.1f} deg"
     )
 
 
@@ -58,17 +75,21 @@ def plan_grasp(config: PlanConfig) -> GraspPlan:
     Raises:
         MskgraspError: The cell, the part or the model cannot be used, or no grasp was found.
     """
+    if config.planner.policy == "certified" and config.part is None:
+        raise UsageError("--planner.policy certified needs the part on the table: --part NAME")
     part = None if config.part is None else part_name(config.part, config.unit)
     make_folder(config.out)
     with open_cell(config.cell) as cell:
         planner = make_planner(config.models, config.planner, cell)
         tell_model(planner.models, cell)
-        if part is not None:
+        by_hand = config.planner.policy == "certified" and cell.feeder is None
+        if part is not None and not by_hand:
             present(cell, part, config.seed)
         if config.go_home:
             _go_home(cell, Operator(cell))
         frame = capture_at_home(cell)
-        plan = planner.plan(frame, np.random.default_rng(config.seed))
+        chooser = planner if part is None else planner_of_part(planner, cell, find_part(part))
+        plan = chooser.plan(frame, np.random.default_rng(config.seed))
     text = json.dumps(dict(plan.to_json(), seed=config.seed), indent=1, allow_nan=False)
     (config.out / "plan.json").write_text(text + "\n", encoding="utf-8")
     draw_plan(frame, plan, config.out / "plan.png")

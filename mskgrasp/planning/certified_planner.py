@@ -1,0 +1,196 @@
+"""Planner for a known part: its certified grasp of least expected error, or else the networks' grasp."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from hal.camera import RgbdFrame
+from hal.cell import Cell
+from hal.errors import OutOfWorkspace
+from mskgrasp.core.displacement_covariance import displacement_jacobian
+from mskgrasp.core.errors import BadPart
+from mskgrasp.core.geometry import twist_and_swing
+from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, to_grasp_displacement
+from mskgrasp.parts import Part
+from mskgrasp.perception.part_detection import view_part
+from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
+from mskgrasp.planning.certified import (
+    CertifiedGrasp,
+    CertifiedGrasps,
+    half_turned,
+    radius_about_vertical,
+    read_certified,
+    rest_frame,
+    to_base,
+    turned,
+)
+from mskgrasp.planning.planner import GraspPlan, Planner
+from mskgrasp.runtime.progress import note
+
+
+class CertifiedPlanner:
+    """Planner of certified grasps of one part.
+
+    Args:
+        planner: Plans where the part has no certified grasp that the arm reaches, and knows the table.
+        part: The part on the table.
+        certified: Its certified grasps.
+        reachable: Whether the arm can execute a grasp; None: all.
+    """
+
+    def __init__(
+        self,
+        planner: Planner,
+        part: Part,
+        certified: CertifiedGrasps,
+        reachable: Callable[[Grasp], bool] | None = None,
+    ):
+        self._planner = planner
+        self._part = part
+        self._certified = certified
+        self._known = KnownPart.of(part, certified.stands)
+        self._reachable = reachable or (lambda grasp: True)
+
+    def with_grasps(self, certified: CertifiedGrasps) -> CertifiedPlanner:
+        """The same planner with other certified grasps of the part, such as none."""
+        other = copy.copy(self)
+        other._certified = certified
+        return other
+
+    def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
+        """Plan a grasp of the part in a frame.
+
+        Raises:
+            NoPartFound: No part is detected.
+            PartNotRecognised: What lies there is not this part, or does not lie flat.
+            GraspRefused: The part has no certified grasp here, and no candidate has the required quality.
+        """
+        started = time.perf_counter()
+        planner = self._planner
+        found = find_part_pose(
+            frame, self._known, table_z=planner.table_z, region=planner.region, min_height=planner.min_height
+        )
+        located = time.perf_counter()
+        plan = self._certified_plan(frame, found)
+        if plan is None:
+            self._tell(found.resting)
+            return replace(planner.plan(frame, rng), pose=found)
+        now = time.perf_counter()
+        seconds = {"pose": located - started, "select": now - located, "total": now - started}
+        return replace(plan, seconds=seconds)
+
+    def _tell(self, resting: int) -> None:
+        """Say why the networks plan, unless that is what was asked for."""
+        if not self._certified.grasps:
+            return
+        reason = self._certified.without.get(
+            self._certified.like.get(resting, (resting, 0.0))[0],
+            "the arm reaches none of its certified grasps",
+        )
+        note(
+            f"'{self._part.name}' in resting pose {resting} has no certified grasp: {reason}; planned by the "
+            "networks"
+        )
+
+    def _certified_plan(self, frame: RgbdFrame, found: PartPose) -> GraspPlan | None:
+        """The plan of the best grasp within reach; None where there is none."""
+        planner, part = self._planner, self._part
+        grasps, turn = self._certified.of(found.resting)
+        if not grasps:
+            return None
+        view = view_part(
+            frame.depth, frame.intrinsics, frame.T_base_camera,
+            table_z=planner.table_z, region=planner.region, min_height=planner.min_height, alone=True,
+        )  # fmt: skip
+        T_base_rest = turned(rest_frame(found.T_base_obj, part.resting.quat_wxyz[found.resting]), turn)
+        vectors = planner.cleared(
+            to_base(T_base_rest, np.stack([one.grasp for one in grasps]), planner.table_z + view.table_offset)
+        )
+        radius = radius_about_vertical(part, found.resting)
+        facing = float(twist_and_swing(T_base_rest.quat_wxyz)[0])
+        scores = np.array(
+            [one.score(_turned_covariance(found.covariance, facing + one.grasp[3]), radius) for one in grasps]
+        )
+        for row in np.argsort(scores, kind="stable"):
+            grasp = Grasp.from_vector(vectors[row])
+            if self._reachable(grasp):
+                break
+        else:
+            return None
+        chosen = grasps[row]
+        sign = half_turned(T_base_rest, chosen.grasp, vectors[row])
+        covariance = chosen.covariance(_turned_covariance(found.covariance, facing + chosen.grasp[3]))
+        mean, covariance = chosen.mean * [sign, sign, 1, 1], _flipped(covariance, sign)
+        origin = centre_in_grasp_frame(np.asarray(found.T_base_obj.position), vectors[row])
+        motion = to_grasp_displacement(mean, origin)
+        inverse = np.linalg.inv(displacement_jacobian(motion, origin))
+        order = np.argsort(scores, kind="stable")
+        return GraspPlan(
+            grasp=grasp,
+            quality=_share(chosen),
+            grasp_displacement=motion,
+            grasp_displacement_cov=inverse @ covariance @ inverse.T,
+            swing=sign * chosen.swing,
+            swing_var=np.diag(chosen.swing_cov).copy(),
+            score=float(scores[row]),
+            view=view,
+            candidates=Grasp.from_vector(vectors),
+            qualities=np.array([_share(one) for one in grasps]),
+            shortlist=order,
+            shortlist_scores=scores[order],
+            seconds={},
+            pose=found,
+            certified=True,
+        )
+
+
+def planner_of_part(planner: Planner, cell: Cell, part: Part) -> Planner | CertifiedPlanner:
+    """The planner for a part: with policy ``certified`` that of its certified grasps, if it has any.
+
+    A part without certified grasps is told on standard error.
+    """
+    if planner.config.policy != "certified":
+        return planner
+    try:
+        certified = read_certified(part)
+    except BadPart as error:
+        note(f"planned by the networks: {error}")
+        return planner
+
+    return CertifiedPlanner(planner, part, certified, reachable_by(cell))
+
+
+def reachable_by(cell: Cell) -> Callable[[Grasp], bool]:
+    """Whether a cell's arm reaches a grasp and the end of its lift."""
+
+    def reachable(grasp: Grasp) -> bool:
+        try:
+            for height in (0.0, cell.workspace.lift_height):
+                cell.arm.check_pose(grasp.raised(height).T_base_tcp)
+        except OutOfWorkspace:
+            return False
+        return True
+
+    return reachable
+
+
+def _share(grasp: CertifiedGrasp) -> float:
+    """Expected share lifted: the mean of its posterior under a uniform prior."""
+    return (grasp.lifted + 1) / (grasp.n + 2)
+
+
+def _turned_covariance(covariance: np.ndarray, angle: float) -> np.ndarray:
+    """Covariance (3, 3) of x, y and turn in axes turned by an angle against those it is given in."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    into = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    return into @ covariance @ into.T
+
+
+def _flipped(covariance: np.ndarray, sign: float) -> np.ndarray:
+    signs = np.array([sign, sign, 1.0, 1.0])
+    return covariance * signs * signs[:, None]

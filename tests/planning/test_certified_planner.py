@@ -1,0 +1,124 @@
+"""Plans of certified grasps on the simulated cell, and of the networks where there are none."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hal import open_cell
+from mskgrasp.core.errors import PartNotRecognised
+from mskgrasp.core.geometry import wrap_half_turn
+from mskgrasp.core.shipped import config_file
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.parts import find_part
+from mskgrasp.planning.certified import rest_frame, to_base
+from mskgrasp.planning.certified_planner import CertifiedPlanner, planner_of_part, reachable_by
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.for_cell import make_planner
+from mskgrasp.planning.planner import Planner
+from tests.planning.test_certified import certified, certified_grasp
+
+PART = find_part("l_bracket_60x40")
+
+
+@pytest.fixture(scope="module")
+def cell():
+    with open_cell(config_file("cells/sapien.yaml")) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def planner(cell) -> Planner:
+    return make_planner(PRETRAINED, PlannerConfig(policy="certified", n_candidates=400), cell)
+
+
+def grasps(resting: int, **changes):
+    slope = np.zeros((4, 3))
+    slope[0, 0] = 1.0
+    sure = certified_grasp(
+        resting=resting, grasp=np.array([0.005, -0.003, 0.0105, 0.4]), slope=slope,
+        mean=np.array([1e-3, 2e-3, -1e-4, 0.1]), swing=np.zeros(2), swing_cov=1e-8 * np.eye(2),
+    )  # fmt: skip
+    poor = dataclasses.replace(sure, grasp=sure.grasp + [0, 0.01, 0, 0.5], residual=1e-5 * np.eye(4))
+    return certified(
+        poor, sure, part=PART.name, part_hash=PART.content_hash, like={}, without={},
+        stands=(True,) * len(PART.resting_probability), **changes,
+    )  # fmt: skip
+
+
+def present(cell, seed: int):
+    cell.feeder.present(PART.name, seed)
+    frame = cell.camera.capture()
+    return frame, cell.tracker.part_pose()
+
+
+def resting_of(true) -> int:
+    """The resting pose whose height the part has, and whose up it has."""
+    up = true.inverse().apply(np.array([0.0, 0.0, 1.0])) - true.inverse().apply(np.zeros(3))
+    ups = [
+        dataclasses.replace(PART.resting, position=np.zeros(3), quat_wxyz=quat)
+        .inverse()
+        .apply(np.array([0.0, 0.0, 1.0]))
+        for quat in PART.resting.quat_wxyz
+    ]
+    return int(np.argmax([one @ up for one in ups]))
+
+
+@pytest.mark.parametrize("seed", [0, 3, 8])
+def test_the_surest_grasp_is_planned_where_the_part_lies(cell, planner, seed):
+    frame, true = present(cell, seed)
+    resting = resting_of(true)
+    known = grasps(resting)
+    own = CertifiedPlanner(planner, PART, known, reachable_by(cell))
+    plan = own.plan(frame, np.random.default_rng(0))
+    assert plan.certified and plan.pose is not None and plan.pose.resting == resting
+    sure = known.grasps[1]
+    expected = to_base(rest_frame(true, PART.resting.quat_wxyz[resting]), sure.grasp)
+    assert np.linalg.norm(plan.grasp.position - expected[:3]) < 1e-3
+    assert abs(wrap_half_turn(np.asarray(plan.grasp.theta - expected[3]))) < np.radians(1.5)
+    # The part, displaced as planned, is where the certified grasp brings it.
+    origin = np.asarray(plan.pose.T_base_obj.position)
+    mean, covariance = plan.displacement_of(origin)
+    sign = np.sign(mean[1])
+    assert mean == pytest.approx(sure.mean * [sign, sign, 1, 1], abs=1e-9)
+    along = plan.pose.covariance[:2, :2].max()
+    assert sure.residual[0, 0] < covariance[0, 0] <= sure.residual[0, 0] + 2 * along
+    assert np.isclose(covariance[1, 1], sure.residual[1, 1], rtol=1e-6)
+    assert plan.quality == pytest.approx(24 / 26)
+
+
+def test_grasps_out_of_reach_are_left_out(cell, planner):
+    frame, true = present(cell, 1)
+    own = CertifiedPlanner(planner, PART, grasps(resting_of(true)))
+    best = own.plan(frame, np.random.default_rng(0)).grasp
+    other = CertifiedPlanner(
+        planner, PART, grasps(resting_of(true)), lambda grasp: bool(abs(grasp.theta - best.theta) > 0.1)
+    )
+    assert abs(other.plan(frame, np.random.default_rng(0)).grasp.theta - best.theta) > 0.1
+
+
+def test_without_certified_grasps_the_networks_plan_and_say_why(cell, planner, capsys):
+    frame, true = present(cell, 2)
+    resting = resting_of(true)
+    others = grasps((resting + 1) % len(PART.resting_probability))
+    others = dataclasses.replace(others, without={resting: "no grasp lifts it"})
+    plan = CertifiedPlanner(planner, PART, others).plan(frame, np.random.default_rng(0))
+    assert not plan.certified and plan.pose is not None and len(plan.candidates) == 400
+    assert "has no certified grasp: no grasp lifts it; planned by the networks" in capsys.readouterr().err
+    network = planner.plan(frame, np.random.default_rng(0))
+    assert np.array_equal(plan.grasp.as_vector(), network.grasp.as_vector())
+
+
+def test_another_part_is_refused(cell, planner):
+    cell.feeder.present("hex_nut_m20", 0)
+    own = CertifiedPlanner(planner, PART, grasps(0))
+    with pytest.raises(PartNotRecognised, match="this is not l_bracket_60x40"):
+        own.plan(cell.camera.capture(), np.random.default_rng(0))
+
+
+def test_a_part_without_a_file_is_planned_by_the_networks(cell, planner, monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr("mskgrasp.planning.certified.parts_folder", lambda: tmp_path / "parts")
+    assert planner_of_part(planner, cell, PART) is planner
+    assert "planned by the networks: no certified grasps of 'l_bracket_60x40'" in capsys.readouterr().err
