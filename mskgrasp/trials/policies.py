@@ -10,6 +10,7 @@ import numpy as np
 from hal.camera import RgbdFrame
 from hal.cell import PartTracker
 from mskgrasp.core.grasp import Grasp, PartView
+from mskgrasp.planning.certified_planner import CertifiedPlanner
 from mskgrasp.planning.planner import GraspPlan, Planner, Shortlist, select, shortlist, variance_score
 from mskgrasp.planning.scoring import Scene, qualities
 from mskgrasp.trials.predictors import PartObservation, Predictor
@@ -71,7 +72,7 @@ def _frame_key(frame: RgbdFrame, rng: np.random.Generator) -> bytes:
 class RepeatedPlanner:
     """Planner that returns its last plan for an equal frame and generator, as under several corrections."""
 
-    def __init__(self, planner: Planner):
+    def __init__(self, planner: Planner | CertifiedPlanner):
         self._planner = planner
         self._last: tuple[bytes, GraspPlan] | None = None
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-Policy = Literal["quality", "low_variance"]
+Policy = Literal["quality", "low_variance", "certified"]
 REFUSED = "refused"
 """Reason of a trial in which no grasp was tried, as the best predicted quality was under the bound."""
 _LEGAL_KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")

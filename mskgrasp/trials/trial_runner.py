@@ -14,11 +14,11 @@ from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
+from mskgrasp.planning.certified_planner import planner_of_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
-from mskgrasp.planning.planner import Planner
 from mskgrasp.runtime.worker_pool import Work, results
-from mskgrasp.trials.engine import TrialEngine, connected_engine
+from mskgrasp.trials.engine import PlansGrasps, TrialEngine, connected_engine
 from mskgrasp.trials.lowess import Lowess
 from mskgrasp.trials.measurement import finish, run_trial
 from mskgrasp.trials.policies import Candidates, Chooser
@@ -101,6 +101,7 @@ class TrialRunner:
         planner = make_planner(setup.models, setup.planner, cell)
         chunk, device = setup.planner.chunk_size, planner.models.device
         self._candidates = Candidates(planner)
+        self._known: dict[str, PlansGrasps] = {}
         self._predictors: dict[str, Predictor] = {"": NetworkPredictor(planner.models, chunk)}
         for label, folder in setup.choosers.items():
             self._predictors[label] = NetworkPredictor(load_models(folder, device), chunk)
@@ -127,8 +128,13 @@ class TrialRunner:
         yield trial
         finish(self._engine, record)
 
-    def _chooser(self, task: TrialTask) -> Chooser | Planner:
+    def _chooser(self, task: TrialTask) -> PlansGrasps:
         planner = self._candidates.planner
+        if task.policy == "certified":
+            if task.source not in self._known:
+                part = find_part(task.source)
+                self._known = {task.source: planner_of_part(planner, self._engine.cell, part)}
+            return self._known[task.source]
         if planner.config.searches and planner.config.policy == task.policy and not task.chosen_by:
             return planner
         return Chooser(

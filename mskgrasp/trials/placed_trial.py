@@ -1,0 +1,90 @@
+"""Record of one trial of the whole loop: a part looked at, grasped and placed."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from mskgrasp.core.geometry import wrap_angle
+
+Correction = Literal["none", "predicted", "seen"]
+CORRECTIONS: tuple[Correction, ...] = ("none", "predicted", "seen")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedTrial:
+    """Outcome of a trial; metres and radians.
+
+    Attributes:
+        part: Name of the part.
+        condition: Name of the cell's condition.
+        number: Index of the trial; all means share its scene.
+        means: What planned the grasp, or was to plan it.
+        certified: The grasp was a certified one.
+        lifted: The part was lifted and held.
+        reason: Reason why it was not lifted or not placed; empty where it was placed.
+        resting: Index of the resting pose that was found; None where the part was not recognised.
+        wrong_pose: Another resting pose was found than the true one or its equals.
+        quality: Expected share of successes.
+        grasp: (4,) the executed grasp.
+        predicted: (4,) expected displacement of the part's origin from its true pose.
+        measured: (4,) its true displacement; None where not lifted.
+        held: (4,) displacement of the point that is to be placed: from the pose in which the part was found,
+            its origin there; without such a pose, from its true pose, the seen centre.
+        expected: (4,) its prediction, by which the placement is corrected.
+        tilt: Of the part in the hand, radians.
+        placed: (3,) x, y and turn of the placed part less those of the target, axes of the hand's grasp frame
+            at the target; None where not placed.
+    """
+
+    part: str
+    condition: str
+    number: int
+    means: str
+    certified: bool = False
+    lifted: bool = False
+    reason: str = ""
+    resting: int | None = None
+    wrong_pose: bool = False
+    quality: float | None = None
+    grasp: list[float] | None = None
+    predicted: list[float] | None = None
+    measured: list[float] | None = None
+    held: list[float] | None = None
+    expected: list[float] | None = None
+    tilt: float | None = None
+    placed: list[float] | None = None
+
+    @property
+    def key(self) -> tuple[str, int, str]:
+        """Identifier of the trial among those of its part."""
+        return self.condition, self.number, self.means
+
+    def error(self, correction: Correction) -> tuple[float, float] | None:
+        """Distance from the target, metres, and error of the turn, radians; None where it cannot be told.
+
+        That is where the part was not placed, or lay in another resting pose than was found.
+
+        ``predicted`` is what was done and measured. Without a correction the part would have been off by its
+        displacement as well, and with a look at the part in the hand by what the release adds alone.
+        """
+        if self.placed is None or self.held is None or self.expected is None or self.wrong_pose:
+            return None
+        off = np.array(self.placed)
+        held, expected = (np.array(one)[[0, 1, 3]] for one in (self.held, self.expected))
+        if correction == "none":
+            off = off + expected
+        elif correction == "seen":
+            off = off - (held - expected)
+        return float(np.hypot(off[0], off[1])), float(abs(wrap_angle(off[2])))
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> PlacedTrial:
+        """The trial that `to_json` converted."""
+        return cls(**values)

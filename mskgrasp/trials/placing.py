@@ -1,0 +1,174 @@
+"""One trial of the whole loop on a cell: look, plan, grasp, place, and measure how far the part is off."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from hal.errors import LoadTooHeavy, MotionAborted, OutOfWorkspace
+from mskgrasp.core.geometry import (
+    Pose,
+    quat_about_z,
+    quat_conjugate,
+    quat_multiply,
+    twist_and_swing,
+    wrap_angle,
+)
+from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, object_displacement
+from mskgrasp.parts import Part
+from mskgrasp.perception.part_pose import PartPose
+from mskgrasp.planning.place_pose import (
+    Target,
+    check_place,
+    displacement_of_point,
+    drop_of,
+    place,
+    place_pose,
+)
+from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.trials.engine import PlansGrasps, TrialEngine
+from mskgrasp.trials.placed_trial import PlacedTrial
+
+TURNS = float(np.radians(45.0))
+"""Greatest turn of a part from where it lies to its target, radians."""
+
+
+def grasp_and_place(
+    engine: TrialEngine,
+    planner: PlansGrasps,
+    part: Part,
+    seeds: tuple[int, int],
+    trial: PlacedTrial,
+    like: Mapping[int, tuple[int, float]],
+) -> PlacedTrial:
+    """Grasp a part as planned and place it in the middle of the region, corrected by the prediction.
+
+    Args:
+        engine: Engine of a cell with a feeder and a tracker.
+        planner: Plans the grasp.
+        part: The part.
+        seeds: Of the scene and of the target's turn: `mskgrasp.core.seeds.scene_seeds`.
+        trial: Names the trial; the outcome is filled in.
+        like: Resting poses that equal another one, as in `mskgrasp.planning.certified.CertifiedGrasps`.
+
+    Raises:
+        HalError: The cell was lost.
+    """
+    try:
+        planned = engine.present(str(part.folder), seeds[0], planner)
+    except LoadTooHeavy:
+        return replace(trial, reason=f"too heavy for the arm ({part.mass:.1f} kg)")
+    plan = planned.plan
+    if plan is None:
+        return replace(trial, reason=planned.reason)
+    trial = replace(
+        trial, certified=plan.certified, quality=plan.quality, grasp=plan.grasp.as_vector().tolist()
+    )
+    lay = engine.part_pose()
+    assert lay is not None  # the cell has a tracker
+    seen, point = lay, np.asarray(plan.view.centre_base)
+    if plan.pose is not None:
+        found = as_turned(part, plan.pose, lay, like)
+        trial = replace(trial, resting=plan.pose.resting, wrong_pose=found is None)
+        seen = found or plan.pose.T_base_obj
+        point = np.asarray(seen.position)
+    done = engine.grasp(plan, planned.part)
+    if done.aborted:
+        engine.recover(MotionAborted(done.aborted))
+    if done.reason or done.result is None or done.before is None or done.displacement is None:
+        return replace(trial, reason=done.reason)
+    lifted = engine.part_pose()
+    assert lifted is not None
+    in_hand = done.result.T_base_tcp.inverse() @ lifted
+    of_origin, _ = object_displacement(plan.grasp.T_base_tcp.inverse() @ seen, in_hand)
+    grasp = plan.grasp.as_vector()
+    origin, of_point = (centre_in_grasp_frame(np.asarray(one), grasp) for one in (seen.position, point))
+    expected = plan.displacement_of(point)[0]
+    trial = replace(
+        trial,
+        lifted=True,
+        predicted=plan.displacement_of(np.asarray(done.before.position))[0].tolist(),
+        measured=done.displacement.tolist(),
+        held=displacement_of_point(np.asarray(of_origin), origin, of_point).tolist(),
+        expected=expected.tolist(),
+        tilt=done.tilt,
+    )
+    return _placed(engine, plan, seen, point, expected, seeds[1], trial)
+
+
+def _placed(
+    engine: TrialEngine,
+    plan: GraspPlan,
+    seen: Pose,
+    point: np.ndarray,
+    expected: np.ndarray,
+    target_seed: int,
+    trial: PlacedTrial,
+) -> PlacedTrial:
+    """Place the held part, a point of it at the target, turned at random, and measure how far it is off."""
+    workspace = engine.cell.workspace
+    turn = np.random.default_rng(target_seed).uniform(-TURNS, TURNS)
+    x, y = workspace.centre
+    drop = drop_of(plan.grasp, plan.view, float(expected[3]), np.nan_to_num(plan.swing))
+    for theta in (turn, 0.0):
+        target = Target(x=float(x), y=float(y), theta=float(theta))
+        pose = place_pose(plan.grasp, expected, point, target, workspace.table_z, drop=drop)
+        with contextlib.suppress(OutOfWorkspace):
+            check_place(engine.cell, pose)
+            break
+    else:
+        engine.put_back(plan)
+        return replace(trial, reason="OutOfWorkspace")
+    try:
+        place(engine.cell, pose, engine.recover, part_height=float(plan.view.size[2]))
+    except MotionAborted as error:
+        engine.recover(error)
+        return replace(trial, reason="collided")
+    after = engine.part_pose()
+    assert after is not None
+    return replace(trial, placed=_off(pose, seen, point, after, target).tolist())
+
+
+def as_turned(part: Part, found: PartPose, true: Pose, like: Mapping[int, tuple[int, float]]) -> Pose | None:
+    """The found pose with the orientation that differs least from the true one by symmetries of the part.
+
+    A hexagon nut found with a turn of 60 degrees too much is found rightly.
+
+    Args:
+        part: The part.
+        found: Its pose as found.
+        true: Its true pose, ``T_base_obj``.
+        like: As in `grasp_and_place`.
+
+    Returns:
+        ``T_base_obj``, or None where another resting pose was found.
+    """
+    quats = part.resting.quat_wxyz
+    swings = [twist_and_swing(quat_multiply(true.quat_wxyz, quat_conjugate(quat)))[1] for quat in quats]
+    turns, groups = [], []
+    for number, pose in ((found.resting, found.T_base_obj), (int(np.argmin(swings)), true)):
+        group, offset = like.get(number, (number, 0.0))
+        turn, _ = twist_and_swing(quat_multiply(pose.quat_wxyz, quat_conjugate(quats[number])))
+        turns.append(float(turn) + offset)
+        groups.append(group)
+    if groups[0] != groups[1]:
+        return None
+    off = 0.0  # of a body of revolution no turn is wrong
+    if found.symmetry:
+        period = 2 * np.pi / found.symmetry
+        off = turns[0] - turns[1]
+        off -= period * round(off / period)
+    quat = quat_multiply(quat_about_z(np.asarray(off)), true.quat_wxyz)
+    return Pose(position=np.asarray(found.T_base_obj.position), quat_wxyz=quat)
+
+
+def _off(pose: Grasp, seen: Pose, point: np.ndarray, after: Pose, target: Target) -> np.ndarray:
+    """(3,) x, y and turn of a placed part less those of its target, axes of the grasp frame at the target."""
+    made, _ = twist_and_swing(quat_multiply(after.quat_wxyz, quat_conjugate(seen.quat_wxyz)))
+    now = (after @ seen.inverse()).apply(point)
+    off = np.array([now[0] - target.x, now[1] - target.y, 0.0])
+    in_hand = Pose(position=np.zeros(3), quat_wxyz=pose.T_base_grasp.quat_wxyz).inverse().apply(off)
+    return np.array([in_hand[0], in_hand[1], float(wrap_angle(np.asarray(made - target.theta)))])
