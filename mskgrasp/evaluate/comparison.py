@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from mskgrasp.evaluate.experiments import CERTIFIED
 from mskgrasp.evaluate.summary import (
     SCHEMA_VERSION,
     TapeComparison,
@@ -23,6 +24,7 @@ Side = Literal["known", "novel"]
 POLICIES: tuple[Policy, ...] = ("quality", "low_variance")
 POLICY_NAMES: dict[Policy, str] = {
     "quality": "high quality", "low_variance": "high quality and low variance",
+    "certified": "certified grasps",
 }  # fmt: skip
 SIDES: tuple[Side, ...] = ("known", "novel")
 
@@ -103,6 +105,9 @@ def compare_models(trials: Sequence[Trial], predictors: Mapping[str, Predictor])
             quality=_statistics(best, label, predictor),
             low_variance=_statistics(chosen, label, predictor) if chosen else None,
         )
+    certified = [trial for trial in trials if trial.chosen_by == CERTIFIED]
+    if certified:
+        policies[POLICY_NAMES["certified"]] = TrialStatistics.of(certified)
     return DisplacementSummary(
         models=models, policies=policies, tape_against_truth=compare_tape(trials), paper=PAPER
     )

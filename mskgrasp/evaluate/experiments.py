@@ -27,7 +27,10 @@ from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
 from mskgrasp.trials.trial_runner import TrialTask
 
+CERTIFIED = "certified"
+"""The label of certified grasps among the models."""
 # No hyphen: it separates the label from the number in a trial's name.
+_TAKEN = (LOWESS, CERTIFIED)
 _LABEL = re.compile(r"[A-Za-z][A-Za-z0-9_+.]*")
 
 
@@ -44,16 +47,16 @@ def model_folders(compare: Iterable[str], models: Path) -> dict[str, Path]:
     folders: dict[str, Path] = {}
     for text in compare:
         label, _, folder = text.partition("=")
-        if not folder or not _LABEL.fullmatch(label) or label.lower() == LOWESS:
+        if not folder or not _LABEL.fullmatch(label) or label.lower() in _TAKEN:
             raise UsageError(
                 f"--compare {text!r}: give label=folder, for example gcip_mv=models/gcip_mv; the label has "
-                f"letters, digits, '_', '+' and '.', begins with a letter, and is not {LOWESS!r}"
+                f"letters, digits, '_', '+' and '.', begins with a letter, and is not {' or '.join(_TAKEN)}"
             )
         if label in folders:
             raise UsageError(f"--compare: two models are called {label!r}")
         folders[label] = Path(folder)
     own = models.resolve().name
-    return folders or {own if _LABEL.fullmatch(own) and own.lower() != LOWESS else "model": models}
+    return folders or {own if _LABEL.fullmatch(own) and own.lower() not in _TAKEN else "model": models}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +144,10 @@ def scenes(
                 continue
             choosers = [*compared.choosers, *([LOWESS] if _knows(compared.lowess, name) else [])]
             best = replace(task, policy="quality")
-            found.append((best, *(replace(task, policy="low_variance", chosen_by=one) for one in choosers)))
+            more = [replace(task, policy="low_variance", chosen_by=one) for one in choosers]
+            if planner.policy == "certified":
+                more.append(replace(task, policy="certified", chosen_by=CERTIFIED))
+            found.append((best, *more))
     return found
 
 

@@ -207,6 +207,9 @@ def _displacement(summary: DisplacementSummary, folder: Path) -> list[Section]:
         for policy in POLICIES
         if (found := model.of(policy, side)) is not None and found.trials
     ]
+    certified = summary.policies.get(POLICY_NAMES["certified"])
+    if certified is not None and certified.trials:
+        rows.append(("with the CAD", POLICY_NAMES["certified"], "all", *_error_row(certified)))
     paper = [
         (label, POLICY_NAMES[policy], millimetres(bar.translation_rmse), degrees(bar.rotation_rmse))
         for label, bars in summary.paper.items()

@@ -34,6 +34,7 @@ from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials, rewrite_trials
+from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.simulation.versions import versions
 from mskgrasp.trials.cell_file import CellFile, check_loads, read_cell
 from mskgrasp.trials.trial import Trial
@@ -93,6 +94,8 @@ def evaluate(config: EvaluateConfig) -> Report:
     inputs |= compared.inputs if compared is not None else {}
     tell_model(models, cell_from_values(cell.values, cell.path))
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=MAY_CHANGE):
+        if config.planner.policy == "certified":
+            certify_missing(list(parts.values()), config.models, config.workers)
         tasks = scenes(parts, config.trials, config.seed, config.planner, compared)
         trials = _make_trials(config, cell, compared, tasks)
         if compared is not None:
@@ -103,8 +106,8 @@ def evaluate(config: EvaluateConfig) -> Report:
 def _check(config: EvaluateConfig) -> None:
     if config.experiment == "success" and (config.compare or config.lowess_data):
         raise UsageError("--compare and --lowess-data need --experiment displacement; add it")
-    if config.experiment == "displacement" and config.planner.policy != "quality":
-        raise UsageError("--experiment displacement runs both policies; omit --planner.policy")
+    if config.experiment == "displacement" and config.planner.policy == "low_variance":
+        raise UsageError("--experiment displacement runs this policy anyway; omit --planner.policy")
     if config.experiment == "displacement" and config.planner.searches:
         raise UsageError(
             "--experiment displacement gives all models the same candidates; omit --planner.refinements and "

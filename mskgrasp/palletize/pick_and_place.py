@@ -21,6 +21,7 @@ from mskgrasp.palletize.placement_records import Correction, Placement
 from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.footprint import seen_footprint
 from mskgrasp.perception.markers import planar_displacement
+from mskgrasp.planning.certified_planner import planner_of_part
 from mskgrasp.planning.place_pose import Target, drop_of, place, place_error, place_pose, turned_by
 from mskgrasp.planning.planner import GraspPlan, Planner
 from mskgrasp.trials.engine import TrialEngine
@@ -70,7 +71,8 @@ class PickAndPlace:
     def __init__(self, engine: TrialEngine, planner: Planner, pictures: Path):
         self._engine = engine
         self._cell = engine.cell
-        self._planner = RepeatedPlanner(planner)
+        self._planner = planner
+        self._planners: dict[str, RepeatedPlanner] = {}
         self._pictures = pictures
         self._tops: dict[int, float] = {}
 
@@ -93,7 +95,7 @@ class PickAndPlace:
             target=(slot.x, slot.y, slot.theta), placed=False, reason="",
         )  # fmt: skip
         planned = self._engine.present(
-            task.part, task.seed, self._planner, name=name, keep=task.keep,
+            task.part, task.seed, self._planner_of(task.part), name=name, keep=task.keep,
             then=f"then to x {slot.x:.3f}, y {slot.y:.3f} m",
         )  # fmt: skip
         frame, plan = planned.frame, planned.plan
@@ -113,6 +115,12 @@ class PickAndPlace:
         write_height_maps(maps, self._pictures / f"{done.name}.npz")
         draw_placement(maps, done, self._pictures / f"{done.name}.png")
         return done
+
+    def _planner_of(self, part: str) -> RepeatedPlanner:
+        if part not in self._planners:
+            own = planner_of_part(self._planner, self._cell, find_part(part))
+            self._planners = {part: RepeatedPlanner(own)}
+        return self._planners[part]
 
     def picture(self, slots: list[Slot]) -> np.ndarray:
         """Capture an image (h, w, 3) of the pallet, the arm at home."""

@@ -28,6 +28,7 @@ from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import TRIALS, append_trial, file_digest, opened_run, read_trials
 from mskgrasp.runtime.worker_pool import Work, results
+from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import check_loads
 from mskgrasp.trials.engine import connected_engine
 
@@ -89,6 +90,8 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
     # The parts determine which of them fills which slot.
     may_change += ["parts", "n_parts"] if config.slots is None else []
     tell_model(models, cell_from_yaml(config.cell))
+    if config.planner.policy == "certified":
+        certify_missing(names, config.models, config.workers)
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
         make_folder(config.out / "placements")
         placements = _place_all(config, pallets, asks)

@@ -21,8 +21,11 @@ from mskgrasp.evaluate.run import evaluate
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
+from mskgrasp.simulation import certify_parts
+from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
+from tests.boxes import make_box
 from tests.browser import Page
 from tests.hal.real_cell import measured_cell
 
@@ -243,3 +246,32 @@ def test_unusable_settings_are_refused_in_one_line_and_leave_no_folder(
         evaluate(config(tmp_path / "out", **changes))
     assert raised.value.exit_code == 2
     assert "\n" not in str(raised.value) and not (tmp_path / "out").exists()
+
+
+def test_certified_grasps_are_made_and_executed_in_the_scenes_of_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    bar = make_box(tmp_path, "bar", (0.07, 0.024, 0.018), 0.2)
+    # A box has three resting poses, and few simulations do for it.
+    monkeypatch.setattr(certify_parts, "CertifyConfig", lambda: CertifyConfig(simulations=72))
+    out = tmp_path / "out"
+    planning = PlannerConfig(policy="certified", n_candidates=60)
+    report = evaluate(
+        config(out, parts=(str(bar.folder),), trials=2, experiment="displacement", planner=planning)
+    )
+    found = trials(out)
+    assert set(found) == {f"bar-00{k}{by}" for k in range(2) for by in ("", "-pretrained", "-certified")}
+    own = [found[f"bar-00{k}-certified"] for k in range(2)]
+    assert all(one.success and one.policy == "certified" for one in own)
+    for one in own:
+        depths = [
+            read_trial(trial_file(out, key))[0].depth for key in (one.key, one.key[: -len("-certified")])
+        ]
+        np.testing.assert_array_equal(*depths)
+        off = np.subtract(one.predicted, one.measured)
+        assert np.linalg.norm(off[:3]) < 1e-3 and abs(off[3]) < 0.02
+    rows = report.to_json()["policies"]
+    assert rows["certified grasps"]["successes"] == 2
+    again = config(out, parts=(str(bar.folder),), trials=2, experiment="displacement", planner=planning)
+    assert evaluate(again).to_json()["policies"] == rows  # neither certified nor executed anew
