@@ -1,4 +1,4 @@
-"""Reports as one HTML file without scripts and without references to other files."""
+"""Reports as one HTML file without references to other files; only interactive views hold scripts."""
 
 from __future__ import annotations
 
@@ -49,6 +49,7 @@ def write_html(
         title=title,
         conclusion=conclusion,
         sections=sections,
+        scripts=any(section.views for section in sections),
         date=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         command=shlex.join(["python", *sys.orig_argv[1:]]) if command is None else command,
         palette=palette,

@@ -30,14 +30,29 @@ class Figure:
 
 
 @dataclass(frozen=True, kw_only=True)
+class View:
+    """An interactive view of a report; neither on the console nor on paper.
+
+    Attributes:
+        page: A whole page that needs nothing but itself, and may hold scripts. It is shown in a frame that
+            cannot reach the report.
+        caption: Shown below it.
+    """
+
+    page: str
+    caption: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Section:
-    """A titled section of a report: text, then tables, then figures.
+    """A titled section of a report: text, then tables, then figures and views.
 
     Attributes:
         title: Its heading.
         text: Paragraphs, plain text.
         tables: Below the text.
         figures: Below the tables.
+        views: Below the figures.
         page_only: Too long for the console.
     """
 
@@ -45,10 +60,11 @@ class Section:
     text: Sequence[str] = ()
     tables: Sequence[Table] = ()
     figures: Sequence[Figure] = ()
+    views: Sequence[View] = ()
     page_only: bool = False
 
     def __bool__(self) -> bool:
-        return bool(self.text or self.tables or self.figures)
+        return bool(self.text or self.tables or self.figures or self.views)
 
 
 def settings_section(settings: Mapping[str, object], versions: Mapping[str, object] | None = None) -> Section:
