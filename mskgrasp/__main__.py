@@ -19,6 +19,7 @@ PROGRAMS = {
         "mskgrasp.palletize",
         "grasp parts and place them, corrected by the predicted displacement",
     ),
+    "assess": ("mskgrasp.assess", "say how precisely a part can be grasped, from its CAD file"),
     "validate": (
         "mskgrasp.validate",
         "check the simulation's settings against closed forms and finer settings",

@@ -1,0 +1,94 @@
+"""Settings of an assessment."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tyro
+from pydantic import Field, field_validator
+
+from mskgrasp.core.config import Config
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.parts.importing.mesh_files import Unit
+
+_TOLERANCE = re.compile(r"\s*([0-9.]+)\s*(mm|m)\s*,\s*([0-9.]+)\s*(deg|rad)\s*")
+SIMULATIONS, QUICK_SIMULATIONS = 1200, 400
+"""Simulated grasps that certify a part's grasps."""
+TRIALS, QUICK_TRIALS = 24, 8
+"""Trials of each policy with an exact camera; half as many with noise, a quarter with each friction."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerance:
+    """Greatest distance of a placed part from its target, metres, and greatest error of its turn, radians."""
+
+    distance: float
+    angle: float
+
+    def __str__(self) -> str:
+        return f"{1e3 * self.distance:g} mm and {np.degrees(self.angle):g} degrees"
+
+
+class AssessConfig(Config):
+    """Settings of an assessment."""
+
+    parts: tyro.conf.Positional[tuple[str, ...]] = ()
+    """Names of parts, part folders, CAD files, or folders of CAD files."""
+    tolerance: str = "1mm,2deg"
+    """Greatest distance of a placed part from its target, and greatest error of its turn about the
+    vertical."""
+    out: Path = Path("out/assess")
+    """Folder for report.html, grasps.json, grasps.isaac.yaml and trials.jsonl; with several parts, of a
+    folder for each, and index.html."""
+    quick: bool = False
+    """A third of the simulations and trials: under three minutes on two cores."""
+    unit: Unit | None = None
+    """Unit of a CAD file's coordinates, where the format states none; mm if not given."""
+    models: Path = PRETRAINED
+    """Folder with model.safetensors and model.json; by default the shipped one."""
+    simulations: int = Field(default=0, ge=0)
+    """Simulated grasps that certify a part's grasps; 0: 1200, or 400 with --quick."""
+    trials: int = Field(default=0, ge=0)
+    """Trials of each policy with an exact camera; 0: 24, or 8 with --quick."""
+    workers: int = Field(default=0, ge=0)
+    """Processes; 0: one per core. The results do not depend on their number."""
+    seed: int = Field(default=0, ge=0)
+    """Determines simulations and trials."""
+
+    @field_validator("tolerance")
+    @classmethod
+    def _tolerance(cls, text: str) -> str:
+        parse_tolerance(text)
+        return text
+
+    @property
+    def n_simulations(self) -> int:
+        """Simulated grasps of a part."""
+        return self.simulations or (QUICK_SIMULATIONS if self.quick else SIMULATIONS)
+
+    @property
+    def n_trials(self) -> int:
+        """Trials of each policy with an exact camera."""
+        return self.trials or (QUICK_TRIALS if self.quick else TRIALS)
+
+
+def parse_tolerance(text: str) -> Tolerance:
+    """The tolerance that a user writes as ``1mm,2deg``.
+
+    Raises:
+        ValueError: It is not a distance and an angle, both positive.
+    """
+    found = _TOLERANCE.fullmatch(text)
+    try:
+        if found is None:
+            raise ValueError(text)
+        distance = float(found[1]) * (1e-3 if found[2] == "mm" else 1.0)
+        angle = float(found[3]) * (np.pi / 180 if found[4] == "deg" else 1.0)
+    except ValueError:
+        distance = angle = 0.0
+    if not (0 < distance <= 0.1 and 0 < angle <= np.pi):
+        raise ValueError(f"a tolerance is a distance and an angle, such as 1mm,2deg, got {text!r}")
+    return Tolerance(distance=distance, angle=float(angle))

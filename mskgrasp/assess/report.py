@@ -1,0 +1,246 @@
+"""Report of an assessed part."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mskgrasp.assess.config import Tolerance
+from mskgrasp.assess.figures import draw_grasps, draw_shares
+from mskgrasp.assess.scene import scene_page
+from mskgrasp.assess.summary import DISTANCES, Row, Share, summarise, summary_json, verdict
+from mskgrasp.assess.trials import EXACT, NOISY
+from mskgrasp.core.files import write_whole
+from mskgrasp.core.grasp import TILT_LIMIT
+from mskgrasp.parts import Part
+from mskgrasp.planning.certified import CertifiedGrasps, radius_about_vertical
+from mskgrasp.planning.isaac_grasp import write_isaac_grasp
+from mskgrasp.reports.html import write_html
+from mskgrasp.reports.quantities import counted
+from mskgrasp.reports.section import Figure, Section, View, settings_section
+from mskgrasp.runtime.console_table import Table
+from mskgrasp.trials.placed_trial import CORRECTIONS, PlacedTrial
+
+_HEADINGS = {
+    "none": "placed directly",
+    "predicted": "corrected by the prediction",
+    "seen": "part seen in hand",
+}
+_RULES = (
+    "Rules of the verdict: of all attempts, failed ones included, at least 95 % must end within the "
+    "tolerance. Place directly, if they do without any correction; correct by the prediction, if they do "
+    "when the predicted displacement is taken into account; look at the part in the hand, if they do when "
+    "its pose there is measured exactly; otherwise use a fixture or another pose.",
+    "Corrected by the prediction is what was simulated and measured. The other two columns follow from it: "
+    "without a correction the part is off by its predicted displacement as well, with an exact look at the "
+    "part in the hand only by what the release adds.",
+)
+
+
+def write_report(
+    out: Path,
+    part: Part,
+    certified: CertifiedGrasps,
+    trials: Sequence[PlacedTrial],
+    tolerance: Tolerance,
+    settings: dict[str, Any],
+) -> tuple[str, list[Row]]:
+    """Write report.html, report.json, grasps.json, grasps.isaac.yaml and the figures.
+
+    Args:
+        out: Folder of the report.
+        part: The part.
+        certified: Its certified grasps.
+        trials: All trials.
+        tolerance: Of the verdict.
+        settings: Of the program.
+
+    Returns:
+        The verdict in a line, and the summary of the trials.
+    """
+    rows = summarise(trials, tolerance, TILT_LIMIT)
+    verdicts = {name: verdict(rows, name, tolerance) for name in (EXACT, NOISY)}
+    headline = conclusion(part, certified, trials, verdicts)
+    certified.write(out)
+    write_isaac_grasp(out / "grasps.isaac.yaml", part, certified)
+    draw_shares(trials, rows, tolerance.distance, out / "shares.png")
+    draw_grasps(part, certified, out / "grasps.png")
+    values = summary_json(
+        rows, dict(name=part.name, hash=part.content_hash, source=part.source), verdicts, tolerance
+    )
+    values["headline"] = headline
+    write_whole(out / "report.json", (json.dumps(values, indent=1, allow_nan=False) + "\n").encode())
+    sections = [
+        trials_section(rows, tolerance, out / "shares.png"),
+        _distances_section(rows),
+        poses_section(part, certified, out / "grasps.png"),
+        Section(
+            title="Certified grasps in 3-D",
+            views=[
+                View(
+                    page=scene_page(part, certified),
+                    caption="Resting poses, each with the best certified grasp; translucent: where the "
+                    "part is expected once the fingers have closed. Drag to turn, scroll to zoom.",
+                )
+            ],
+            page_only=True,
+        ),
+        _grasps_section(part, certified),
+        settings_section(settings),
+    ]
+    write_html(out / "report.html", title=f"Precision of {part.name}", conclusion=headline, sections=sections)
+    return headline, rows
+
+
+def conclusion(
+    part: Part, certified: CertifiedGrasps, trials: Sequence[PlacedTrial], verdicts: dict[str, str]
+) -> str:
+    """The result in a line or two: whether the part can be grasped at all, and the verdicts."""
+    if not any(trial.lifted for trial in trials):
+        reasons = sorted({trial.reason for trial in trials if trial.reason})
+        why = next(iter(certified.without.values()), "")
+        return (
+            f"{part.name} cannot be grasped by this hand in any of its resting poses: none of {len(trials)} "
+            f"attempts lifted it ({', '.join(reasons)}{'; ' + why if why else ''})."
+        )
+    lines = [f"With {'an ' if name == EXACT else ''}{name}: {text}." for name, text in verdicts.items()]
+    return " ".join(lines)
+
+
+def trials_section(rows: Sequence[Row], tolerance: Tolerance, figure: Path) -> Section:
+    """Shares lifted and within the tolerance, by condition and means."""
+    table = [
+        (
+            row.condition,
+            "certified grasps" if row.means == "certified" else "networks",
+            _share(row.lifted),
+            *(_share(row.within[one]) for one in CORRECTIONS),
+            "-" if row.translation_rmse is None else f"{1e3 * row.translation_rmse:.2f} mm",
+            "-" if row.rotation_rmse is None else f"{np.degrees(row.rotation_rmse):.2f} deg",
+            row.tilted,
+            counted(row.reasons) or "-",
+        )
+        for row in rows
+    ]
+    header = (
+        "condition", "planned by", "lifted", *(_HEADINGS[one] for one in CORRECTIONS), "RMSE", "turn RMSE",
+        "tilted", "not placed",
+    )  # fmt: skip
+    return Section(
+        title=f"Trials: within {tolerance}",
+        text=_RULES,
+        tables=[
+            Table(
+                header=header,
+                rows=table,
+                caption="Shares of all attempts with 95 % intervals (Wilson); RMSE of the predicted "
+                "displacement in the hand; tilted: by more than 2 degrees in the hand",
+            )
+        ],
+        figures=[Figure(path=figure, caption="Share of attempts that end within a distance of the target")],
+    )
+
+
+def _distances_section(rows: Sequence[Row]) -> Section:
+    table = [
+        (
+            row.condition,
+            "certified grasps" if row.means == "certified" else "networks",
+            _HEADINGS[one],
+            *(f"{share.value:.0%}" for share in row.within_distance[one]),
+        )
+        for row in rows
+        for one in CORRECTIONS
+    ]
+    header = ("condition", "planned by", "placed", *(f"{1e3 * distance:g} mm" for distance in DISTANCES))
+    return Section(
+        title="Placed within a distance",
+        tables=[Table(header=header, rows=table, caption="Shares of all attempts, whatever the turn")],
+        page_only=True,
+    )
+
+
+def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Section:
+    """Resting poses with their certified grasps."""
+    conditions = certified.conditions
+    errors = conditions["pose_errors"]
+    pose_cov = np.diag(np.square([errors["position"], errors["position"], errors["turn"]]))
+    rows = []
+    for number, share in enumerate(part.resting_probability):
+        if number in certified.like:
+            continue
+        alike = [other for other, (first, _) in certified.like.items() if first == number]
+        grasps, _ = certified.of(number)
+        radius = radius_about_vertical(part, number)
+        best = min((1e3 * np.sqrt(one.score(pose_cov, radius)) for one in grasps), default=None)
+        rows.append(
+            (
+                f"{number}" + (f" and {len(alike)} alike" if alike else ""),
+                f"{share + part.resting_probability[alike].sum():.1%}",
+                len(grasps),
+                "-" if best is None else f"{best:.2f} mm",
+                certified.without.get(number, ""),
+            )
+        )
+    rows.sort(key=lambda row: -float(row[1].rstrip("%")))
+    return Section(
+        title="Resting poses",
+        text=[
+            f"Certified: lifted in at least {conditions['least_lifted']:.0%} of the last simulations, tilts "
+            f"by at most {np.degrees(TILT_LIMIT):g} degrees (RMS), expected error at most "
+            f"{1e3 * conditions['most_error']:g} mm. The expected error is the root of the mean squared "
+            "distance by which the part's points miss their predicted places, with errors of the seen pose "
+            f"of {1e3 * errors['position']:g} mm and {np.degrees(errors['turn']):.2g} degrees, friction 0.3 "
+            "to 0.8, force 30 to 70 N a pad, and the arm's 0.1 mm."
+        ],
+        tables=[
+            Table(
+                header=("pose", "probability", "certified grasps", "least expected error", "why not"),
+                rows=rows,
+            )
+        ],
+        figures=[Figure(path=figure, caption="Certified grasps from above, the best one in blue")],
+    )
+
+
+def _grasps_section(part: Part, certified: CertifiedGrasps) -> Section:
+    rows = []
+    for grasp in certified.grasps:
+        x, y, z, theta = grasp.grasp
+        low, high = grasp.lifted_interval
+        std = np.sqrt(np.diag(grasp.residual))
+        rows.append(
+            (
+                grasp.resting,
+                f"{1e3 * x:.1f}, {1e3 * y:.1f}, {1e3 * z:.1f}",
+                f"{np.degrees(theta):.1f}",
+                f"{grasp.lifted} of {grasp.n} [{low:.0%}, {high:.0%}]",
+                ", ".join(f"{1e3 * value:+.2f}" for value in grasp.mean[:3]),
+                f"{np.degrees(grasp.mean[3]):+.2f}",
+                ", ".join(f"{1e3 * value:.2f}" for value in std[:3]),
+                f"{np.degrees(std[3]):.2f}",
+            )
+        )
+    header = (
+        "pose", "x, y, z, mm", "theta, deg", "lifted", "shift x, y, z, mm", "turn, deg",
+        "deviations, mm", "deg",
+    )  # fmt: skip
+    return Section(
+        title="All certified grasps",
+        text=[
+            "In the part's rest frame: under its centroid, z up, axes of the mesh file turned into the "
+            "resting pose. Shift and turn of the part in the hand, and their standard deviations apart from "
+            "errors of the seen pose, along the axes of the grasp."
+        ],
+        tables=[Table(header=header, rows=rows)],
+        page_only=True,
+    )
+
+
+def _share(share: Share) -> str:
+    low, high = share.interval
+    return f"{share.n} of {share.of} [{low:.0%}, {high:.0%}]"

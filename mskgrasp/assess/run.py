@@ -1,0 +1,150 @@
+"""Assessment of parts: import, certification, trials, report, and the index of several."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from mskgrasp.assess.config import AssessConfig, Tolerance, parse_tolerance
+from mskgrasp.assess.index import IndexEntry, write_index
+from mskgrasp.assess.report import poses_section, trials_section, write_report
+from mskgrasp.assess.summary import Row
+from mskgrasp.assess.trials import AssessSetup, run_scenes, scene_tasks, write_cells
+from mskgrasp.core.errors import BadPart, MskgraspError, UsageError
+from mskgrasp.learning.grasp_models import load_models
+from mskgrasp.parts import Part, find_part
+from mskgrasp.parts.importing.mesh_files import LOADERS
+from mskgrasp.planning.certified import CertifiedGrasps
+from mskgrasp.planning.for_cell import part_name
+from mskgrasp.planning.run_inputs import model_digests, part_digests
+from mskgrasp.reports.console import print_sections
+from mskgrasp.runtime.cli import make_folder
+from mskgrasp.runtime.progress import note, progress
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials
+from mskgrasp.simulation.certify import CertifyConfig
+from mskgrasp.simulation.certify_parts import certify
+from mskgrasp.trials.placed_trial import PlacedTrial
+
+SCENE_VERSION = 1
+"""Raised by every change after which a seed makes other trials."""
+_MAY_CHANGE = ("parts", "out", "tolerance", "trials", "workers", "quick", "simulations")
+
+
+@dataclass(frozen=True)
+class Assessed:
+    """A part's result."""
+
+    part: Part
+    headline: str
+    rows: list[Row]
+
+
+def assess(config: AssessConfig) -> None:
+    """Assess all parts, each in a folder of its own where there are several.
+
+    Raises:
+        UsageError: There is no part, or the folder holds other files.
+        MskgraspError: The only part, or the model, cannot be used.
+    """
+    load_models(config.models)  # refused before a part is imported
+    sources = _sources(config)
+    tolerance = parse_tolerance(config.tolerance)
+    if len(sources) == 1:
+        out = config.out
+        found = _assess_one(sources[0], config, out, tolerance)
+        print(f"\n{found.headline}")
+        print(f"wrote {out}/report.html, report.json, grasps.json, grasps.isaac.yaml")
+        return
+    make_folder(config.out)
+    entries = []
+    for number, source in enumerate(sources, 1):
+        note(f"{source} ({number} of {len(sources)})")
+        try:
+            part = find_part(part_name(source, config.unit))
+            found = _assess_one(source, config, config.out / part.name, tolerance)
+        except MskgraspError as error:
+            if isinstance(error, UsageError) and not isinstance(error, BadPart):
+                raise
+            note(f"{source}: {error}")
+            entries.append(IndexEntry(name=Path(source).name, headline=str(error), rows=(), folder=None))
+        else:
+            entries.append(
+                IndexEntry(name=part.name, headline=found.headline, rows=tuple(found.rows), folder=part.name)
+            )
+        write_index(config.out / "index.html", entries, tolerance)
+    print(f"wrote {config.out}/index.html")
+
+
+def _sources(config: AssessConfig) -> list[str]:
+    """The parts named by the user; a folder without a part stands for its CAD files.
+
+    Raises:
+        UsageError: There is none.
+    """
+    sources: list[str] = []
+    for text in config.parts:
+        path = Path(text)
+        if path.is_dir() and not (path / "part.json").exists():
+            files = sorted(str(file) for file in path.iterdir() if file.suffix.lower() in LOADERS)
+            if not files:
+                raise UsageError(f"{text} holds no CAD file ({' '.join(sorted(LOADERS))})")
+            sources += files
+        else:
+            sources.append(text)
+    if not sources:
+        raise UsageError(
+            "name a part, a part folder, a CAD file or a folder of them: "
+            "python -m mskgrasp.assess bracket.stl"
+        )
+    return list(dict.fromkeys(sources))
+
+
+def _assess_one(source: str, config: AssessConfig, out: Path, tolerance: Tolerance) -> Assessed:
+    part = find_part(part_name(source, config.unit))
+    # A part outside the cache is known by its folder alone.
+    place = str(part.folder)
+    workers = config.workers or os.cpu_count() or 1
+    inputs = model_digests(config.models) | part_digests([place])
+    with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
+        settings = CertifyConfig(simulations=config.n_simulations, seed=config.seed)
+        certified = certify([place], settings, config.models, workers)[part.name]
+        trials = _trials(part, certified, config, out, workers)
+        headline, rows = write_report(out, part, certified, trials, tolerance, config.model_dump(mode="json"))
+    print_sections(
+        [
+            poses_section(part, certified, out / "grasps.png"),
+            trials_section(rows, tolerance, out / "shares.png"),
+        ]
+    )
+    return Assessed(part=part, headline=headline, rows=rows)
+
+
+def _trials(
+    part: Part, certified: CertifiedGrasps, config: AssessConfig, out: Path, workers: int
+) -> Sequence[PlacedTrial]:
+    """All trials of a part; those that are stored are not made again."""
+    setup = AssessSetup(
+        source=str(part.folder),
+        certified=certified,
+        models=config.models,
+        cells=write_cells(out),
+        out=out,
+        seed=config.seed,
+    )
+    path = out / TRIALS
+    found = {trial.key: trial for trial in read_trials(path, PlacedTrial.from_json)}
+    tasks = scene_tasks(config.n_trials)
+    missing = [left for task in tasks if (left := task.without(found)) is not None]
+    keys = [key for task in tasks for key in task.keys()]
+    bar = progress(
+        total=len(keys), done=sum(key in found for key in keys), unit="trial", keep=True, title="trials"
+    )
+    with closing(run_scenes(setup, missing, workers)) as made, bar:
+        for trial in made:
+            append_trial(path, trial.to_json())
+            found[trial.key] = trial
+            bar.update()
+    return [found[key] for key in keys]

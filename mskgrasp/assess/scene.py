@@ -1,0 +1,101 @@
+"""Part, certified grasps and expected shift in 3-D, as a page that needs no network."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from trimesh.viewer.notebook import scene_to_html
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from mskgrasp.core.geometry import Pose, quat_about_z
+from mskgrasp.core.grasp import (
+    FINGER_HALF_WIDTH,
+    MAX_OPENING,
+    PAD_REACH,
+    PALM_HEIGHT,
+    pose_base_grasp,
+    to_grasp_displacement,
+)
+from mskgrasp.parts import Part
+from mskgrasp.planning.certified import CertifiedGrasp, CertifiedGrasps
+
+MOST_FACES = 20_000
+"""A finer mesh is shown with its collision hulls instead, so that a report stays small enough to send."""
+_PART, _HAND, _GHOST = (160, 165, 175, 255), (31, 111, 235, 255), (232, 89, 12, 90)
+
+
+def scene_page(part: Part, certified: CertifiedGrasps, n_poses: int = 4) -> str:
+    """A page with the most probable resting poses side by side, each with the hand of its best grasp.
+
+    A translucent part shows where it is expected to lie relative to the hand once the fingers have closed.
+
+    Args:
+        part: The part.
+        certified: Its certified grasps.
+        n_poses: Greatest number of resting poses.
+    """
+    mesh = trimesh.load_mesh(part.mesh_path, process=False)
+    if len(mesh.faces) > MOST_FACES:
+        mesh = trimesh.load_scene(part.hulls_path).to_mesh().apply_scale(1e-3)
+    scene = trimesh.Scene()
+    numbers = [
+        int(number)
+        for number in np.argsort(-part.resting_probability, kind="stable")
+        if number not in certified.like
+    ][:n_poses]
+    step = 1.3 * float(np.linalg.norm(part.extents)) + 0.05
+    for column, number in enumerate(numbers):
+        aside = np.array([column * step, 0.0, 0.0])
+        lying = Pose(
+            position=aside + [0.0, 0.0, part.resting.position[number, 2]],
+            quat_wxyz=part.resting.quat_wxyz[number],
+        )
+        scene.add_geometry(_painted(mesh, _PART), transform=lying.as_matrix())
+        grasps, _ = certified.of(number)
+        if grasps:
+            at = Pose(position=aside, quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
+            hand = at @ pose_base_grasp(grasps[0].grasp)
+            for box in _hand_boxes():
+                scene.add_geometry(_painted(box, _HAND), transform=hand.as_matrix())
+            moved = hand @ _motion(grasps[0], hand.inverse() @ lying) @ (hand.inverse() @ lying)
+            scene.add_geometry(_painted(mesh, _GHOST), transform=moved.as_matrix())
+    # The viewer's up is y.
+    upright = trimesh.transformations.rotation_matrix(-np.pi / 2, [1, 0, 0])
+    scene.apply_transform(upright)
+    scene.set_camera(angles=(-0.5, 0.5, 0.0), distance=1.1 * scene.scale, center=scene.centroid)
+    return scene_to_html(scene)
+
+
+def _motion(grasp: CertifiedGrasp, lying: Pose) -> Pose:
+    """Motion of the part in the grasp frame that displaces its origin as expected."""
+    origin = np.asarray(lying.position)
+    motion = to_grasp_displacement(grasp.mean, origin)
+    # The hand moves by it in the part's frame: the part moves by the inverse.
+    return Pose(position=motion[:3], quat_wxyz=quat_about_z(np.asarray(motion[3]))).inverse()
+
+
+def _hand_boxes() -> list[trimesh.Trimesh]:
+    """Open fingers and palm in the grasp frame, which has z up."""
+    boxes = []
+    for side in (-1, 1):
+        finger = trimesh.creation.box([2 * FINGER_HALF_WIDTH, 0.008, PALM_HEIGHT + PAD_REACH])
+        finger.apply_translation([0.0, side * (MAX_OPENING / 2 + 0.004), (PALM_HEIGHT - PAD_REACH) / 2])
+        boxes.append(finger)
+    palm = trimesh.creation.box([2 * FINGER_HALF_WIDTH, MAX_OPENING + 0.03, 0.02])
+    palm.apply_translation([0.0, 0.0, PALM_HEIGHT + 0.01])
+    return [*boxes, palm]
+
+
+def _painted(mesh: trimesh.Trimesh, colour: tuple[int, int, int, int]) -> trimesh.Trimesh:
+    painted = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    red, green, blue, alpha = (value / 255 for value in colour)
+    material = PBRMaterial(
+        baseColorFactor=[red, green, blue, alpha],
+        metallicFactor=0.1,
+        roughnessFactor=0.7,
+        alphaMode="BLEND" if alpha < 1 else "OPAQUE",
+        doubleSided=True,
+    )
+    painted.visual = TextureVisuals(material=material)
+    return painted

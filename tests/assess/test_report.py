@@ -1,0 +1,86 @@
+"""Report of an assessment: figures, exports, and a page that works without a network."""
+
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from mskgrasp.assess.config import parse_tolerance
+from mskgrasp.assess.report import write_report
+from mskgrasp.assess.trials import NOISY
+from tests.assess.made_trials import failed, made
+from tests.browser import Page
+from tests.planning.test_certified import PART, certified, certified_grasp
+
+CONDITIONS = dict(
+    seed=0,
+    least_lifted=0.95,
+    most_error=0.002,
+    pose_errors=dict(position=3e-4, height=2e-4, turn=5e-3),
+)
+
+
+def grasps():
+    return certified(
+        certified_grasp(), certified_grasp(resting=2), without={4: "it is rare (probability 1.0%)"},
+        like={1: (0, 0.5), 3: (2, 0.0)}, conditions=CONDITIONS,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    out = tmp_path_factory.mktemp("report")
+    trials = [
+        *(made(number) for number in range(20)),
+        *(made(number, means="networks", placed=[0.002, 0, 0.01]) for number in range(19)),
+        failed(19, means="networks"),
+        *(made(number, condition=NOISY) for number in range(10)),
+    ]
+    headline, _ = write_report(
+        out, PART, grasps(), trials, parse_tolerance("1mm,2deg"), dict(quick=False, seed=0)
+    )
+    return out, headline
+
+
+def test_the_first_line_is_the_verdict(written):
+    out, headline = written
+    assert headline.startswith("With an exact camera: correct by the prediction: 20 of 20")
+    assert "With Kinect v2 noise: " in headline
+    values = json.loads((out / "report.json").read_text())
+    assert values["headline"] == headline and values["rows"][0]["within"]["predicted"]["n"] == 20
+
+
+def test_the_page_works_by_itself_and_shows_the_part_in_3d(written, tmp_path):
+    out, headline = written
+    with Page(out / "report.html") as page:
+        assert headline in page.evaluate("document.querySelector('.conclusion').textContent")
+        page.evaluate("document.querySelector('iframe').loading = 'eager'")
+        page.evaluate("document.querySelector('iframe').scrollIntoView()")
+        page.evaluate("new Promise(done => setTimeout(done, 3000))")
+        page.screenshot(tmp_path / "page.png")
+        top, height = page.evaluate(
+            "(r => [r.top + scrollY, r.height])(document.querySelector('iframe').getBoundingClientRect())"
+        )
+        complaints = [one for one in page.complaints if "WebGL" not in one and "GPU" not in one]
+        assert complaints == []
+    scene = cv2.imread(str(tmp_path / "page.png"))[int(top) : int(top + height)].astype(int)
+    blue, _, red = np.moveaxis(scene, -1, 0)
+    assert (blue - red > 60).sum() > 500  # the hand
+    assert (red - blue > 30).sum() > 50  # the part as it is expected in it
+    text = (out / "report.html").read_text()
+    assert "http://" not in text.split("<iframe")[0] and 'src="http' not in text
+    assert 'sandbox="allow-scripts"' in text
+
+
+def test_a_part_that_nothing_lifts_gets_a_report_that_says_so_first(tmp_path):
+    none = certified(
+        without={0: "no grasp lifts it in 95% of the simulations (best 0%)"}, conditions=CONDITIONS
+    )
+    headline, _ = write_report(
+        tmp_path, PART, none, [failed(0, "refused"), failed(1, "refused")], parse_tolerance("1mm,2deg"), {}
+    )
+    assert headline.startswith("hex_nut_m20 cannot be grasped by this hand in any of its resting poses")
+    assert "refused" in headline and "no grasp lifts it" in headline

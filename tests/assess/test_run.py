@@ -1,0 +1,96 @@
+"""Assessment of a part from its CAD file to its report, in the simulated cell."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import torch
+import trimesh
+
+from mskgrasp.assess.__main__ import main
+from mskgrasp.assess.trials import CONDITIONS, EXACT
+from mskgrasp.core.errors import BadPart, MissingModel, UsageError
+from mskgrasp.runtime.run_folder import TRIALS, read_trials
+from mskgrasp.trials.placed_trial import PlacedTrial
+from tests.browser import Page
+
+
+@pytest.fixture(autouse=True)
+def threads() -> Iterator[None]:
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)  # the simulated cells set one
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    monkeypatch.setattr("sys.argv", ["assess", *map(str, arguments)])
+    return main()
+
+
+@pytest.fixture
+def cad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a bar, and its own cache."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    folder = tmp_path / "cad"
+    folder.mkdir()
+    trimesh.creation.box([70.0, 24.0, 18.0]).export(folder / "bar.stl")
+    return folder
+
+
+def test_a_bar_is_assessed_and_placed_within_a_millimetre(cad, tmp_path, monkeypatch, capsys):
+    out = tmp_path / "out"
+    arguments = (cad / "bar.stl", "--out", out, "--simulations", 72, "--trials", 1, "--workers", 1)
+    assert run(monkeypatch, *arguments) == 0
+    said = capsys.readouterr().out
+    values = json.loads((out / "report.json").read_text())
+    assert values["headline"] in said and values["headline"].startswith("With an exact camera: ")
+    trials = read_trials(out / TRIALS, PlacedTrial.from_json)
+    assert len(trials) == 2 * len(CONDITIONS)
+    (own,) = (one for one in trials if one.condition == EXACT and one.means == "certified")
+    # A bar between parallel pads: nothing is easier.
+    assert own.lifted and own.certified and not own.wrong_pose
+    error = own.error("predicted")
+    assert error is not None and error[0] < 1e-3 and error[1] < 0.02
+    stored = (out / TRIALS).read_bytes()
+    assert run(monkeypatch, *arguments, "--tolerance", "5mm,5deg") == 0  # nothing is made again
+    assert (out / TRIALS).read_bytes() == stored
+    assert "5 mm and 5 degrees" in (out / "report.html").read_text()
+    with pytest.raises(UsageError, match="seed differ"):
+        run(monkeypatch, *arguments, "--seed", 1)
+
+
+def test_a_block_too_wide_and_too_heavy_gets_a_report_that_says_so(cad, tmp_path, monkeypatch, capsys):
+    trimesh.creation.box([120.0, 110.0, 100.0]).export(cad / "block.stl")
+    out = tmp_path / "out"
+    arguments = (cad / "block.stl", "--out", out, "--simulations", 24, "--trials", 1, "--workers", 1)
+    assert run(monkeypatch, *arguments) == 0
+    said = capsys.readouterr().out
+    assert "block cannot be grasped by this hand in any of its resting poses" in said
+    assert "too heavy for the arm (10.4 kg)" in said and "no grasp lifts it" in said
+    with Page(out / "report.html") as page:
+        line = page.evaluate("document.querySelector('.conclusion').textContent")
+    assert line.startswith("block cannot be grasped")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ((), UsageError, "name a part"),
+        (("no_such_part",), BadPart, "no part or part folder is called"),
+        (("EMPTY",), UsageError, "holds no CAD file"),
+        (("CAD/broken.stl",), BadPart, "broken.stl"),
+        (("hex_nut_m20", "--models", "nowhere"), MissingModel, "nowhere"),
+        (("hex_nut_m20", "--out", "CAD"), UsageError, "holds other files"),
+    ],
+)
+def test_what_cannot_be_assessed_is_refused_in_a_line(arguments, error, message, cad, tmp_path, monkeypatch):
+    (tmp_path / "empty").mkdir()
+    (cad / "broken.stl").write_bytes(b"solid nothing\n")
+    words = {"EMPTY": str(tmp_path / "empty"), "CAD": str(cad)}
+    filled = [words.get(one, one.replace("CAD/", f"{cad}/")) for one in arguments]
+    with pytest.raises(error, match=message) as caught:
+        run(monkeypatch, *filled, "--simulations", 24, "--trials", 1, "--workers", 1)
+    assert "\n" not in str(caught.value)
