@@ -27,12 +27,12 @@ SIMILAR_HEIGHT, SIMILAR_AREA, SIMILAR_SHARE = 0.5e-3, 6e-6, 0.03
 MOST_ORDERS = 72
 """Greatest order of symmetry other than a full one."""
 MOST_COMPARED = 12
-"""Resting poses with similar looks that are distinguished; more of them are facets of a body of revolution."""
+"""Similar resting poses that are distinguished; more of them are facets of a body of revolution."""
 FEW_POINTS = 20000
 """Points of a look for a first fit."""
 _TANGENTS = (0.1, 0.18, 0.25)
-"""Tangents of angles between ray and vertical: at 0.8 m a part is at most 0.2 m off the axis, and the walls of
-a deep bore are seen from near the axis only."""
+"""Tangents of angles between ray and vertical: at 0.8 m a part is at most 0.2 m off the axis, and the walls
+of a deep bore are seen from near the axis only."""
 _SIDES = np.arange(8) * np.pi / 4
 _FAR = 10.0
 
@@ -116,7 +116,7 @@ class KnownPart:
         groups: list[list[tuple[_Seen, float]]] = []
         chosen = [i for i in range(len(part.resting_probability)) if stands is None or stands[i]]
         if not chosen:
-            raise ValueError(f"none of the {len(part.resting_probability)} resting poses of {part.name} counts")
+            raise ValueError(f"no resting pose of {part.name} counts")
         for index in chosen:
             seen = _Seen.of(part, index, points_obj, cell)
             for group in groups:

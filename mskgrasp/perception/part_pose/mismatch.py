@@ -141,5 +141,5 @@ def reason_to_refuse(mismatch: Mismatch, seen: Seen) -> str:
     if mismatch.patch > most_patch:
         return f"a patch of {mismatch.patch} pixels differs"
     if mismatch.excess > most_excess:
-        return f"its heights differ by more than noise (cost {mismatch.excess:.2f}, at most {most_excess:.2f})"
+        return f"its heights differ by more than noise (by {mismatch.excess:.2f}, at most {most_excess:.2f})"
     return ""
