@@ -43,7 +43,7 @@ def test_resting_poses_that_do_not_stand_are_left_out():
 
 def test_a_part_without_a_resting_pose_is_refused():
     part = find_part("washer_m36")
-    with pytest.raises(ValueError, match="none of the"):
+    with pytest.raises(ValueError, match="no resting pose of"):
         KnownPart.of(part, [False] * len(part.resting_probability))
 
 
