@@ -45,7 +45,7 @@ PART = (
 )
 IMPORT = (
     *(f"mskgrasp/parts/importing/{name}.py" for name in ("import_file", "mesh_files", "repair", "bodies")),
-    *(f"mskgrasp/parts/solids/{name}.py" for name in ("simplify", "surface")),
+    *(f"mskgrasp/parts/solids/{name}.py" for name in ("simplify", "surface", "layers", "mesh_pieces")),
     "mskgrasp/parts/importing/formats/*.py",
 )
 

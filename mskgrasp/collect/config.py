@@ -20,6 +20,8 @@ class PartFilter(Config):
     """Least length of a part's longest axis, m; shorter parts are not collected."""
     max_length: float | None = None
     """Greatest length of a part's longest axis, m; longer parts are not collected."""
+    coarse: bool = False
+    """Collect parts of grade coarse, too: hulls farther from the mesh than those of a fine part."""
     min_success: float | None = Field(default=None, ge=0, le=1)
     """Parts that fewer grasps of the first shard lift get no further shards, and are marked as not kept."""
     max_success: float | None = Field(default=None, ge=0, le=1)

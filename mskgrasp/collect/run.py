@@ -176,13 +176,19 @@ def _n_workers(config: CollectConfig, missing: list[ShardTask]) -> int:
 
 
 def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:
-    """The requested parts of the filter's lengths, by the names given; those that are missing are built."""
+    """The requested parts that the filter takes, by the names given; those that are missing are built."""
     parts: list[tuple[str, Part]] = []
     for name in progress(config.parts, title="parts", unit="part"):
         part = find_part(name)
         if not config.part_filter.takes_length(part.longest_axis):
             size = f"longest axis {part.longest_axis * 1e3:.0f} mm"
             print(f"left out {part.name}: {size} is outside the part filter", file=sys.stderr)
+        elif part.grade == "coarse" and not config.part_filter.coarse:
+            print(
+                f"left out {part.name}: coarse, 95 % of its surface is within "
+                f"{1e3 * part.hull_error_p95:.2f} mm of its hulls; part_filter.coarse includes it",
+                file=sys.stderr,
+            )
         else:
             parts.append((name, part))
     names = [part.name for _, part in parts]
@@ -190,7 +196,7 @@ def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:
     if doubles:
         raise BadPart(f"two parts are called '{doubles[0]}'; give each its own name")
     if not parts:
-        raise BadPart("no part is left to collect; widen the bounds of part_filter")
+        raise BadPart("no part is left to collect; widen part_filter")
     return parts
 
 

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from mskgrasp.core.geometry import Pose
 
 SCHEMA_VERSION = 2
+
+FINE_P95_MM = 0.7
+"""95 % of the surfaces of hulls and mesh are within this distance in a fine part."""
+
+FINE_VOLUME_RATIO = 1.1
+"""Largest ratio between the volumes of hulls and mesh in a fine part, either way."""
+
+Grade = Literal["fine", "coarse"]
+"""How closely a part's hulls represent its mesh."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +46,8 @@ class Part:
         n_hulls: Number of convex hulls in ``hulls.glb``.
         hulls_volume: Sum of their volumes, overlaps counted twice, cubic metres.
         hull_error: Largest distance between the hulls' union and the mesh, metres.
+        hull_error_p95: 95 % of both surfaces are within this distance, metres.
+        hull_volume_ratio: Volume of the hulls' union divided by that of the mesh.
         resting: ``T_table_obj`` of the k stable poses (z of the table is 0): position (k, 3) with
             x = y = 0, quat_wxyz (k, 4).
         resting_probability: (k,), sums to 1.
@@ -58,8 +70,17 @@ class Part:
     n_hulls: int
     hulls_volume: float
     hull_error: float
+    hull_error_p95: float
+    hull_volume_ratio: float
     resting: Pose
     resting_probability: np.ndarray
+
+    @property
+    def grade(self) -> Grade:
+        """``fine`` where the hulls are within ``FINE_P95_MM`` and ``FINE_VOLUME_RATIO``, else ``coarse``."""
+        ratio = max(self.hull_volume_ratio, 1 / self.hull_volume_ratio)
+        fine = 1000 * self.hull_error_p95 <= FINE_P95_MM and ratio <= FINE_VOLUME_RATIO
+        return "fine" if fine else "coarse"
 
     @property
     def mesh_path(self) -> Path:

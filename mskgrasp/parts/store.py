@@ -243,6 +243,8 @@ def _part_of(folder: Path, record: dict[str, Any]) -> Part:
         n_hulls=int(_positive(record, "n_hulls")),
         hulls_volume=_positive(record, "hulls_volume"),
         hull_error=_finite(record, "hull_error"),
+        hull_error_p95=_finite(record, "hull_error_p95"),
+        hull_volume_ratio=_positive(record, "hull_volume_ratio"),
         resting=Pose(
             position=_array(record["resting"], "position", (count, 3)),
             quat_wxyz=_unit(_array(record["resting"], "quat_wxyz", (count, 4))),

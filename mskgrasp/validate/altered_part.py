@@ -45,7 +45,7 @@ def altered_part(part: Part, folder: Path, *, density: float = 1.0, hulls: str =
         BadPart: The hulls are too far from the mesh, or more than PhysX should handle.
     """
     solid = _with_hulls(part, hulls) if hulls else _stored(part)
-    if len(solid.hulls) > MOST_HULLS:
+    if hulls and len(solid.hulls) > MOST_HULLS:
         raise BadPart(f"{part.name}: {len(solid.hulls)} hulls, at most {MOST_HULLS} are simulated")
     with store.kept_in(folder):
         try:
@@ -58,6 +58,7 @@ def altered_part(part: Part, folder: Path, *, density: float = 1.0, hulls: str =
                 density=density * part.density,
                 dimensions=part.dimensions,
                 recipe_hash=f"altered: {density} {hulls} {part.content_hash}",
+                coarse=part.grade == "coarse",
             )
         except BadPart as error:
             raise BadPart(f"{part.name}: {error}") from error

@@ -13,14 +13,19 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import trimesh
 import yaml
 
-from mskgrasp.collect.config import CollectConfig
-from mskgrasp.collect.run import check_out, is_done, main
+from mskgrasp.collect.config import CollectConfig, PartFilter
+from mskgrasp.collect.run import check_out, chosen_parts, is_done, main
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock
 from mskgrasp.dataset import list_shards, read_shard, read_success, shard_path
 from mskgrasp.dataset.labels import export_labels
+from mskgrasp.parts import store
+from mskgrasp.parts.solids import solid as s
+from mskgrasp.parts.solids.solid import Solid
+from mskgrasp.parts.write_solid import write_solid
 from mskgrasp.simulation.shard_task import ShardTask
 from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, collect, command
 from tests.programs import run_here
@@ -152,6 +157,22 @@ def test_a_wrong_configuration_is_one_line_that_names_it(tmp_path, text, code, m
     assert done.returncode == code
     assert message in done.stderr.strip().splitlines()[-1]
     assert not (tmp_path / "data").exists()
+
+
+def test_coarse_parts_are_left_out_unless_asked_for(tmp_path, capsys):
+    solid = Solid(
+        mesh=trimesh.creation.annulus(8, 20, 20), hulls=(np.array(s.prism(s.polygon(20, 16), 0, 20)),)
+    )
+    with store.kept_in(tmp_path):
+        part = write_solid(
+            solid, name="plugged", family="test", source="own", licence="CC0-1.0", density=1000.0, dimensions={},
+            recipe_hash="0", coarse=True,
+        )  # fmt: skip
+        config = CollectConfig(parts=(str(part.folder), "hex_nut_m30"))
+        assert [one.name for _, one in chosen_parts(config)] == ["hex_nut_m30"]
+        assert "left out plugged: coarse, 95 % of its surface is within" in capsys.readouterr().err
+        config = config.model_copy(update={"part_filter": PartFilter(coarse=True)})
+        assert [one.name for _, one in chosen_parts(config)] == ["plugged", "hex_nut_m30"]
 
 
 def test_a_dataset_made_with_settings_that_no_longer_exist_is_not_added_to(collected, tmp_path):

@@ -1,11 +1,14 @@
 """Fields of a part, against its files."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
 from mskgrasp.core.geometry import Pose
 from mskgrasp.parts import Part
+from mskgrasp.parts.part import FINE_P95_MM, FINE_VOLUME_RATIO
 
 
 @pytest.fixture
@@ -19,6 +22,19 @@ def test_the_mesh_is_in_metres_and_the_hulls_in_millimetres_of_one_frame(part: P
     assert np.allclose(mesh.extents, part.extents, atol=1e-6) and 0.02 < part.longest_axis < 0.15
     assert np.allclose(1e-3 * hulls.bounds, mesh.bounds, atol=1e-3)
     assert len(hulls.geometry) == part.n_hulls
+
+
+def test_a_part_is_fine_within_both_bounds_and_coarse_beyond_either(part: Part):
+    assert part.grade == "fine"
+    bound, ratio = 1e-3 * FINE_P95_MM, FINE_VOLUME_RATIO
+    for p95, volume, grade in (
+        (bound, ratio, "fine"),
+        (bound, 1 / ratio + 1e-6, "fine"),
+        (1.01 * bound, 1.0, "coarse"),
+        (0.0, 1.01 * ratio, "coarse"),
+        (0.0, 0.99 / ratio, "coarse"),
+    ):
+        assert replace(part, hull_error_p95=p95, hull_volume_ratio=volume).grade == grade
 
 
 def test_every_stable_pose_stands_on_the_table_with_its_centre_of_mass_over_its_support(part: Part):

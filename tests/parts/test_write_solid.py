@@ -12,10 +12,10 @@ from mskgrasp.parts.store import read_part
 from mskgrasp.parts.write_solid import MANY_HULLS, with_hulls, write_solid
 
 
-def written(solid: Solid) -> Part:
+def written(solid: Solid, coarse: bool = False) -> Part:
     return write_solid(
         solid, name="one", family="test", source="own", licence="CC0-1.0", density=1000.0, dimensions={},
-        recipe_hash="0",
+        recipe_hash="0", coarse=coarse,
     )  # fmt: skip
 
 
@@ -50,6 +50,9 @@ def test_hulls_that_are_not_the_part_are_refused_with_both_numbers():
     plugged = Solid(mesh=mesh, hulls=(mesh.convex_hull.vertices[::8],))
     with pytest.raises(BadPart, match=r"95 % of the surface is within .* mm .*volume ratio 2\.\d\d"):
         written(plugged)
+    part = written(plugged, coarse=True)
+    assert part.grade == "coarse" and part.hull_volume_ratio > 2
+    assert read_part(part.folder).grade == "coarse"
 
 
 @pytest.mark.parametrize(

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import tyro
 from rich.console import Console
 from rich.text import Text
 
-from mskgrasp.core.errors import BadPart, MskgraspError, UsageError
+from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts import store
+from mskgrasp.parts.commands.grade import coarse_note
+from mskgrasp.parts.commands.import_files import FileResult, ImportOptions, import_files
 from mskgrasp.parts.part import Part
 from mskgrasp.runtime.console_table import Table, print_table, report_console
 from mskgrasp.runtime.progress import note, progress
-
-if TYPE_CHECKING:
-    from mskgrasp.parts.importing.import_file import Imported
 
 _FLAG = tyro.conf.FlagCreatePairsOff
 
@@ -37,7 +37,8 @@ class Import:
 
     Takes files, folders and quoted patterns such as 'cad/**/*.stl'. Defects that can be repaired safely are
     repaired; a file with others is refused with the reason, and the remaining files are still imported. A
-    table at the end lists the result of each file. The convex hulls of a part take from a second to a minute.
+    table at the end lists the result of each file, with the grade of its hulls: fine, or coarse, which the
+    collector leaves out. A file takes seconds; several are imported on all cores.
     Example: python -m mskgrasp.parts import clamp.stl cad/ --density 2700
     """
 
@@ -57,6 +58,8 @@ class Import:
     """Kind of part, for grouping in reports."""
     licence: str = "NOASSERTION"
     """SPDX identifier of the files' licence, for example CC-BY-4.0."""
+    workers: int = 0
+    """Number of processes; 0: one for each core."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +71,7 @@ class _Row:
 
 
 def run_import(command: Import) -> int:
-    """Import the files one by one; return the exit code: 0, or 1 where a file was refused.
+    """Import the files; return the exit code: 0, or 1 where a file was refused.
 
     Raises:
         UsageError: There is nothing to import, or the options contradict each other.
@@ -83,6 +86,10 @@ def run_import(command: Import) -> int:
         check_density(command.density)
     except BadPart as error:
         raise UsageError(f"--density: {error}") from error
+    if command.workers < 0:
+        raise UsageError(
+            f"--workers {command.workers}: give a number of processes, or 0 for one for each core"
+        )
     selected = select_files(command.files)
     if not selected.files and all(path in command.files for path, _ in selected.refused):
         reason = selected.refused[0][1] if selected.refused else "no file given"
@@ -95,66 +102,59 @@ def run_import(command: Import) -> int:
     for path, why in selected.refused:
         rows.append(_Row(file=str(path), result="refused", remarks=(_without(why, path),)))
         print(f"error: {why}", file=sys.stderr)
+    found: dict[Path, FileResult] = {}
     try:
-        _import_all(command, selected.files, rows)
+        for result in _import_all(command, selected.files):
+            found[result.path] = result
     finally:  # also when stopped: finished files are listed
+        rows += [_row(found[path]) for path in selected.files if path in found]
         if rows:
             _print_table(rows)
     if selected.skipped:
         print(f"skipped {_listed(selected.skipped)}: not CAD files by their suffix", file=sys.stderr)
     good = sum(row.result != "refused" for row in rows)
     print(f"{good} of {len(rows)} files imported, in {store.parts_folder()}")
+    coarse = coarse_note(part for row in rows for part in row.parts)
+    if coarse is not None:
+        print(coarse, file=sys.stderr)
     return 0 if good == len(rows) else 1
 
 
-def _import_all(command: Import, files: Sequence[Path], rows: list[_Row]) -> None:
-    """Import the files; add a row for each."""
-    from mskgrasp.parts.importing.import_file import import_file, legal_name
-
-    taken: dict[str, Path] = {}
-    with progress(total=len(files), unit="file") as bar:
-        for path in files:
-            bar.set_description(path.name, refresh=False)
-            try:
-                name = legal_name(path.stem if command.name is None else command.name)
-                replaced: list[str] = []
-                imported = import_file(
-                    path,
-                    name=name,
-                    family=command.family,
-                    unit=command.unit,
-                    density=command.density,
-                    licence=command.licence,
-                    bodies="split" if command.split else "union" if command.union else "one",
-                    check_name=partial(_check_name, taken, path, replaced),
-                )
-                taken |= {part.name: path for part in imported.parts}
-                for part in imported.parts:
-                    for warning in _warnings(part, imported.unit):
+def _import_all(command: Import, files: Sequence[Path]) -> Generator[FileResult]:
+    """Import the files on all cores, with a progress bar and a line for each warning and refusal."""
+    options = ImportOptions(
+        name=command.name,
+        family=command.family,
+        unit=command.unit,
+        density=command.density,
+        licence=command.licence,
+        bodies="split" if command.split else "union" if command.union else "one",
+    )
+    events = import_files(files, options, command.workers or os.cpu_count() or 1)
+    with progress(total=len(files), unit="file") as bar, closing(events):
+        for result in events:
+            bar.set_description(result.path.name, refresh=False)
+            if result.imported is None:
+                note(f"error: {result.reason}")
+            else:
+                for part in result.imported.parts:
+                    for warning in _warnings(part, result.imported.unit):
                         note(f"warning: {warning}")
-                rows.append(_row(path, imported, replaced=bool(replaced)))
-            except MskgraspError as error:
-                rows.append(_Row(file=str(path), result="refused", remarks=(_without(str(error), path),)))
-                note(f"error: {error}")
+            yield result
             bar.update()
 
 
-def _check_name(taken: dict[str, Path], path: Path, replaced: list[str], name: str) -> None:
-    """Refuse the name of a part that an earlier file was imported as; note one of an older part."""
-    if name in taken:
-        raise BadPart(f"{path} would replace the part {name!r} of {taken[name]}: import it with --name")
-    if (store.parts_folder() / name).is_dir():
-        replaced.append(name)
-
-
-def _row(path: Path, imported: Imported, *, replaced: bool) -> _Row:
+def _row(result: FileResult) -> _Row:
+    imported, file = result.imported, str(result.path)
+    if imported is None:
+        return _Row(file=file, result="refused", remarks=(_without(result.reason, result.path),))
     if imported.unchanged:
-        return _Row(file=str(path), result="unchanged", parts=imported.parts, remarks=("up to date",))
+        return _Row(file=file, result="unchanged", parts=imported.parts, remarks=("up to date",))
     remarks = imported.notes
-    if replaced:
+    if result.replaced:
         remarks = (*remarks, "replaced the part of that name")
     return _Row(
-        file=str(path),
+        file=file,
         result="repaired" if imported.notes else "imported",
         parts=imported.parts,
         remarks=remarks,
@@ -191,7 +191,7 @@ def _print_table(rows: Sequence[_Row]) -> None:
             _print_lines(console, row)
         return
     header = (
-        "file", "part", "result", "size mm", "mass g", "hulls", "error p95 mm", "max mm",
+        "file", "part", "result", "size mm", "mass g", "hulls", "grade", "error p95 mm", "max mm",
         "repairs, or reason of refusal",
     )  # fmt: skip
     cells: list[tuple[object, ...]] = []
@@ -203,7 +203,7 @@ def _print_table(rows: Sequence[_Row]) -> None:
             of_file = ("", "", "")
         if not row.parts:
             file, result, remarks = of_file
-            cells.append((file, "", result, *5 * ("",), remarks))
+            cells.append((file, "", result, *6 * ("",), remarks))
     print_table(Table(header=header, rows=cells))
 
 
@@ -212,19 +212,18 @@ def _print_lines(console: Console, row: _Row) -> None:
     head = Text.assemble((row.file, "bold"), ": ", (row.result, _COLOURS[row.result]))
     console.print(head.append("".join(f"; {remark}" for remark in row.remarks)))
     for part in row.parts:
-        size, mass, hulls, p95, largest = _figures(part)
-        console.print(
-            Text(f"  {part.name}: {size} mm, {mass} g, hulls {hulls}, error p95 {p95} mm, max {largest} mm")
-        )
+        size, mass, hulls, grade, p95, largest = _figures(part)
+        figures = f"{size} mm, {mass} g, hulls {hulls}, {grade}, error p95 {p95} mm, max {largest} mm"
+        console.print(Text(f"  {part.name}: {figures}"))
 
 
 def _figures(part: Part) -> tuple[str, ...]:
-    p95 = float(store.read_record(part.folder).get("hull_error_p95", float("nan")))
     return (
         " x ".join(f"{1e3 * size:.1f}" for size in part.extents),
         f"{1e3 * part.mass:.3g}",
         str(part.n_hulls),
-        f"{1e3 * p95:.2f}",
+        part.grade,
+        f"{1e3 * part.hull_error_p95:.2f}",
         f"{1e3 * part.hull_error:.2f}",
     )
 

@@ -54,7 +54,8 @@ def run_list(command: List) -> int:
     else:
         names = sorted((*starter_names(), *imported_names()))
         header = (
-            "name", "family", "source", "longest axis mm", "mass g", "hulls", "hull error mm", "poses"
+            "name", "family", "source", "longest axis mm", "mass g", "hulls", "grade", "error p95 mm",
+            "max mm", "poses",
         )  # fmt: skip
         print_table(Table(header=header, rows=[(name, *_row(name)) for name in names]))
         print(f"{len(names)} parts")
@@ -90,17 +91,19 @@ def _built_index() -> Index:
 
 def _row(name: str) -> tuple[str, ...]:
     if name in starter_names() and not is_built(name):
-        return ("(not built yet)", *6 * ("",))
+        return ("(not built yet)", *8 * ("",))
     try:
         part = store.read_part(store.parts_folder() / name)
     except BadPart:
-        return ("(damaged: import it again)", *6 * ("",))
+        return ("(damaged: import it again)", *8 * ("",))
     return (
         part.family,
         part.source,
         f"{1e3 * part.longest_axis:.1f}",
         f"{1e3 * part.mass:.3g}",
         str(part.n_hulls),
+        part.grade,
+        f"{1e3 * part.hull_error_p95:.2f}",
         f"{1e3 * part.hull_error:.2f}",
         str(len(part.resting_probability)),
     )

@@ -11,6 +11,7 @@ import tyro
 from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts.builtin import find_part
 from mskgrasp.parts.catalogue import read_index
+from mskgrasp.parts.commands.grade import coarse_note, grade_text
 from mskgrasp.runtime.progress import advance_to, progress
 from mskgrasp.simulation.resting import Resting, resting_of
 
@@ -55,6 +56,10 @@ def run_show(command: Show) -> int:
     _check(out)
     draw_part(part, out)
     print(out)
+    print(f"hulls: {part.n_hulls}, {grade_text(part)}")
+    coarse = coarse_note([part])
+    if coarse is not None:
+        print(coarse)
     print(resting_text(resting_of(part)))
     return 0
 

@@ -19,7 +19,7 @@ from mskgrasp.parts.builtin import LEGAL_NAME, builtin_names
 from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
 from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, MeshFile, Unit, read_content, read_mesh
 from mskgrasp.parts.part import Part
-from mskgrasp.parts.solids.decompose import convex_pieces
+from mskgrasp.parts.solids.mesh_pieces import mesh_pieces
 from mskgrasp.parts.solids.simplify import for_collision
 from mskgrasp.parts.solids.solid import Solid
 from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION, stamp
@@ -175,7 +175,7 @@ def _make(
 ) -> Part:
     try:
         return write_solid(
-            Solid(mesh=mesh, hulls=convex_pieces(for_collision(mesh))),
+            Solid(mesh=mesh, hulls=mesh_pieces(for_collision(mesh))),
             name=name,
             family=family,
             source=f"imported from {path.name}",
@@ -185,6 +185,7 @@ def _make(
                 f"extent_{axis}": float(size) / 1000 for axis, size in zip("xyz", mesh.extents, strict=True)
             },
             recipe_hash=recipe_hash,
+            coarse=True,
         )
     except BadPart as error:
         raise BadPart(f"{path}: {error}") from error

@@ -22,7 +22,7 @@ from mskgrasp.parts.solids.measure import (
     MeshSurface,
     aspect_ratio,
 )
-from mskgrasp.parts.solids.pieces import merge_hulls
+from mskgrasp.parts.solids.pieces import merge_in_steps
 from mskgrasp.parts.solids.solid import cut, few_corners
 
 MOST_HULLS = 48
@@ -44,7 +44,7 @@ _SLACKS = (0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04)
 
 _MOST_AFTER_SPLITTING = 96
 _SLIVER_MM = 0.2
-_CONVEX_RATIO = 1.001
+CONVEX_RATIO = 1.001
 _OVERLAP_MM = 0.1
 _LOST_SHARE = 0.4
 
@@ -59,19 +59,19 @@ def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
         BadPart: Pieces as fine as they may be are too far from the mesh, or too thin for PhysX.
     """
     # CoACD would search for concavity between the facets of a fine ball, for minutes.
-    convex = mesh_mm.convex_hull.volume <= _CONVEX_RATIO * mesh_mm.volume
+    convex = mesh_mm.convex_hull.volume <= CONVEX_RATIO * mesh_mm.volume
     surface = MeshSurface(mesh_mm)
     tried: list[tuple[float, int, HullFit]] = []
     for concavity_mm in CONCAVITIES_MM:
-        cut_up = [np.asarray(mesh_mm.vertices)] if convex else _cut_up(mesh_mm, concavity_mm)
-        for pieces in _with_few_corners(cut_up, _LOST_SHARE * concavity_mm):
+        parts = [np.asarray(mesh_mm.vertices)] if convex else cut_up(mesh_mm, concavity_mm)
+        for pieces in with_few_corners(parts, _LOST_SHARE * concavity_mm):
             fit = surface.fit(pieces)
             if _within(fit, MOST_P95_MM, MOST_VOLUME_RATIO):
-                joined = _join(surface, pieces, MOST_P95_MM, MOST_VOLUME_RATIO, finish=_split_slender)
+                joined = _join(surface, pieces, MOST_P95_MM, MOST_VOLUME_RATIO, finish=split_slender)
                 if len(joined) <= MOST_HULLS:
                     return tuple(joined)
             tried.append((fit.p95, len(pieces), fit))
-        if len(cut_up) >= MOST_HULLS:
+        if len(parts) >= MOST_HULLS:
             break  # at the limit of pieces a finer cut is no closer, and takes minutes
     _, count, fit = min(tried, key=lambda item: item[0])
     raise BadPart(
@@ -103,7 +103,8 @@ def fewest_hulls(
     return tuple(_join(surface, hulls, most_p95, most_ratio, most_largest))
 
 
-def _cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
+def cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
+    """Pieces (n, 3) of CoACD, at most ``MOST_HULLS``, of this concavity where these suffice."""
     coacd.set_log_level("error")
     pieces = coacd.run_coacd(
         coacd.Mesh(np.asarray(mesh_mm.vertices), np.asarray(mesh_mm.faces)),
@@ -122,7 +123,7 @@ def _cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
     return [np.asarray(vertices, dtype=float) for vertices, _ in pieces]
 
 
-def _with_few_corners(pieces: Sequence[np.ndarray], most_lost_mm: float) -> Iterator[list[np.ndarray]]:
+def with_few_corners(pieces: Sequence[np.ndarray], most_lost_mm: float) -> Iterator[list[np.ndarray]]:
     """Pieces with no more corners than PhysX accepts; where that loses much, again with those halved.
 
     A ball is one convex piece, but with 32 corners it loses 6 % of its diameter.
@@ -165,10 +166,11 @@ def _join(
     best: list[np.ndarray] | None = None
     # Pieces that are slender from the start stay so; ``finish`` cuts them.
     most_slender = max([0.9 * MOST_ASPECT_RATIO, *(aspect_ratio(points) for points in hulls)])
+    steps = merge_in_steps(hulls, _SLACKS)
     low, high, middle = 0, len(_SLACKS), len(_SLACKS) - 1
     while low < high:
         # The largest slack first, which fits most parts, then bisection.
-        joined = merge_hulls(hulls, _SLACKS[middle])
+        joined = steps[middle]
         if len(joined) == len(hulls):
             low, middle = middle + 1, (middle + 1 + high) // 2
             continue
@@ -186,7 +188,7 @@ def _within(fit: HullFit, most_p95: float, most_ratio: float) -> bool:
     return fit.p95 <= most_p95 and 1 / most_ratio <= fit.volume_ratio <= most_ratio
 
 
-def _split_slender(pieces: Sequence[np.ndarray]) -> list[np.ndarray]:
+def split_slender(pieces: Sequence[np.ndarray], most: int = _MOST_AFTER_SPLITTING) -> list[np.ndarray]:
     """Pieces cut across their length until PhysX on a GPU accepts them.
 
     Raises:
@@ -200,11 +202,11 @@ def _split_slender(pieces: Sequence[np.ndarray]) -> list[np.ndarray]:
             continue  # a remainder between two cuts; the fit is measured without it
         if ratio <= 0.9 * MOST_ASPECT_RATIO:
             done.append(points)
-        elif len(done) + len(pending) < _MOST_AFTER_SPLITTING:
+        elif len(done) + len(pending) < most:
             pending += _halves(points)
         else:
             raise BadPart(
-                f"the part is too thin: over {_MOST_AFTER_SPLITTING} hulls would be needed to keep each "
+                f"the part is too thin: over {most} hulls would be needed to keep each "
                 f"hull's length under {MOST_ASPECT_RATIO:.0f} times its thickness; make thin walls thicker"
             )
     return done

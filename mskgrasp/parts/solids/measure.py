@@ -11,6 +11,7 @@ from manifold3d import Manifold, Mesh64, OpType
 from scipy.spatial import ConvexHull, KDTree
 
 from mskgrasp.core.geometry import quat_from_matrix
+from mskgrasp.parts.part import FINE_P95_MM, FINE_VOLUME_RATIO
 
 MOST_SAMPLES = 12_000
 """Number of points on each surface at which hulls and mesh are compared."""
@@ -18,10 +19,10 @@ MOST_SAMPLES = 12_000
 MOST_ASPECT_RATIO = 50.0
 """PhysX on a GPU drops hulls whose length is about 64 times their thickness."""
 
-MOST_P95_MM = 0.7
+MOST_P95_MM = FINE_P95_MM
 """95 % of the surfaces of hulls and mesh have to be within this distance."""
 
-MOST_VOLUME_RATIO = 1.1
+MOST_VOLUME_RATIO = FINE_VOLUME_RATIO
 """Largest ratio between the volumes of hulls and mesh, either way."""
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,10 @@ from mskgrasp.parts.solids import solid as s
 _MOST_CORNERS = s.MAX_HULL_VERTICES // 2
 _MOST_PROFILE_CORNERS = 10
 _TOUCH = 1e-6
+_TOUCH_HULLS_MM = 1e-3
+
+Boxes = dict[int, tuple[np.ndarray, np.ndarray]]
+"""Lowest and highest corner (3,) of the box around each piece, by its number."""
 
 
 def convex_polygons(region: Any, most_corners: int = _MOST_CORNERS) -> list[np.ndarray]:
@@ -35,7 +38,11 @@ def convex_polygons(region: Any, most_corners: int = _MOST_CORNERS) -> list[np.n
         if triangle.area > 1e-9
     ]
     pieces: dict[int, np.ndarray] = {n: _counter_clockwise(t) for n, t in enumerate(triangles)}
-    sides: dict[int, list[int]] = {n: _neighbours(n, pieces) for n in pieces}
+    corners = {n: {tuple(corner) for corner in np.round(t, 7)} for n, t in pieces.items()}
+    sides: dict[int, list[int]] = {
+        n: [m for m, others in corners.items() if m != n and len(own & others) == 2]
+        for n, own in corners.items()
+    }
     # Unions of pairs that no later union has changed are not computed again.
     known: dict[tuple[int, int], tuple[float, np.ndarray] | None] = {}
     while True:
@@ -107,37 +114,63 @@ def merge_hulls(hulls: Sequence[np.ndarray], slack: float = 0.002) -> list[np.nd
         hulls: Corner points (n, 3) of each piece.
         slack: Volume that all unions together may add, as a share of the whole.
     """
+    return merge_in_steps(hulls, (slack,))[0]
+
+
+def merge_in_steps(hulls: Sequence[np.ndarray], slacks: Sequence[float]) -> list[list[np.ndarray]]:
+    """The results of `merge_hulls` with several slacks, in increasing order, for the time of the last."""
     pieces = {number: np.asarray(points, dtype=float) for number, points in enumerate(hulls)}
     volumes = {number: ConvexHull(points).volume for number, points in pieces.items()}
-    budget = slack * sum(volumes.values())
+    boxes = {number: (points.min(axis=0), points.max(axis=0)) for number, points in pieces.items()}
+    whole = sum(volumes.values())
+    # What is left of each slack. More than the last one leaves is of no use to the others either.
+    budgets = [slack * whole for slack in slacks]
+    found: list[list[np.ndarray]] = []
     heap: list[tuple[float, int, int]] = []
     joints: dict[tuple[int, int], tuple[np.ndarray, float]] = {}
 
     def consider(a: int, b: int) -> None:
         joined = _joined_hull(pieces[a], pieces[b])
-        if joined is None or (added := joined[1] - volumes[a] - volumes[b]) >= budget:
+        if joined is None or (added := joined[1] - volumes[a] - volumes[b]) >= budgets[-1]:
             return
         # The sum of their volumes counts the common volume twice.
         added += _common_volume(pieces[a], pieces[b])
-        if added < budget:
+        if added < budgets[-1]:
             joints[a, b] = joined
             heapq.heappush(heap, (added, a, b))
 
-    for a, b in combinations(sorted(pieces), 2):
-        consider(a, b)
+    numbers = sorted(pieces)
+    for place, a in enumerate(numbers):
+        for b in _near(a, numbers[place + 1 :], boxes):
+            consider(a, b)
     fresh = len(pieces)
     while heap:
         added, a, b = heapq.heappop(heap)
-        if a not in pieces or b not in pieces or added > budget:
+        if a not in pieces or b not in pieces:
             continue
-        budget -= max(added, 0.0)
+        # All that is left in the heap adds at least as much.
+        while len(found) < len(budgets) and added > budgets[len(found)]:
+            found.append(list(pieces.values()))
+        if len(found) == len(budgets):
+            break
+        budgets = [budget - max(added, 0.0) for budget in budgets]
         pieces[fresh], volumes[fresh] = joints[a, b]
+        boxes[fresh] = pieces[fresh].min(axis=0), pieces[fresh].max(axis=0)
         del pieces[a], pieces[b]
-        for other in sorted(pieces):
-            if other != fresh:
-                consider(other, fresh)
+        for other in _near(fresh, sorted(pieces.keys() - {fresh}), boxes):
+            consider(other, fresh)
         fresh += 1
-    return list(pieces.values())
+    return found + [list(pieces.values()) for _ in range(len(budgets) - len(found))]
+
+
+def _near(number: int, others: Sequence[int], boxes: Boxes) -> list[int]:
+    """Those of the other pieces whose boxes touch that of one piece."""
+    if not others:
+        return []
+    low, high = boxes[number]
+    lows, highs = np.array([boxes[other] for other in others]).swapaxes(0, 1)
+    apart = (low > highs + _TOUCH_HULLS_MM).any(axis=1) | (lows > high + _TOUCH_HULLS_MM).any(axis=1)
+    return [others[k] for k in np.flatnonzero(~apart).tolist()]
 
 
 def _frusta(section: Any) -> tuple[Any | None, list[np.ndarray]]:
@@ -337,8 +370,6 @@ def _faces(points: np.ndarray) -> list[tuple[np.ndarray, float]]:
 
 def _joined_hull(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, float] | None:
     """Corners and volume of the hull of two bodies that touch; None where it has too many corners."""
-    if (a.min(axis=0) > b.max(axis=0) + 1e-3).any() or (b.min(axis=0) > a.max(axis=0) + 1e-3).any():
-        return None
     points = np.concatenate([a, b])
     try:
         hull = ConvexHull(points)
@@ -365,15 +396,6 @@ def _signed_area(polygon: np.ndarray) -> float:
 
 def _area(polygon: np.ndarray) -> float:
     return abs(_signed_area(polygon))
-
-
-def _neighbours(number: int, pieces: dict[int, np.ndarray]) -> list[int]:
-    own = {tuple(corner) for corner in np.round(pieces[number], 7)}
-    return [
-        other
-        for other, polygon in pieces.items()
-        if other != number and len(own & {tuple(corner) for corner in np.round(polygon, 7)}) == 2
-    ]
 
 
 def _joined(a: np.ndarray, b: np.ndarray, most_corners: int) -> np.ndarray | None:

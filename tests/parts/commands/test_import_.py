@@ -39,7 +39,7 @@ def table(stdout: str) -> dict[str, str]:
     lines = table_lines(stdout)
     assert (
         lines[0].split()
-        == "file part result size mm mass g hulls error p95 mm max mm repairs, or reason of refusal".split()
+        == "file part result size mm mass g hulls grade error p95 mm max mm repairs, or reason of refusal".split()
     )
     return {re.split(r"\s{2,}", line)[0]: line for line in lines[1:-1]}
 
@@ -66,7 +66,7 @@ def test_a_folder_with_all_a_user_may_have_in_it(program, tmp_path, own_cache):
     assert done.returncode == 1
     rows = {Path(name).name: row for name, row in table(done.stdout).items()}
     wanted = {
-        "Gehäuse oben.stl": r"gehaeuse-oben\s+imported\s+40\.0 x 30\.0 x 20\.0\s+24\s+1\s+0\.00\s+0\.00$",
+        "Gehäuse oben.stl": r"gehaeuse-oben\s+imported\s+40\.0 x 30\.0 x 20\.0\s+24\s+1\s+fine\s+0\.00\s+0\.00$",
         "inner link.stl": r"inner-link\s+imported",
         "sheet.stl": r"imported\s+60\.0 x 40\.0 x 1\.0\s+2\.4 ",
         "linked.stl": r"refused\s+leads out of .*CAD Daten für Köln to .*/outside\.stl: give that",
@@ -102,6 +102,9 @@ def importing(tmp_path, monkeypatch, capsys) -> Callable[..., Run]:
     monkeypatch.chdir(tmp_path)
 
     def run(*files: str, **options: Any) -> Run:
+        options = (
+            dict(workers=1) | options
+        )  # more would be processes of their own, which take seconds to start
         code = run_import(Import(files=tuple(Path(file) for file in files), **options))
         captured = capsys.readouterr()
         return Run(code, captured.out, captured.err)
@@ -132,6 +135,7 @@ def test_mistakes_of_the_command_line_are_reported_in_one_line(importing, tmp_pa
         ("bare", {}, "the folder bare holds no CAD file"),
         ("box.stl", {"split": True, "union": True}, "--split and --union exclude each other"),
         ("box.stl", {"density": 7.85}, "in kg/m^3, not g/cm^3"),
+        ("box.stl", {"workers": -1}, "--workers -1: give a number of processes"),
     ):
         with pytest.raises(UsageError) as caught:
             importing(file, **options)

@@ -1,0 +1,162 @@
+"""Convex pieces of any watertight mesh: layers along the direction that suits it, or CoACD's.
+
+A search from fine to coarse that ends with the first set of pieces that are close and few. It depends on the
+mesh alone, never on time, so that the same mesh always gives the same pieces.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+import numpy as np
+import trimesh
+
+from mskgrasp.core.errors import BadPart
+from mskgrasp.parts.solids.decompose import (
+    CLOSE_P95_MM,
+    CLOSE_VOLUME_RATIO,
+    CONVEX_RATIO,
+    MOST_HULLS,
+    convex_pieces,
+    cut_up,
+    split_slender,
+    with_few_corners,
+)
+from mskgrasp.parts.solids.layers import Layers, Tolerances, layer_directions
+from mskgrasp.parts.solids.measure import MOST_P95_MM, MOST_VOLUME_RATIO, HullFit, MeshSurface
+from mskgrasp.parts.solids.pieces import merge_in_steps
+
+MOST_MESH_HULLS = 128
+"""Greatest number of pieces of a mesh."""
+
+FINE = (
+    Tolerances(sections=0.4, outline=0.15, thickness=0.6, holes=2.6),
+    Tolerances(sections=0.4, outline=0.15, thickness=0.6, holes=0.5),
+    Tolerances(sections=0.8, outline=0.3, thickness=1.0, holes=2.6),
+    Tolerances(sections=1.5, outline=0.5, thickness=2.0, holes=2.6),
+)
+"""Tolerances of layers, tried in turn until pieces are within the bounds of a fine part.
+
+Holes up to 2.6 mm in radius are filled first, as in the built-in families: no finger fits in.
+"""
+
+COARSE = (
+    Tolerances(sections=2.5, outline=0.8, thickness=3.0, holes=2.6),
+    Tolerances(sections=5.0, outline=1.5, thickness=6.0, holes=4.0),
+)
+"""Tolerances of layers where those of a fine part need too many pieces."""
+
+_BOUNDS = ((CLOSE_P95_MM, CLOSE_VOLUME_RATIO), (MOST_P95_MM - 0.05, MOST_VOLUME_RATIO - 0.01))
+"""Bounds for joining pieces, mm and volume ratio; the second where the first leaves many.
+
+It is closer than a fine part's, which is measured again on the mesh itself and with pieces that overlap.
+"""
+_SLACKS = (0.005, 0.015, 0.03, 0.05, 0.08)
+_COARSE_SLACKS = (0.03, 0.08, 0.15, 0.3, 0.5)
+"""Shares of the volume that joining may add."""
+_TRIED_DIRECTIONS = 2
+"""Number of directions tried: those with the fewest pieces."""
+_MOST_SPLIT = 2_000
+_ENOUGH = 1.5
+"""Layers that miss the bounds of a fine part by no more than this factor are taken: CoACD takes long."""
+_COARSE_CONCAVITY = 0.02
+"""Concavity that CoACD may leave, as a share of the mesh's length, where layers do not succeed."""
+
+
+def mesh_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
+    """Convex pieces of a watertight mesh: close and few where possible, otherwise as close as few can be.
+
+    Args:
+        mesh_mm: Millimetres; `mskgrasp.parts.solids.simplify.for_collision` makes one of few triangles.
+
+    Returns:
+        Corners (n, 3) of each piece, millimetres.
+    """
+    if mesh_mm.convex_hull.volume <= CONVEX_RATIO * mesh_mm.volume:
+        return convex_pieces(mesh_mm)
+    search = _Search(mesh_mm)
+    for tolerances in FINE:
+        found = search.fine(tolerances)
+        if found is not None:
+            return tuple(found)
+    excess, layers = search.coarse()
+    if excess <= _ENOUGH:
+        return tuple(layers)
+    try:
+        return convex_pieces(mesh_mm)
+    except BadPart:  # no 48 pieces of CoACD are close enough
+        return tuple(layers) if layers else search.last()
+
+
+class _Search:
+    """Joined layers of one mesh."""
+
+    def __init__(self, mesh_mm: trimesh.Trimesh) -> None:
+        self._mesh = mesh_mm
+        self._surface = MeshSurface(mesh_mm)
+        self._directions = layer_directions(mesh_mm)
+
+    def fine(self, tolerances: Tolerances) -> list[np.ndarray] | None:
+        """Few pieces within the bounds of a fine part; None where there are none or too many."""
+        best: list[np.ndarray] | None = None
+        for pieces in self._sets(tolerances):
+            joined = self._joined(pieces) if self._within(_BOUNDS[-1], pieces) else None
+            if joined is not None and (best is None or len(joined) < len(best)):
+                best = joined
+            if best is not None and len(best) <= MOST_HULLS:
+                break
+        return best
+
+    def coarse(self) -> tuple[float, list[np.ndarray]]:
+        """The closest of the sets of joined layers that are small enough, and by how much they miss.
+
+        As a factor of the bounds of a fine part; infinite, and no pieces, where all sets are too large.
+        """
+        found: list[tuple[float, list[np.ndarray]]] = []
+        for tolerances in (*FINE[-1:], *COARSE):
+            for pieces in self._sets(tolerances):
+                steps = (split_slender(step, _MOST_SPLIT) for step in merge_in_steps(pieces, _COARSE_SLACKS))
+                few = next((step for step in steps if len(step) <= MOST_MESH_HULLS), None)
+                if few is not None:
+                    found.append((_excess(self._surface.fit(few)), few))
+        return min(found, key=lambda item: item[0], default=(np.inf, []))
+
+    def last(self) -> tuple[np.ndarray, ...]:
+        """The pieces of CoACD, however far from the mesh."""
+        pieces = cut_up(self._mesh, _COARSE_CONCAVITY * float(np.max(self._mesh.extents)))
+        return tuple(split_slender(next(with_few_corners(pieces, np.inf)), _MOST_SPLIT))
+
+    def _sets(self, tolerances: Tolerances) -> Iterator[list[np.ndarray]]:
+        """Sets of pieces, each of layers across another direction, the one of the fewest pieces first."""
+        layers = [Layers(self._mesh, direction, tolerances) for direction in self._directions]
+        for one in sorted(layers, key=lambda one: one.count)[:_TRIED_DIRECTIONS]:
+            pieces = one.pieces()
+            if pieces is not None:
+                yield pieces
+
+    def _joined(self, pieces: Sequence[np.ndarray]) -> list[np.ndarray] | None:
+        """Pieces joined to few, as far as the bounds allow; None where too many are left."""
+        steps = [split_slender(step, _MOST_SPLIT) for step in (pieces, *merge_in_steps(pieces, _SLACKS))]
+        if len(steps[-1]) > MOST_MESH_HULLS:
+            return None
+        largest_first = steps[::-1]
+        joined = steps[0]
+        for bounds in _BOUNDS:
+            # Where a step is within the bounds, those of less slack are, too.
+            place = bisect_left(largest_first, True, key=partial(self._within, bounds))
+            joined = largest_first[min(place, len(steps) - 1)]
+            if len(joined) <= MOST_HULLS:
+                break
+            largest_first = largest_first[: place + 1]
+        return joined if len(joined) <= MOST_MESH_HULLS else None
+
+    def _within(self, bounds: tuple[float, float], pieces: Sequence[np.ndarray]) -> bool:
+        return self._surface.fit_within(pieces, *bounds) is not None
+
+
+def _excess(fit: HullFit) -> float:
+    """By how much a fit exceeds the bounds of a fine part, as a factor."""
+    ratio = max(fit.volume_ratio, 1 / fit.volume_ratio)
+    return max(fit.p95 / MOST_P95_MM, (ratio - 1) / (MOST_VOLUME_RATIO - 1))

@@ -1,0 +1,76 @@
+"""Convex pieces of meshes that few hulls represent badly: close where possible, graded otherwise."""
+
+import hashlib
+import os
+import subprocess
+import sys
+
+import numpy as np
+import trimesh
+from manifold3d import Manifold
+
+from mskgrasp.parts.solids import solid as s
+from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, MOST_P95_MM, aspect_ratio, hull_fit
+from mskgrasp.parts.solids.mesh_pieces import MOST_MESH_HULLS, mesh_pieces
+from tests.parts.solids.test_decompose import mesh_of
+
+DIGEST = """
+import hashlib
+from tests.parts.solids.test_mesh_pieces import honeycomb
+from tests.parts.solids.test_decompose import mesh_of
+from mskgrasp.parts.solids.mesh_pieces import mesh_pieces
+print(hashlib.sha256(b"".join(p.tobytes() for p in mesh_pieces(mesh_of(honeycomb())))).hexdigest())
+"""
+
+
+def honeycomb() -> Manifold:
+    body = s.extrude(s.rectangle(0, 40, 0, 30), 0, 6)
+    for row in range(3):
+        for column in range(3):
+            body -= s.extrude(s.polygon(4.4, 6) + [7 + 12 * column, 6 + 9.5 * row], -1, 7)
+    return body
+
+
+def check(mesh: trimesh.Trimesh, pieces: tuple[np.ndarray, ...]) -> None:
+    assert 1 <= len(pieces) <= MOST_MESH_HULLS
+    for points in pieces:
+        assert 4 <= len(points) <= s.MAX_HULL_VERTICES
+        assert aspect_ratio(points) <= MOST_ASPECT_RATIO
+
+
+def test_a_grille_that_few_pieces_of_coacd_do_not_represent_is_close_and_open():
+    mesh = mesh_of(honeycomb())
+    pieces = mesh_pieces(mesh)
+    check(mesh, pieces)
+    fit = hull_fit(mesh, pieces)
+    assert fit.p95 < MOST_P95_MM and 1 / 1.1 < fit.volume_ratio < 1.1
+    for points in pieces:
+        assert not trimesh.convex.convex_hull(points).contains([[7, 6, 3], [19, 15.5, 3]]).any()
+
+
+def test_a_thin_shell_keeps_its_inside_open():
+    body = s.extrude(s.rectangle(0, 60, 0, 40), 0, 25) - s.extrude(s.rectangle(0.8, 59.2, 0.8, 39.2), 0.8, 26)
+    mesh = mesh_of(body)
+    pieces = mesh_pieces(mesh)
+    check(mesh, pieces)
+    assert hull_fit(mesh, pieces).p95 < 0.1
+    assert not any(trimesh.convex.convex_hull(points).contains([[30, 20, 5]])[0] for points in pieces)
+
+
+def test_a_ball_is_one_convex_body_and_its_pieces_are_close():
+    mesh = trimesh.creation.icosphere(subdivisions=3, radius=15)
+    pieces = mesh_pieces(mesh)
+    check(mesh, pieces)
+    assert hull_fit(mesh, pieces).p95 < MOST_P95_MM
+
+
+def test_the_same_mesh_gives_the_same_bytes_in_another_process():
+    here = hashlib.sha256(b"".join(p.tobytes() for p in mesh_pieces(mesh_of(honeycomb())))).hexdigest()
+    there = subprocess.run(
+        [sys.executable, "-c", DIGEST],
+        env=os.environ | {"OMP_NUM_THREADS": "2"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert there.stdout.strip() == here
