@@ -54,6 +54,10 @@ regression: $(READY) ## Plan, grasp and place a fixed set, compare with the stor
 bench-parts: $(TESTABLE) ## Measure seconds to build a part, by family and stage
 	$(RUN) tests.benchmarks.build_parts
 
+bench-import: $(TESTABLE) ## Measure the share of open CAD files that become parts, and seconds a file
+	$(RUN) tests.benchmarks.cad_files out/cad_files
+	$(RUN) tests.benchmarks.import_parts out/cad_files --speed-up 2
+
 bench-collect: $(TESTABLE) ## Measure grasps/s of the collector, plain ManiSkill and raw SAPIEN
 	$(RUN) tests.benchmarks.collect_speed
 

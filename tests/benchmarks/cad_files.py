@@ -3,7 +3,8 @@
 Writes STL files in millimetres and ``sources.csv`` (file, source, licence) into a folder, from packages:
 
 - ManiSkill, which mskgrasp needs: robots' parts that carry an open licence of their own.
-- robosuite: parts of grippers and robots. ``pip install --no-deps --target DIR robosuite``, ``--packages DIR``.
+- robosuite: parts of grippers and robots. ``pip install --no-deps --target DIR robosuite``, then give
+  ``--packages DIR``.
 - bd_warehouse (the extra [cad]): gears, threads, plates of machines, couplings, flanges.
 - OpenSCAD with its examples and the library MCAD: ``apt-get install openscad openscad-mcad``.
 - Shapes drawn here that are hard to represent by convex hulls: springs, heat sinks, grilles, thin shells.
@@ -26,12 +27,9 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from manifold3d import CrossSection, FillRule, Manifold
 
-from mskgrasp.parts.solids import solid as s
 from mskgrasp.runtime.progress import note, progress
-
-MCAD = "LGPL-2.1"
+from tests.benchmarks.cad_shapes import DRAWN, mesh_of
 
 MANISKILL = {
     "so100": ("Apache-2.0", (
@@ -42,8 +40,8 @@ MANISKILL = {
         "gripper", "centered_base_link", "link_3_part", "link_2_rotation_connector",
     )),
     "g1_humanoid": ("BSD-3-Clause", (
-        "left_four_link", "left_ankle_pitch_link", "right_shoulder_yaw_link", "left_three_link", "left_one_link",
-        "left_zero_link", "left_elbow_pitch_link", "left_palm_link", "pelvis_contour_link",
+        "left_four_link", "left_ankle_pitch_link", "right_shoulder_yaw_link", "left_three_link",
+        "left_one_link", "left_zero_link", "left_elbow_pitch_link", "left_palm_link", "pelvis_contour_link",
     )),
 }  # fmt: skip
 """Robots with a licence file of their own, and those of their meshes that are one closed body."""
@@ -70,22 +68,30 @@ ROBOSUITE = (
 """Meshes below ``robosuite/models/assets``."""
 
 SCAD = {
-    "servo_ds420": (MCAD, "use <MCAD/servos.scad>\nalignds420([0,0,0],[0,0,0]);"),
-    "servo_s3003": (MCAD, "use <MCAD/servos.scad>\nfutabas3003([0,0,0],[0,0,0]);"),
-    "stepper_nema17": (MCAD, "include <MCAD/stepper.scad>\nmotor(Nema17);"),
-    "stepper_nema14": (MCAD, "include <MCAD/stepper.scad>\nmotor(Nema14, NemaShort);"),
-    "involute_gear": (MCAD, "use <MCAD/involute_gears.scad>\ngear(number_of_teeth=30, circular_pitch=200, circles=6);"),
-    "bevel_gear": (MCAD, "use <MCAD/involute_gears.scad>\nbevel_gear(number_of_teeth=20, outside_circular_pitch=400);"),
-    "twisted_gear": (MCAD, "use <MCAD/involute_gears.scad>\ngear(number_of_teeth=16, circular_pitch=300, gear_thickness=12, "
-                     "rim_thickness=14, hub_thickness=18, twist=20);"),
-    "lego_brick": (MCAD, "use <MCAD/lego_compatibility.scad>\nblock(4,2,1,reinforcement=true);"),
-    "lego_beam": (MCAD, "use <MCAD/lego_compatibility.scad>\nblock(6,1,1,axle_hole=true);"),
-    "grid_beam": (MCAD, "include <MCAD/gridbeam.scad>\nscale(0.8) zBeam(3);"),
-    "auger": (MCAD, "use <MCAD/screw.scad>\nauger(20, 50, 15, 4);"),
-    "motor_plate": (MCAD, "use <MCAD/motors.scad>\nlinear_extrude(4) difference() { square(50, center=true); "
-                    "stepper_motor_mount(17, mochup=false); }"),
-}  # fmt: skip
-"""Licence and source of OpenSCAD bodies that use MCAD."""
+    "servo_ds420": "use <MCAD/servos.scad>\nalignds420([0,0,0],[0,0,0]);",
+    "servo_s3003": "use <MCAD/servos.scad>\nfutabas3003([0,0,0],[0,0,0]);",
+    "stepper_nema17": "include <MCAD/stepper.scad>\nmotor(Nema17);",
+    "stepper_nema14": "include <MCAD/stepper.scad>\nmotor(Nema14, NemaShort);",
+    "involute_gear": (
+        "use <MCAD/involute_gears.scad>\ngear(number_of_teeth=30, circular_pitch=200, circles=6);"
+    ),
+    "bevel_gear": (
+        "use <MCAD/involute_gears.scad>\nbevel_gear(number_of_teeth=20, outside_circular_pitch=400);"
+    ),
+    "twisted_gear": (
+        "use <MCAD/involute_gears.scad>\ngear(number_of_teeth=16, circular_pitch=300, gear_thickness=12, "
+        "rim_thickness=14, hub_thickness=18, twist=20);"
+    ),
+    "lego_brick": "use <MCAD/lego_compatibility.scad>\nblock(4,2,1,reinforcement=true);",
+    "lego_beam": "use <MCAD/lego_compatibility.scad>\nblock(6,1,1,axle_hole=true);",
+    "grid_beam": "include <MCAD/gridbeam.scad>\nscale(0.8) zBeam(3);",
+    "auger": "use <MCAD/screw.scad>\nauger(20, 50, 15, 4);",
+    "motor_plate": (
+        "use <MCAD/motors.scad>\nlinear_extrude(4) difference() { square(50, center=true); "
+        "stepper_motor_mount(17, mochup=false); }"
+    ),
+}
+"""OpenSCAD bodies that use MCAD (LGPL-2.1)."""
 
 EXAMPLES = {
     "example001": 0.5, "example002": 0.5, "example003": 0.5, "example004": 0.5, "example005": 0.2,
@@ -160,7 +166,7 @@ def cad_files(packages: Path | None = None) -> Iterator[CadFile]:
     yield from _from_openscad()
     for name, make in DRAWN.items():
         yield CadFile(
-            name=name, source="drawn by this script", licence="Apache-2.0", mesh=partial(_mesh_of, make)
+            name=name, source="drawn by this script", licence="Apache-2.0", mesh=partial(mesh_of, make)
         )
 
 
@@ -193,7 +199,7 @@ def _from_robosuite(packages: Path | None) -> Iterator[CadFile]:
     for name in ROBOSUITE if root else ():
         path = root / "models" / "assets" / name
         yield CadFile(
-            name=f"robosuite_{path.parent.name if path.parent.name != 'meshes' else 'xarm7'}_{path.stem.lower()}",
+            name=f"robosuite_{path.parts[-3 if path.parent.name == 'meshes' else -2]}_{path.stem.lower()}",
             source=f"robosuite, {name}",
             licence="MIT",
             mesh=partial(_read, path),
@@ -230,8 +236,8 @@ def _from_bd_warehouse() -> Iterator[CadFile]:
         "threaded_screw": lambda: fastener.HexHeadScrew("M12-1.75", 30, "iso4014", simple=False),
         "threaded_nut": lambda: fastener.HexNut("M20-2.5", "iso4032", simple=False),
         "heat_set_nut": lambda: fastener.HeatSetNut("M5-0.8-Standard", "McMaster-Carr", simple=False),
-        "flange": lambda: flange.SlipOnFlange("1/2", 150),
-        "weld_neck_flange": lambda: flange.WeldNeckFlange("1/2", 150),
+        "flange": lambda: flange.SlipOnFlange("1", 150),
+        "weld_neck_flange": lambda: flange.WeldNeckFlange("1", 150),
         "gantry_plate": open_builds.CBeamGantryPlate,
         "riser_plate": open_builds.CBeamRiserPlate,
         "end_mount": open_builds.CBeamEndMount,
@@ -262,9 +268,9 @@ def _from_openscad() -> Iterator[CadFile]:
     if shutil.which("openscad") is None or not EXAMPLES_FOLDER.is_dir():
         note("left out OpenSCAD, which is not installed: apt-get install openscad openscad-mcad")
         return
-    for name, (licence, code) in SCAD.items():
+    for name, code in SCAD.items():
         yield CadFile(
-            name=f"scad_{name}", source="openscad-mcad", licence=licence, mesh=partial(_rendered, code)
+            name=f"scad_{name}", source="openscad-mcad", licence="LGPL-2.1", mesh=partial(_rendered, code)
         )
     for name, scale in EXAMPLES.items():
         yield CadFile(
@@ -294,145 +300,6 @@ def _example(path: Path, scale: float) -> trimesh.Trimesh:
     mesh.apply_scale(scale)
     return mesh
 
-
-def _mesh_of(make: Callable[[], Manifold]) -> trimesh.Trimesh:
-    data = make().to_mesh()
-    return trimesh.Trimesh(np.asarray(data.vert_properties)[:, :3], np.asarray(data.tri_verts))
-
-
-def _spring(radius: float = 12, wire: float = 1.5, turns: float = 5, pitch: float = 7) -> Manifold:
-    sides, steps = 12, int(turns * 32)
-    ring = s.polygon(wire, sides)
-    angle = 2 * np.pi * turns * np.arange(steps + 1) / steps
-    points = np.stack(
-        [
-            np.column_stack(
-                [
-                    (radius + ring[:, 0]) * np.cos(a),
-                    (radius + ring[:, 0]) * np.sin(a),
-                    ring[:, 1] + pitch * a / 2 / np.pi,
-                ]
-            )
-            for a in angle
-        ]
-    )
-    # Overlapping hulls of neighbouring rings are a closed body without folds.
-    hulls = [Manifold.hull_points(points[k : k + 2].reshape(-1, 3)) for k in range(steps)]
-    return sum(hulls[1:], hulls[0])
-
-
-def _heat_sink() -> Manifold:
-    body = s.extrude(s.rectangle(0, 40, 0, 40), 0, 3)
-    for x in np.arange(0, 39, 3.2):
-        body += s.extrude(s.rectangle(x, x + 1.2, 0, 40), 2.9, 15)
-    return body
-
-
-def _pin_sink() -> Manifold:
-    body = s.extrude(s.rectangle(0, 30, 0, 30), 0, 3)
-    for x in np.arange(1, 30, 4.6):
-        for y in np.arange(1, 30, 4.6):
-            body += s.extrude(s.rectangle(x, x + 2, y, y + 2), 2.9, 14)
-    return body
-
-
-def _fan_grille() -> Manifold:
-    rings = [s.extrude(s.circle(r + 1), 0, 2, [s.circle(r - 1)]) for r in (8, 16, 24, 32)]
-    spokes = [s.extrude(s.rectangle(0, 33, -1.2, 1.2), 0, 2.5).rotate((0, 0, 45 + 90 * k)) for k in range(4)]
-    return sum((*rings[1:], *spokes), rings[0])
-
-
-def _cable_clip() -> Manifold:
-    ring = s.extrude(s.circle(7), 0, 10, [s.circle(5)]) - s.extrude(s.rectangle(-3, 3, 2, 10), -1, 11)
-    foot = s.extrude(s.rectangle(-15, 15, -9, -6.5), 0, 10)
-    return ring + foot - s.drill(2.2, (-11, -12, 5), "y", 8) - s.drill(2.2, (11, -12, 5), "y", 8)
-
-
-def _thin_box(wall: float = 0.8) -> Manifold:
-    return s.extrude(s.rectangle(0, 60, 0, 40), 0, 25) - s.extrude(
-        s.rectangle(wall, 60 - wall, wall, 40 - wall), wall, 26
-    )
-
-
-def _thin_dome() -> Manifold:
-    return Manifold.sphere(25, 64).trim_by_plane((0, 0, 1), 0) - Manifold.sphere(23.8, 64)
-
-
-def _ribbed_housing() -> Manifold:
-    body = _thin_box(2.0)
-    for x in np.arange(8, 56, 8):
-        body += s.extrude(s.rectangle(x, x + 1.2, 1, 39), 1, 12)
-    for x, y in ((5, 5), (55, 5), (5, 35), (55, 35)):
-        body += s.extrude(s.circle(3.5) + [x, y], 1, 22) - s.extrude(s.circle(1.3) + [x, y], 4, 23)
-    for z in (8, 12, 16):
-        body -= s.extrude(s.rectangle(15, 45, -1, 3), z, z + 2)
-    return body
-
-
-def _servo_horn() -> Manifold:
-    arm = Manifold.batch_hull([s.extrude(s.circle(4), 0, 2), s.extrude(s.circle(2.5) + [18, 0], 0, 2)])
-    star = sum((arm.rotate((0, 0, 90 * k)) for k in range(1, 4)), arm) + s.extrude(s.circle(4.5), 0, 5)
-    for turn in range(4):
-        for x in (9, 12, 15, 18):
-            star -= s.extrude(s.circle(0.6) + [x, 0], -1, 6).rotate((0, 0, 90 * turn))
-    return star - s.extrude(s.polygon(2.9, 25), 1.5, 6)
-
-
-def _impeller() -> Manifold:
-    blade = CrossSection([s.rectangle(4, 22, -0.7, 0.7)], FillRule.EvenOdd).extrude(14, 20, 40)
-    return sum((blade.rotate((0, 0, 60 * k)) for k in range(6)), s.extrude(s.circle(6), 0, 14))
-
-
-def _knurled_knob() -> Manifold:
-    body = s.lathe([(0, 0), (16, 0), (16, 10), (12, 14), (0, 14)])
-    for k in range(24):
-        body -= s.extrude(s.polygon(1.5, 16) + [16.5, 0], -1, 11).rotate((0, 0, 15 * k))
-    return body - s.extrude(s.circle(3), -1, 9)
-
-
-def _turned_shaft() -> Manifold:
-    return s.lathe(
-        [(0, 0), (6, 0), (6, 12), (5, 13), (9, 15), (9, 30), (7, 32), (7, 50), (3, 52), (3, 60), (0, 60)]
-    )
-
-
-def _bent_tube() -> Manifold:
-    return CrossSection([s.circle(6) + [30, 0], s.circle(4.5) + [30, 0]], FillRule.EvenOdd).revolve(96, 120)
-
-
-def _tilted_bracket() -> Manifold:
-    return (
-        s.extrude(np.array([[0, 0], [50, 0], [50, 6], [6, 6], [6, 35], [0, 35]], dtype=float), 0, 25)
-        - s.drill(3, (30, -1, 12), "y", 10)
-    ).rotate((25, 40, 10))
-
-
-def _honeycomb() -> Manifold:
-    body = s.extrude(s.rectangle(0, 60, 0, 50), 0, 6)
-    for row in range(5):
-        for column in range(6):
-            centre = [5 + 10 * column + 5 * (row % 2), 6 + 9.5 * row]
-            body -= s.extrude(s.polygon(4.6, 6, np.pi / 6) + centre, -1, 7)
-    return body
-
-
-DRAWN: dict[str, Callable[[], Manifold]] = {
-    "spring": _spring,
-    "heat_sink": _heat_sink,
-    "pin_heat_sink": _pin_sink,
-    "fan_grille": _fan_grille,
-    "cable_clip": _cable_clip,
-    "thin_box": _thin_box,
-    "thin_dome": _thin_dome,
-    "ribbed_housing": _ribbed_housing,
-    "servo_horn": _servo_horn,
-    "impeller": _impeller,
-    "knurled_knob": _knurled_knob,
-    "turned_shaft": _turned_shaft,
-    "bent_tube": _bent_tube,
-    "tilted_bracket": _tilted_bracket,
-    "honeycomb": _honeycomb,
-}
 
 if __name__ == "__main__":
     main()

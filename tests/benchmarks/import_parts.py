@@ -1,9 +1,9 @@
 """Share of CAD files that become parts, and time. Run: python -m tests.benchmarks.import_parts --help.
 
-Imports the CAD files of a folder (anybody's; `tests.benchmarks.cad_files` exports a set) into a cache folder of
-its own, one after the other on one core. Files that are no single watertight body by the reader's own repair are
-listed and not counted. ``--speed-up N`` imports them again with one process and with N, compares the wall time,
-and checks that the parts are the same to the last byte.
+Imports the CAD files of a folder (anybody's; `tests.benchmarks.cad_files` exports a set) into a cache folder
+of its own, one after the other on one core. Files that are no single watertight body by the reader's own
+repair are listed and not counted. ``--speed-up N`` imports them again with one process and with N, compares
+the wall time, and checks that the parts are the same to the last byte.
 """
 
 from __future__ import annotations

@@ -165,8 +165,8 @@ def test_coarse_parts_are_left_out_unless_asked_for(tmp_path, capsys):
     )
     with store.kept_in(tmp_path):
         part = write_solid(
-            solid, name="plugged", family="test", source="own", licence="CC0-1.0", density=1000.0, dimensions={},
-            recipe_hash="0", coarse=True,
+            solid, name="plugged", family="test", source="own", licence="CC0-1.0", density=1000.0,
+            dimensions={}, recipe_hash="0", coarse=True,
         )  # fmt: skip
         config = CollectConfig(parts=(str(part.folder), "hex_nut_m30"))
         assert [one.name for _, one in chosen_parts(config)] == ["hex_nut_m30"]

@@ -33,14 +33,16 @@ MOST_MESH_HULLS = 128
 
 FINE = (
     Tolerances(sections=0.4, outline=0.15, thickness=0.6, holes=2.6),
-    Tolerances(sections=0.4, outline=0.15, thickness=0.6, holes=0.5),
     Tolerances(sections=0.8, outline=0.3, thickness=1.0, holes=2.6),
     Tolerances(sections=1.5, outline=0.5, thickness=2.0, holes=2.6),
+    Tolerances(sections=0.4, outline=0.15, thickness=0.6, holes=0.5),
 )
 """Tolerances of layers, tried in turn until pieces are within the bounds of a fine part.
 
 Holes up to 2.6 mm in radius are filled first, as in the built-in families: no finger fits in.
 """
+
+_WIDEST = max(FINE, key=lambda tolerances: tolerances.sections)
 
 COARSE = (
     Tolerances(sections=2.5, outline=0.8, thickness=3.0, holes=2.6),
@@ -102,10 +104,14 @@ class _Search:
         """Few pieces within the bounds of a fine part; None where there are none or too many."""
         best: list[np.ndarray] | None = None
         for pieces in self._sets(tolerances):
-            joined = self._joined(pieces) if self._within(_BOUNDS[-1], pieces) else None
-            if joined is not None and (best is None or len(joined) < len(best)):
+            if not self._within(_BOUNDS[-1], pieces):
+                continue
+            joined = self._joined(pieces)
+            if joined is None:
+                break  # more pieces across the next direction leave too many, too
+            if best is None or len(joined) < len(best):
                 best = joined
-            if best is not None and len(best) <= MOST_HULLS:
+            if len(best) <= MOST_HULLS:
                 break
         return best
 
@@ -115,7 +121,7 @@ class _Search:
         As a factor of the bounds of a fine part; infinite, and no pieces, where all sets are too large.
         """
         found: list[tuple[float, list[np.ndarray]]] = []
-        for tolerances in (*FINE[-1:], *COARSE):
+        for tolerances in (_WIDEST, *COARSE):
             for pieces in self._sets(tolerances):
                 steps = (split_slender(step, _MOST_SPLIT) for step in merge_in_steps(pieces, _COARSE_SLACKS))
                 few = next((step for step in steps if len(step) <= MOST_MESH_HULLS), None)

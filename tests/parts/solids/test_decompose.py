@@ -140,8 +140,8 @@ def test_a_sliver_is_taken_up_by_its_neighbour_instead_of_being_cut_to_pieces():
     ]
     pieces = [np.asarray(box.vertices) for box in boxes]
     mesh = trimesh.creation.box(bounds=[[0, 0, 0], [60, 30, 20]])
-    assert len(decompose._split_slender(pieces)) > 3
-    assert len(decompose._join(MeshSurface(mesh), pieces, 0.7, 1.1, finish=decompose._split_slender)) == 1
+    assert len(decompose.split_slender(pieces)) > 3
+    assert len(decompose._join(MeshSurface(mesh), pieces, 0.7, 1.1, finish=decompose.split_slender)) == 1
 
 
 def test_a_fit_that_stops_early_decides_as_the_whole_fit_does():
