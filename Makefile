@@ -5,8 +5,8 @@ READY := $(VENV)/.ready
 TESTABLE := $(VENV)/.testable
 RUN := $(VENV)/bin/python -m
 
-.PHONY: help setup collect train plan evaluate palletize test test-all regression bench-parts bench-collect bench-train \
-	bench-plan check format reference results clean
+.PHONY: help setup collect train plan evaluate palletize test test-all regression bench-parts bench-import bench-collect \
+	bench-train bench-plan check format reference results clean
 .DEFAULT_GOAL := help
 
 help: ## Explain the targets
