@@ -24,7 +24,7 @@ from mskgrasp.parts import Part, store
 from mskgrasp.parts.commands.import_files import ImportOptions, import_files
 from mskgrasp.parts.importing.mesh_files import Unit
 from mskgrasp.runtime.console_table import Table
-from mskgrasp.runtime.progress import progress
+from mskgrasp.runtime.progress import note, progress
 from tests.benchmarks.report import show
 
 
@@ -86,7 +86,9 @@ def measure(folder: Path, unit: Unit | None, every: int = 1) -> tuple[list[Outco
                 part = import_file(path, unit=unit).parts[0]
             except BadPart as error:
                 reason = str(error)
-            outcomes.append(Outcome(path=path, part=part, reason=reason, seconds=time.process_time() - start))
+            one = Outcome(path=path, part=part, reason=reason, seconds=time.process_time() - start)
+            outcomes.append(one)
+            note(", ".join(str(cell) for cell in _row(one)))
     return outcomes, others
 
 
@@ -103,18 +105,16 @@ def _no_body(path: Path, unit: Unit | None) -> str:
 
 
 def _files(outcomes: Sequence[Outcome]) -> Table:
-    rows = [
-        (
-            one.path.name,
-            one.part.grade if one.part else "refused",
-            one.part.n_hulls if one.part else "",
-            f"{1e3 * one.part.hull_error_p95:.2f}" if one.part else one.reason,
-            f"{one.part.hull_volume_ratio:.3f}" if one.part else "",
-            f"{one.seconds:.1f}",
-        )
-        for one in outcomes
-    ]
-    return Table(header=("file", "grade", "hulls", "error p95 mm", "volume", "processor s"), rows=rows)
+    header = ("file", "grade", "hulls", "error p95 mm", "volume", "processor s")
+    return Table(header=header, rows=[_row(one) for one in outcomes])
+
+
+def _row(one: Outcome) -> tuple[object, ...]:
+    seconds = f"{one.seconds:.1f}"
+    if one.part is None:
+        return (one.path.name, "refused", "", one.reason, "", seconds)
+    p95, volume = f"{1e3 * one.part.hull_error_p95:.2f}", f"{one.part.hull_volume_ratio:.3f}"
+    return (one.path.name, one.part.grade, one.part.n_hulls, p95, volume, seconds)
 
 
 def _summary(outcomes: Sequence[Outcome], others: Sequence[str]) -> Table:

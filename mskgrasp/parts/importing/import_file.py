@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scipy.spatial import QhullError
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import store
@@ -189,3 +190,7 @@ def _make(
         )
     except BadPart as error:
         raise BadPart(f"{path}: {error}") from error
+    except QhullError as error:
+        raise BadPart(
+            f"{path}: a convex piece of the mesh is flat: repair its thinnest walls, or make them thicker"
+        ) from error

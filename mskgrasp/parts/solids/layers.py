@@ -28,6 +28,8 @@ _LEAST_LEVEL_MM2 = 0.5
 """Smaller faces across the direction (parts of roundings) make no level."""
 _LEAST_LAYER_MM = 0.05
 _LEAST_AREA_MM2 = 0.02
+_LEAST_WIDTH_MM = 0.01
+"""Narrower polygons are remainders between two cuts, and flat to a convex hull."""
 _MOST_SECTIONS = 400
 
 
@@ -113,10 +115,13 @@ class Layers:
         if self.count > 2 * MOST_PIECES:
             return None
         for layer in self._layers:
-            for part in shapely.get_parts(layer.section):
+            for part in _polygons(layer.section):
                 if part.area >= _LEAST_AREA_MM2:
-                    polygons = convex_polygons(part)
-                    found += [prism(corners, layer.low, layer.high) @ self._turn for corners in polygons]
+                    found += [
+                        prism(corners, layer.low, layer.high) @ self._turn
+                        for corners in convex_polygons(part)
+                        if _width(corners) > _LEAST_WIDTH_MM
+                    ]
         return found if 0 < len(found) <= MOST_PIECES else None
 
     def _cut(self, levels: Sequence[float], tolerances: Tolerances) -> list[Layer]:
@@ -169,7 +174,7 @@ def _levels(triangles: np.ndarray, cosines: np.ndarray, areas: np.ndarray) -> li
 def _count(section: Any) -> int:
     """Approximate number of convex polygons: one more for each corner that bends inwards."""
     count = 0
-    for part in shapely.get_parts(shapely.orient_polygons(section)):
+    for part in _polygons(shapely.orient_polygons(section)):
         count += 1
         for ring in (part.exterior, *part.interiors):
             corners = np.asarray(ring.coords)[:-1]
@@ -190,9 +195,19 @@ def _simplified(region: Any, tolerances: Tolerances) -> Any:
     least = np.pi * tolerances.holes**2
     parts = [
         shapely.Polygon(part.exterior, [ring for ring in part.interiors if _area(ring) > least])
-        for part in shapely.get_parts(region)
+        for part in _polygons(region)
     ]
     return shapely.union_all([part.simplify(tolerances.outline).buffer(0) for part in parts])
+
+
+def _polygons(region: Any) -> list[Any]:
+    """The polygons of a region; a difference may leave lines and points where outlines touch."""
+    return [part for part in shapely.get_parts(region) if part.geom_type == "Polygon" and not part.is_empty]
+
+
+def _width(corners: np.ndarray) -> float:
+    """Area of a polygon (n, 2) by its length."""
+    return float(shapely.Polygon(corners).area / np.linalg.norm(np.ptp(corners, axis=0)))
 
 
 def _area(ring: Any) -> float:

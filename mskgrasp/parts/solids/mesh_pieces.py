@@ -13,7 +13,6 @@ from functools import partial
 import numpy as np
 import trimesh
 
-from mskgrasp.core.errors import BadPart
 from mskgrasp.parts.solids.decompose import (
     CLOSE_P95_MM,
     CLOSE_VOLUME_RATIO,
@@ -62,9 +61,9 @@ _TRIED_DIRECTIONS = 2
 """Number of directions tried: those with the fewest pieces."""
 _MOST_SPLIT = 2_000
 _ENOUGH = 1.5
-"""Layers that miss the bounds of a fine part by no more than this factor are taken: CoACD takes long."""
+"""Layers that miss the bounds of a fine part by no more than this factor are taken; CoACD takes longer."""
 _COARSE_CONCAVITY = 0.02
-"""Concavity that CoACD may leave, as a share of the mesh's length, where layers do not succeed."""
+"""Concavity that CoACD may leave, as a share of the mesh's length: less takes minutes."""
 
 
 def mesh_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
@@ -83,13 +82,7 @@ def mesh_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
         found = search.fine(tolerances)
         if found is not None:
             return tuple(found)
-    excess, layers = search.coarse()
-    if excess <= _ENOUGH:
-        return tuple(layers)
-    try:
-        return convex_pieces(mesh_mm)
-    except BadPart:  # no 48 pieces of CoACD are close enough
-        return tuple(layers) if layers else search.last()
+    return tuple(search.coarse())
 
 
 class _Search:
@@ -115,11 +108,8 @@ class _Search:
                 break
         return best
 
-    def coarse(self) -> tuple[float, list[np.ndarray]]:
-        """The closest of the sets of joined layers that are small enough, and by how much they miss.
-
-        As a factor of the bounds of a fine part; infinite, and no pieces, where all sets are too large.
-        """
+    def coarse(self) -> list[np.ndarray]:
+        """The closest set of joined layers that is small enough, or of CoACD where those are far."""
         found: list[tuple[float, list[np.ndarray]]] = []
         for tolerances in (_WIDEST, *COARSE):
             for pieces in self._sets(tolerances):
@@ -127,12 +117,11 @@ class _Search:
                 few = next((step for step in steps if len(step) <= MOST_MESH_HULLS), None)
                 if few is not None:
                     found.append((_excess(self._surface.fit(few)), few))
-        return min(found, key=lambda item: item[0], default=(np.inf, []))
-
-    def last(self) -> tuple[np.ndarray, ...]:
-        """The pieces of CoACD, however far from the mesh."""
-        pieces = cut_up(self._mesh, _COARSE_CONCAVITY * float(np.max(self._mesh.extents)))
-        return tuple(split_slender(next(with_few_corners(pieces, np.inf)), _MOST_SPLIT))
+        if not found or min(excess for excess, _ in found) > _ENOUGH:
+            cut = cut_up(self._mesh, _COARSE_CONCAVITY * float(np.max(self._mesh.extents)))
+            pieces = split_slender(next(with_few_corners(cut, np.inf)), _MOST_SPLIT)
+            found.append((_excess(self._surface.fit(pieces)), pieces))
+        return min(found, key=lambda item: item[0])[1]
 
     def _sets(self, tolerances: Tolerances) -> Iterator[list[np.ndarray]]:
         """Sets of pieces, each of layers across another direction, the one of the fewest pieces first."""

@@ -6,10 +6,15 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 import trimesh
 from manifold3d import Manifold
 
+from mskgrasp.parts import store
+from mskgrasp.parts.importing.import_file import import_part
+from mskgrasp.parts.solids import mesh_pieces as mesh_pieces_module
 from mskgrasp.parts.solids import solid as s
+from mskgrasp.parts.solids.layers import Tolerances
 from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, MOST_P95_MM, aspect_ratio, hull_fit
 from mskgrasp.parts.solids.mesh_pieces import MOST_MESH_HULLS, mesh_pieces
 from tests.parts.solids.test_decompose import mesh_of
@@ -62,6 +67,23 @@ def test_a_ball_is_one_convex_body_and_its_pieces_are_close():
     pieces = mesh_pieces(mesh)
     check(mesh, pieces)
     assert hull_fit(mesh, pieces).p95 < MOST_P95_MM
+
+
+def test_what_no_fine_layers_represent_becomes_as_close_as_coarse_ones_are(tmp_path, monkeypatch):
+    # Rungs so coarse that the holes are filled, as for a mesh that finer ones would cut into too many pieces.
+    coarse = Tolerances(sections=20, outline=2, thickness=5, holes=6)
+    monkeypatch.setattr(mesh_pieces_module, "FINE", ())
+    monkeypatch.setattr(mesh_pieces_module, "_WIDEST", coarse)
+    monkeypatch.setattr(mesh_pieces_module, "COARSE", ())
+    monkeypatch.setattr(mesh_pieces_module, "_ENOUGH", np.inf)
+    mesh_of(honeycomb()).export(tmp_path / "grille.stl")
+    with store.kept_in(tmp_path / "parts"):
+        part = import_part(tmp_path / "grille.stl", density=1000.0)
+    assert part.grade == "coarse" and part.n_hulls == 1
+    holes = 9 * 4.4**2 * 1.5 * np.sqrt(3)
+    # Mass is the mesh's, whatever the hulls are.
+    assert part.mass == pytest.approx(1e-6 * 6 * (40 * 30 - holes), rel=1e-3)
+    assert part.hull_volume_ratio == pytest.approx(40 * 30 / (40 * 30 - holes), rel=1e-3)
 
 
 def test_the_same_mesh_gives_the_same_bytes_in_another_process():
