@@ -1,4 +1,4 @@
-"""Convex pieces of any watertight mesh: layers along the direction that suits it, or CoACD's.
+"""Convex pieces of any watertight mesh: layers along the direction that suits it, seldom CoACD's.
 
 A search from fine to coarse that ends with the first set of pieces that are close and few. It depends on the
 mesh alone, never on time, so that the same mesh always gives the same pieces.
@@ -60,8 +60,6 @@ _COARSE_SLACKS = (0.03, 0.08, 0.15, 0.3, 0.5)
 _TRIED_DIRECTIONS = 2
 """Number of directions tried: those with the fewest pieces."""
 _MOST_SPLIT = 2_000
-_ENOUGH = 1.5
-"""Layers that miss the bounds of a fine part by no more than this factor are taken; CoACD takes longer."""
 _COARSE_CONCAVITY = 0.02
 """Concavity that CoACD may leave, as a share of the mesh's length: less takes minutes."""
 
@@ -109,7 +107,7 @@ class _Search:
         return best
 
     def coarse(self) -> list[np.ndarray]:
-        """The closest set of joined layers that is small enough, or of CoACD where those are far."""
+        """The closest set of joined layers that is small enough; CoACD's pieces where there is none."""
         found: list[tuple[float, list[np.ndarray]]] = []
         for tolerances in (_WIDEST, *COARSE):
             for pieces in self._sets(tolerances):
@@ -117,11 +115,10 @@ class _Search:
                 few = next((step for step in steps if len(step) <= MOST_MESH_HULLS), None)
                 if few is not None:
                     found.append((_excess(self._surface.fit(few)), few))
-        if not found or min(excess for excess, _ in found) > _ENOUGH:
-            cut = cut_up(self._mesh, _COARSE_CONCAVITY * float(np.max(self._mesh.extents)))
-            pieces = split_slender(next(with_few_corners(cut, np.inf)), _MOST_SPLIT)
-            found.append((_excess(self._surface.fit(pieces)), pieces))
-        return min(found, key=lambda item: item[0])[1]
+        if found:
+            return min(found, key=lambda item: item[0])[1]
+        pieces = cut_up(self._mesh, _COARSE_CONCAVITY * float(np.max(self._mesh.extents)))
+        return split_slender(next(with_few_corners(pieces, np.inf)), _MOST_SPLIT)
 
     def _sets(self, tolerances: Tolerances) -> Iterator[list[np.ndarray]]:
         """Sets of pieces, each of layers across another direction, the one of the fewest pieces first."""
