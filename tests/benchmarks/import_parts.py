@@ -55,6 +55,10 @@ def main() -> None:
     options = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
     outcomes, no_bodies = measure(options.folder, cast("Unit | None", options.unit), options.every)
+    if not any(one.part for one in outcomes):
+        parser.error(
+            f"no file of {options.folder} becomes a part: {'; '.join(no_bodies[:3]) or 'none found'}"
+        )
     tables = [_files(outcomes), _summary(outcomes, no_bodies)]
     if options.speed_up:
         files = [outcome.path for outcome in outcomes]
