@@ -60,6 +60,8 @@ _COARSE_SLACKS = (0.03, 0.08, 0.15, 0.3, 0.5)
 _TRIED_DIRECTIONS = 2
 """Number of directions tried: those with the fewest pieces."""
 _MOST_SPLIT = 2_000
+_FAR = 3.0
+"""Layers that miss the bounds of a fine part by more than this factor (thin domes) compete with CoACD."""
 _COARSE_CONCAVITY = 0.02
 """Concavity that CoACD may leave, as a share of the mesh's length: less takes minutes."""
 
@@ -107,7 +109,7 @@ class _Search:
         return best
 
     def coarse(self) -> list[np.ndarray]:
-        """The closest set of joined layers that is small enough; CoACD's pieces where there is none."""
+        """The closest set of joined layers that is small enough, or CoACD's pieces where it is far."""
         found: list[tuple[float, list[np.ndarray]]] = []
         for tolerances in (_WIDEST, *COARSE):
             for pieces in self._sets(tolerances):
@@ -115,10 +117,11 @@ class _Search:
                 few = next((step for step in steps if len(step) <= MOST_MESH_HULLS), None)
                 if few is not None:
                     found.append((_excess(self._surface.fit(few)), few))
-        if found:
-            return min(found, key=lambda item: item[0])[1]
-        pieces = cut_up(self._mesh, _COARSE_CONCAVITY * float(np.max(self._mesh.extents)))
-        return split_slender(next(with_few_corners(pieces, np.inf)), _MOST_SPLIT)
+        if min((excess for excess, _ in found), default=np.inf) > _FAR:
+            cut = cut_up(self._mesh, _COARSE_CONCAVITY * float(np.max(self._mesh.extents)))
+            pieces = split_slender(next(with_few_corners(cut, np.inf)), _MOST_SPLIT)
+            found.append((_excess(self._surface.fit(pieces)), pieces))
+        return min(found, key=lambda item: item[0])[1]
 
     def _sets(self, tolerances: Tolerances) -> Iterator[list[np.ndarray]]:
         """Sets of pieces, each of layers across another direction, the one of the fewest pieces first."""
