@@ -75,6 +75,7 @@ def test_what_no_fine_layers_represent_becomes_as_close_as_coarse_ones_are(tmp_p
     monkeypatch.setattr(mesh_pieces_module, "FINE", ())
     monkeypatch.setattr(mesh_pieces_module, "_WIDEST", coarse)
     monkeypatch.setattr(mesh_pieces_module, "COARSE", ())
+    monkeypatch.setattr(mesh_pieces_module, "_FAR", np.inf)  # CoACD would find the holes
     mesh_of(honeycomb()).export(tmp_path / "grille.stl")
     with store.kept_in(tmp_path / "parts"):
         part = import_part(tmp_path / "grille.stl", density=1000.0)
