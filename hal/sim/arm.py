@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from itertools import pairwise
 
 import numpy as np
@@ -97,7 +98,7 @@ class SapienArm(SimulatedArm[SapienWorld]):
         pressed = self._pressed()
         for begin, end in pairwise([0, *ends]):
             if in_air[begin]:
-                with motion.coarsely(AIR_HZ):
+                with self._coarsely():
                     every = self._world.physics.rate_hz // motion.rate_hz
                     picked = [*range(begin + every - 1, end - 1, every), end - 1]
                     pressed = self._follow_piece(path[picked], pressed, limit)
@@ -138,8 +139,14 @@ class SapienArm(SimulatedArm[SapienWorld]):
     def _pause(self, seconds: float, in_air: bool) -> None:
         """Let time pass; coarsely in free air."""
         motion = self._world.env.motion
-        with motion.coarsely(AIR_HZ) if in_air else nullcontext():
+        with self._coarsely() if in_air else nullcontext():
             motion.step(motion.n_steps(seconds))
+
+    @contextmanager
+    def _coarsely(self) -> Iterator[None]:
+        """Long steps, in free air."""
+        with self._world.env.motion.coarsely(AIR_HZ), self._world.parts_kept_still():
+            yield
 
     def _target(self) -> Tensor:
         """(7,) drive targets, radians: a motion starts there, so that they do not jump."""
@@ -153,7 +160,7 @@ class SapienArm(SimulatedArm[SapienWorld]):
         free = bool(self._in_air(self._target()[None])[0])
         self._force = 0.0
         motion.hold(False)
-        with motion.coarsely(AIR_HZ) if free else nullcontext():
+        with self._coarsely() if free else nullcontext():
             motion.move_fingers(width / 2, check=self._stop.is_set)
 
     def _grasp(self, force: float) -> GraspOutcome:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import gymnasium
@@ -11,6 +13,7 @@ import numpy as np
 import sapien
 import torch
 from mani_skill.utils.structs.actor import Actor
+from sapien.physx import PhysxRigidDynamicComponent
 
 from hal.errors import NotConnected
 from hal.sim.board import show_board
@@ -27,6 +30,9 @@ from tasks import GraspDisplacementEnv
 from tasks.attempt.clearance import hand_clearance
 from tasks.scene.frames import base_pose, to_world
 from tasks.scene.renderer import render_backend
+
+STILL_SPEED, STILL_TURN = 0.002, 0.05
+"""A part slower than this, m/s and rad/s, is at rest."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -146,6 +152,24 @@ class SapienWorld(SimulatedWorld):
         assert hand is not None
         show_board(hand._objs[0].entity, image, size, T_tcp_board)
 
+    @contextmanager
+    def parts_kept_still(self) -> Iterator[None]:
+        """Keep parts that are at rest where they are, while nothing can touch them.
+
+        A part that stands on an edge or on teeth creeps in long steps: a pinion shaft by 5 mm/s at 125 Hz.
+        """
+        bodies = [_rigid(lying.body) for lying in [*self._beside, self._present]]
+        still = [body for body in bodies if _is_still(body)]
+        for body in still:
+            body.set_locked_motion_axes([True] * 6)
+        try:
+            yield
+        finally:
+            for body in still:
+                body.set_locked_motion_axes([False] * 6)
+                body.set_linear_velocity(np.zeros(3))
+                body.set_angular_velocity(np.zeros(3))
+
     def top(self) -> float:
         """Height of the highest point of the parts on the table, m."""
         bodies = [*self._beside, self._present]
@@ -184,6 +208,17 @@ class SapienWorld(SimulatedWorld):
     def part_pose(self) -> Pose:
         """``T_base_obj`` of the part, the simulator's ground truth."""
         return _pose(self._present)
+
+
+def _rigid(body: Actor) -> PhysxRigidDynamicComponent:
+    found = body._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
+    assert isinstance(found, PhysxRigidDynamicComponent)
+    return found
+
+
+def _is_still(body: PhysxRigidDynamicComponent) -> bool:
+    slow = float(np.linalg.norm(body.linear_velocity)) < STILL_SPEED
+    return slow and float(np.linalg.norm(body.angular_velocity)) < STILL_TURN
 
 
 def _pose(lying: Lying) -> Pose:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sapien
+from sapien.physx import PhysxRigidDynamicComponent
 
 from hal.config import TableError
 from hal.errors import NotConnected
@@ -120,3 +121,25 @@ def test_a_part_lies_on_a_table_with_an_error(block: Part):
     rise = 0.003 + 0.01 * (moved.position[0] - 0.5)
     assert moved.position[2] - level.position[2] == pytest.approx(rise, abs=2e-4)
     assert pose_distance(level, moved)[1] == pytest.approx(0.01, abs=2e-3)
+
+
+def test_a_part_at_rest_stays_where_it_is_while_the_arm_is_far_and_a_falling_one_falls(
+    world: SapienWorld, block: Part
+):
+    put(world, 0.5, 0.0)
+    before = world.part_pose()
+    body = world.env.part._objs[0]
+    with world.parts_kept_still():
+        # A push that would move it.
+        rigid = body.find_component_by_type(PhysxRigidDynamicComponent)
+        rigid.add_force_torque(np.array([5.0, 0.0, 0.0], np.float32), np.zeros(3, np.float32))
+        world.env.motion.step(20)
+    distance, angle = pose_distance(before, world.part_pose())
+    assert distance < 1e-6 and angle < 1e-5
+    world.env.motion.step(50)
+    assert pose_distance(before, world.part_pose())[0] < 1e-4  # and keeps no speed
+    body.set_pose(sapien.Pose(p=to_world(np.array([0.5, 0.0, 0.1])), q=np.array([1.0, 0, 0, 0])))
+    world.env.motion.step(10)
+    with world.parts_kept_still():
+        world.env.motion.step(world.env.motion.n_steps(0.5))
+    assert world.part_pose().position[2] == pytest.approx(0.015, abs=1e-3)
