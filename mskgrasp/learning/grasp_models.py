@@ -193,7 +193,7 @@ def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -
     """
     folder = Path(folder)
     require_model(folder)
-    meta = _read_meta(folder / DESCRIPTION)
+    meta = read_meta(folder / DESCRIPTION)
     require_hand(meta, HAND_GEOMETRY, folder)
     path = folder / WEIGHTS
     try:
@@ -233,7 +233,12 @@ def require_model(folder: Path) -> None:
             )
 
 
-def _read_meta(path: Path) -> ModelMeta:
+def read_meta(path: Path) -> ModelMeta:
+    """Read a model's description alone, without its weights.
+
+    Raises:
+        BadModel: It is damaged or of another schema.
+    """
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -359,6 +359,17 @@ class Planner:
             NoPartFound: No part is detected.
             TableTooHigh: The table is seen more than `hal.table.HIGHEST_TABLE` over its stated height.
         """
+        view = self.view(frame)
+        grasps = self.cleared(sample_grasps(view, self.config.n_candidates, rng))
+        return view, Grasp.from_vector(grasps)
+
+    def view(self, frame: RgbdFrame) -> PartView:
+        """Detect the part in a frame.
+
+        Raises:
+            NoPartFound: No part is detected.
+            TableTooHigh: The table is seen more than `hal.table.HIGHEST_TABLE` over its stated height.
+        """
         view = view_part(
             frame.depth,
             frame.intrinsics,
@@ -374,8 +385,7 @@ class Planner:
                 f"than {1e3 * HIGHEST_TABLE:g} mm: the fingers could press on it; run hal.touch, and if "
                 "table_z holds, correct camera.depth_offset"
             )
-        grasps = self.cleared(sample_grasps(view, self.config.n_candidates, rng))
-        return view, Grasp.from_vector(grasps)
+        return view
 
     def cleared(self, grasps: np.ndarray) -> np.ndarray:
         """Raise grasps (n, 4) whose pads would be too near the table."""
