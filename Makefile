@@ -18,9 +18,9 @@ $(READY): pyproject.toml .ci/constraints.txt .ci/setup
 	PYTHON=$(PYTHON) .ci/setup
 	@touch $@
 
-# Tests need what collecting and planning do without: [cad] (700 MB), Ray, the drivers, and a browser (100 MB).
+# Tests need what collecting and planning do without: [cad] (700 MB), Ray, drivers, a web server, a browser (100 MB).
 $(TESTABLE): pyproject.toml .ci/constraints.txt .ci/setup
-	PYTHON=$(PYTHON) EXTRAS=dev,cad,cluster,franka,mujoco,parquet BROWSER=yes .ci/setup
+	PYTHON=$(PYTHON) EXTRAS=dev,cad,cluster,franka,mujoco,parquet,serve BROWSER=yes .ci/setup
 	@touch $@ $(READY)
 
 collect: $(READY) ## Collect the demo dataset into data/demo (the main job; resumes)

@@ -19,6 +19,7 @@ PROGRAMS = {
         "mskgrasp.palletize",
         "grasp parts and place them, corrected by the predicted displacement",
     ),
+    "serve": ("mskgrasp.serve", "answer requests for grasps over HTTP"),
     "assess": ("mskgrasp.assess", "say how precisely a part can be grasped, from its CAD file"),
     "validate": (
         "mskgrasp.validate",

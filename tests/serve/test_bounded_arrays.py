@@ -1,0 +1,108 @@
+"""Arrays and images of others: none is unpacked beyond what is allowed."""
+
+from __future__ import annotations
+
+import io
+import struct
+import tracemalloc
+import zipfile
+import zlib
+
+import numpy as np
+import pytest
+
+from mskgrasp.serve.bounded_arrays import MAX_SIDE, read_npz, read_png16
+from mskgrasp.serve.rejection import Rejected
+from tests.serve.bodies import FRAME, npz, png16
+
+LIMITS = {"depth": MAX_SIDE**2, "intrinsics": 9, "T_base_camera": 7}
+
+
+def packed(data: bytes, name: str = "depth.npy", **info: int) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(name, data)
+    return file.getvalue()
+
+
+def png(width: int, height: int, pixels: bytes, *, depth: int = 16, more: tuple[bytes, ...] = ()) -> bytes:
+    header = struct.pack(">IIBBBBB", width, height, depth, 0, 0, 0, 0)
+    parts = [chunk(b"IHDR", header), *more, chunk(b"IDAT", zlib.compress(pixels)), chunk(b"IEND", b"")]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
+
+
+def chunk(name: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+
+def test_arrays_come_back_as_they_were_written():
+    fortran = np.asfortranarray(FRAME.depth.astype(">f8"))
+    found = read_npz(npz(depth=fortran), LIMITS)
+    np.testing.assert_array_equal(found["depth"], FRAME.depth)
+    np.testing.assert_array_equal(found["intrinsics"], FRAME.intrinsics)
+    assert found.keys() == LIMITS.keys()
+
+
+def test_an_image_comes_back_as_it_was_written_and_its_text_is_skipped():
+    counts = np.round(FRAME.depth / 1e-4).astype(np.uint16)
+    np.testing.assert_array_equal(read_png16(png16()), counts)
+    pixels = np.arange(16 * 20, dtype=np.uint16).reshape(16, 20)
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in pixels)
+    bomb = chunk(b"zTXt", b"a\0\0" + zlib.compress(bytes(10_000_000)))
+    np.testing.assert_array_equal(read_png16(png(20, 16, rows, more=(bomb,))), pixels)
+
+
+def lying(body: bytes, size: int) -> bytes:
+    """The archive, with another unpacked size in both of its headers."""
+    at = body.index(b"PK\x01\x02")
+    changed = bytearray(body)
+    changed[22:26] = changed[at + 24 : at + 28] = struct.pack("<I", size)
+    return bytes(changed)
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "message"),
+    [
+        (packed(bytes(300_000_000)), 413, "300000000 bytes unpacked"),
+        (lying(packed(bytes(300_000_000)), 1000), 400, "damaged|header"),
+        (packed(b"\x93NUMPY\x01\x00" + struct.pack("<H", 60_000) + b" " * 60_000), 400, "no header"),
+        (packed(b"\x93NUMPY\x09\x00" + bytes(100)), 400, "no header"),
+    ],
+    ids=("bomb", "lying bomb", "long header", "unknown version"),
+)
+def test_a_bomb_is_refused_without_being_unpacked(body: bytes, status: int, message: str):
+    tracemalloc.start()
+    with pytest.raises(Rejected, match=message) as refused:
+        read_npz(body, LIMITS)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert refused.value.status == status and peak < 80e6
+
+
+def test_an_array_of_objects_is_refused_before_any_is_made():
+    with pytest.raises(Rejected, match="holds object"):
+        read_npz(npz(depth=np.array([{}] * 300, dtype=object)), LIMITS)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (png(20_000, 20_000, b""), "20000 x 20000 pixels, at most 2048"),
+        (png(100, 100, bytes(50_000_000)), "does not hold the 100 x 100 pixels"),
+        (png(100, 100, bytes(100)), "does not hold the 100 x 100 pixels"),
+        (png(100, 100, bytes(100 * 101), depth=8), "8 bits"),
+        (png16()[:-20], "cut off or damaged"),
+        (png16().replace(b"IDAT", b"IDAU", 1), "cut off or damaged"),
+        (b"GIF89a", "no PNG image"),
+        (b"", "no PNG image"),
+        (b"\x89PNG\r\n\x1a\n", "no header"),
+    ],
+    ids=range(9),
+)
+def test_an_image_of_another_size_than_its_header_says_is_refused(data: bytes, message: str):
+    tracemalloc.start()
+    with pytest.raises(Rejected, match=message):
+        read_png16(data)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 10e6

@@ -1,0 +1,61 @@
+"""Requests that wait for a process."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+
+from mskgrasp.serve.dispatcher import Dispatcher
+from mskgrasp.serve.planner_process import PlannerProcess
+from mskgrasp.serve.rejection import Rejected
+from tests.serve.bodies import ALONG, NPZ, npz
+
+BODY = npz(grasps=[ALONG])
+
+
+async def ask(dispatcher: Dispatcher) -> tuple[int, object]:
+    try:
+        status, answer = await dispatcher.ask("score", NPZ, BODY)
+        return status, json.loads(answer)
+    except Rejected as error:
+        return error.status, str(error)
+
+
+def test_what_exceeds_queue_or_time_is_503_and_a_process_that_dies_is_replaced(process: PlannerProcess):
+    async def story() -> None:
+        dispatcher = Dispatcher([process], waiting=1, timeout_s=60.0)
+        dispatcher.open()
+        assert process.pid is not None
+        os.kill(process.pid, signal.SIGSTOP)  # as long as a request takes
+        first, second = (asyncio.create_task(ask(dispatcher)) for _ in range(2))
+        await asyncio.sleep(0.05)
+        assert dispatcher.status == {"workers": 1, "working": 1, "requests": 2}
+        status, message = await ask(dispatcher)
+        assert status == 503 and "2 requests" in str(message)
+        os.kill(process.pid, signal.SIGCONT)
+        found = [await first, await second]
+        assert [status for status, _ in found] == [200, 200] and found[0] == found[1]
+
+        os.kill(process.pid, signal.SIGSTOP)
+        lost, later = (asyncio.create_task(ask(dispatcher)) for _ in range(2))
+        await asyncio.sleep(0.05)
+        before = process.pid
+        os.kill(before, signal.SIGKILL)
+        status, message = await lost
+        assert status == 503 and "the worker ended" in message["error"]  # pyright: ignore
+        assert await later == found[0] and process.pid != before
+        assert dispatcher.status == {"workers": 1, "working": 1, "requests": 0}
+
+        assert process.pid is not None
+        os.kill(process.pid, signal.SIGSTOP)
+        hasty = Dispatcher([process], waiting=0, timeout_s=0.1)
+        hasty.open()
+        status, message = await ask(hasty)
+        assert status == 503 and "no answer within 0.1 s" in str(message)
+        assert hasty.status["requests"] == 0
+        await hasty.close()
+        await dispatcher.close()
+
+    asyncio.run(story())
