@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.programs import running
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
@@ -68,6 +70,16 @@ def test_an_arm_of_ones_own_performs_a_planned_grasp():
     assert (w, z) == pytest.approx((0, 0), abs=1e-4)
     assert math.degrees(2 * math.atan2(y, x)) == pytest.approx(degrees, abs=0.6)
     assert printed.endswith("\nholding\n")
+
+
+def test_a_client_has_the_server_plan_and_place():
+    with running("mskgrasp.serve", "--port", "0", "--workers", "1") as server:
+        address = re.match(r"http://127\.0\.0\.1:\d+", server.stdout.readline())[0]
+        printed = run("serve_client.py", address)
+    assert float(re.search(r"quality ([\d.]+)", printed)[1]) > 0.9
+    assert "\n10 alternatives\n" in printed
+    x, y = map(float, re.search(r"place with the hand at \[ *([\d.]+) +([\d.]+)", printed).groups())
+    assert abs(x - 0.45) < 0.03 and abs(y - 0.1) < 0.03  # the grasp is near the block's centre
 
 
 def test_the_maniskill_task_runs_in_a_loop():
