@@ -6,7 +6,7 @@ TESTABLE := $(VENV)/.testable
 RUN := $(VENV)/bin/python -m
 
 .PHONY: help setup collect train plan evaluate palletize test test-all regression bench-parts bench-import bench-collect \
-	bench-train bench-plan check format reference results clean
+	bench-train bench-plan bench-serve check format reference results clean
 .DEFAULT_GOAL := help
 
 help: ## Explain the targets
@@ -66,6 +66,9 @@ bench-train: $(TESTABLE) ## Measure samples/s of training, our networks and the 
 
 bench-plan: $(TESTABLE) ## Measure milliseconds of a plan, our networks and the paper's
 	$(RUN) tests.benchmarks.plan_speed
+
+bench-serve: $(TESTABLE) ## Measure requests/s of the server, and what malformed requests do
+	$(RUN) tests.benchmarks.serve_load $(ARGS)
 
 check: $(TESTABLE) ## Check style, types and the layers of imports
 	$(RUN) ruff format --check .

@@ -65,6 +65,7 @@ def make_app(
     )
     app.exception_handler(Rejected)(_rejected)
     app.exception_handler(HTTPException)(_no_such_path)
+    app.exception_handler(Exception)(_defect)
 
     async def about_a_frame(kind: Kind, request: Request) -> Response:
         content_type = _content_type(request, (JSON, NPZ))
@@ -146,6 +147,11 @@ def _headers(status: int) -> dict[str, str]:
 async def _rejected(request: Request, error: Exception) -> Response:
     assert isinstance(error, Rejected)
     return Response(error_body(str(error)), error.status, media_type=JSON, headers=_headers(error.status))
+
+
+async def _defect(request: Request, error: Exception) -> Response:
+    message = "the request met a defect of the server; its log has the details"
+    return Response(error_body(message), 500, media_type=JSON)
 
 
 async def _no_such_path(request: Request, error: Exception) -> Response:

@@ -110,7 +110,7 @@ class Dispatcher:
                 process.start()
                 await asyncio.get_running_loop().run_in_executor(self._threads, process.wait_until_ready)
                 break
-            except MskgraspError as error:
+            except (MskgraspError, OSError) as error:
                 print(f"mskgrasp.serve: {error}", file=sys.stderr, flush=True)
                 await asyncio.sleep(AGAIN_S)
         self._n_working += 1

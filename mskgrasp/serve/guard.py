@@ -1,4 +1,4 @@
-"""Checks of a request before anything of it is read: host, token, number of requests at once."""
+"""Checks of a request before anything of it is read: host, token, address, number of requests at once."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import hmac
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
+from mskgrasp.serve.config import is_local
 from mskgrasp.serve.rejection import error_body
 
 Message = MutableMapping[str, Any]
@@ -13,8 +14,6 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[MutableMapping[str, Any], Receive, Send], Awaitable[None]]
 
-LOCAL_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
-"""Names by which a client on this machine addresses it."""
 OPEN = frozenset({"/health"})
 """Paths that need no token, for monitors."""
 
@@ -40,12 +39,14 @@ class Guard:
             return
         headers: dict[bytes, bytes] = dict(scope["headers"])
         host = headers.get(b"host", b"").decode("latin-1")
-        if self._token is None and _name(host) not in LOCAL_NAMES:
+        if self._token is None and not is_local(_name(host)):
             message = f"host {host[:80]!r} is not this server; address it as 127.0.0.1 or localhost"
             await _refuse(send, 400, message)
         elif not (scope["path"] in OPEN or self._admits(headers.get(b"authorization", b""))):
             message = "the token is missing or wrong; send the header 'Authorization: Bearer TOKEN'"
             await _refuse(send, 401, message, (b"www-authenticate", b"Bearer"))
+        elif scope["query_string"]:
+            await _refuse(send, 400, "parameters in the address are not read; send them in the body")
         elif self._n_open >= self._most:
             message = f"{self._n_open} requests are open; try again in a second"
             await _refuse(send, 503, message, (b"retry-after", b"1"))
@@ -66,7 +67,7 @@ class Guard:
 
 def _name(host: str) -> str:
     """The name in a header ``Host``, without the port."""
-    return (host.partition("]")[0] + "]" if host.startswith("[") else host.partition(":")[0]).lower()
+    return (host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]).lower()
 
 
 async def _refuse(send: Send, status: int, message: str, *headers: tuple[bytes, bytes]) -> None:

@@ -6,6 +6,8 @@ import os
 import signal
 import socket
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +55,7 @@ def serve(config: ServeConfig) -> None:
     settings = planner_settings(config)
     n = config.workers or len(os.sched_getaffinity(0))
     processes = [PlannerProcess(settings) for _ in range(n)]
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # what began is ended as after Ctrl-C
-    with listening(config.host, config.port) as listener:
+    with listening(config.host, config.port) as listener, ended_by_sigterm():
         try:
             for process in processes:
                 process.start()
@@ -85,6 +86,16 @@ def serve(config: ServeConfig) -> None:
         finally:
             for process in processes:
                 process.stop()
+
+
+@contextmanager
+def ended_by_sigterm() -> Iterator[None]:
+    """Make a request to terminate raise `SystemExit` in the block, so that what was started is ended."""
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def read_token(config: ServeConfig) -> str | None:

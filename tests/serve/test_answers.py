@@ -85,3 +85,10 @@ def test_a_part_held_at_its_centre_is_placed_with_its_centre_at_the_target():
     # The hand is turned to 0: the part has moved by 4 mm along its y, hence the hand stands 4 mm before.
     np.testing.assert_allclose([x, y, theta], [0.4, -0.104, 0.0], atol=1e-12)
     assert 0.03 <= z < 0.04 and z > lowest_grasp_z(0.0)
+
+
+def test_a_defect_is_logged_and_answered_without_its_details(capsys):
+    broken: Planner = None  # pyright: ignore[reportAssignmentType]
+    status, found = answer(broken, "plan", npz())
+    assert status == 500 and "defect of the server" in found["error"] and "NoneType" not in found["error"]
+    assert "AttributeError" in capsys.readouterr().err

@@ -93,6 +93,8 @@ WRONG: dict[str, tuple[str, bytes, str, int, str]] = {
     "objects": ("/plan", npz(depth=np.array([[{}]], dtype=object)), NPZ, 400, "holds object"),
     "text": ("/plan", npz(depth=np.array([["a"]])), NPZ, 400, "holds <U1"),
     "complex numbers": ("/plan", npz(depth=FLAT.astype(complex)), NPZ, 400, "holds complex128"),
+    "half precision": ("/plan", npz(depth=FLAT.astype(np.float16)), NPZ, 400, "holds float16"),
+    "a query": ("/plan?seed=1", text(), JSON, 400, "send them in the body"),
     "a bomb": ("/plan", npz(depth=np.zeros((9000, 9000), np.float32)), NPZ, 413, "bytes unpacked, at most"),
     "a row": ("/plan", npz(depth=FLAT[0]), NPZ, 400, "depth has shape (160,)"),
     "a stack": ("/plan", npz(depth=FLAT[None]), NPZ, 400, "two dimensions at most"),

@@ -18,7 +18,9 @@ async def hello(scope, receive, send) -> None:
     await send({"type": "http.response.body", "body": b"{}"})
 
 
-async def ask(guard: Guard, path: str = "/plan", seconds: float = 0, **headers: str) -> tuple[int, dict]:
+async def ask(
+    guard: Guard, path: str = "/plan", query: str = "", seconds: float = 0, **headers: str
+) -> tuple[int, dict]:
     sent: list[dict] = []
 
     async def send(message):
@@ -30,7 +32,11 @@ async def ask(guard: Guard, path: str = "/plan", seconds: float = 0, **headers: 
     named = [
         (name.encode(), value.encode()) for name, value in ({"host": "localhost:8093"} | headers).items()
     ]
-    await guard({"type": "http", "path": path, "headers": named, "seconds": seconds}, receive, send)
+    await guard(
+        {"type": "http", "path": path, "query_string": query.encode(), "headers": named, "seconds": seconds},
+        receive,
+        send,
+    )
     return sent[0]["status"], json.loads(sent[1]["body"])
 
 
@@ -52,10 +58,16 @@ def test_health_needs_no_token():
 @pytest.mark.parametrize(
     ("host", "status"),
     [("127.0.0.1:8093", 200), ("localhost", 200), ("LOCALHOST:1", 200), ("[::1]:8093", 200),
-     ("evil.example.org:8093", 400), ("localhost.example.org", 400), ("", 400), ("[::2]:8093", 400)],
+     ("evil.example.org:8093", 400), ("localhost.example.org", 400), ("", 400), ("[::2]:8093", 400),
+     ("127.0.1.1:8093", 200), ("[::1", 200)],
 )  # fmt: skip
 def test_without_a_token_only_local_names_are_let_through(host: str, status: int):
     assert asyncio.run(ask(Guard(hello, token=None, most=4), host=host))[0] == status
+
+
+def test_parameters_in_the_address_are_not_ignored_but_refused():
+    status, answer = asyncio.run(ask(Guard(hello, token=None, most=4), query="seed=3"))
+    assert status == 400 and "send them in the body" in answer["error"]
 
 
 def test_more_requests_at_once_than_allowed_are_503():
