@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipaddress
 from pathlib import Path
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from mskgrasp.core.config import Config
 from mskgrasp.learning.grasp_models import PRETRAINED
@@ -36,6 +36,15 @@ class ServeConfig(Config):
     """Largest request, megabytes."""
     planner: PlannerConfig = PlannerConfig()
     """Settings of the choice of the grasp; min_quality is 0.5 if not set, since plans are to be executed."""
+
+    @field_validator("planner")
+    @classmethod
+    def _without_cad(cls, planner: PlannerConfig) -> PlannerConfig:
+        if planner.policy == "certified":
+            raise ValueError(
+                "policy certified needs the part's CAD, which no request holds; use low_variance"
+            )
+        return planner
 
 
 def is_local(host: str) -> bool:

@@ -27,6 +27,11 @@ def test_only_loopback_addresses_are_local(host: str, local: bool):
     assert is_local(host) is local
 
 
+def test_a_policy_that_needs_the_parts_cad_is_refused():
+    with pytest.raises(UsageError, match="--planner: policy certified needs the part's CAD"):
+        parse(ServeConfig, prog="serve", description="", argv=("--planner.policy", "certified"))
+
+
 @pytest.mark.parametrize(
     "arguments", [("--port", "65536"), ("--workers", "0"), ("--timeout-s", "0"), ("--max-body-mb", "-1")]
 )
