@@ -167,8 +167,8 @@ class SapienWorld(SimulatedWorld):
         finally:
             for body in still:
                 body.set_locked_motion_axes([False] * 6)
-                body.set_linear_velocity(np.zeros(3))
-                body.set_angular_velocity(np.zeros(3))
+                body.set_linear_velocity([0.0, 0.0, 0.0])
+                body.set_angular_velocity([0.0, 0.0, 0.0])
 
     def top(self) -> float:
         """Height of the highest point of the parts on the table, m."""
