@@ -26,7 +26,7 @@ MOST_PATCH, MOST_PATCH_SHARE = 5, 0.03
 facet of a body of revolution differs from the next by more than the noise."""
 MOST_EXCESS = 0.8
 """Greatest mean excess of an exact image."""
-MOST_NOISY_EXCESS, EXCESS_SPREAD = 0.45, 3.5
+MOST_NOISY_EXCESS, EXCESS_SPREAD = 0.58, 3.5
 """The same of a noisy one, and what is added to it over the root of the number of pixels."""
 MOST_UNEXPLAINED = 0.1
 """Greatest share of pixels that are unexplained."""

@@ -133,7 +133,7 @@ def test_a_part_at_rest_stays_where_it_is_while_the_arm_is_far_and_a_falling_one
         # A push that would move it.
         rigid = body.find_component_by_type(PhysxRigidDynamicComponent)
         assert isinstance(rigid, PhysxRigidDynamicComponent)
-        rigid.add_force_torque(np.array([5.0, 0.0, 0.0], np.float32), np.zeros(3, np.float32))
+        rigid.add_force_torque([5.0, 0.0, 0.0], [0.0, 0.0, 0.0])
         world.env.motion.step(20)
     distance, angle = pose_distance(before, world.part_pose())
     assert distance < 1e-6 and angle < 1e-5
