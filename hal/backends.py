@@ -15,7 +15,7 @@ from hal.limits import ArmLimits
 from mskgrasp.core.config import Config, check_config
 from mskgrasp.core.errors import BadConfig, MskgraspError
 
-Group = Literal["arms", "cameras", "cells"]
+Group = Literal["arms", "cameras", "cells", "planners"]
 DeviceT = TypeVar("DeviceT", Arm, Camera, Cell)
 
 

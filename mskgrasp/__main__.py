@@ -21,6 +21,10 @@ PROGRAMS = {
     ),
     "serve": ("mskgrasp.serve", "answer requests for grasps over HTTP"),
     "assess": ("mskgrasp.assess", "say how precisely a part can be grasped, from its CAD file"),
+    "benchmark": (
+        "mskgrasp.benchmark",
+        "compare planners by the share of attempts that place a part within a tolerance",
+    ),
     "validate": (
         "mskgrasp.validate",
         "check the simulation's settings against closed forms and finer settings",

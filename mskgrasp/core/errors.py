@@ -47,6 +47,10 @@ class MissingModel(BadModel, UsageError):
     """There is no model in that folder."""
 
 
+class BadPlanner(MskgraspError):
+    """A planner of another package or program cannot be used, or answers what is no grasp."""
+
+
 class NoPartFound(MskgraspError):
     """The depth image shows no part that could be grasped."""
 

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
 
+from mskgrasp.core.config import read_yaml
+from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.files import write_whole
-from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import MAX_OPENING, pose_base_tcp
+from mskgrasp.core.geometry import Pose, quat_to_matrix, wrap_half_turn
+from mskgrasp.core.grasp import MAX_OPENING, lowest_grasp_z, pose_base_tcp
 from mskgrasp.core.panda_kinematics import TCP_OFFSET
 from mskgrasp.parts import Part
 from mskgrasp.planning.certified import CertifiedGrasps
+
+MOST_TILT = float(np.radians(5.0))
+"""Greatest angle between the approach of a grasp that counts as top-down and the vertical, radians."""
+_TCP_IN_LINK = {"panda_hand": TCP_OFFSET, "panda_hand_tcp": 0.0}
+"""Distance of the TCP along z of the links that a file may give poses of, metres."""
 
 
 def write_isaac_grasp(path: Path, part: Part, certified: CertifiedGrasps) -> None:
@@ -50,4 +60,119 @@ def write_isaac_grasp(path: Path, part: Part, certified: CertifiedGrasps) -> Non
         gripper_frame_link="panda_hand",
         grasps=grasps,
     )
+    write_whole(path, yaml.safe_dump(values, sort_keys=False).encode())
+
+
+@dataclass(frozen=True, kw_only=True)
+class IsaacGrasps:
+    """Grasps of a file in the format.
+
+    Attributes:
+        values: Contents of the file.
+        T_mesh_tcp: Poses of the TCP in the part's frame of the file, by the grasp's name.
+    """
+
+    values: dict[str, Any]
+    T_mesh_tcp: dict[str, Pose]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TopDownGrasp:
+    """A grasp of a file that is top-down in a resting pose of the part.
+
+    Attributes:
+        resting: Index of the resting pose.
+        grasp: (4,) x y z theta in its rest frame, metres over the table and radians.
+        sign: -1 where the axes of this grasp are those of the hand in the file turned by half a turn, else 1.
+        tilt: Angle between the approach and the vertical, radians.
+    """
+
+    resting: int
+    grasp: np.ndarray
+    sign: float
+    tilt: float
+
+
+def read_isaac_grasp(path: Path) -> IsaacGrasps:
+    """Read a file of grasps of ``panda_hand``, or of its ``panda_hand_tcp``.
+
+    Raises:
+        BadConfig: The file is missing or not of the format, or its grasps are of another hand.
+    """
+    values = read_yaml(path)
+    if values.get("format") != "isaac_grasp":
+        raise BadConfig(f"{path}: format is {values.get('format')!r}, legal: 'isaac_grasp'")
+    link = values.get("gripper_frame_link")
+    if link not in _TCP_IN_LINK:
+        raise BadConfig(
+            f"{path}: gripper_frame_link is {link!r}, legal: {', '.join(_TCP_IN_LINK)}, the only known hand"
+        )
+    T_link_tcp = Pose(
+        position=np.array([0.0, 0.0, _TCP_IN_LINK[link]]), quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0])
+    )
+    found = {}
+    grasps = values.get("grasps")
+    if not isinstance(grasps, dict) or not grasps:
+        raise BadConfig(f"{path} holds no grasps")
+    for name, one in grasps.items():
+        try:
+            position = np.array(one["position"], dtype=np.float64).reshape(3)
+            quat = np.array([one["orientation"]["w"], *one["orientation"]["xyz"]], dtype=np.float64).reshape(
+                4
+            )
+            if not np.isfinite(position).all() or abs(np.linalg.norm(quat) - 1) > 0.01:
+                raise ValueError("position or orientation is not finite, or no rotation")
+        except (LookupError, TypeError, ValueError) as error:
+            raise BadConfig(f"{path}: grasp {name!r} has no pose: {' '.join(str(error).split())}") from error
+        found[str(name)] = Pose(position=position, quat_wxyz=quat / np.linalg.norm(quat)) @ T_link_tcp
+    return IsaacGrasps(values=values, T_mesh_tcp=found)
+
+
+def top_down_grasp(part: Part, T_obj_tcp: Pose, stands: Sequence[bool] | None = None) -> TopDownGrasp | None:
+    """The most vertical of a grasp's directions in the part's resting poses.
+
+    Args:
+        part: The part.
+        T_obj_tcp: Pose of the TCP in the part's frame.
+        stands: Of each resting pose, whether it counts; None: all do.
+
+    Returns:
+        The grasp; None where in each pose it is tilted by more than `MOST_TILT`, or its pads touch the table.
+    """
+    found = []
+    for number in range(len(part.resting_probability)):
+        if stands is not None and not stands[number]:
+            continue
+        T_table_obj = Pose(
+            position=np.array([0.0, 0.0, part.resting.position[number, 2]]),
+            quat_wxyz=part.resting.quat_wxyz[number],
+        )
+        T_table_tcp = T_table_obj @ T_obj_tcp
+        axes = quat_to_matrix(np.asarray(T_table_tcp.quat_wxyz))
+        tilt = float(np.arccos(np.clip(-axes[2, 2], -1.0, 1.0)))
+        if tilt <= MOST_TILT and T_table_tcp.position[2] >= lowest_grasp_z(0.0):
+            # The tcp's x is that of the grasp frame.
+            theta = float(np.arctan2(axes[1, 0], axes[0, 0]))
+            wrapped = float(wrap_half_turn(theta))
+            grasp = np.array([*T_table_tcp.position, wrapped])
+            sign = 1.0 if np.cos(theta - wrapped) > 0 else -1.0
+            found.append(TopDownGrasp(resting=number, grasp=grasp, sign=sign, tilt=tilt))
+    return min(found, key=lambda one: one.tilt, default=None)
+
+
+def write_scored(path: Path, read: IsaacGrasps, scores: Mapping[str, Mapping[str, Any]]) -> None:
+    """Write the grasps of a file that were scored, with all their fields and those of their scores.
+
+    Args:
+        path: The new file.
+        read: The file that was read.
+        scores: Fields by the grasp's name; the others are left out.
+
+    Raises:
+        OSError: The disk is full or not writable.
+    """
+    grasps = {
+        name: dict(one, **scores[name]) for name, one in read.values["grasps"].items() if name in scores
+    }
+    values = read.values | {"grasps": grasps}
     write_whole(path, yaml.safe_dump(values, sort_keys=False).encode())

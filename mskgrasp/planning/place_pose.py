@@ -176,6 +176,7 @@ def place(
     *,
     tallest: float = 0.0,
     part_height: float = 0.0,
+    arrived: Callable[[], None] | None = None,
 ) -> None:
     """Move the held part to a pose, release it and retract.
 
@@ -189,6 +190,7 @@ def place(
         recover: Lets the arm move again after that contact, or raises an error.
         tallest: Height of the tallest other thing over the table, metres.
         part_height: Height of the part, over which the open hand rises, metres.
+        arrived: Called once the part is there, before the fingers open.
 
     Raises:
         OutOfWorkspace: The pose is refused before anything moves.
@@ -207,6 +209,8 @@ def place(
         if cell.arm.state().T_base_tcp.position[2] > pose.position[2] + EARLY:
             raise
         recover(error)
+    if arrived is not None:
+        arrived()
     let_go(cell, pose, opening=0.0, tallest=max(tallest, part_height))
 
 

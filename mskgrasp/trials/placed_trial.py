@@ -27,7 +27,7 @@ class PlacedTrial:
         reason: Reason why it was not lifted or not placed; empty where it was placed.
         resting: Index of the resting pose that was found; None where the part was not recognised.
         wrong_pose: Another resting pose was found than the true one or its equals.
-        quality: Expected share of successes.
+        quality: Expected share of successes, of the best grasp where all were refused; None: not predicted.
         grasp: (4,) the executed grasp.
         predicted: (4,) expected displacement of the part's origin from its true pose.
         measured: (4,) its true displacement; None where not lifted.
@@ -35,6 +35,10 @@ class PlacedTrial:
             its origin there; without such a pose, from its true pose, the seen centre.
         expected: (4,) its prediction, by which the placement is corrected.
         tilt: Of the part in the hand, radians.
+        seeing: (3,) x, y and turn of the found pose less the true one, axes of the grasp frame; without such
+            a pose, of the seen centre less that of the part's box, and no turn.
+        carried: (3,) x, y and turn by which the point that is to be placed moved in the hand from the end of
+            the lift to the moment before its release, axes of the grasp frame; None where not placed.
         placed: (3,) x, y and turn of the placed part less those of the target, axes of the hand's grasp frame
             at the target; None where not placed.
     """
@@ -55,6 +59,8 @@ class PlacedTrial:
     held: list[float] | None = None
     expected: list[float] | None = None
     tilt: float | None = None
+    seeing: list[float] | None = None
+    carried: list[float] | None = None
     placed: list[float] | None = None
 
     @property
@@ -62,23 +68,26 @@ class PlacedTrial:
         """Identifier of the trial among those of its part."""
         return self.condition, self.number, self.means
 
-    def error(self, correction: Correction) -> tuple[float, float] | None:
-        """Distance from the target, metres, and error of the turn, radians; None where it cannot be told.
+    def off(self, correction: Correction) -> np.ndarray | None:
+        """x, y and turn (3,) by which the part misses its target; None where it cannot be told.
 
         That is where the part was not placed, or lay in another resting pose than was found.
 
         ``predicted`` is what was done and measured. Without a correction the part would have been off by its
-        displacement as well, and with a look at the part in the hand by what the release adds alone.
+        displacement as well, and with a look at the part in the hand by what follows the look alone.
         """
         if self.placed is None or self.held is None or self.expected is None or self.wrong_pose:
             return None
         off = np.array(self.placed)
         held, expected = (np.array(one)[[0, 1, 3]] for one in (self.held, self.expected))
         if correction == "none":
-            off = off + expected
-        elif correction == "seen":
-            off = off - (held - expected)
-        return float(np.hypot(off[0], off[1])), float(abs(wrap_angle(off[2])))
+            return off + expected
+        return off - (held - expected) if correction == "seen" else off
+
+    def error(self, correction: Correction) -> tuple[float, float] | None:
+        """Distance from the target, metres, and error of the turn, radians; None where `off` is."""
+        off = self.off(correction)
+        return None if off is None else (float(np.hypot(off[0], off[1])), float(abs(wrap_angle(off[2]))))
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import trimesh
 
 from hal.errors import LoadTooHeavy, MotionAborted, OutOfWorkspace
 from mskgrasp.core.geometry import (
@@ -63,18 +64,25 @@ def grasp_and_place(
         return replace(trial, reason=f"too heavy for the arm ({part.mass:.1f} kg)")
     plan = planned.plan
     if plan is None:
-        return replace(trial, reason=planned.reason)
+        return replace(trial, reason=planned.reason, quality=planned.best_quality)
     trial = replace(
-        trial, certified=plan.certified, quality=plan.quality, grasp=plan.grasp.as_vector().tolist()
+        trial,
+        certified=plan.certified,
+        quality=None if np.isnan(plan.quality) else plan.quality,
+        grasp=plan.grasp.as_vector().tolist(),
     )
     lay = engine.part_pose()
     assert lay is not None  # the cell has a tracker
     seen, point = lay, np.asarray(plan.view.centre_base)
-    if plan.pose is not None:
+    if plan.pose is None:
+        trial = replace(trial, seeing=_centre_error(part, plan, lay).tolist())
+    else:
         found = as_turned(part, plan.pose, lay, like)
         trial = replace(trial, resting=plan.pose.resting, wrong_pose=found is None)
         seen = found or plan.pose.T_base_obj
         point = np.asarray(seen.position)
+        if found is not None:
+            trial = replace(trial, seeing=_pose_error(plan.grasp, found, lay).tolist())
     done = engine.grasp(plan, planned.part)
     if done.aborted:
         engine.recover(MotionAborted(done.aborted))
@@ -96,7 +104,7 @@ def grasp_and_place(
         expected=expected.tolist(),
         tilt=done.tilt,
     )
-    return _placed(engine, plan, seen, point, expected, seeds[1], trial)
+    return _placed(engine, plan, seen, point, in_hand, expected, seeds[1], trial)
 
 
 def _placed(
@@ -104,6 +112,7 @@ def _placed(
     plan: GraspPlan,
     seen: Pose,
     point: np.ndarray,
+    in_hand: Pose,
     expected: np.ndarray,
     target_seed: int,
     trial: PlacedTrial,
@@ -122,14 +131,26 @@ def _placed(
     else:
         engine.put_back(plan)
         return replace(trial, reason="OutOfWorkspace")
+    released: list[Pose] = []
+
+    def arrived() -> None:
+        there = engine.part_pose()
+        assert there is not None
+        released.append(engine.cell.arm.state().T_base_tcp.inverse() @ there)
+
     try:
-        place(engine.cell, pose, engine.recover, part_height=float(plan.view.size[2]))
+        place(engine.cell, pose, engine.recover, part_height=float(plan.view.size[2]), arrived=arrived)
     except MotionAborted as error:
         engine.recover(error)
         return replace(trial, reason="collided")
     after = engine.part_pose()
     assert after is not None
-    return replace(trial, placed=_off(pose, seen, point, after, target).tolist())
+    point_tcp = in_hand.apply(seen.inverse().apply(point))
+    return replace(
+        trial,
+        carried=_moved(in_hand, released[0], point_tcp).tolist(),
+        placed=_off(pose, seen, point, after, target).tolist(),
+    )
 
 
 def as_turned(part: Part, found: PartPose, true: Pose, like: Mapping[int, tuple[int, float]]) -> Pose | None:
@@ -163,6 +184,41 @@ def as_turned(part: Part, found: PartPose, true: Pose, like: Mapping[int, tuple[
         off -= period * round(off / period)
     quat = quat_multiply(quat_about_z(np.asarray(off)), true.quat_wxyz)
     return Pose(position=np.asarray(found.T_base_obj.position), quat_wxyz=quat)
+
+
+def _centre_error(part: Part, plan: GraspPlan, true: Pose) -> np.ndarray:
+    """(3,) x and y of the seen centre less that of the part's true box, axes of the grasp frame, and 0."""
+    vertices = np.asarray(trimesh.load_mesh(part.mesh_path, process=False).vertices, dtype=np.float64)
+    box = plan.view.T_base_box.inverse().apply(true.apply(vertices))[:, :2]
+    off = plan.view.T_base_box.apply(np.append((box.min(axis=0) + box.max(axis=0)) / 2, 0.0))
+    return np.append(_along(plan.grasp, np.asarray(plan.view.centre_base) - off), 0.0)
+
+
+def _pose_error(grasp: Grasp, found: Pose, true: Pose) -> np.ndarray:
+    """(3,) x, y and turn of a found pose less those of the true one, axes of the grasp frame."""
+    turn, _ = twist_and_swing(quat_multiply(found.quat_wxyz, quat_conjugate(true.quat_wxyz)))
+    return np.append(_along(grasp, np.asarray(found.position) - np.asarray(true.position)), float(turn))
+
+
+def _along(grasp: Grasp, vector_base: np.ndarray) -> np.ndarray:
+    """(2,) a vector (3,) along the axes of a grasp."""
+    cos, sin = np.cos(grasp.theta), np.sin(grasp.theta)
+    x, y = vector_base[:2]
+    return np.array([cos * x + sin * y, cos * y - sin * x])
+
+
+def _moved(before: Pose, after: Pose, point_tcp: np.ndarray) -> np.ndarray:
+    """(3,) x, y and turn by which a part moved in the hand, of a point of it, axes of the grasp frame.
+
+    Args:
+        before: ``T_tcp_obj``.
+        after: The same, later.
+        point_tcp: (3,) the point before, tcp frame, metres.
+    """
+    _, _, _, turn = object_displacement(before, after)[0]
+    # The grasp frame's y and z are the tcp's reversed.
+    x, y, _ = (after @ before.inverse()).apply(point_tcp) - point_tcp
+    return np.array([x, -y, turn])
 
 
 def _off(pose: Grasp, seen: Pose, point: np.ndarray, after: Pose, target: Target) -> np.ndarray:

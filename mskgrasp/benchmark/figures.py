@@ -1,0 +1,61 @@
+"""Figures of a benchmark: shares placed within a distance, and precision against refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mskgrasp.benchmark.summary import ANGLE, COLUMNS, DISTANCE, Column, Refusal, by_planner, placing_error
+from mskgrasp.core.palette import BLUE, FAINT, GREEN, INK, ORANGE, RED
+from mskgrasp.reports.style import saved_figure
+from mskgrasp.trials.placed_trial import PlacedTrial
+
+NAMES: dict[Column, str] = {
+    "none": "no correction", "predicted": "planner's prediction", "camera": "camera at the hand",
+    "truth": "truth",
+}  # fmt: skip
+_LINES = [(colour, style) for style in ("-", ":", "--") for colour in (BLUE, ORANGE, GREEN, INK, RED, FAINT)]
+
+
+def draw_shares(trials: Sequence[PlacedTrial], seed: int, path: Path) -> None:
+    """Draw for each correction the share of all attempts of each planner within any distance.
+
+    The turn is within `ANGLE`.
+    """
+    planners = by_planner(trials)
+    with saved_figure(path, 11.0, 3.6) as figure:
+        axes = figure.subplots(1, len(COLUMNS), sharey=True)
+        for axis, column in zip(axes, COLUMNS, strict=True):
+            for (name, some), (colour, style) in zip(planners.items(), _LINES, strict=False):
+                errors = [placing_error(one, column, seed) for one in some]
+                near = np.sort([one[0] for one in errors if one is not None and one[1] <= ANGLE])
+                share = np.arange(len(near) + 1) / len(some)
+                x = 1e3 * np.concatenate([[1e-6], near, [0.1]])
+                axis.step(
+                    x, np.append(share, share[-1]), where="post", color=colour, linestyle=style, label=name
+                )
+            axis.axvline(1e3 * DISTANCE, color=FAINT, linewidth=0.8)
+            axis.set(xscale="log", xlim=(0.1, 20), ylim=(0, 1), title=NAMES[column], xlabel="distance, mm")
+            axis.set_xticks([0.1, 0.25, 0.5, 1, 2, 5, 20], ["0.1", "", "0.5", "1", "2", "5", "20"])
+        axes[0].set_ylabel("share of attempts within it")
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 6), fontsize=9)
+
+
+def draw_refusals(refused: Sequence[Refusal], path: Path) -> None:
+    """Draw the share placed of the attempts that are tried against the share that is refused."""
+    with saved_figure(path, 5.0, 3.6) as figure:
+        axis = figure.subplots()
+        for name, (colour, style) in zip(dict.fromkeys(one.planner for one in refused), _LINES, strict=False):
+            some = [one for one in refused if one.planner == name]
+            axis.plot(
+                [one.refused for one in some], [one.placed.value for one in some], color=colour,
+                linestyle=style, marker="o", markersize=3, label=name,
+            )  # fmt: skip
+        axis.set(
+            xlim=(-0.02, 1), ylim=(0, 1.02), xlabel="share refused", ylabel="share placed of those tried"
+        )
+        if refused:
+            axis.legend(fontsize=9)

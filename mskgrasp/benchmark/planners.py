@@ -1,0 +1,128 @@
+"""Planners that are compared, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from hal.backends import find_backend, package_of
+from hal.cell import Cell
+from mskgrasp.benchmark.config import BUILT_IN, PROGRAM, BenchmarkConfig
+from mskgrasp.core.errors import UsageError
+from mskgrasp.parts import Part
+from mskgrasp.planning.certified import read_certified
+from mskgrasp.planning.certified_planner import CertifiedPlanner, reachable_by
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.for_cell import make_planner
+from mskgrasp.planning.image_planners import AntipodalPlanner, CentroidPlanner
+from mskgrasp.planning.planner import Planner
+from mskgrasp.planning.program_planner import ProgramPlanner
+from mskgrasp.planning.proposal import GROUP, OtherPlanner, installed_planner
+from mskgrasp.trials.engine import PlansGrasps
+
+_KNOWN = (*BUILT_IN, PROGRAM)
+WITHOUT_POSE = tuple(name for name in _KNOWN if name != "certified")
+"""Planners that do not find the part's pose by its CAD."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannerSettings:
+    """What the planners are made of.
+
+    Attributes:
+        models: Folder of our networks.
+        paper_models: Folder of the paper's; None: there are none.
+        program: Command of the program that plans; empty: none.
+    """
+
+    models: Path
+    paper_models: Path | None = None
+    program: str = ""
+
+
+def check_planners(config: BenchmarkConfig) -> None:
+    """Refuse names of planners that cannot run, before a part is built.
+
+    Raises:
+        UsageError: A name is unknown, or what its planner needs is not given.
+        BadBackend: Several packages have that name.
+    """
+    for name in config.rows:
+        if find_backend(name, GROUP, _KNOWN, "--planners") is not None:
+            continue
+        if name == "paper" and config.paper_models is None:
+            raise UsageError(
+                "planner 'paper' needs --paper-models: the folder of networks trained with "
+                "--config configs/train/paper.yaml"
+            )
+        if name == PROGRAM and not config.program:
+            raise UsageError("planner 'program' needs --program: the command that starts it")
+    if config.program and PROGRAM not in config.rows:
+        raise UsageError("--program is given, but --planners does not name program; add it")
+
+
+def package_digests(names: tuple[str, ...]) -> dict[str, str]:
+    """Packages of the planners that are not of this program, with versions, by the planner's name."""
+    return {f"planner {name}": str(package_of(name, GROUP)) for name in names if name not in _KNOWN}
+
+
+@dataclass
+class Planners:
+    """Planners of a connected cell, made when they are first used.
+
+    Attributes:
+        cell: The cell.
+        settings: What they are made of.
+        stack: Ends the programs that were started.
+    """
+
+    cell: Cell
+    settings: PlannerSettings
+    stack: ExitStack
+    _made: dict[str, PlansGrasps] = field(default_factory=dict)
+    _certified: tuple[str, PlansGrasps] | None = None
+
+    def of(self, name: str, part: Part) -> PlansGrasps:
+        """The planner of a name, for a part.
+
+        Raises:
+            MskgraspError: It cannot be made.
+        """
+        if name == "certified":
+            if self._certified is None or self._certified[0] != part.content_hash:
+                self._certified = part.content_hash, self._certified_planner(part)
+            return self._certified[1]
+        return self._once(name, lambda: self._make(name))
+
+    def _once(self, name: str, make: Callable[[], PlansGrasps]) -> PlansGrasps:
+        if name not in self._made:
+            self._made[name] = make()
+        return self._made[name]
+
+    def _make(self, name: str) -> PlansGrasps:
+        settings, workspace = self.settings, self.cell.workspace
+        match name:
+            case "centroid":
+                return OtherPlanner(CentroidPlanner(workspace), workspace, name)
+            case "antipodal":
+                return OtherPlanner(AntipodalPlanner(workspace), workspace, name)
+            case "paper":
+                assert settings.paper_models is not None
+                return make_planner(settings.paper_models, PlannerConfig(), self.cell)
+            case "ours":
+                return make_planner(settings.models, PlannerConfig(), self.cell)
+            case "ours-min-quality":
+                return make_planner(settings.models, PlannerConfig().for_motion(), self.cell)
+            case "program":
+                program = ProgramPlanner(settings.program, workspace)
+                self.stack.callback(program.close)
+                return OtherPlanner(program, workspace, name)
+            case _:
+                return installed_planner(name, _KNOWN, workspace, "--planners")
+
+    def _certified_planner(self, part: Part) -> CertifiedPlanner:
+        networks = self._once("ours-min-quality", lambda: self._make("ours-min-quality"))
+        assert isinstance(networks, Planner)
+        return CertifiedPlanner(networks, part, read_certified(part), reachable_by(self.cell))

@@ -1,0 +1,139 @@
+"""Benchmark: parts, trials of every planner, report."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import closing
+
+from mskgrasp.benchmark.config import QUICK_PARTS, BenchmarkConfig
+from mskgrasp.benchmark.part_list import BenchmarkPart, benchmark_parts
+from mskgrasp.benchmark.planners import PlannerSettings, check_planners, package_digests
+from mskgrasp.benchmark.report import RunFacts, write_report
+from mskgrasp.benchmark.trials import BenchmarkSetup, SceneTask, key_of, run_scenes, scene_tasks
+from mskgrasp.core.errors import UsageError
+from mskgrasp.learning.grasp_models import load_models
+from mskgrasp.parts import find_part
+from mskgrasp.parts.catalogue import read_index
+from mskgrasp.parts.select_parts import part_names
+from mskgrasp.planning.run_inputs import model_digests, part_digests
+from mskgrasp.reports.console import print_sections
+from mskgrasp.runtime.progress import progress
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials
+from mskgrasp.simulation.certify_parts import certify_missing
+from mskgrasp.trials.cell_file import CellFile, read_cell
+from mskgrasp.trials.placed_trial import PlacedTrial
+
+SCENE_VERSION = 1
+"""Raised by every change after which a seed makes other trials."""
+_MAY_CHANGE = (
+    "planners",
+    "parts",
+    "n_parts",
+    "trials",
+    "quick",
+    "workers",
+    "out",
+    "grasps",
+    "part",
+    "grasps_origin",
+)
+
+
+def benchmark(config: BenchmarkConfig) -> None:
+    """Compare planners on parts, and write the report.
+
+    Raises:
+        UsageError: A planner cannot run, the cell is not simulated, or the folder holds another run.
+        MskgraspError: A part, a model or a planner cannot be used.
+    """
+    check_planners(config)
+    cell = read_cell(config.cell_file, noise=config.noise, measure="truth", tape=None)
+    if not cell.simulated:
+        raise UsageError(
+            f"--cell {config.cell} is not simulated, and the benchmark needs a feeder and a tracker; use sapien "
+            "or mujoco"
+        )
+    training = {"": load_models(config.models).meta.training}
+    if config.paper_models is not None:
+        training["paper"] = load_models(config.paper_models).meta.training
+    sources, parts = _parts(config, training[""])
+    workers = config.workers or os.cpu_count() or 1
+    inputs = {"cell": cell.digest} | model_digests(config.models) | part_digests(sources)
+    if config.paper_models is not None:
+        inputs |= model_digests(config.paper_models, "paper")
+    if config.program:
+        inputs["program"] = config.program
+    inputs |= package_digests(config.rows)
+    with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
+        if "certified" in config.rows:
+            certify_missing(sources, config.models, workers)
+        trials = _trials(config, cell, scene_tasks(sources, config.n_trials, config.rows), workers)
+        facts = RunFacts(
+            cell=config.cell,
+            noise=cell.noise,
+            seed=config.seed,
+            parts=parts,
+            trained_on=_trained_on(config, training, parts),
+            settings=config.model_dump(mode="json"),
+        )
+        headline, sections = write_report(config.out, trials, facts)
+    print_sections(sections)
+    print(f"\n{headline}\nwrote {config.out}/report.html, report.json, trials.jsonl")
+
+
+def _parts(config: BenchmarkConfig, training: dict) -> tuple[list[str], list[BenchmarkPart]]:
+    """Names or folders of the parts, built where they are not yet, and their descriptions."""
+    if config.parts:
+        sources = part_names(config.parts, training, config.n_parts)
+        index = read_index().parts
+        found = []
+        for source in sources:
+            part = find_part(source)
+            split = index[part.name].split if part.name in index else "-"
+            found.append(BenchmarkPart(name=part.name, family=part.family, split=split, standard=part.source))
+        return sources, found
+    listed = benchmark_parts(config.n_parts or (QUICK_PARTS if config.quick else 0))
+    for part in progress(listed, unit="part", title="parts"):
+        find_part(part.name)
+    return [part.name for part in listed], listed
+
+
+def _trained_on(
+    config: BenchmarkConfig, training: dict[str, dict], parts: Sequence[BenchmarkPart]
+) -> dict[str, int]:
+    found = {}
+    for name in ("paper", "ours", "ours-min-quality", "certified"):
+        if name in config.rows:
+            known = training["paper" if name == "paper" else ""].get("training_parts") or ()
+            found[name] = sum(part.name in known for part in parts)
+    return {name: n for name, n in found.items() if n}
+
+
+def _trials(
+    config: BenchmarkConfig, cell: CellFile, tasks: Sequence[SceneTask], workers: int
+) -> list[PlacedTrial]:
+    """All trials; those that are stored are not made again."""
+    setup = BenchmarkSetup(
+        cell=cell.write(config.out),
+        condition=config.cell,
+        planners=PlannerSettings(
+            models=config.models, paper_models=config.paper_models, program=config.program
+        ),
+        out=config.out,
+        seed=config.seed,
+    )
+    path = config.out / TRIALS
+    found = {key_of(trial): trial for trial in read_trials(path, PlacedTrial.from_json)}
+    missing = [left for task in tasks if (left := task.without(found)) is not None]
+    # Planner by planner, as the report lists them.
+    keys = [(task.part, task.number, name) for name in config.rows for task in tasks]
+    bar = progress(
+        total=len(keys), done=sum(key in found for key in keys), unit="trial", keep=True, title="trials"
+    )
+    with closing(run_scenes(setup, missing, workers)) as made, bar:
+        for trial in made:
+            append_trial(path, trial.to_json())
+            found[key_of(trial)] = trial
+            bar.update()
+    return [found[key] for key in keys]
