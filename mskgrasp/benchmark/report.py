@@ -117,8 +117,8 @@ def _first_section(rows: Sequence[Row], facts: RunFacts, figure: Path) -> Sectio
     text = [
         "The share of all attempts in which the part ends within the tolerance of where it was meant to be; "
         "attempts that find no grasp, refuse the part or do not lift it count.",
-        "Corrected by the planner's prediction is what was simulated and measured; without a prediction it is "
-        "zero. The other columns follow from it: without a correction the part is off "
+        "Corrected by the planner's prediction is what was simulated and measured; a planner without one "
+        "predicts zero. The other columns follow from it: without a correction the part is off "
         "by its predicted displacement as well; a camera that looks at the part in the hand, with errors of "
         f"{1e3 * CAMERA_POSITION:g} mm along each axis and {np.degrees(CAMERA_TURN):g} degrees (standard "
         "deviations), and the truth leave what the way to the target and the release add.",
@@ -206,7 +206,7 @@ def _budget_section(budget: Sequence[Budget]) -> Section:
     return Section(
         title="Error budget",
         text=[
-            "Medians over the placed attempts, corrected by the planner's prediction. Seeing: the found pose, "
+            "Medians over the placed attempts, corrected by the prediction. Seeing: the found pose, "
             "or without CAD the centre of the part's box, less the true one; without CAD the seen centre is "
             "what is meant to be at the target, so that this error is not part of the total. Seizing: the "
             "displacement in the hand less the predicted one. Carrying: from the end of the lift to the "

@@ -34,6 +34,8 @@ _MAY_CHANGE = (
     "quick",
     "workers",
     "out",
+    "paper_models",
+    "program",
     "grasps",
     "part",
     "grasps_origin",
@@ -51,7 +53,7 @@ def benchmark(config: BenchmarkConfig) -> None:
     cell = read_cell(config.cell_file, noise=config.noise, measure="truth", tape=None)
     if not cell.simulated:
         raise UsageError(
-            f"--cell {config.cell} is not simulated, and the benchmark needs a feeder and a tracker; use sapien "
+            f"--cell {config.cell} is not simulated; the benchmark needs a feeder and a tracker: use sapien "
             "or mujoco"
         )
     training = {"": load_models(config.models).meta.training}

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import torch
 
 from hal.camera import RgbdFrame
 from hal.cell import Workspace
 from mskgrasp.core.errors import NoGraspFound
-from mskgrasp.core.grasp import (
-    FINGER_HALF_WIDTH,
-    MAX_OPENING,
-    PAD_REACH,
-    PALM_HEIGHT,
-    Grasp,
-    PartView,
-    sample_grasps,
-)
+from mskgrasp.core.geometry import wrap_half_turn
+from mskgrasp.core.grasp import MAX_OPENING, PAD_REACH, PALM_HEIGHT, Grasp, PartView
 from mskgrasp.perception.part_detection import find_part_pixels
 from mskgrasp.planning.proposal import ProposedGrasp, view_of
 from mskgrasp.planning.refine import hand_room
@@ -24,13 +18,17 @@ from mskgrasp.planning.scoring import Scene
 
 PALM_CLEARANCE = 0.005
 """Least distance of the palm from the top of the part, metres."""
-N_CANDIDATES = 1500
-"""Grasps of which `AntipodalPlanner` chooses one."""
 FRICTION_CONE = float(np.arctan(0.5))
-"""Greatest angle between an edge and the pad that closes on it, radians: that of a friction of 0.5."""
+"""Greatest angle between the normal of an edge and the closing direction, radians: of a friction of 0.5."""
+SPARE = 0.003
+"""Least distance of each open pad from the part, metres."""
+MOST_TRIED = 200
+"""Pairs of edges, best first, for which the room of the open hand is checked."""
 _STEP = 0.001
 _DEEP = 0.002
-"""Edges are those of what rises so far over the tips of the fingers, and lies within so much of a pad, m."""
+"""What rises by more over the tips of the fingers counts no more, metres."""
+_SMOOTH = 0.002
+"""Standard deviation of the smoothing, metres: about a pixel of the overhead camera."""
 
 
 class CentroidPlanner:
@@ -57,9 +55,9 @@ class CentroidPlanner:
 class AntipodalPlanner:
     """Planner of the most opposite pair of edges near the centroid, between which the open hand has room.
 
-    Grasps are drawn over the part and centred between the edges that their pads would meet. The slope of an
-    edge is that of a line through what lies within 2 mm of the pad. The grasp of least cost is taken: the
-    greater angle between edge and pad in units of the friction cone, plus the distance from the centroid in
+    Edges are those of what rises over the tips of the fingers. Of pairs that the hand spans, whose normals
+    point away from each other within the friction cone, that of least cost is taken: the greater angle
+    between a normal and the line through both in units of the cone, plus the distance from the centroid in
     units of the part's radius of gyration.
     """
 
@@ -67,7 +65,7 @@ class AntipodalPlanner:
         self._workspace = workspace
 
     def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> ProposedGrasp:
-        """Plan a grasp of the part in a frame.
+        """Plan a grasp of the part in a frame; the generator is not used.
 
         Raises:
             NoPartFound: No part is detected.
@@ -76,65 +74,62 @@ class AntipodalPlanner:
         workspace = self._workspace
         view = view_of(frame, workspace)
         scene = Scene.of(frame, view, workspace.table_z, torch.device("cpu"))
-        grasps = sample_grasps(view, N_CANDIDATES, rng)
-        grasps[:, 2] = _height(view, workspace, grasps[:, :2])
-        shift, _ = edges_between(scene, grasps)
-        along = np.column_stack([-np.sin(grasps[:, 3]), np.cos(grasps[:, 3])])
-        grasps = grasps[np.isfinite(shift)]
-        grasps[:, :2] += (shift[:, None] * along)[np.isfinite(shift)]
-        _, angle = edges_between(scene, grasps)
         centroid = _part_points(frame, workspace).mean(axis=0)
-        away = np.linalg.norm(grasps[:, :2] - centroid, axis=1) / max(view.gyration_radius, 1e-3)
-        cost = np.where(angle <= FRICTION_CONE, angle / FRICTION_CONE + away, np.inf)
-        for row in np.argsort(cost, kind="stable"):
-            if not np.isfinite(cost[row]):
-                break
-            free, between = hand_room(scene, grasps[row : row + 1])
-            if free[0] and between[0]:
-                return ProposedGrasp(grasp=Grasp.from_vector(grasps[row]))
-        raise NoGraspFound(
-            "no two opposite edges of the part have room for the open hand; turn the part over"
-        )
+        z = float(_height(view, workspace, centroid[None])[0])
+        first, second, angle = opposite_edges(*edges(scene, z))
+        middle, line = (first + second) / 2, second - first
+        away = np.linalg.norm(middle - centroid, axis=1) / max(view.gyration_radius, 1e-3)
+        order = np.argsort(angle / FRICTION_CONE + away, kind="stable")[:MOST_TRIED]
+        grasps = np.column_stack(
+            [middle, _height(view, workspace, middle), wrap_half_turn(np.arctan2(-line[:, 0], line[:, 1]))]
+        )[order]
+        free, between = hand_room(scene, grasps) if len(grasps) else (np.zeros(0, bool), np.zeros(0, bool))
+        good = np.flatnonzero(free & between)
+        if not len(good):
+            raise NoGraspFound("no two opposite edges of the part have room for the hand; turn the part over")
+        return ProposedGrasp(grasp=Grasp.from_vector(grasps[good[0]]))
 
 
-def edges_between(scene: Scene, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the edges on which the pads of grasps would close.
-
-    Args:
-        scene: The part.
-        grasps: (n, 4) base frame.
+def edges(scene: Scene, z: float) -> tuple[np.ndarray, np.ndarray]:
+    """Find the edges that the pads of a hand at height ``z`` meet, base frame, metres.
 
     Returns:
-        The middle between both edges along the closing direction (n,), metres, NaN where nothing lies between
-        the pads, and the greater angle between an edge and its pad (n,), radians, infinite there.
+        Points (n, 2) on them, base frame, and their normals (n, 2), which point away from the part.
     """
-    rows, columns = 2 * round(MAX_OPENING / 2 / _STEP) + 1, 2 * round(FINGER_HALF_WIDTH / _STEP) + 1
-    heights = scene.crop_of(grasps, (rows, columns), _STEP)[:, 0].cpu().double().numpy()
-    tips = grasps[:, 2] - scene.table_z - PAD_REACH
-    solid = heights > np.maximum(tips, 0.0)[:, None, None] + _DEEP
-    # The first row of a crop is the farthest along the closing direction.
-    y = -(np.arange(rows) - (rows - 1) / 2) * _STEP
-    x = (np.arange(columns) - (columns - 1) / 2) * _STEP
-    some = solid.max(axis=1)
-    far = np.where(some, y[solid.argmax(axis=1)], -np.inf)
-    near = np.where(some, y[rows - 1 - solid[:, ::-1].argmax(axis=1)], np.inf)
-    found = some.max(axis=1)
-    with np.errstate(invalid="ignore"):
-        middle = np.where(found, (far.max(axis=1) + near.min(axis=1)) / 2, np.nan)
-    angles = np.maximum(_slope(x, far), _slope(x, -near))
-    return middle, np.where(found, angles, np.inf)
+    view = scene.view
+    n = int(np.ceil((float(view.size[:2].max()) + 0.02) * np.sqrt(2) / _STEP))
+    centre = np.array([[*view.centre_base[:2], z, 0.0]])
+    heights = scene.crop_of(centre, (n, n), _STEP)[0, 0].cpu().double().numpy()
+    tip = max(z - scene.table_z - PAD_REACH, 0.0)
+    over = cv2.GaussianBlur(np.clip(heights - tip, 0.0, _DEEP), (0, 0), _SMOOTH / _STEP)
+    # Rows run against the base's y, columns along its x.
+    down, right = np.gradient(over)
+    steep = np.hypot(down, right)
+    rows, columns = np.nonzero(steep > 0.5 * steep.max()) if steep.max() > 0 else (np.zeros(0, int),) * 2
+    middle = (n - 1) / 2
+    points = view.centre_base[:2] + _STEP * np.column_stack([columns - middle, middle - rows])
+    normals = np.column_stack([-right[rows, columns], down[rows, columns]])
+    return points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
-def _slope(x: np.ndarray, edge: np.ndarray) -> np.ndarray:
-    """Angles (n,) between edges (n, k) at x (k,) and the pad that meets their greatest; -inf: no edge."""
-    touched = edge > edge.max(axis=1, keepdims=True) - _DEEP
-    weight = touched / np.maximum(touched.sum(axis=1, keepdims=True), 1)
-    y = np.where(touched, edge, 0.0)
-    mean_x, mean_y = (weight * x).sum(axis=1, keepdims=True), (weight * y).sum(axis=1, keepdims=True)
-    spread = (weight * (x - mean_x) ** 2).sum(axis=1)
-    # A contact of a few millimetres has no slope that the image shows.
-    rise = (weight * (x - mean_x) * (y - mean_y)).sum(axis=1) / (spread + _STEP**2)
-    return np.arctan(np.abs(rise))
+def opposite_edges(points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find pairs of edge points that the hand spans and whose normals are opposite within the friction cone.
+
+    Args:
+        points: (n, 2) metres.
+        normals: (n, 2) unit vectors.
+
+    Returns:
+        The first and the second point (k, 2) of each pair, and the greater angle (k,) between a normal and
+        the line through both, radians.
+    """
+    i, j = np.triu_indices(len(points), 1)
+    line = points[j] - points[i]
+    length = np.maximum(np.linalg.norm(line, axis=1), 1e-12)
+    along = line / length[:, None]
+    cosine = np.minimum(-(normals[i] * along).sum(axis=1), (normals[j] * along).sum(axis=1))
+    kept = (cosine >= np.cos(FRICTION_CONE)) & (length <= MAX_OPENING - 2 * SPARE)
+    return points[i][kept], points[j][kept], np.arccos(np.clip(cosine[kept], -1.0, 1.0))
 
 
 def _part_points(frame: RgbdFrame, workspace: Workspace) -> np.ndarray:

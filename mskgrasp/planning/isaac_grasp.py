@@ -21,6 +21,8 @@ from mskgrasp.planning.certified import CertifiedGrasps
 
 MOST_TILT = float(np.radians(5.0))
 """Greatest angle between the approach of a grasp that counts as top-down and the vertical, radians."""
+_ROUNDING = 1e-4
+"""A grasp may be lower than the lowest by this much, metres: files are rounded."""
 _TCP_IN_LINK = {"panda_hand": TCP_OFFSET, "panda_hand_tcp": 0.0}
 """Distance of the TCP along z of the links that a file may give poses of, metres."""
 
@@ -150,7 +152,7 @@ def top_down_grasp(part: Part, T_obj_tcp: Pose, stands: Sequence[bool] | None = 
         T_table_tcp = T_table_obj @ T_obj_tcp
         axes = quat_to_matrix(np.asarray(T_table_tcp.quat_wxyz))
         tilt = float(np.arccos(np.clip(-axes[2, 2], -1.0, 1.0)))
-        if tilt <= MOST_TILT and T_table_tcp.position[2] >= lowest_grasp_z(0.0):
+        if tilt <= MOST_TILT and T_table_tcp.position[2] >= lowest_grasp_z(0.0) - _ROUNDING:
             # The tcp's x is that of the grasp frame.
             theta = float(np.arctan2(axes[1, 0], axes[0, 0]))
             wrapped = float(wrap_half_turn(theta))

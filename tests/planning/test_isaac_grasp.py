@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 import yaml
 
+from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.geometry import Pose
+from mskgrasp.core.grasp import pose_base_tcp
 from mskgrasp.core.panda_kinematics import TCP_OFFSET
-from mskgrasp.planning.isaac_grasp import write_isaac_grasp
+from mskgrasp.planning.isaac_grasp import (
+    read_isaac_grasp,
+    top_down_grasp,
+    write_isaac_grasp,
+    write_scored,
+)
 from tests.planning.test_certified import PART, certified, certified_grasp
 
 
@@ -33,3 +40,75 @@ def test_a_hand_stands_over_the_part_with_its_fingers_down(tmp_path):
     across = (lying @ hand).apply(np.array([0.0, 1.0, 0.0])) - (lying @ hand).position
     theta = grasp.grasp[3]
     assert abs(across @ [-np.sin(theta), np.cos(theta), 0.0]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("link", ["panda_hand", "panda_hand_tcp"])
+def test_a_written_grasp_is_read_as_it_was(link, tmp_path):
+    grasps = [certified_grasp(), certified_grasp(grasp=np.array([0.001, 0.002, 0.012, -1.4]))]
+    path = tmp_path / "grasps.yaml"
+    write_isaac_grasp(path, PART, certified(*grasps))
+    if link == "panda_hand_tcp":
+        values = yaml.safe_load(path.read_text())
+        for one in values["grasps"].values():
+            quat = np.array([one["orientation"]["w"], *one["orientation"]["xyz"]])
+            hand = Pose(position=np.array(one["position"]), quat_wxyz=quat)
+            one["position"] = hand.apply(np.array([0.0, 0.0, TCP_OFFSET])).tolist()
+        path.write_text(yaml.safe_dump(values | {"gripper_frame_link": link}))
+    read = read_isaac_grasp(path)
+    for pose, grasp in zip(read.T_mesh_tcp.values(), grasps, strict=True):
+        found = top_down_grasp(PART, pose, [True] + [False] * (len(PART.resting_probability) - 1))
+        assert found is not None and found.resting == 0 and found.sign == 1.0
+        assert found.grasp == pytest.approx(grasp.grasp, abs=1e-9)
+        assert found.tilt == pytest.approx(0.0, abs=1e-6)
+
+
+def lying(grasp: np.ndarray, tilt: float = 0.0) -> Pose:
+    """Pose of the TCP in the part, tilted about its x, for a grasp in the rest frame of pose 0."""
+    T_table_obj = Pose(
+        position=np.array([0.0, 0.0, PART.resting.position[0, 2]]), quat_wxyz=PART.resting.quat_wxyz[0]
+    )
+    turned = Pose(position=np.zeros(3), quat_wxyz=np.array([np.cos(tilt / 2), np.sin(tilt / 2), 0.0, 0.0]))
+    return T_table_obj.inverse() @ pose_base_tcp(grasp) @ turned
+
+
+def test_a_hand_turned_by_half_a_turn_is_the_same_grasp_with_reversed_axes():
+    found = top_down_grasp(PART, lying(np.array([0.0, 0.0, 0.0105, 0.3 + np.pi])))
+    assert found is not None and found.grasp[3] == pytest.approx(0.3) and found.sign == -1.0
+
+
+def test_a_grasp_that_is_top_down_in_no_resting_pose_is_none():
+    first = [True] + [False] * (len(PART.resting_probability) - 1)
+    assert top_down_grasp(PART, lying(np.array([0.0, 0.0, 0.0105, 0.3]), np.radians(4))) is not None
+    assert top_down_grasp(PART, lying(np.array([0.0, 0.0, 0.0105, 0.3]), np.radians(7)), first) is None
+    assert top_down_grasp(PART, lying(np.array([0.0, 0.0, 0.005, 0.3])), first) is None
+
+
+def test_scored_grasps_keep_all_else_and_the_others_are_left_out(tmp_path):
+    path, scored = tmp_path / "grasps.yaml", tmp_path / "scored.yaml"
+    write_isaac_grasp(path, PART, certified(certified_grasp(), certified_grasp(resting=2)))
+    before = yaml.safe_load(path.read_text())
+    write_scored(scored, read_isaac_grasp(path), {"grasp_1_pose_2": dict(confidence=0.25)})
+    after = yaml.safe_load(scored.read_text())
+    expected = before["grasps"]["grasp_1_pose_2"] | {"confidence": 0.25}
+    assert after == before | {"grasps": {"grasp_1_pose_2": expected}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (dict(format="grasps"), "format is 'grasps', legal: 'isaac_grasp'"),
+        (dict(gripper_frame_link="robotiq_base"), "gripper_frame_link is 'robotiq_base', legal: panda_hand"),
+        (dict(grasps={}), "holds no grasps"),
+        (dict(grasps={"one": dict(position=[0, 0])}), "grasp 'one' has no pose"),
+        (
+            dict(grasps={"one": dict(position=[0, 0, 0], orientation=dict(w=2.0, xyz=[0, 0, 0]))}),
+            "grasp 'one' has no pose",
+        ),
+    ],
+)
+def test_a_file_of_another_kind_is_refused_in_a_line(changes, message, tmp_path):
+    path = tmp_path / "grasps.yaml"
+    write_isaac_grasp(path, PART, certified(certified_grasp()))
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | changes))
+    with pytest.raises(BadConfig, match=message):
+        read_isaac_grasp(path)

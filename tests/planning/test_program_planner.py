@@ -1,0 +1,109 @@
+"""Planners in processes of their own: what they read, and what is said when they fail."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mskgrasp.core.errors import BadPlanner, NoGraspFound
+from mskgrasp.core.geometry import Pose
+from mskgrasp.planning.program_planner import ProgramPlanner, write_frame
+from tests.planning.hand_made import FRAME
+from tests.planning.workspaces import WORKSPACE
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Iterator:
+    """Starts a program of some lines, which finds ``request`` and ``frame`` set for each request."""
+    started = []
+
+    def start(lines: str, timeout_s: float = 30.0) -> ProgramPlanner:
+        path = tmp_path / f"planner{len(started)}.py"
+        path.write_text(
+            "import json, sys, time\nimport numpy as np\nfor number, line in enumerate(sys.stdin):\n"
+            "    request = json.loads(line)\n    frame = np.load(request['frame'])\n"
+            + "".join(f"    {one}\n" for one in lines.splitlines())
+        )
+        planner = ProgramPlanner(f"{shlex.quote(sys.executable)} {path}", WORKSPACE, timeout_s)
+        started.append(planner)
+        return planner
+
+    yield start
+    for planner in started:
+        planner.close()
+
+
+def ask(planner: ProgramPlanner, seed: int = 0):
+    return planner.plan(FRAME, np.random.default_rng(seed))
+
+
+def answer(values: str) -> str:
+    return f"print(json.dumps({values}), flush=True)"
+
+
+def test_a_frame_is_written_with_all_that_a_planner_needs(tmp_path):
+    write_frame(tmp_path / "frame.npz", FRAME, WORKSPACE)
+    frame = np.load(tmp_path / "frame.npz", allow_pickle=False)
+    assert frame["depth"].dtype == np.float32 and (frame["depth"] == FRAME.depth).all()
+    pose = Pose.from_matrix(frame["T_base_camera"])
+    assert pose.position == pytest.approx(FRAME.T_base_camera.position)
+    assert tuple(frame["region"]) == WORKSPACE.region
+    assert (float(frame["table_z"]), float(frame["min_height"])) == (0.0, 0.002)
+
+
+def test_one_process_answers_request_after_request(program):
+    planner = program(
+        answer("{'grasp': [float(frame['region'][0]), 0.01 * number, 0.02, 0.3], 'quality': 0.7, "
+               "'displacement': [0.001, 0, 0, 0.1], 'point_base': [0.4, 0, 0]}")
+    )  # fmt: skip
+    first, second = ask(planner), ask(planner)
+    assert first.grasp.as_vector() == pytest.approx([WORKSPACE.region[0], 0.0, 0.02, 0.3])
+    assert second.grasp.position[1] == pytest.approx(0.01)  # the same process counts on
+    assert first.quality == 0.7 and first.displacement_cov is None
+    assert first.displacement == pytest.approx([0.001, 0, 0, 0.1])
+    assert first.point_base == pytest.approx([0.4, 0, 0])
+
+
+def test_a_request_has_a_seed_of_the_generator(program):
+    planner = program(answer("{'grasp': [0.4, 0.0, 0.02, request['seed'] / 2**31]}"))
+    same, again, other = ask(planner, 1), ask(planner, 1), ask(planner, 2)
+    assert same.grasp.theta == again.grasp.theta != other.grasp.theta
+
+
+def test_a_program_may_refuse_a_part(program):
+    with pytest.raises(NoGraspFound, match="too wide"):
+        ask(program(answer("{'refused': 'too wide'}")))
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ("print('hello', flush=True)", "must answer a line such as .* got 'hello'"),
+        (answer("{'grasp': [0.4, 0.0, 0.02]}"), "must answer a line such as"),
+        (answer("{'grasp': [0.4, 0.0, 0.02, 0], 'qality': 1}"), "must answer a line such as"),
+        (answer("[1, 2]"), "must answer a line such as"),
+        ("raise RuntimeError('no licence')", r"ended with exit code 1 \(RuntimeError: no licence\)"),
+        ("sys.exit(3)", "ended with exit code 3"),
+    ],
+)
+def test_a_program_that_fails_is_one_line(lines, message, program):
+    with pytest.raises(BadPlanner, match=message) as caught:
+        ask(program(lines))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_program_that_does_not_answer_is_ended(program):
+    with pytest.raises(BadPlanner, match="did not answer within 1 s; does it flush"):
+        ask(program("time.sleep(60)", timeout_s=1.0))
+
+
+def test_a_program_that_is_missing_is_named():
+    planner = ProgramPlanner("no_such_program --fast", WORKSPACE)
+    with pytest.raises(BadPlanner, match="'no_such_program --fast' cannot be started"):
+        ask(planner)
+    planner.close()
