@@ -212,13 +212,13 @@ def refusals(trials: Sequence[PlacedTrial], seed: int) -> list[Refusal]:
         hits = (off <= DISTANCE) & (turn <= ANGLE)
         order = np.argsort(qualities, kind="stable")
         for part_refused in REFUSED:
-            bound = max(0.0, float(qualities[order[int(part_refused * len(order))]]))
-            tried = qualities >= bound
+            least = float(qualities[order[int(part_refused * len(order))]])
+            tried = qualities >= least
             names = [one.part for one, kept in zip(some, tried, strict=True) if kept]
             found.append(
                 Refusal(
-                    planner=planner, bound=bound, refused=float(1 - tried.mean()), parts=len(set(names)),
-                    placed=share(hits[tried], names),
+                    planner=planner, bound=max(0.0, least), refused=float(1 - tried.mean()),
+                    parts=len(set(names)), placed=share(hits[tried], names),
                 )
             )  # fmt: skip
     return list(dict.fromkeys(found))

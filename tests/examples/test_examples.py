@@ -1,5 +1,6 @@
 """Every program in examples/ runs as its docstring says, and stays short enough to read."""
 
+import json
 import math
 import os
 import re
@@ -85,3 +86,38 @@ def test_a_client_has_the_server_plan_and_place():
 def test_the_maniskill_task_runs_in_a_loop():
     printed = run("maniskill_task.py", "hex_nut_m30", "3")
     assert re.search(r"^[1-3] of 3 lifted, median shift [\d.]+ mm$", printed, re.MULTILINE)
+
+
+def placed_by(planner: str, folder: Path, **variables: str) -> dict:
+    """The row of a planner in the report of a small benchmark."""
+    arguments = ["--parts", "t_nut_m16x18", "--trials", "1", "--workers", "1", "--out", str(folder / "out")]
+    if planner == "program":
+        arguments += ["--program", f"{sys.executable} {EXAMPLES / 'planner_program.py'}"]
+    done = subprocess.run(
+        [sys.executable, "-m", "mskgrasp.benchmark", "--planners", planner, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([*variables.values(), str(EXAMPLES.parent)])},
+    )
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads((folder / "out" / "report.json").read_text())["rows"]
+    return row
+
+
+def test_a_planner_of_ones_own_takes_part_in_the_benchmark(tmp_path):
+    code = (EXAMPLES / "own_planner.py").read_text(encoding="utf-8")
+    (name, value) = re.search(r'^    (\w+) = "(own_planner:\w+)"$', code, re.MULTILINE).groups()
+    site = tmp_path / "site"
+    info = site / "own_planner-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: own_planner\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[mskgrasp.planners]\n{name} = {value}\n")
+    (site / "own_planner.py").write_text(code)
+    row = placed_by(name, tmp_path, site=str(site))
+    assert row["planner"] == "highest" and row["lifted"]["of"] == 1
+
+
+def test_a_planner_program_takes_part_in_the_benchmark(tmp_path):
+    row = placed_by("program", tmp_path)
+    assert row["planner"] == "program" and row["lifted"]["of"] == 1

@@ -183,6 +183,20 @@ def test_a_low_part_goes_straight_aside():
     assert bench.seen == [[0.5, 0.2, 0.12], [0.5, 0.2, 0.06], [0.5, 0.2, 0.12]]
 
 
+def test_the_part_may_be_measured_at_its_place_before_the_fingers_open():
+    bench = WritingCell(0.16)
+    there: list[float] = []
+
+    def arrived() -> None:
+        there.extend(np.asarray(bench.cell.arm.state().T_base_tcp.position))
+        bench.seen.append([])
+
+    pose = Grasp.from_vector(np.array([0.5, 0.2, 0.06, 0.0]))
+    place(bench.cell, pose, recover, tallest=0.03, arrived=arrived)
+    assert there == pytest.approx([0.5, 0.2, 0.06], abs=1e-3)
+    assert bench.seen == [[0.5, 0.2, 0.12], [0.5, 0.2, 0.06], [], [0.5, 0.2, 0.12]]
+
+
 def test_a_place_over_which_the_part_cannot_be_carried_is_refused_before_anything_moves():
     bench = WritingCell(0.16)
     pose = Grasp.from_vector(np.array([0.5, 0.2, 0.06, 0.0]))

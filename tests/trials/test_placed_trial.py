@@ -20,6 +20,19 @@ def test_a_part_that_was_not_placed_has_no_error():
     assert made(0, wrong_pose=True).error("predicted") is None
 
 
+def test_the_error_is_that_of_the_offset():
+    off = made(0, placed=[0.0003, 0.0004, 0.002]).off("predicted")
+    assert off == pytest.approx([0.0003, 0.0004, 0.002])
+    assert made(0, placed=[0.0003, 0.0004, 0.002]).error("predicted")[0] == pytest.approx(0.0005)
+    assert failed(0).off("predicted") is None
+
+
+def test_a_trial_of_an_earlier_run_has_no_stages():
+    values = made(0).to_json()
+    del values["seeing"], values["carried"]
+    assert PlacedTrial.from_json(values).carried is None
+
+
 def test_a_turn_is_wrapped():
     assert made(0, placed=[0.0, 0.0, 2 * np.pi - 0.01]).error("predicted")[1] == pytest.approx(0.01)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, twist_and_swing
+from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.shipped import config_file
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts import find_part
@@ -17,7 +18,7 @@ from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.trials.engine import connected_engine
 from mskgrasp.trials.placed_trial import PlacedTrial
-from mskgrasp.trials.placing import as_turned, grasp_and_place
+from mskgrasp.trials.placing import _moved, _pose_error, as_turned, grasp_and_place
 
 NUT = find_part("hex_nut_m20")
 
@@ -74,6 +75,21 @@ def test_a_body_of_revolution_has_no_wrong_turn():
     assert seen is not None and turn_between(seen, pose(flat, 0.0)) == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_motion_in_the_hand_is_that_of_the_point_along_the_axes_of_the_grasp():
+    # The tcp's y and z are the grasp frame's reversed: a turn by +0.1 there is one by -0.1 here.
+    before = Pose(position=np.array([0.01, 0.0, 0.0]), quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
+    turned = Pose(position=np.array([0.0, 0.002, 0.0]), quat_wxyz=quat_about_z(np.asarray(-0.1)))
+    moved = _moved(before, turned @ before, np.array([0.03, 0.0, 0.0]))
+    assert moved[2] == pytest.approx(0.1)
+    assert moved[:2] == pytest.approx([0.03 * (np.cos(0.1) - 1), 0.03 * np.sin(0.1) - 0.002])
+
+
+def test_an_error_of_the_found_pose_is_along_the_axes_of_the_grasp():
+    grasp = Grasp.from_vector(np.array([0.5, 0.1, 0.01, np.pi / 2 - 1e-9]))
+    off = _pose_error(grasp, pose(0, 0.32, off=0.001), pose(0, 0.3))
+    assert off == pytest.approx([0.0, -0.001, 0.02], abs=1e-8)
+
+
 def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(tmp_path: Path):
     part = find_part("t_nut_m16x18")
     with connected_engine(
@@ -88,6 +104,9 @@ def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(tmp_path: P
         off = np.array(done.held) - done.expected
         assert done.placed[:2] == pytest.approx(off[:2], abs=1.5e-3)
         assert done.placed[2] == pytest.approx(off[3], abs=0.05)
+        # The seen centre is that of the part's box; little changes on the way.
+        assert done.seeing is not None and done.seeing[:2] == pytest.approx([0.0, 0.0], abs=1.5e-3)
+        assert done.carried is not None and done.carried[:2] == pytest.approx([0.0, 0.0], abs=5e-4)
         error = done.error("predicted")
         assert error is not None and error[0] == pytest.approx(np.hypot(*done.placed[:2]))
         # It lies where the target is.

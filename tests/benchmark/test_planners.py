@@ -1,0 +1,69 @@
+"""Planners by name, and what is said of names that cannot be used."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hal import cell_from_yaml
+from mskgrasp.benchmark.config import BenchmarkConfig
+from mskgrasp.benchmark.planners import Planners, PlannerSettings, check_planners, package_digests
+from mskgrasp.core.errors import BadConfig, BadPart, UsageError
+from mskgrasp.core.shipped import config_file
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.parts import find_part
+from mskgrasp.planning.planner import Planner
+from tests import synthetic
+from tests.synthetic import Box
+
+PART = find_part("hex_nut_m20")
+FRAME = synthetic.frame([Box(x=0.45, y=0.02, yaw=0.4, size=(0.06, 0.02, 0.03))])
+
+
+@pytest.fixture
+def planners():
+    with ExitStack() as stack:
+        cell = cell_from_yaml(config_file("cells/sapien.yaml"))
+        yield Planners(cell, PlannerSettings(models=PRETRAINED, paper_models=PRETRAINED), stack)
+
+
+@pytest.mark.parametrize("name", ["centroid", "antipodal"])
+def test_a_planner_without_a_model_predicts_nothing(name, planners):
+    plan = planners.of(name, PART).plan(FRAME, np.random.default_rng(0))
+    assert np.isnan(plan.quality) and not plan.displacement.any()
+
+
+def test_a_bound_on_the_quality_is_all_that_tells_ours_apart(planners):
+    ours, bounded = planners.of("ours", PART), planners.of("ours-min-quality", PART)
+    assert isinstance(ours, Planner) and isinstance(bounded, Planner)
+    assert (ours.config.least_quality, bounded.config.least_quality) == (0.0, 0.5)
+    assert bounded.config.model_copy(update={"min_quality": None}) == ours.config
+    assert planners.of("ours", PART) is ours  # loaded once
+
+
+def test_certified_grasps_that_were_not_made_are_named(planners, tmp_path: Path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(BadPart, match="no certified grasps of 'hex_nut_m20'; make them"):
+        planners.of("certified", PART)
+
+
+@pytest.mark.parametrize(
+    ("settings", "error", "message"),
+    [
+        (dict(planners=("paper",)), UsageError, "planner 'paper' needs --paper-models"),
+        (dict(planners=("program",)), UsageError, "planner 'program' needs --program"),
+        (dict(planners=("ours",), program="x"), UsageError, "--planners does not name program"),
+        (dict(planners=("ors",)), BadConfig, "--planners is 'ors'; legal: centroid, antipodal, paper, ours"),
+    ],
+)
+def test_a_planner_that_cannot_run_is_refused_first(settings, error, message):
+    with pytest.raises(error, match=message):
+        check_planners(BenchmarkConfig(**settings))
+    check_planners(BenchmarkConfig())
+
+
+def test_planners_of_this_program_are_of_no_package():
+    assert package_digests(("ours", "program", "theirs")) == {"planner theirs": "None"}

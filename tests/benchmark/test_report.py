@@ -1,0 +1,71 @@
+"""Report of a benchmark: its line, its tables, and its numbers."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from mskgrasp.benchmark.part_list import BenchmarkPart
+from mskgrasp.benchmark.report import RunFacts, write_report
+from tests.benchmark.made_trials import failed, made
+from tests.browser import Page
+
+PARTS = [
+    BenchmarkPart(name="nut", family="nut", split="test", standard="ISO 4032"),
+    BenchmarkPart(name="bracket", family="bracket", split="test", standard=""),
+]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    out = tmp_path_factory.mktemp("report")
+    trials = [
+        *(made(number, part=part.name, quality=0.9) for part in PARTS for number in range(5)),
+        *(made(number, "centroid", part=part.name, quality=None, expected=[0.0] * 4, placed=[0.0042, 0, 0])
+          for part in PARTS for number in range(4)),
+        *(failed(4, "centroid", part=part.name, quality=None) for part in PARTS),
+    ]  # fmt: skip
+    facts = RunFacts(
+        cell="sapien", noise="off", seed=0, parts=PARTS, trained_on={"ours": 1}, settings=dict(seed=0)
+    )
+    headline, sections = write_report(out, trials, facts)
+    return out, headline, {section.title: section for section in sections}
+
+
+def test_the_first_line_names_the_planner_that_places_most(written):
+    out, headline, _ = written
+    assert headline.startswith(
+        "Of all 10 attempts at 2 parts, ours places most within 1 mm and 2 degrees: 100% corrected by its "
+        "prediction (95 % interval 72% to 100%), 0% without a correction"
+    )
+    assert json.loads((out / "report.json").read_text())["headline"] == headline
+
+
+def test_the_numbers_are_stored(written):
+    out, _, _ = written
+    values = json.loads((out / "report.json").read_text())
+    ours, centroid = values["rows"]
+    assert ours["within"]["predicted"][2][1]["n"] == 10 and centroid["lifted"]["n"] == 8
+    assert centroid["reasons"] == {"slipped": 2}
+    assert values["trained_on"] == {"ours": 1} and values["parts"] == ["nut", "bracket"]
+    assert {one["planner"] for one in values["refusals"]} == {"ours"}
+    assert {one["part"] for one in values["budgets"]} == {"", "nut", "bracket"}
+
+
+def test_the_tables_say_which_parts_can_be_bought_and_what_was_known(written):
+    _, headline, sections = written
+    (table,) = sections["Parts"].tables
+    assert table.rows[0] == ("nut", "nut", "ISO 4032", "test", "5 of 5", "0 of 5")
+    assert table.rows[1][2] == "-"
+    first = sections["Placed within 1 mm and 2 degrees"]
+    assert any("ours is made of networks that were trained on 1 of these parts" in one for one in first.text)
+    (budget,) = sections["Error budget"].tables
+    assert budget.rows[0][:3] == ("ours", 10, "0.50 mm, 0.00 deg")
+
+
+def test_the_page_works_by_itself(written):
+    out, headline, _ = written
+    with Page(out / "report.html") as page:
+        assert headline in page.evaluate("document.querySelector('.conclusion').textContent")
+        assert page.complaints == []

@@ -1,0 +1,76 @@
+"""The benchmark on both simulated cells, from the command line to the report."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import torch
+
+from mskgrasp.benchmark.__main__ import main
+from mskgrasp.runtime.run_folder import TRIALS, read_trials
+from mskgrasp.trials.placed_trial import PlacedTrial
+from tests.programs import Ended, run_here
+
+PROGRAM = f"{shlex.quote(sys.executable)} {Path(__file__).parents[2] / 'examples' / 'planner_program.py'}"
+
+
+@pytest.fixture(autouse=True)
+def threads() -> Iterator[None]:
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)  # the simulated cells set one
+
+
+def run(out: Path, *arguments: object) -> Ended:
+    words = ("--parts", "t_nut_m16x18", "--trials", 1, "--workers", 1, "--out", out, *arguments)
+    return run_here(main, *map(str, words))
+
+
+def test_planners_are_compared_in_the_same_scene_and_stored_trials_are_kept(tmp_path):
+    out = tmp_path / "out"
+    planners = ("--planners", "centroid", "ours", "program", "--program", PROGRAM)
+    done = run(out, *planners)
+    assert done.returncode == 0, done.stderr
+    values = json.loads((out / "report.json").read_text())
+    assert values["headline"] in done.stdout
+    assert [row["planner"] for row in values["rows"]] == ["centroid", "ours", "program"]
+    centroid, ours, program = read_trials(out / TRIALS, PlacedTrial.from_json)
+    assert centroid.lifted and centroid.quality is None and centroid.expected == [0.0] * 4
+    assert program.quality == 0.5
+    assert ours.placed is not None and ours.carried is not None and ours.seeing is not None
+    # What the table sees of a box-like part is its centre.
+    assert max(map(abs, ours.seeing)) < 0.002
+    stored = (out / TRIALS).read_bytes()
+    done = run(out, *planners[:-2], "antipodal", *planners[-2:])  # one more row
+    assert done.returncode == 0, done.stderr
+    assert (out / TRIALS).read_bytes().startswith(stored)
+    assert [one.means for one in read_trials(out / TRIALS, PlacedTrial.from_json)][3:] == ["antipodal"]
+    other = run(out, "--seed", 1)
+    assert other.returncode == 2 and "seed differ" in other.stderr
+
+
+def test_mujoco_runs_the_same_scene(tmp_path):
+    done = run(tmp_path / "out", "--cell", "mujoco", "--planners", "centroid")
+    assert done.returncode == 0, done.stderr
+    (trial,) = read_trials(tmp_path / "out" / TRIALS, PlacedTrial.from_json)
+    assert trial.condition == "mujoco" and trial.lifted and trial.placed is not None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--cell", "nowhere.yaml"), "nowhere.yaml"),
+        (("--planners", "paper"), "planner 'paper' needs --paper-models"),
+        (("--models", "nowhere"), "nowhere"),
+        (("--parts", "no_such_part"), "no part or part folder is called"),
+    ],
+)
+def test_what_cannot_run_is_refused_in_a_line(arguments, message, tmp_path):
+    done = run(tmp_path / "out", *arguments)
+    assert done.returncode == 2 and message in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
