@@ -12,7 +12,7 @@ from tests.docs.pages import ROOT, anchors, links, pages
 
 PAGES = pytest.mark.parametrize("page", pages(), ids=lambda page: str(page.relative_to(ROOT)))
 OWN = r"(?:mskgrasp|hal|tasks|tests)"
-ENTRY_POINTS = {"mskgrasp.cells", "mskgrasp.arms", "mskgrasp.cameras"}
+ENTRY_POINTS = {"mskgrasp.cells", "mskgrasp.planners", "mskgrasp.arms", "mskgrasp.cameras"}
 
 
 @PAGES
