@@ -227,10 +227,10 @@ def test_a_missing_file_is_reported_before_any_part_is_looked_for(
         (dict(cell=REPOSITORY / "configs/cells/panda_kinect2.yaml"), r"run hal\.touch"),
         (dict(experiment="displacement", compare=("a-b=x",)), "label=folder"),
         (dict(experiment="displacement", compare=("a",)), "label=folder"),
-        (dict(experiment="displacement", compare=(f"LOWESS={PRETRAINED}",)), "is not 'lowess'"),
+        (dict(experiment="displacement", compare=(f"LOWESS={PRETRAINED}",)), "is not lowess or certified"),
         (dict(experiment="displacement", compare=("a=typo",)), "no model.json in typo"),
         (dict(experiment="displacement", lowess_data=Path("typo")), "no dataset folder typo"),
-        (dict(experiment="displacement", planner=PlannerConfig()), "both policies"),
+        (dict(experiment="displacement", planner=PlannerConfig()), "runs this policy anyway"),
         (
             dict(experiment="displacement", planner=PlannerConfig(policy="quality", refinements=1)),
             "omit --planner.refinements",
@@ -248,6 +248,7 @@ def test_unusable_settings_are_refused_in_one_line_and_leave_no_folder(
     assert "\n" not in str(raised.value) and not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow  # test_run of the assessment places a bar by certified grasps
 def test_certified_grasps_are_made_and_executed_in_the_scenes_of_the_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -129,16 +129,16 @@ def fails(workspace): raise OSError("no file")
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Installs a package of a name with entry points into ``NAME_code``."""
+    """Installs a package of a name with entry points into ``NAME_planner``."""
 
     def package(name: str, points: dict[str, str], code: str = CODE) -> None:
         site = tmp_path / name
         info = site / f"{name}-1.0.dist-info"
         info.mkdir(parents=True)
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-        lines = [f"{point} = {name}_code:{value}" for point, value in points.items()]
+        lines = [f"{point} = {name}_planner:{value}" for point, value in points.items()]
         (info / "entry_points.txt").write_text("[mskgrasp.planners]\n" + "\n".join(lines) + "\n")
-        (site / f"{name}_code.py").write_text(code)
+        (site / f"{name}_planner.py").write_text(code)
         monkeypatch.syspath_prepend(str(site))
 
     return package
