@@ -90,5 +90,5 @@ def parse_tolerance(text: str) -> Tolerance:
     except ValueError:
         distance = angle = 0.0
     if not (0 < distance <= 0.1 and 0 < angle <= np.pi):
-        raise ValueError(f"a tolerance is a distance and an angle, such as 1mm,2deg, got {text!r}")
+        raise ValueError("a tolerance is a distance and an angle, such as 1mm,2deg")
     return Tolerance(distance=distance, angle=float(angle))
