@@ -152,7 +152,7 @@ class CertifiedPlanner:
 def planner_of_part(planner: Planner, cell: Cell, part: Part) -> Planner | CertifiedPlanner:
     """The planner for a part: with policy ``certified`` that of its certified grasps, if it has any.
 
-    A part without certified grasps is told on standard error.
+    A part without certified grasps is named on standard error, with the remedy.
     """
     if planner.config.policy != "certified":
         return planner
