@@ -40,7 +40,7 @@ from tests.benchmarks.scores import (
     score_table,
     scores_of,
 )
-from tests.benchmarks.training_cost import cost_table
+from tests.benchmarks.training_cost import add_cost_options, cost_table
 from tests.benchmarks.trainings import make_trainings
 from tests.docs.uses_of_test_parts import commit, log_use
 
@@ -276,10 +276,7 @@ def _options() -> argparse.Namespace:
         "--lowess-data", type=Path,
         help="dataset of 1000 attempts at each of the parts in known_parts.txt; default: those of --data",
     )  # fmt: skip
-    parser.add_argument("--threads", type=int, default=1, help="of this process (default 1)")
-    parser.add_argument("--quick", action="store_true", help="one seed, two epochs: tries the command")
-    parser.add_argument("--estimate", action="store_true", help="print how long each network takes, and end")
-    parser.add_argument("--measure", type=float, default=10.0, help="seconds a network for --estimate")
+    add_cost_options(parser)
     return parser.parse_args()
 
 

@@ -35,7 +35,7 @@ from tests.benchmarks.oracle_networks import OracleSamples, builder
 from tests.benchmarks.paper_choices import CONFIGS, with_stages
 from tests.benchmarks.report import show
 from tests.benchmarks.scores import change_table, changes, errors_of, score_table, scores_of
-from tests.benchmarks.training_cost import cost_table
+from tests.benchmarks.training_cost import add_cost_options, cost_table
 from tests.benchmarks.trainings import make_trainings
 
 BASELINE = "as a camera sees it"
@@ -279,10 +279,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="folder of images, trainings and reports")
     parser.add_argument("--seeds", type=int, default=3, help="trainings of each network (default 3)")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="how the wanted choices' names begin")
-    parser.add_argument("--threads", type=int, default=1, help="of this process (default 1)")
-    parser.add_argument("--quick", action="store_true", help="one seed, two epochs: tries the command")
-    parser.add_argument("--estimate", action="store_true", help="print how long each network takes, and end")
-    parser.add_argument("--measure", type=float, default=10.0, help="seconds a network for --estimate")
+    add_cost_options(parser)
     return parser.parse_args()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -106,3 +107,11 @@ def cost_table(choices: Sequence[Choice], looks: Looks, sides: Sides, *, seconds
             cells.append(f"{cost.samples[stage]}" if known else None)
         rows.append((*cells, f"{cost.total_s / 3600:.2f}"))
     return Table(header=header, rows=rows)
+
+
+def add_cost_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say how much is trained, and what it would take."""
+    parser.add_argument("--threads", type=int, default=1, help="of this process (default 1)")
+    parser.add_argument("--quick", action="store_true", help="one seed, two epochs: tries the command")
+    parser.add_argument("--estimate", action="store_true", help="print how long each network takes, and end")
+    parser.add_argument("--measure", type=float, default=10.0, help="seconds a network for --estimate")
