@@ -17,6 +17,7 @@ from mskgrasp.core.errors import BadPart
 from mskgrasp.core.geometry import twist_and_swing
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, to_grasp_displacement
 from mskgrasp.parts import Part
+from mskgrasp.parts.alike_poses import PartSurface
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
 from mskgrasp.planning.certified import (
@@ -32,9 +33,16 @@ from mskgrasp.planning.certified import (
 from mskgrasp.planning.planner import GraspPlan, Planner
 from mskgrasp.runtime.progress import note
 
+AMBIGUOUS_FROM = 1.5e-3
+"""Poses whose surfaces lie farther apart may need different grasps, metres."""
+
 
 class CertifiedPlanner:
     """Planner of certified grasps of one part.
+
+    An image of a noisy camera may fit two poses, such as those of an open box that lies on its side with the
+    opening to the left or to the right. A certified grasp is that of one pose, so the networks, which see no
+    more than the image, plan there.
 
     Args:
         planner: Plans where the part has no certified grasp that the arm reaches, and knows the table.
@@ -54,6 +62,7 @@ class CertifiedPlanner:
         self._part = part
         self._certified = certified
         self._known = KnownPart.of(part, certified.stands)
+        self._surface = PartSurface.of(part)
         self._reachable = reachable or (lambda grasp: True)
 
     def with_grasps(self, certified: CertifiedGrasps) -> CertifiedPlanner:
@@ -76,25 +85,33 @@ class CertifiedPlanner:
             frame, self._known, table_z=planner.table_z, region=planner.region, min_height=planner.min_height
         )
         located = time.perf_counter()
-        plan = self._certified_plan(frame, found)
+        plan = None if self._ambiguous(found) else self._certified_plan(frame, found)
         if plan is None:
-            self._tell(found.resting)
+            self._tell(found)
             return replace(planner.plan(frame, rng), pose=found)
         now = time.perf_counter()
         seconds = {"pose": located - started, "select": now - located, "total": now - started}
         return replace(plan, seconds=seconds)
 
-    def _tell(self, resting: int) -> None:
+    def _ambiguous(self, found: PartPose) -> bool:
+        """Whether the image fits poses that may need different grasps."""
+        return any(
+            self._surface.apart(found.T_base_obj, other.T_base_obj) > AMBIGUOUS_FROM
+            for other in found.alternatives
+        )
+
+    def _tell(self, found: PartPose) -> None:
         """Say why the networks plan, unless that is what was asked for."""
         if not self._certified.grasps:
             return
-        reason = self._certified.without.get(
-            self._certified.like.get(resting, (resting, 0.0))[0],
-            "the arm reaches none of its certified grasps",
-        )
+        resting = self._certified.like.get(found.resting, (found.resting, 0.0))[0]
+        if self._ambiguous(found):
+            reason = "the image fits two poses of it"
+        else:
+            reason = self._certified.without.get(resting, "the arm reaches none of its certified grasps")
         note(
-            f"'{self._part.name}' in resting pose {resting} has no certified grasp: {reason}; planned by the "
-            "networks"
+            f"'{self._part.name}' in resting pose {found.resting} gets no certified grasp: {reason}; planned "
+            "by the networks"
         )
 
     def _certified_plan(self, frame: RgbdFrame, found: PartPose) -> GraspPlan | None:

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply
 from mskgrasp.parts import Part, find_part
-from mskgrasp.parts.alike_poses import alike_poses
+from mskgrasp.parts.alike_poses import PartSurface, alike_poses
 
 
 def cloud(part: Part, number: int, turn: float = 0.0) -> np.ndarray:
@@ -33,3 +33,14 @@ def test_a_hexagon_has_one_pose_on_its_sides(name: str, distinct: int):
 
 def test_an_angle_with_unequal_legs_has_no_two_poses_alike():
     assert alike_poses(find_part("l_bracket_60x40")) == {}
+
+
+def test_a_nut_is_as_far_from_itself_as_it_was_raised_and_nowhere_after_a_sixth_of_a_turn():
+    nut = find_part("hex_nut_m20")
+    surface = PartSurface.of(nut)
+    here = Pose(position=np.array([0.5, 0.1, 0.02]), quat_wxyz=nut.resting.quat_wxyz[0])
+    turned = Pose(position=np.zeros(3), quat_wxyz=quat_about_z(np.array(np.pi / 3)))
+    assert surface.apart(here, here) < 1e-6
+    assert surface.apart(here, here @ turned) < 0.1e-3
+    raised = Pose(position=here.position + [0.0, 0.0, 0.005], quat_wxyz=here.quat_wxyz)
+    assert surface.apart(here, raised) == pytest.approx(0.005, abs=0.3e-3)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.special import ndtr
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.errors import PartNotRecognised
@@ -22,8 +23,8 @@ BORDER = 4
 """Pixels around the part that are compared, too."""
 NOISY_BORDER, MOST_BORDER = 6, 25
 """The same in a noisy image, in which an end of the part may not be detected."""
-LIKELIHOOD_RATIO = 20.0
-"""A pose that is less likely than another by more than this is no alternative."""
+MOST_DEVIATIONS = 3.0
+"""A pose whose cost exceeds the least by more deviations of the difference than this is no alternative."""
 COVARIANCE_SCALE = 2.0
 """Factor from the covariance of independent pixels to that of the errors which `tests.benchmarks.part_pose`
 finds: pixels along an edge see the same error of the model."""
@@ -167,14 +168,21 @@ def _covariance(fit: Fit) -> np.ndarray:
 
 
 def _alternatives(fits: list[Fit], known: KnownPart, table_z: float) -> tuple[PossiblePose, ...]:
-    costs = np.array([fit.cost for fit in fits])
-    likely = np.exp(costs[0] - costs)
+    """Other poses that the image does not tell from the best one.
+
+    The likelihood is not exactly that of a camera, so that a difference of the costs counts against its own
+    deviation, that of a sum of so many independent terms (Vuong, Econometrica 57, 1989).
+    """
+    best, near = fits[0], []
+    for fit in fits[1:]:
+        assert fit.pixel_costs is not None and best.pixel_costs is not None
+        differences = fit.pixel_costs - best.pixel_costs
+        deviation = float(np.sqrt(len(differences)) * differences.std())
+        deviations = (fit.cost - best.cost) / max(deviation, 1e-9)
+        if deviations <= MOST_DEVIATIONS:
+            near.append((fit, float(ndtr(-deviations) / ndtr(deviations))))
+    total = 1 + sum(likely for _, likely in near)
     return tuple(
-        PossiblePose(
-            resting=fit.lying.resting,
-            T_base_obj=_pose(fit, known, table_z),
-            share=float(one / likely.sum()),
-        )
-        for fit, one in zip(fits[1:], likely[1:], strict=True)
-        if one * LIKELIHOOD_RATIO > 1
+        PossiblePose(resting=fit.lying.resting, T_base_obj=_pose(fit, known, table_z), share=likely / total)
+        for fit, likely in near
     )

@@ -30,7 +30,8 @@ class Fit:
         lying: The resting pose.
         pose: (3,) x, y in base, metres, and turn of the resting pose's frame, radians.
         covariance: (3, 3) of them.
-        cost: Negative logarithm of the likelihood of all pixels.
+        cost: Negative logarithm of the likelihood of all pixels, less that of the resting pose's probability.
+        pixel_costs: (n,) of every pixel; none in a first fit.
     """
 
     look: Look
@@ -38,6 +39,7 @@ class Fit:
     pose: np.ndarray
     covariance: np.ndarray
     cost: float
+    pixel_costs: np.ndarray | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,8 +178,9 @@ def improve(fit: Fit, seen: Seen, known: KnownPart, effort: Effort) -> Fit:
         values, vectors = np.linalg.eigh(covariance + np.diag(least**2))
         root = 1.5 * vectors * np.sqrt(values)
         root[2] *= turns
-    cost = float(table.costs(pixels, mean[None]).sum()) - np.log(max(fit.lying.probability, 0.01))
-    return replace(fit, pose=mean, covariance=covariance, cost=cost)
+    pixel_costs = table.costs(pixels, mean[None])[0]
+    cost = float(pixel_costs.sum()) - np.log(max(fit.lying.probability, 0.01))
+    return replace(fit, pose=mean, covariance=covariance, cost=cost, pixel_costs=pixel_costs)
 
 
 def _informative(
