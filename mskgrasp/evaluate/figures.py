@@ -36,6 +36,7 @@ from mskgrasp.trials.trial import Trial
 _COLOURS = {"dx": BLUE, "dy": ORANGE, "dz": FAINT, "turn": GREEN}
 _OURS = {"quality": BLUE, "low_variance": RED}
 _PAPERS = {"quality": MID_BLUE, "low_variance": MID_RED}
+_CAD = "with\nthe CAD"
 _MOST_ROWS = 40
 _BAR = 0.2
 """Width of a bar."""
@@ -116,17 +117,23 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
     """Draw each model's RMSE under both policies as in figure 5 of the paper, beside the paper's bars.
 
     Rows: known and novel parts; columns: translation and rotation. The paper's bars are of known and novel
-    parts together and appear in both rows. A bar without an interval is of a single part.
+    parts together and appear in both rows, as those of certified grasps do, which know the CAD of all. A bar
+    without an interval is of a single part.
     """
     models = summary.models
     ours = figure_names(models)
-    order = [*PAPER, *(name for name in ours if name not in PAPER)]
+    certified = summary.policies.get(POLICY_NAMES["certified"])
+    order = [*PAPER, *(name for name in ours if name not in PAPER), *([_CAD] if certified else [])]
     with saved_figure(path, 5 + 1.4 * len(order), 7.4) as figure:
         grid = figure.subplots(2, 2, sharex=True, sharey="col")
         for row, side in zip(grid, SIDES, strict=True):
             for axes, kind, scale, unit in zip(
                 row, ("translation", "rotation"), (100.0, 180 / np.pi), ("cm", "degrees"), strict=True
             ):
+                if certified is not None:
+                    value = getattr(certified, f"{kind}_rmse")
+                    interval = getattr(certified, f"{kind}_interval")
+                    _bar(axes, order.index(_CAD), value, interval, scale, GREEN)
                 for x, name in enumerate(order):
                     for k, policy in enumerate(POLICIES):
                         found = models[ours[name]].of(policy, side) if name in ours else None
@@ -149,7 +156,10 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
             for who, colours in (("this run", _OURS), ("paper (all parts)", _PAPERS))
             for policy in POLICIES
         ]
-        figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=9)
+        if certified is not None:
+            label = f"{POLICY_NAMES['certified']}, this run (all parts)"
+            handles.append(Patch(color=GREEN, label=label))
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)
 
 
 def _bar(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
-from mskgrasp.core.palette import BLUE
+from mskgrasp.core.palette import BLUE, GREEN
 from mskgrasp.evaluate import figures
 from mskgrasp.evaluate.comparison import compare_models
 from mskgrasp.evaluate.summary import summarise_trials
@@ -88,3 +88,15 @@ def test_a_models_bars_stand_beside_the_papers_at_their_heights(tmp_path: Path, 
 
 def _rgb(colour: str) -> tuple[float, ...]:
     return tuple(int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
+
+
+def test_certified_grasps_have_a_green_bar_beside_the_models(tmp_path: Path, monkeypatch):
+    kept = keep_figures(figures, monkeypatch)
+    predictions = {"gcip_mv": Prediction(mean=[0.0, 0.001, 0.0, -0.1], std=[0.01] * 4)}
+    trials = [trial(predictions=predictions), trial(predictions=predictions, chosen_by="certified")]
+    figures.draw_comparison(compare_models(trials, {"gcip_mv": Model()}), tmp_path / "displacement.png")
+    for axes in (kept[0].axes[0], kept[0].axes[2]):
+        bars = [bar for bar in axes.patches if isinstance(bar, Rectangle)]
+        green = [bar for bar in bars if bar.get_facecolor()[:3] == pytest.approx(_rgb(GREEN))]
+        assert [bar.get_height() for bar in green] == pytest.approx([0.5])  # 3 mm predicted, 4 mm across
+        assert green[0].get_x() > max(bar.get_x() for bar in bars if bar is not green[0])
