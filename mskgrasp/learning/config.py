@@ -58,6 +58,10 @@ class LearningConfig(Config):
             raise ValueError(
                 "symmetric: true needs patches that are rotated with the grasp; with image: object none are"
             )
+        if self.network.mixture > 1 and self.beta > 0:
+            raise ValueError(
+                f"beta: {self.beta:g} needs network.mixture: 1; a mixture has the plain likelihood"
+            )
         if self.network.symmetric_views and not self.symmetric:
             raise ValueError("network.symmetric_views needs symmetric: true, which trains on these views")
         return self

@@ -30,6 +30,22 @@ def image_autocast(features: nn.Module) -> torch.autocast:
     )
 
 
+class ResidualBlock(nn.Module):
+    """Two convolutions whose output is added to their input (He et al. 2016, arXiv 1512.03385)."""
+
+    def __init__(self, channels: int):
+        super().__init__()
+        self.first = nn.Conv2d(channels, channels, 3, padding=1)
+        self.second = nn.Conv2d(channels, channels, 3, padding=1)
+        # At first the block changes nothing: without normalisation layers a deep network learns from there.
+        for parameter in self.second.parameters():
+            nn.init.zeros_(parameter)
+
+    def forward(self, image: Tensor) -> Tensor:
+        """Compute features (n, c, r, w) of an image of the same shape."""
+        return torch.relu(image + self.second(torch.relu(self.first(image))))
+
+
 class HandFeatures(nn.Module):
     """Feature vector of the heights around a grasp and the part's centre relative to it."""
 
@@ -42,6 +58,7 @@ class HandFeatures(nn.Module):
         normalisation: Normalisation,
         widths: tuple[int, ...],
         shape: tuple[int, int],
+        n_blocks: int = 0,
     ):
         """Build the layers.
 
@@ -50,6 +67,7 @@ class HandFeatures(nn.Module):
             normalisation: Scale of the object centre.
             widths: Channels of the convolutions.
             shape: Rows and columns of the patches.
+            n_blocks: Number of residual blocks after each convolution.
         """
         super().__init__()
         layers: list[nn.Module] = []
@@ -57,6 +75,7 @@ class HandFeatures(nn.Module):
         for number, width in enumerate(widths):
             kernel = 5 if number == 0 else 3
             layers += [nn.Conv2d(before, width, kernel, stride=2, padding=kernel // 2), nn.ReLU(inplace=True)]
+            layers += [ResidualBlock(width) for _ in range(n_blocks)]
             before = width
         self.convolutions = nn.Sequential(*layers, nn.Flatten())
         with torch.no_grad():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -28,6 +28,11 @@ class _NetworkConfig(Config):
     apart (`symmetry`), its variance that of their mixture: equivalent grasps get the same prediction."""
     swing: bool = False
     """The displacement network predicts the swing of the part in the hand, too (paper: no)."""
+    mixture: int = Field(default=1, ge=1, le=8)
+    """Gaussians whose mixture the displacement network fits (paper: 1); it predicts their mean and variance.
+
+    A peg stays in the hand or turns: one Gaussian fits neither.
+    """
     least_std: tuple[float, float] = (0.0, 0.0)
     """Least standard deviation that is predicted, metres and radians (paper: none).
 
@@ -39,6 +44,14 @@ class _NetworkConfig(Config):
     def n_outputs(self) -> int:
         """Number of predicted components: x, y, z, theta, and the swing about x and y."""
         return 6 if self.swing else 4
+
+    @model_validator(mode="after")
+    def _mixtures_have_variances(self) -> Self:
+        if self.mixture > 1 and not self.variance:
+            raise ValueError(
+                f"mixture: {self.mixture} needs variance: true; without variances use mixture: 1"
+            )
+        return self
 
     @field_validator("least_std")
     @classmethod
@@ -65,8 +78,9 @@ class PatchNetworkConfig(_NetworkConfig):
 
     @model_validator(mode="after")
     def _views_need_rotated_patches(self) -> PatchNetworkConfig:
-        for name in ("symmetric_views", "swing"):
-            if self.image == "object" and getattr(self, name):
+        used = {"symmetric_views": self.symmetric_views, "swing": self.swing, "mixture": self.mixture > 1}
+        for name in used:
+            if self.image == "object" and used[name]:
                 raise ValueError(
                     f"{name} needs patches that are rotated with the grasp; with image: object none are"
                 )
@@ -110,6 +124,8 @@ class HandNetworkConfig(_NetworkConfig):
     """Channels of the quality network's convolutions, each of which halves the image."""
     displacement_layers: _Convolutions = (16, 32, 32)
     """Channels of the displacement network's convolutions."""
+    displacement_blocks: int = Field(default=0, ge=0, le=8)
+    """Residual blocks after each of them, of two convolutions that keep the size (He et al. 2016)."""
 
     @model_validator(mode="after")
     def _quality_pixels_are_centred(self) -> HandNetworkConfig:

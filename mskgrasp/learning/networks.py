@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor, nn
 
@@ -79,7 +81,9 @@ def make_features(
         return PatchFeatures(config, normalisation, n_action)
     if quality:
         return HandFeatures(config, normalisation, config.layers, config.quality_shape)
-    return HandFeatures(config, normalisation, config.displacement_layers, config.patch_shape)
+    return HandFeatures(
+        config, normalisation, config.displacement_layers, config.patch_shape, config.displacement_blocks
+    )
 
 
 def _head(n_features: int, config: NetworkConfig, n_outputs: int) -> nn.Sequential:
@@ -115,19 +119,38 @@ class GraspQualityNetwork(nn.Module):
         return torch.sigmoid(logits[:, 1] - logits[:, 0] + self.log_prior_odds)
 
 
+class Gaussians(NamedTuple):
+    """A mixture of m Gaussians of k independent components for each of n grasps, metres and radians.
+
+    Attributes:
+        mean: (n, m, k).
+        variance: (n, m, k); None where the mean alone is predicted.
+        log_weight: (n, m) logarithms of their shares, which sum to 1.
+    """
+
+    mean: Tensor
+    variance: Tensor | None
+    log_weight: Tensor
+
+
 class GraspDisplacementNetwork(nn.Module):
     """GDN: a Gaussian over the grasp displacement of a successful grasp (paper, section 3.4).
 
-    With ``swing: true`` also over the swing of the part: k = 6 components instead of 4.
+    With ``swing: true`` also over the swing of the part: k = 6 components instead of 4. With ``mixture`` it
+    is a mixture of m Gaussians (Bishop, Mixture Density Networks, 1994); `forward` gives mean and variance.
     """
 
     def __init__(self, config: NetworkConfig, normalisation: Normalisation):
         super().__init__()
         self.sees_object = config.sees_object
         self.features = make_features(config, normalisation, quality=False)
-        n_outputs = config.n_outputs
-        self.mean_head = _head(self.features.n_features, config, n_outputs)
-        self.variance_head = _head(self.features.n_features, config, n_outputs) if config.variance else None
+        n_outputs, self.n_gaussians = config.n_outputs, config.mixture
+        n_heads = n_outputs * config.mixture
+        self.mean_head = _head(self.features.n_features, config, n_heads)
+        self.variance_head = _head(self.features.n_features, config, n_heads) if config.variance else None
+        self.weight_head = (
+            _head(self.features.n_features, config, config.mixture) if config.mixture > 1 else None
+        )
         self.target_mean: Tensor
         self.target_std: Tensor
         self.register_buffer("target_mean", torch.tensor(normalisation.target_mean), persistent=False)
@@ -171,12 +194,44 @@ class GraspDisplacementNetwork(nn.Module):
 
     def outputs(self, features: Tensor) -> tuple[Tensor, Tensor | None]:
         """Compute mean and variance (n, k) from features (n, f), along the axes of the patch."""
-        mean = self.target_mean + self.target_std * self.mean_head(features)
+        gaussians = self.gaussians(features)
+        if self.n_gaussians == 1 or gaussians.variance is None:
+            return gaussians.mean[:, 0], None if gaussians.variance is None else gaussians.variance[:, 0]
+        weight = gaussians.log_weight.exp()[..., None]
+        mean = (weight * gaussians.mean).sum(dim=1)
+        apart = (gaussians.mean - mean[:, None]).square()
+        return mean, (weight * (gaussians.variance + apart)).sum(dim=1)
+
+    def gaussians(self, features: Tensor) -> Gaussians:
+        """Compute the distribution from features (n, f), along the axes of the patch."""
+        shape = len(features), self.n_gaussians, len(self.target_mean)
+        mean = self.target_mean + self.target_std * self.mean_head(features).view(shape)
+        if self.weight_head is None:
+            log_weight = features.new_zeros(shape[:2])
+        else:
+            log_weight = torch.log_softmax(self.weight_head(features), dim=-1)
         if self.variance_head is None:
-            return mean, None
+            return Gaussians(mean, None, log_weight)
         # The bound keeps a single outlier from driving the exponential to infinity or to zero.
         log_variance = self.variance_head(features).clamp(-_LOG_VARIANCE_LIMIT, _LOG_VARIANCE_LIMIT)
-        return mean, self.target_std.square() * log_variance.exp() + self.least_variance
+        variance = self.target_std.square() * log_variance.exp().view(shape) + self.least_variance
+        return Gaussians(mean, variance, log_weight)
+
+    def loss(
+        self,
+        patches: Tensor,
+        centre_grasp: Tensor,
+        height: Tensor,
+        theta: Tensor,
+        target: Tensor,
+        beta: float,
+    ) -> Tensor:
+        """Compute `mixture_loss`, or `displacement_loss` of a single Gaussian, which beta belongs to."""
+        if self.n_gaussians == 1:
+            mean, variance = self(patches, centre_grasp, height, theta)
+            return displacement_loss(mean, variance, target, self.target_std, beta=beta)
+        features = self.features(_prepared(self.features, patches, height), centre_grasp, height)
+        return mixture_loss(self.gaussians(features), target, self.target_std)
 
     def start_from(self, gqn: GraspQualityNetwork) -> None:
         """Copy the convolutions' weights of a trained GQN (paper, figure 3)."""
@@ -232,3 +287,20 @@ def displacement_loss(
     if beta > 0:
         terms = terms * variance.detach().pow(beta)
     return terms.sum(dim=-1).mean()
+
+
+def mixture_loss(gaussians: Gaussians, target: Tensor, target_std: Tensor) -> Tensor:
+    """Compute the negative log likelihood of a mixture in the scale of `displacement_loss`, batch mean.
+
+    Of a single Gaussian it equals that loss without beta.
+
+    Args:
+        gaussians: Predicted, with variances.
+        target: (n, k).
+        target_std: (k,) the training data's deviation.
+    """
+    assert gaussians.variance is not None
+    squared = (displacement_error(gaussians.mean, target[:, None]) / target_std).square()
+    variance = gaussians.variance / target_std.square()
+    terms = (variance.log() + squared / variance).sum(dim=-1)
+    return -2 * torch.logsumexp(gaussians.log_weight - terms / 2, dim=-1).mean()

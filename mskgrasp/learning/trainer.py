@@ -243,9 +243,7 @@ class Stage:
         if self.name == "gqn":
             loss = nn.functional.cross_entropy(self.models.gqn(patches, centre, height), success.long())
         else:
-            gdn = self.models.gdn
-            mean, variance = gdn(patches, centre, height, theta)
-            loss = displacement_loss(mean, variance, target, gdn.target_std, beta=self.config.beta)
+            loss = self.models.gdn.loss(patches, centre, height, theta, target, self.config.beta)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         self.optimiser.step()

@@ -12,3 +12,12 @@ def test_views_that_the_network_never_learned_are_refused():
 def test_turned_samples_need_pictures_that_turn():
     with pytest.raises(ValueError, match="symmetric"):
         LearningConfig(network=PatchNetworkConfig(image="object"), symmetric=True)
+
+
+def test_a_mixture_is_trained_by_its_likelihood_and_has_variances():
+    with pytest.raises(ValueError, match="beta: 0.5 needs network.mixture: 1"):
+        LearningConfig(beta=0.5, network=PatchNetworkConfig(mixture=3))
+    with pytest.raises(ValueError, match="mixture: 3 needs variance: true"):
+        PatchNetworkConfig(mixture=3, variance=False)
+    with pytest.raises(ValueError, match="mixture needs patches that are rotated"):
+        PatchNetworkConfig(mixture=3, image="object")

@@ -100,7 +100,8 @@ def test_the_shipped_model_is_loaded_as_its_own_architecture():
     network = load_models(PRETRAINED).meta.network
     assert isinstance(network, HandNetworkConfig)
     read = {name: list(v) if isinstance(v, tuple) else v for name, v in network.model_dump().items()}
-    assert read.pop("swing") is False  # of a time before the swing was predicted
+    # Of a time before these settings.
+    assert (read.pop("swing"), read.pop("mixture"), read.pop("displacement_blocks")) == (False, 1, 0)
     assert read == {name: value for name, value in stored.items() if name not in ("channels", "image")}
 
 

@@ -23,3 +23,21 @@ def test_our_network_sees_what_the_hand_would_meet():
     models = build_models(ModelMeta(network=config, normalisation=NORMAL))
     inputs = torch.rand(3, 1, 16, 8), torch.zeros(3, 3), torch.full((3,), 0.02)
     assert models.quality(*inputs).shape == (3,) and models.grasp_displacement(*inputs)[0].shape == (3, 4)
+
+
+def test_residual_blocks_change_nothing_until_they_have_learned():
+    plain = HandNetworkConfig(patch_pixels=16, patch_columns=8, displacement_layers=(4, 8))
+    deep = plain.model_copy(update={"displacement_blocks": 2})
+    torch.manual_seed(0)
+    shallow = build_models(ModelMeta(network=plain, normalisation=NORMAL)).gdn
+    blocks = build_models(ModelMeta(network=deep, normalisation=NORMAL)).gdn
+    own = {
+        name: value for name, value in blocks.named_parameters() if ".first." in name or ".second." in name
+    }
+    assert len(own) == 2 * 2 * 4
+    rest = [value for name, value in blocks.named_parameters() if name not in own]
+    with torch.no_grad():
+        for value, other in zip(rest, shallow.parameters(), strict=True):
+            value.copy_(other)
+    inputs = torch.rand(3, 1, 16, 8) * 0.05, torch.rand(3, 3) * 0.01, torch.full((3,), 0.02)
+    assert torch.equal(blocks(*inputs)[0], shallow(*inputs)[0])

@@ -4,9 +4,11 @@ import torch
 
 from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.networks import (
+    Gaussians,
     GraspDisplacementNetwork,
     GraspQualityNetwork,
     displacement_loss,
+    mixture_loss,
     standardise,
     with_noise,
 )
@@ -135,3 +137,57 @@ def test_the_loss_is_least_at_the_true_mean_and_variance():
 
     best = loss(0.1, 0.25)
     assert all(best < loss(*other) for other in ((0.2, 0.25), (0.0, 0.25), (0.1, 0.35), (0.1, 0.18)))
+
+
+def test_a_mixtures_loss_is_twice_its_likelihood_up_to_a_constant():
+    torch.manual_seed(0)
+    std = torch.tensor(NORMAL.target_std)
+    mean, target = torch.randn(6, 3, 4) * std, torch.randn(6, 4) * std
+    variance = (torch.rand(6, 3, 4) + 0.5) * std.square()
+    weight = torch.softmax(torch.randn(6, 3), dim=-1)
+    each = torch.distributions.Independent(torch.distributions.Normal(mean, variance.sqrt()), 1)
+    mixture = torch.distributions.MixtureSameFamily(torch.distributions.Categorical(weight), each)
+    constant = 4 * np.log(2 * np.pi) + 2 * float(std.log().sum())
+    loss = mixture_loss(Gaussians(mean, variance, weight.log()), target, std)
+    assert float(loss) == pytest.approx(-2 * float(mixture.log_prob(target).mean()) - constant, rel=1e-5)
+
+
+def test_a_mixture_predicts_the_mean_and_variance_of_draws_from_it():
+    torch.manual_seed(0)
+    gdn = small_models(mixture=3).gdn
+    features = torch.randn(2, gdn.features.n_features)
+    with torch.no_grad():
+        mean, variance = gdn.outputs(features)
+        found = gdn.gaussians(features)
+    which = torch.distributions.Categorical(found.log_weight.exp()).sample((200_000,))
+    rows = torch.arange(2).expand_as(which)
+    draws = torch.normal(found.mean[rows, which], found.variance[rows, which].sqrt())
+    std = torch.tensor(NORMAL.target_std)
+    assert torch.allclose(draws.mean(dim=0) / std, mean / std, atol=0.02)
+    assert torch.allclose(draws.var(dim=0), variance, rtol=0.03)
+
+
+def test_a_mixture_learns_that_a_peg_stays_or_turns_which_one_gaussian_cannot():
+    models = {n: small_models(mixture=n, dropout=0.0).gdn for n in (1, 2)}
+    generator = torch.Generator().manual_seed(0)
+    turned = torch.rand(64, generator=generator) < 0.5
+    target = 1e-4 * torch.randn(64, 4, generator=generator)
+    target[:, 3] = torch.where(turned, 1.0, 0.0) + 0.01 * torch.randn(64, generator=generator)
+    same = torch.zeros(64, 1, 32, 32), torch.zeros(64, 3), torch.zeros(64), torch.zeros(64)
+    losses = {}
+    for n, gdn in models.items():
+        torch.manual_seed(0)
+        gdn.train()
+        optimiser = torch.optim.Adam(gdn.parameters(), lr=1e-2)
+        for _ in range(400):
+            optimiser.zero_grad()
+            gdn.loss(*same, target, 0.0).backward()
+            optimiser.step()
+        gdn.eval()
+        with torch.no_grad():
+            losses[n] = float(gdn.loss(*same, target, 0.0))
+            mean, variance = gdn(*same)
+        # Both say the mean turn, and how far outcomes lie from it.
+        assert float(mean[0, 3]) == pytest.approx(0.5, abs=0.15)
+        assert float(variance[0, 3]) == pytest.approx(0.25, abs=0.1)
+    assert losses[2] < losses[1] - 3
