@@ -5,7 +5,10 @@ from hal.sim.arm import SapienArm
 from hal.sim.camera import SapienCamera
 from hal.sim.cell import sapien_cell
 from hal.sim.config import SapienCameraConfig, SapienCellConfig
+from hal.sim.film import EDGE, Film, FilmFrame, View
+from hal.sim.world import SapienWorld
 
 __all__ = [
-    "SapienArm", "SapienCamera", "SapienCameraConfig", "SapienCellConfig", "sapien_camera", "sapien_cell",
+    "EDGE", "Film", "FilmFrame", "SapienArm", "SapienCamera", "SapienCameraConfig", "SapienCellConfig",
+    "SapienWorld", "View", "sapien_camera", "sapien_cell",
 ]  # fmt: skip
