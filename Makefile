@@ -5,7 +5,7 @@ READY := $(VENV)/.ready
 TESTABLE := $(VENV)/.testable
 RUN := $(VENV)/bin/python -m
 
-.PHONY: help setup collect train plan evaluate palletize test test-all regression bench-parts bench-import bench-collect \
+.PHONY: help setup demo docs collect train plan evaluate palletize test test-all regression bench-parts bench-import bench-collect \
 	bench-train bench-plan bench-serve check format reference results clean
 .DEFAULT_GOAL := help
 
@@ -22,6 +22,9 @@ $(READY): pyproject.toml .ci/constraints.txt .ci/setup
 $(TESTABLE): pyproject.toml .ci/constraints.txt .ci/setup
 	PYTHON=$(PYTHON) EXTRAS=dev,cad,cluster,franka,mujoco,parquet,serve BROWSER=yes .ci/setup
 	@touch $@ $(READY)
+
+demo: $(READY) ## Plan a grasp, carry it out and film it: out/demo/grasp.gif (less than a minute)
+	$(RUN) mskgrasp.demo
 
 collect: $(READY) ## Collect the demo dataset into data/demo (the main job; resumes)
 	$(RUN) mskgrasp.collect --config configs/collect/demo.yaml
