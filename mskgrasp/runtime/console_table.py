@@ -9,6 +9,7 @@ from typing import Literal
 
 from rich import box
 from rich.console import Console
+from rich.padding import Padding
 from rich.table import Table as ConsoleTable
 from rich.text import Text
 
@@ -16,6 +17,10 @@ Kind = Literal["number", "word", "prose"]
 _NUMBER = re.compile(r"[+\-−]?\d.*|[-–]?")
 _LONG = 40
 """Characters; a column with a longer cell is wrapped."""
+_LONG_WORD = 16
+"""Characters; a longer word, such as a path, may be broken."""
+_BETWEEN = 3
+"""Characters between two columns."""
 _PIPE_WIDTH = 10_000
 """Characters: wide enough that no table is wrapped in a file."""
 
@@ -78,21 +83,48 @@ def report_console() -> Console:
 def print_table(table: Table, console: Console | None = None) -> None:
     """Print one table without its caption; `rich.text.Text` in a cell keeps its style.
 
+    On a terminal that is too narrow for the numbers they are wrapped, too; where even the words do not fit,
+    each row becomes a list of its cells. Nothing is cut.
+
     Args:
         table: The table.
         console: Console to print on; None: `report_console`.
     """
     console = console or report_console()
-    shown = _console_table(table)
-    if console.is_terminal:
-        console.print(shown)
-        return
-    with console.capture() as capture:
-        console.print(shown)
-    console.print(Text("\n".join(line.rstrip() for line in capture.get().splitlines())), soft_wrap=True)
+    if not console.is_terminal:
+        with console.capture() as capture:
+            console.print(_console_table(table, whole_numbers=True))
+        console.print(Text("\n".join(line.rstrip() for line in capture.get().splitlines())), soft_wrap=True)
+    elif _width(table, whole_numbers=False) > console.width:
+        for row in table.rows:
+            _print_list(table.header, row, console)
+    else:
+        whole = _width(table, whole_numbers=True) <= console.width
+        console.print(_console_table(table, whole_numbers=whole))
 
 
-def _console_table(table: Table) -> ConsoleTable:
+def _width(table: Table, *, whole_numbers: bool) -> int:
+    """Characters that a table needs so that no word, or no number with its unit, is broken."""
+    widths = []
+    for k, kind in enumerate(table.kinds()):
+        texts = [table.header[k], *(cell_text(row[k]) for row in table.rows)]
+        if not (whole_numbers and kind == "number"):
+            # The end of prose, often a path or a list, may be broken anywhere.
+            texts = [word[:_LONG_WORD] for text in texts for word in text.split()]
+        widths.append(max(map(len, texts), default=0))
+    return sum(widths) + _BETWEEN * (len(widths) - 1)
+
+
+def _print_list(header: Sequence[str], row: Sequence[object], console: Console) -> None:
+    """The first cell in bold, and below it a line for each of the others that is not empty."""
+    shown = [cell if isinstance(cell, Text) else Text(cell_text(cell)) for cell in row]
+    console.print(Text(shown[0].plain, style="bold"))
+    for name, cell in zip(header[1:], shown[1:], strict=True):
+        if cell.plain:
+            console.print(Padding(Text.assemble(f"{name}: " if name else "", cell), (0, 0, 0, 2)))
+
+
+def _console_table(table: Table, *, whole_numbers: bool) -> ConsoleTable:
     rows = [[cell if isinstance(cell, Text) else Text(cell_text(cell)) for cell in row] for row in table.rows]
     last = rows.pop() if table.total and rows else None
     shown = ConsoleTable(
@@ -105,7 +137,7 @@ def _console_table(table: Table) -> ConsoleTable:
             last[k] if last is not None else "",
             justify="right" if kind == "number" else "left",
             overflow="fold",
-            no_wrap=kind == "number",
+            no_wrap=kind == "number" and whole_numbers,
         )
     for row in rows:
         shown.add_row(*row)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections import Counter
 
 import pytest
 from rich.console import Console
@@ -61,6 +62,30 @@ def test_a_row_is_one_line_in_a_file_and_is_wrapped_on_a_terminal(capsys: pytest
     assert len(capsys.readouterr().out.splitlines()) == 3
     lines = printed(table, terminal=True, width=40)
     assert len(lines) > 6 and max(map(len, lines)) <= 40
+
+
+WIDE = Table(
+    header=("part", "lifted", "n", "shift", "remark"),
+    rows=[(f"p_{k}", f"{k} of 2250 (81.3 %)", 1234567, "3.25 mm 4.5 deg", "a" * 70) for k in range(10)],
+)
+
+
+def letters(text: str) -> Counter[str]:
+    return Counter(text.replace(" ", ""))
+
+
+def test_where_numbers_do_not_fit_a_terminal_they_are_wrapped_and_not_cut():
+    lines = printed(WIDE, terminal=True, width=60)
+    assert max(map(len, lines)) <= 60 and len(lines) > 2 + 10 * 2
+    assert letters("".join(lines[2:])) == letters("".join(str(cell) for row in WIDE.rows for cell in row))
+
+
+def test_where_words_do_not_fit_a_terminal_each_row_is_a_list_of_its_cells():
+    lines = printed(WIDE, terminal=True, width=30)
+    assert max(map(len, lines)) <= 30
+    names = "".join(f"{name}:" for name in WIDE.header[1:]) * len(WIDE.rows)
+    assert letters("".join(lines)) == letters(names + "".join(str(cell) for row in WIDE.rows for cell in row))
+    assert lines[0].rstrip() == "p_0" and "  n: 1234567" in [line.rstrip() for line in lines]
 
 
 def test_text_of_users_is_no_markup_and_styled_text_keeps_its_style():
