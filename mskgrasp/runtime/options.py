@@ -19,6 +19,7 @@ from tyro.constructors import ConstructorRegistry, StructConstructorSpec, Struct
 from mskgrasp.core.config import check_config, read_config
 from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.runtime.option_errors import parse_arguments
+from mskgrasp.runtime.programs import guide
 
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
 CommandT = TypeVar("CommandT")
@@ -51,9 +52,9 @@ def parse(
     note = f" Settings come from --config FILE (default: {default_config}); options override it."
     # Without a file there may be required options: tyro demands them.
     known: dict[str, Any] = {} if default is None else {"default": default}
-    description += note if default_config else ""
+    description += (note if default_config else "") + _guide(prog)
     parsed = parse_arguments(
-        model, rest, prog=prog, also_legal=["--config"], description=description, registry=_registry, **known
+        model, rest, prog=prog, also_legal=["--config"], description=description, registry=registry, **known
     )
     # No warnings: types are checked next.
     return check_config(model, parsed.model_dump(warnings=False), "command line", name=_option)
@@ -80,8 +81,14 @@ def parse_command(
     kinds = [Annotated[kind, tyro.conf.subcommand(name)] for name, kind in commands.items()]
     union = functools.reduce(operator.or_, kinds)
     return parse_arguments(
-        union, arguments, prog=prog, options_of=commands.get(name), description=description
+        union, arguments, prog=prog, options_of=commands.get(name), description=description + _guide(prog)
     )
+
+
+def _guide(prog: str) -> str:
+    """The last paragraph of a description: the page about the program."""
+    line = guide(prog)
+    return f"\n\n{line}" if line else ""
 
 
 def _take_config_option(arguments: list[str]) -> tuple[list[str], Path | None]:
@@ -95,16 +102,17 @@ def _take_config_option(arguments: list[str]) -> tuple[list[str], Path | None]:
     return rest, found.config
 
 
-_registry = ConstructorRegistry()
+registry = ConstructorRegistry()
+"""Rules by which tyro makes configurations."""
 
 
-@_registry.struct_rule
+@registry.struct_rule
 def _without_validation(info: StructTypeInfo) -> StructConstructorSpec | None:
     """Have tyro fill models without validating them: it would print pydantic's errors in its own words."""
-    if _registry in info.markers or not (isinstance(info.type, type) and issubclass(info.type, BaseModel)):
+    if registry in info.markers or not (isinstance(info.type, type) and issubclass(info.type, BaseModel)):
         return None
     # The marker ends the recursion: tyro's own rule gives the fields.
-    spec = ConstructorRegistry.get_struct_spec(replace(info, markers=(*info.markers, _registry)))
+    spec = ConstructorRegistry.get_struct_spec(replace(info, markers=(*info.markers, registry)))
     if not isinstance(spec, StructConstructorSpec):
         return None
 
