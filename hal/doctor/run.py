@@ -8,6 +8,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from rich.text import Text
+
 from hal.camera import RgbdFrame
 from hal.cell import Cell
 from hal.doctor.checks import (
@@ -32,6 +34,7 @@ from hal.errors import BadBackend
 from hal.open_cell import cell_from_values
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadConfig, UsageError
+from mskgrasp.runtime.console_table import report_console
 from mskgrasp.runtime.options import parse
 
 DESCRIPTION = """Checks a cell and prints one line a check: ok, warn or fail, and the remedy.
@@ -44,6 +47,8 @@ next. The exit code is 0 if nothing failed, else 1.
 and closes three times on nothing, which gives its speed; then it closes three times on a spring scale or load
 cell that you hold between the pads and read, after you have measured with a tape how far it opens. The arm
 stands still. After a question workspace.measured_grip is written into the cell's file; its comments stay."""
+
+_COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 
 
 def examine(path: Path, *, move: bool, dry_run: bool = False) -> Iterator[Finding]:
@@ -121,10 +126,11 @@ def main() -> int:
                 "--gripper measures the hand alone; omit --move and --dry-run, or run one after the other"
             )
         return measure_gripper(config.cell)
-    found = []
+    found, console = [], report_console()
     for finding in examine(config.cell, move=config.move, dry_run=config.dry_run):
         found.append(finding)
-        print(f"{finding.level:5} {finding.subject:15} {finding.text}", flush=True)
+        level = Text(f"{finding.level:5}", style=_COLOURS[finding.level])
+        console.print(level.append(f" {finding.subject:15} {finding.text}", style="default"), soft_wrap=True)
     counts = Counter(finding.level for finding in found)
     print(f"{counts['ok']} ok, {counts['warn']} warn, {counts['fail']} fail")
     print(next_step(found, config))

@@ -116,7 +116,7 @@ def main() -> int:
     config = parse(TouchConfig, prog="python -m hal.touch", description=DESCRIPTION)
     report, operator = measure(config)
     print("\n".join(report.lines()))
-    print(f"wrote table.json and table.png in {config.out}")
+    print(f"wrote {config.out}/table.json and {config.out}/table.png")
     if "workspace" not in read_yaml(config.cell):
         return 0
     slope = None if report.plane.level else report.plane.slope

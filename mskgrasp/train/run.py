@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from rich.console import Console
 
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import UsageError
@@ -83,21 +82,20 @@ def run_training(config: TrainConfig) -> int:
         raise UsageError(f"{missing} is needed: python -m mskgrasp.train --data DATASET --out MODEL")
     out = config.out
     _check_out(config, out)
-    console = Console()
     if (out / DESCRIPTION).exists() and (out / WEIGHTS).exists():
-        console.print(f"{out} is trained already; choose another --out to train again")
+        print(f"{out} is trained already; choose another --out to train again")
         return 0
     device = _device(config.device)
     samples = _read(config, config.data)
     sides = split(samples, config)
-    console.print(
+    print(
         f"{len(sides.training)} attempts to train on, "
         f"{len(samples) - len(sides.training)} at held-out parts; "
         f"{float(samples.success.double().mean()):.0%} succeed; on {device}"
     )
     if samples.skipped:
         skipped = ", ".join(f"{n} ({why})" for why, n in samples.skipped.items())
-        console.print(f"unusable attempts: {skipped}")
+        print(f"unusable attempts: {skipped}")
     cli.make_folder(out)
     write_config(config, out / "config.yaml")
     with closing(_ProgressBar(out / "log.csv")) as bar:
@@ -113,7 +111,7 @@ def run_training(config: TrainConfig) -> int:
     save_model(out, models)
     _write(out / "card.md", model_card(models.meta))
     (out / CHECKPOINT).unlink(missing_ok=True)
-    _summarise(console, models.meta.metrics, out)
+    _summarise(models.meta.metrics, out)
     return 0
 
 
@@ -173,19 +171,19 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _summarise(console: Console, report: dict[str, Any], out: Path) -> None:
+def _summarise(report: dict[str, Any], out: Path) -> None:
     gqn, gdn = (report.get("test", report)[name] for name in ("gqn", "gdn"))
-    console.print(
+    print(
         f"quality on held-out parts: AUROC {gqn['auroc']:.3f}, "
         f"balanced accuracy {gqn['balanced_accuracy']:.1%}, "
         f"Brier {gqn['brier']:.3f} (always the base rate: {gqn['brier_of_base_rate']:.3f})"
     )
     for name, values in (("network", gdn), *((k, gdn[k]) for k in ("zero_displacement", "training_mean"))):
-        console.print(
+        print(
             f"displacement, {name.replace('_', ' ')}: {values['translation_rmse'] * 1e3:.2f} mm, "
             f"{math.degrees(values['rotation_rmse']):.2f} deg"
         )
-    console.print(f"saved in {out}")
+    print(f"wrote {out}: model.safetensors, model.json, card.md, metrics.json, curves.png")
 
 
 def main() -> int:
