@@ -6,7 +6,7 @@ Poses are in the robot's base frame (z up), lengths in metres, angles in radians
 
 `load_part` makes a part of a CAD file, `open_cell` connects a simulated or real cell, `Planner.plan` chooses
 a `Grasp` in a depth image and predicts the part's displacement in the hand, `execute_grasp` performs it, and
-`open_dataset` reads collected attempts. The folder ``examples`` shows each in use.
+`open_dataset` reads collected attempts. The tutorials and the folder ``examples`` show each in use.
 
 Names are imported when they are first used: ``import mskgrasp`` alone loads neither torch nor a simulator.
 """
