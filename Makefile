@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 READY := $(VENV)/.ready
 TESTABLE := $(VENV)/.testable
+DOCUMENTABLE := $(VENV)/.documentable
 RUN := $(VENV)/bin/python -m
 
 .PHONY: help setup demo docs collect train plan evaluate palletize test test-all regression bench-parts bench-import bench-collect \
@@ -25,6 +26,15 @@ $(TESTABLE): pyproject.toml .ci/constraints.txt .ci/setup
 
 demo: $(READY) ## Plan a grasp, carry it out and film it: out/demo/grasp.gif (less than a minute)
 	$(RUN) mskgrasp.demo
+
+# What the extra [docs] names, and nothing else: the site is made without importing the packages.
+$(DOCUMENTABLE): .ci/constraints.txt
+	[ -x $(VENV)/bin/pip ] || $(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip --disable-pip-version-check install --quiet --constraint .ci/constraints.txt zensical
+	@touch $@
+
+docs: $(DOCUMENTABLE) ## Build the documentation site: build/site/index.html
+	$(RUN) tests.docs.build_site
 
 collect: $(READY) ## Collect the demo dataset into data/demo (the main job; resumes)
 	$(RUN) mskgrasp.collect --config configs/collect/demo.yaml
@@ -90,5 +100,5 @@ results: $(READY) ## Render docs/results from stored reports (ARGS="--record NAM
 	$(RUN) tests.docs.make_results $(ARGS)
 
 clean: ## Remove the virtual environment and caches (data, models and out stay)
-	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis .import_linter_cache *.egg-info
+	rm -rf $(VENV) build .pytest_cache .ruff_cache .hypothesis .import_linter_cache *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
