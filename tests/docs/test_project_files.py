@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 import mskgrasp
+from tests.docs.build_site import SITE
 from tests.docs.pages import ROOT
 
 TESTED_BY_NAME = ("hal", "mskgrasp", "tasks")
@@ -37,6 +38,16 @@ def test_the_workflow_runs_what_can_be_run_here():
     assert "python:3.11" in job["container"]
     assert job["steps"][-1] == {"run": "bash .ci/run"}
     assert (ROOT / ".ci/run").stat().st_mode & 0o111
+
+
+def test_the_site_is_built_and_its_folder_published_by_a_workflow_with_a_pinned_builder():
+    jobs = yaml.safe_load((ROOT / ".github/workflows/docs.yml").read_text(encoding="utf-8"))["jobs"]
+    steps = jobs["build"]["steps"]
+    assert {"run": "make docs"} in steps
+    assert ROOT / steps[-1]["with"]["path"] == SITE and jobs["publish"]["needs"] == "build"
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    (builder,) = extras["optional-dependencies"]["docs"]
+    assert re.search(rf"^{builder}==", (ROOT / ".ci/constraints.txt").read_text(encoding="utf-8"), flags=re.M)
 
 
 def test_the_architecture_names_every_room():

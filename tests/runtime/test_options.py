@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mskgrasp.core.errors import BadConfig
-from mskgrasp.runtime.options import parse_command
+from mskgrasp.runtime.options import parse, parse_command
 from tests.runtime.small_program import COMMANDS, Eat, ProgramConfig, parse_program
 
 
@@ -53,3 +53,15 @@ def test_help_shows_the_models_docstrings(capsys):
         parse_program("--help")
     shown = capsys.readouterr().out
     assert "--camera.n-pixels" in shown and "Along an edge." in shown and "The camera." in shown
+
+
+def test_help_of_a_program_ends_its_description_with_the_page_about_it(capsys):
+    with pytest.raises(SystemExit):
+        parse(ProgramConfig, prog="python -m mskgrasp.assess", description="Says.", argv=["--help"])
+    with pytest.raises(SystemExit):
+        parse_command(COMMANDS, prog="python -m mskgrasp.parts", description="Does.", argv=["--help"])
+    shown = capsys.readouterr().out
+    assert "Explained in docs/assess.md;" in shown and "Explained in docs/parts.md;" in shown
+    with pytest.raises(SystemExit):
+        parse_program("--help")
+    assert "Explained" not in capsys.readouterr().out
