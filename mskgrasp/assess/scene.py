@@ -10,15 +10,12 @@ from trimesh.visual.material import PBRMaterial
 
 from mskgrasp.core.geometry import Pose, quat_about_z
 from mskgrasp.core.grasp import (
-    FINGER_HALF_WIDTH,
-    MAX_OPENING,
-    PAD_REACH,
-    PALM_HEIGHT,
     pose_base_grasp,
     to_grasp_displacement,
 )
 from mskgrasp.parts import Part
 from mskgrasp.planning.certified import CertifiedGrasp, CertifiedGrasps
+from mskgrasp.reports.hand_boxes import hand_boxes
 
 MOST_FACES = 20_000
 """A finer mesh is shown with its collision hulls instead, so that a report stays small enough to send."""
@@ -56,7 +53,7 @@ def scene_page(part: Part, certified: CertifiedGrasps, n_poses: int = 4) -> str:
         if grasps:
             at = Pose(position=aside, quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
             hand = at @ pose_base_grasp(grasps[0].grasp)
-            for box in _hand_boxes():
+            for box in hand_boxes():
                 scene.add_geometry(_painted(box, _HAND), transform=hand.as_matrix())
             moved = hand @ _motion(grasps[0], hand.inverse() @ lying) @ (hand.inverse() @ lying)
             scene.add_geometry(_painted(mesh, _GHOST), transform=moved.as_matrix())
@@ -73,18 +70,6 @@ def _motion(grasp: CertifiedGrasp, lying: Pose) -> Pose:
     motion = to_grasp_displacement(grasp.mean, origin)
     # The hand moves by it in the part's frame: the part moves by the inverse.
     return Pose(position=motion[:3], quat_wxyz=quat_about_z(np.asarray(motion[3]))).inverse()
-
-
-def _hand_boxes() -> list[trimesh.Trimesh]:
-    """Open fingers and palm in the grasp frame, which has z up."""
-    boxes = []
-    for side in (-1, 1):
-        finger = trimesh.creation.box([2 * FINGER_HALF_WIDTH, 0.008, PALM_HEIGHT + PAD_REACH])
-        finger.apply_translation([0.0, side * (MAX_OPENING / 2 + 0.004), (PALM_HEIGHT - PAD_REACH) / 2])
-        boxes.append(finger)
-    palm = trimesh.creation.box([2 * FINGER_HALF_WIDTH, MAX_OPENING + 0.03, 0.02])
-    palm.apply_translation([0.0, 0.0, PALM_HEIGHT + 0.01])
-    return [*boxes, palm]
 
 
 def _painted(mesh: trimesh.Trimesh, colour: tuple[int, int, int, int]) -> trimesh.Trimesh:

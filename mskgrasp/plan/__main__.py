@@ -18,7 +18,8 @@ def main() -> int:
     """Parse, plan, report."""
     with ctrl_c_deferred():
         from mskgrasp.plan.config import PlanConfig
-        from mskgrasp.plan.run import plan_grasp, plan_text
+        from mskgrasp.plan.run import plan_grasp
+        from mskgrasp.reports.plan_text import plan_text
         from mskgrasp.runtime.options import parse
     config = parse(PlanConfig, prog="python -m mskgrasp.plan", description=DESCRIPTION)
     print(plan_text(plan_grasp(config)))

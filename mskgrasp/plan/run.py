@@ -10,52 +10,12 @@ from hal import Cell, capture_at_home, go_home, open_cell
 from hal.operator import Operator, StoppedByOperator
 from mskgrasp.core.errors import UsageError
 from mskgrasp.parts import find_part
-from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.plan.config import PlanConfig
 from mskgrasp.planning.certified_planner import planner_of_part
-from mskgrasp.planning.config import MIN_QUALITY
 from mskgrasp.planning.for_cell import make_planner, part_name, present, tell_model
 from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.runtime.cli import make_folder
-
-
-def plan_text(plan: GraspPlan) -> str:
-    """The plan in words, with units."""
-    x, y, z, theta = plan.grasp.as_vector()
-    mean, std = plan.displacement, plan.displacement_std
-    shifts = ", ".join(
-        f"{name} {value * 1e3:+.1f} +- {deviation * 1e3:.1f} mm"
-        for name, value, deviation in zip(("dx", "dy", "dz"), mean[:3], std[:3], strict=True)
-    )
-    turn = f"dtheta {np.degrees(mean[3]):+.1f} +- {np.degrees(std[3]):.1f} deg"
-    tilt = float(np.degrees(np.linalg.norm(plan.swing)))
-    spread = float(np.degrees(np.sqrt(plan.swing_var.sum())))
-    tilted = f"{tilt:.1f} +- {spread:.1f} deg"
-    stages = ", ".join(f"{name} {value:.2f} s" for name, value in plan.seconds.items() if name != "total")
-    pose = [] if plan.pose is None else [_pose_text(plan.pose)]
-    n = len(plan.candidates)
-    of = f"{n} certified grasps" if plan.certified else f"best of {n}: {plan.qualities.max():.3f}"
-    return "\n".join(
-        [
-            *pose,
-            f"grasp         x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, theta {np.degrees(theta):.1f} deg (base)",
-            f"quality       {plan.quality:.3f} ({of})"
-            + ("" if plan.quality >= MIN_QUALITY else f"; under {MIN_QUALITY:g}, not worth trying"),
-            f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
-            *([] if np.isnan(plan.swing).any() else [f"tilt          {tilted}"]),
-            f"planned in    {plan.seconds['total']:.2f} s ({stages})",
-        ]
-    )
-
-
-def _pose_text(pose: PartPose) -> str:
-    x, y, _ = pose.T_base_obj.position
-    std = np.sqrt(np.diag(pose.covariance))
-    return (
-        f"part          resting pose {pose.resting} at x {x:.4f} +- {std[0]:.4f} m, "
-        f"y {y:.4f} +- {std[1]:.4f} m, its turn known to +- {np.degrees(std[2]):.1f} deg"
-    )
 
 
 def _go_home(cell: Cell, operator: Operator) -> None:

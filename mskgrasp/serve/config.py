@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 from pathlib import Path
 
 from pydantic import Field, field_validator
@@ -45,11 +44,3 @@ class ServeConfig(Config):
                 "policy certified needs the part's CAD, which no request holds; use low_variance"
             )
         return planner
-
-
-def is_local(host: str) -> bool:
-    """Whether an address can be reached from this machine alone."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"

@@ -6,7 +6,7 @@ import hmac
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
-from mskgrasp.serve.config import is_local
+from mskgrasp.runtime.address import is_local, name_of
 from mskgrasp.serve.rejection import error_body
 
 Message = MutableMapping[str, Any]
@@ -39,7 +39,7 @@ class Guard:
             return
         headers: dict[bytes, bytes] = dict(scope["headers"])
         host = headers.get(b"host", b"").decode("latin-1")
-        if self._token is None and not is_local(_name(host)):
+        if self._token is None and not is_local(name_of(host)):
             message = f"host {host[:80]!r} is not this server; address it as 127.0.0.1 or localhost"
             await _refuse(send, 400, message)
         elif not (scope["path"] in OPEN or self._admits(headers.get(b"authorization", b""))):
@@ -63,11 +63,6 @@ class Guard:
         scheme, _, token = authorization.partition(b" ")
         # The time of the comparison does not depend on how much of the token is right.
         return scheme.lower() == b"bearer" and hmac.compare_digest(token.strip(), self._token)
-
-
-def _name(host: str) -> str:
-    """The name in a header ``Host``, without the port."""
-    return (host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]).lower()
 
 
 async def _refuse(send: Send, status: int, message: str, *headers: tuple[bytes, bytes]) -> None:

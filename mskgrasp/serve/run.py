@@ -21,8 +21,9 @@ from mskgrasp.core.grasp import HAND_GEOMETRY
 from mskgrasp.core.settings import TABLE_Z
 from mskgrasp.learning.grasp_models import DESCRIPTION, read_meta, require_hand, require_model
 from mskgrasp.planning.run_inputs import model_digests
+from mskgrasp.runtime.address import is_local, listening
 from mskgrasp.runtime.progress import note
-from mskgrasp.serve.config import ServeConfig, is_local
+from mskgrasp.serve.config import ServeConfig
 from mskgrasp.serve.dispatcher import Dispatcher
 from mskgrasp.serve.guard import Guard
 from mskgrasp.serve.planner_process import PlannerProcess, PlannerSettings
@@ -198,27 +199,3 @@ def _listen(listener: socket.socket) -> None:
         listener.listen()
     except OSError as error:
         raise UsageError(f"cannot listen: {error.strerror}; choose another --port") from error
-
-
-def listening(host: str, port: int) -> socket.socket:
-    """Reserve the address; nobody can connect until the workers are ready.
-
-    Raises:
-        UsageError: It is taken, or is not an address of this machine.
-    """
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-        listener = socket.socket(family, kind, protocol)
-    except OSError as error:
-        raise UsageError(f"cannot listen on {host}: {error.strerror}; choose another --host") from error
-    try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(address)
-    except OSError as error:
-        listener.close()
-        raise UsageError(
-            f"cannot listen on {host} port {port}: {error.strerror}; choose another --port or --host"
-        ) from error
-    return listener

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,10 +15,9 @@ from hal.errors import ArmInView
 from mskgrasp.core.errors import BadConfig, UnknownPart
 from mskgrasp.parts import find_part
 from mskgrasp.plan.config import PlanConfig
-from mskgrasp.plan.run import plan_grasp, plan_text
+from mskgrasp.plan.run import plan_grasp
 from mskgrasp.planning.config import PlannerConfig
 from tests.figures import picture
-from tests.planning.hand_made import FRAME, planner
 
 PART = "hex_nut_m30"
 
@@ -52,19 +50,6 @@ def test_no_grasp_is_planned_while_the_arm_may_be_in_view_unless_it_goes_home(tm
     with pytest.raises(ArmInView, match="joint 1 is 0.30 rad from home"):
         plan_grasp(config)
     assert plan_grasp(config.model_copy(update={"go_home": True})).quality >= 0
-
-
-def test_a_plan_is_described_in_millimetres_and_degrees():
-    plan = planner().plan(FRAME, np.random.default_rng(0))
-    text = plan_text(plan)
-    lines = dict(line.split("  ", 1) for line in text.splitlines())
-    x, y, z, theta = (float(value) for value in re.findall(r"-?\d+\.\d+", lines["grasp"]))
-    np.testing.assert_allclose([x, y, z], plan.grasp.position, atol=5e-5)
-    assert theta == pytest.approx(np.degrees(plan.grasp.theta), abs=0.05)
-    # The hand-made network moves the hand by 1 and 2 mm and turns it by 0.1 rad: the part, the other way.
-    assert "dtheta -5.7 +- " in lines["displacement"]
-    assert f"dx {1e3 * plan.displacement[0]:+.1f} +- {1e3 * plan.displacement_std[0]:.1f} mm" in text
-    assert "best of 600" in lines["quality"] and "sample" in lines["planned in"] and "total" not in text
 
 
 def test_an_unknown_part_and_an_unknown_cell_are_refused_and_nothing_is_written(tmp_path: Path):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from mskgrasp.core.errors import UsageError
+from mskgrasp.runtime.address import is_local
 from mskgrasp.runtime.options import parse
-from mskgrasp.serve.config import ServeConfig, is_local
+from mskgrasp.serve.config import ServeConfig
 
 
 def test_by_default_the_shipped_model_serves_this_machine_alone():
@@ -16,15 +17,6 @@ def test_by_default_the_shipped_model_serves_this_machine_alone():
         and is_local(config.host)
         and config.token_file is None
     )
-
-
-@pytest.mark.parametrize(
-    ("host", "local"),
-    [("127.0.0.1", True), ("127.8.8.8", True), ("::1", True), ("localhost", True), ("0.0.0.0", False),
-     ("::", False), ("192.168.1.2", False), ("localhost.example.org", False), ("", False)],
-)  # fmt: skip
-def test_only_loopback_addresses_are_local(host: str, local: bool):
-    assert is_local(host) is local
 
 
 def test_a_policy_that_needs_the_parts_cad_is_refused():

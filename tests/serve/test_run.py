@@ -18,7 +18,7 @@ from mskgrasp.core.settings import REGION
 from mskgrasp.serve import run
 from mskgrasp.serve.__main__ import main
 from mskgrasp.serve.config import ServeConfig
-from mskgrasp.serve.run import listening, planner_settings, read_token
+from mskgrasp.serve.run import planner_settings, read_token
 from tests.programs import run_here
 from tests.serve.bodies import NPZ, Client, npz
 from tests.serve.conftest import server
@@ -75,14 +75,6 @@ def test_what_does_not_exist_is_one_line_and_exit_code_2(
     (tmp_path / "token").chmod(0o600)
     ended = run_here(main, "--port", "0", *arguments)
     assert ended.returncode == 2 and message in ended.stderr and ended.stderr.count("\n") == 1
-
-
-def test_an_address_that_is_taken_is_refused():
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        with pytest.raises(UsageError, match="already in use; choose another --port"):
-            listening("127.0.0.1", taken.getsockname()[1])
 
 
 @pytest.mark.parametrize("package", ["fastapi", "uvicorn"])

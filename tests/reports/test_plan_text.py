@@ -1,0 +1,24 @@
+"""A plan in words."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from mskgrasp.reports.plan_text import plan_text
+from tests.planning.hand_made import FRAME, planner
+
+
+def test_a_plan_is_described_in_millimetres_and_degrees():
+    plan = planner().plan(FRAME, np.random.default_rng(0))
+    text = plan_text(plan)
+    lines = dict(line.split("  ", 1) for line in text.splitlines())
+    x, y, z, theta = (float(value) for value in re.findall(r"-?\d+\.\d+", lines["grasp"]))
+    np.testing.assert_allclose([x, y, z], plan.grasp.position, atol=5e-5)
+    assert theta == pytest.approx(np.degrees(plan.grasp.theta), abs=0.05)
+    # The hand-made network moves the hand by 1 and 2 mm and turns it by 0.1 rad: the part, the other way.
+    assert "dtheta -5.7 +- " in lines["displacement"]
+    assert f"dx {1e3 * plan.displacement[0]:+.1f} +- {1e3 * plan.displacement_std[0]:.1f} mm" in text
+    assert "best of 600" in lines["quality"] and "sample" in lines["planned in"] and "total" not in text
