@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
@@ -44,6 +45,8 @@ PEAK_ACCELERATION = 1.5
 """Greatest acceleration of the hand on straight lines, m/s^2, as in `tasks.robot.motion`."""
 TURN_SPEED = 1.0
 """Greatest turning speed of the hand on a straight motion, rad/s."""
+WATCH_S = 0.02
+"""Simulated time between two calls of `SimulatedWorld.watch`, s."""
 _WAYPOINT_M, _WAYPOINT_RAD = 0.01, 0.05
 
 
@@ -60,6 +63,7 @@ class SimulatedWorld(ABC):
         table_error: Difference of the table from what the cell states.
         presented: Number of parts placed so far.
         presented_seed: Seed of the last placement.
+        watch: Called every `WATCH_S` of a motion, by the thread that commands it; None: nothing is.
     """
 
     overhead: Overhead
@@ -70,6 +74,7 @@ class SimulatedWorld(ABC):
     table_error: TableError = field(default_factory=TableError)
     presented: int = field(default=0, init=False)
     presented_seed: int = field(default=0, init=False)
+    watch: Callable[[], None] | None = field(default=None, init=False)
     _users: int = field(default=0, init=False)
 
     @property
@@ -101,6 +106,11 @@ class SimulatedWorld(ABC):
         self._users = max(0, self._users - 1)
         if self._users == 0:
             self._free()
+
+    def call_watch(self) -> None:
+        """Call `watch`, if there is one; a simulator does so during motions."""
+        if self.watch is not None:
+            self.watch()
 
     @abstractmethod
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
@@ -193,6 +203,14 @@ class SimulatedArm(SharingDevice, Arm, Generic[WorldT]):
     def __init__(self, world: WorldT, limits: ArmLimits):
         super().__init__(limits)
         self._resource = self._world = world
+
+    def watch(self, call: Callable[[], None] | None) -> None:
+        """Have a function called every `WATCH_S` of simulated time during motions; None ends that.
+
+        The thread that commands the motion calls it; there `state` and the tracker may be read, which another
+        thread must not do while the simulation runs.
+        """
+        self._world.watch = call
 
     def _forward(self, joints: np.ndarray) -> Pose:
         return forward_pose(joints)

@@ -13,6 +13,7 @@ from hal.limits import lowest_point
 from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.panda import FINGER_STIFFNESS, FINGERS
 from hal.mujoco.scene import build_model
+from hal.simulated import WATCH_S
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.panda_kinematics import forward_pose
@@ -101,6 +102,9 @@ class Simulation:
         self._measured = 0
         self._wanted = np.zeros(self.model.nv)
         self._torque = np.zeros(self.model.nv)
+        self.watch: Callable[[], None] | None = None
+        """Called every `WATCH_S`; None: nothing is."""
+        self._unwatched = 0
         self._settle()
 
     @property
@@ -149,6 +153,7 @@ class Simulation:
                 break
             if free[start] and free[end] and self._at_rest():
                 self._place(path, end)
+                self._call_watch(end - start)
                 simulated, pressed = False, 0.0
                 continue
             simulated = True
@@ -270,6 +275,14 @@ class Simulation:
         data.ctrl[7] = self._opening
         mujoco.mj_step2(model, data)
         self._measure_force()
+        self._call_watch(1)
+
+    def _call_watch(self, n_steps: int) -> None:
+        """Count the steps that have passed, and call `watch` when it is due."""
+        self._unwatched += n_steps
+        if self.watch is not None and self._unwatched * self.step_s >= WATCH_S:
+            self._unwatched = 0
+            self.watch()
 
     def _place(self, path: _Path, k: int) -> None:
         """Put the arm at a step of a path."""

@@ -80,6 +80,7 @@ class MujocoWorld(SimulatedWorld):
             self.home,
             moved,
         )
+        self._simulation.watch = self.call_watch
         self.presented, self.presented_seed = self.presented + 1, seed
 
     def part_pose(self) -> Pose:

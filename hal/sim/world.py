@@ -113,6 +113,7 @@ class SapienWorld(SimulatedWorld):
         # A fresh scene each time, so that a trial does not depend on those before it.
         self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
         self._move_table()
+        self._watch_motions()
         self._beside = [
             restore(self.env.scene, lying, pose, number, 2 * self.physics.friction_table_part)
             for number, (lying, pose) in enumerate(staying)
@@ -122,6 +123,18 @@ class SapienWorld(SimulatedWorld):
         if self.tape is not None:
             entity = self.env.part._objs[0]
             stick_tape(entity, self.env.parts[0], self.part_pose().quat_wxyz, self.tape)
+
+    def _watch_motions(self) -> None:
+        """Have the scene's motions, which are built with it, call `watch`, too."""
+        motion = self.env.motion
+        judged = motion.watch
+
+        def passed(seconds: float) -> None:
+            if judged is not None:
+                judged(seconds)
+            self.call_watch()
+
+        motion.watch = passed
 
     def _move_table(self) -> None:
         """Move the table, and the part with it, to where they truly are."""

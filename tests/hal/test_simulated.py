@@ -73,3 +73,14 @@ def test_a_camera_outside_its_context_names_itself():
 
 def test_the_hand_accelerates_as_in_simulated_attempts():
     assert PEAK_ACCELERATION == motion.PEAK_ACCELERATION
+
+
+def test_a_world_calls_the_function_that_an_arm_was_given():
+    world, calls = make_world(), []
+    world.call_watch()
+    arm = ToyArm(world, panda_limits())
+    arm.watch(lambda: calls.append(1))
+    world.call_watch()
+    arm.watch(None)
+    world.call_watch()
+    assert calls == [1]
