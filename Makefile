@@ -19,9 +19,9 @@ $(READY): pyproject.toml .ci/constraints.txt .ci/setup
 	PYTHON=$(PYTHON) .ci/setup
 	@touch $@
 
-# Tests need what collecting and planning do without: [cad] (700 MB), Ray, drivers, a web server, a browser (100 MB).
+# Tests need what collecting and planning do without: [cad] (700 MB), Ray, drivers, web servers, a browser (100 MB).
 $(TESTABLE): pyproject.toml .ci/constraints.txt .ci/setup
-	PYTHON=$(PYTHON) EXTRAS=dev,cad,cluster,franka,mujoco,parquet,serve BROWSER=yes .ci/setup
+	PYTHON=$(PYTHON) EXTRAS=dev,cad,cluster,franka,mujoco,parquet,serve,view BROWSER=yes .ci/setup
 	@touch $@ $(READY)
 
 demo: $(READY) ## Plan a grasp, carry it out and film it: out/demo/grasp.gif (less than a minute)

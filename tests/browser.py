@@ -40,16 +40,22 @@ class Page:
     """A page that has been loaded; a context manager.
 
     Args:
-        path: The HTML file.
+        address: The HTML file, or a server's address that ends with a slash.
         width: Of the window, pixels.
+        webgl: Draw in 3-D, in software, whether there is a GPU or not.
 
     Attributes:
-        complaints: Messages of the browser's console and log, and every request other than for the file.
+        complaints: Messages of the browser's console and log, and every request other than for the page.
+        errors: Those of them that are errors: the page's own, or requests to elsewhere.
     """
 
-    def __init__(self, path: Path, *, width: int = 1000):
+    def __init__(self, address: Path | str, *, width: int = 1000, webgl: bool = False):
         self.complaints: list[str] = []
-        self._url = path.resolve().as_uri()
+        self.errors: list[str] = []
+        self._url = address if isinstance(address, str) else address.resolve().as_uri()
+        self._draws = (
+            ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"] if webgl else ["--disable-gpu"]
+        )
         self._number = 0
         self._rest = b""
         self._width = width
@@ -57,7 +63,7 @@ class Page:
     def __enter__(self) -> Page:
         hear, says = os.pipe()
         reads, writes = os.pipe()
-        options = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+        options = ["--headless", "--no-sandbox", *self._draws, "--disable-dev-shm-usage"]
         options += ["--remote-debugging-pipe", f"--window-size={self._width},900", "about:blank"]
         self._process = subprocess.Popen(
             [sys.executable, "-c", _CONNECT, str(hear), str(writes), browser(), *options],
@@ -97,6 +103,28 @@ class Page:
         if "exceptionDetails" in found:
             raise RuntimeError(str(found["exceptionDetails"]))
         return found["result"].get("value")
+
+    def wait_for(self, expression: str, timeout_s: float = 60.0) -> Any:
+        """Wait until an expression of JavaScript is true; its value."""
+        deadline = time.monotonic() + timeout_s
+        while not (found := self.evaluate(expression)):
+            if time.monotonic() > deadline:
+                text = self.evaluate("document.body.innerText")
+                raise RuntimeError(f"{expression} was not true within {timeout_s} s; the page says: {text}")
+            time.sleep(0.1)
+        return found
+
+    def press(self, label: str) -> None:
+        """Press the button with this label, once there is one that can be pressed."""
+        button = (
+            f"[...document.querySelectorAll('button')].find(b => b.innerText.trim() === {json.dumps(label)})"
+        )
+        self.wait_for(f"!!{button} && !{button}.disabled")
+        self.evaluate(f"{button}.click()")
+
+    def mouse(self, kind: str, x: float, y: float) -> None:
+        """Press, move or release the left button of the mouse (``mousePressed``, ``mouseMoved``, ...)."""
+        self._ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def screenshot(self, path: Path) -> None:
         """The whole page as PNG."""
@@ -153,12 +181,18 @@ class Page:
     def _note(self, method: str, values: dict[str, Any]) -> None:
         match method:
             case "Log.entryAdded":
-                self.complaints.append(values["entry"]["text"])
+                self._complain(values["entry"]["text"], error=values["entry"]["level"] == "error")
             case "Runtime.consoleAPICalled":
-                self.complaints.append(str(values["args"]))
+                self._complain(str(values["args"]), error=values["type"] in ("error", "assert"))
             case "Runtime.exceptionThrown":
-                self.complaints.append(str(values["exceptionDetails"]))
+                self._complain(str(values["exceptionDetails"]), error=True)
             case "Network.requestWillBeSent" if not values["request"]["url"].startswith(("data:", self._url)):
-                self.complaints.append(f"asked for {values['request']['url']}")
+                url = values["request"]["url"]
+                self._complain(f"asked for {url}", error=not url.startswith(f"blob:{self._url}"))
             case _:
                 pass
+
+    def _complain(self, text: str, *, error: bool) -> None:
+        self.complaints.append(text)
+        if error:
+            self.errors.append(text)

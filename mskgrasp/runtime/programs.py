@@ -96,6 +96,12 @@ GROUPS: dict[str, dict[str, Program]] = {
             "docs/validation.md",
             "mskgrasp.validate.config:ValidateConfig",
         ),
+        "view": Program(
+            "mskgrasp.view",
+            "show parts, datasets, plans and trials in 3-D in the browser",
+            "docs/view.md",
+            "mskgrasp.view.config:ViewConfig",
+        ),
         "serve": Program(
             "mskgrasp.serve",
             "answer requests for grasps over HTTP",

@@ -72,7 +72,7 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
             env_kwargs=dict(
                 obs_mode="depth",
                 control_mode="grasp",
-                physics=_physics(info),
+                physics=physics_of(info),
                 noise=dict(info.noise),
                 camera=camera,
             ),
@@ -96,7 +96,7 @@ def _pose_after(attempts: Attempts, lift_height: float) -> np.ndarray:
     return np.where(attempts.success[:, None], after.as_vector(), np.nan)
 
 
-def _physics(info: ShardInfo) -> dict[str, Any]:
+def physics_of(info: ShardInfo) -> dict[str, Any]:
     """Get those settings of a shard that the task has; settings of older versions would be refused.
 
     A shard without a coarse rate was simulated at the full rate throughout.
