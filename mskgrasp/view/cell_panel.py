@@ -107,7 +107,7 @@ class CellPanel(Panel):
             self._show(frame, None)
             return
         self._set_plan(plan)
-        self.text.content = f"```\n{plan_text(plan)}\n```"
+        self.text.content = in_markdown(plan_text(plan))
         self._show(frame, plan)
 
     def present(self) -> None:
@@ -243,3 +243,9 @@ class CellPanel(Panel):
 
         yes.on_click(agreed)
         no.on_click(lambda _: modal.close())
+
+
+def in_markdown(text: str) -> str:
+    """Lines of a name and its values, two spaces apart or more, as Markdown that a narrow panel wraps."""
+    rows = (line.split("  ", 1) for line in text.splitlines())
+    return "\n\n".join(f"**{name}** {values.strip()}" for name, values in rows)

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import trimesh
 
 from hal import Cell, HalError
-from hal.simulated import SimulatedArm
+from hal.simulated import WATCH_S, SimulatedArm
 from mskgrasp.core.geometry import Pose
 from mskgrasp.view.main_thread import FRAME_S
 from mskgrasp.view.page import Page
@@ -37,7 +37,7 @@ class LiveArm:
         self._part = None
         if mesh is not None and cell.tracker is not None and not cell.recorded:
             self._part = add_part(page.scene, f"{name}/part", mesh)
-        self._seen = 0.0
+        self._seen = self._due = 0.0
 
     def part_pose(self) -> Pose | None:
         """``T_base_obj`` by the cell's tracker; None where it has none."""
@@ -61,12 +61,13 @@ class LiveArm:
 
     @contextmanager
     def in_motion(self) -> Iterator[None]:
-        """Keep drawing while the block moves the arm, as often as a page can show it."""
+        """Keep drawing while the block moves the arm; a simulated motion takes as long as a real one."""
         arm = self._cell.arm
         if self._cell.recorded:
             yield
         elif isinstance(arm, SimulatedArm):
-            arm.watch(self._look_if_due)
+            self._due = time.monotonic()
+            arm.watch(self._passed)
             try:
                 yield
             finally:
@@ -82,9 +83,16 @@ class LiveArm:
                 over.set()
                 looking.join()
 
-    def _look_if_due(self) -> None:
+    def _passed(self) -> None:
+        """Look at a simulated arm, and wait where the simulation is faster than the motion is."""
         if time.monotonic() - self._seen >= FRAME_S:
             self.look()
+        self._due += WATCH_S
+        now = time.monotonic()
+        if self._due > now:
+            time.sleep(self._due - now)
+        else:
+            self._due = now  # time that a slow simulation has lost is not made up for
 
     def _poll(self, over: threading.Event) -> None:
         """Look at a real arm, whose state any thread may read, until the motion is over."""

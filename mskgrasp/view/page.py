@@ -34,15 +34,23 @@ class Page:
         self._status = self.gui.add_markdown("")
         x_min, x_max, y_min, y_max = REGION
         x, y = (x_min + x_max) / 2, (y_min + y_max) / 2
+        # Shadows would double the work of a browser without a GPU.
+        self.scene.configure_default_lights(cast_shadow=False)
         self.scene.add_grid(
-            "/table", 1.0, 1.4, position=(x, y, -1e-4), cell_size=0.05, section_size=0.1, shadow_opacity=0.0
-        )
-        server.initial_camera.position = (x + 0.22, y - 0.2, 0.22)
+            "/table", 1.0, 1.4, position=(x, y, -1e-3), cell_size=0.01, section_size=0.05, cell_thickness=0.5,
+            cell_color=(236, 237, 239), section_color=(214, 216, 220), shadow_opacity=0.0,
+        )  # fmt: skip
+        server.initial_camera.position = (x + 0.17, y - 0.16, 0.17)
         server.initial_camera.look_at = (x, y, 0.01)
 
     def tell(self, text: str) -> None:
         """Show a line or a paragraph under the panel, in place of the last one."""
         self._status.content = text
+
+    @property
+    def said(self) -> str:
+        """What it says now."""
+        return self._status.content
 
     def fail(self, error: MskgraspError) -> None:
         """Show an error on the page, and print it."""

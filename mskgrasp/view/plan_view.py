@@ -20,9 +20,9 @@ from mskgrasp.view.scene import (
     HandNode,
     add_candidates,
     add_cloud,
-    add_ellipsoid,
     add_part,
     add_region,
+    add_shift,
     colours_of,
     near_region,
     rgb,
@@ -30,6 +30,8 @@ from mskgrasp.view.scene import (
 
 MARGIN = 0.004
 """Points this far around a detected part's box are drawn as its own, metres."""
+OVER = 0.012
+"""Height over the part at which the arrow of its shift is drawn, metres."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,9 +77,10 @@ class PlanView:
             self.cloud, self.candidates = box("depth image"), box("candidates")
             self.least = gui.add_slider("least quality", 0.0, 1.0, 0.01, 0.0)
             self.chosen, self.expected = box("chosen grasp"), box("expected shift")
+            self.magnified = gui.add_slider("arrow, times", 1, 20, 1, 5)
             self.spread = gui.add_checkbox("2 sigma ghosts", False)
         for control in (
-            self.cloud, self.candidates, self.least, self.chosen, self.expected, self.spread,
+            self.cloud, self.candidates, self.least, self.chosen, self.expected, self.magnified, self.spread,
         ):  # fmt: skip
             panel.on(control, self._draw)
 
@@ -114,15 +117,10 @@ class PlanView:
                 colours = colours_of(plan.qualities[good])
                 add_candidates(scene, f"{name}/candidates", plan.candidates[good], colours)
         if self.chosen.value:
-            HandNode(scene, f"{name}/chosen").place(plan.grasp.T_base_tcp)
+            HandNode(scene, f"{name}/chosen", opacity=0.6).place(plan.grasp.T_base_tcp)
         if self.expected.value:
-            motion = expected_motion(plan)
-            self._draw_ghost("expected", shown, motion, rgb(ORANGE), 0.5)
-            covariance = plan.displacement_cov[:3, :3]
-            if np.isfinite(covariance).all():
-                centre = motion.apply(plan.view.centre_base)
-                axes = Pose(position=centre, quat_wxyz=plan.grasp.T_base_grasp.quat_wxyz)
-                add_ellipsoid(scene, f"{name}/ellipsoid", axes, covariance, rgb(ORANGE))
+            self._draw_ghost("expected", shown, expected_motion(plan), rgb(ORANGE), 0.5)
+            self._draw_shift(plan)
         if self.spread.value:
             for number, motion in enumerate(likely_motions(plan)):
                 self._draw_ghost(f"spread{number}", shown, motion, rgb(ORANGE), 0.12)
@@ -132,6 +130,17 @@ class PlanView:
             measured = np.nan_to_num(shown.measured)
             motion = motion_of(plan.grasp.T_base_grasp, measured, point)
             self._draw_ghost("measured", shown, motion, rgb(GREEN), 0.5)
+
+    def _draw_shift(self, plan: GraspPlan) -> None:
+        """Draw the shift of the seen centre and its ellipsoid over the part, where both can be seen."""
+        times = float(self.magnified.value)
+        start = plan.view.centre_base + np.array([0.0, 0.0, plan.view.size[2] / 2 + OVER])
+        axes = Pose(position=start, quat_wxyz=plan.grasp.T_base_grasp.quat_wxyz)
+        shift, covariance = times * plan.displacement[:3], times**2 * plan.displacement_cov[:3, :3]
+        add_shift(self._page.scene, f"{self._name}/shift", axes, shift, covariance, rgb(ORANGE))
+        if times != 1:
+            above = shift + np.array([0.0, 0.0, OVER])
+            self._page.scene.add_label(f"{self._name}/shift/label", f"{times:g} times", position=above)
 
     def _draw_ghost(
         self, name: str, shown: Shown, motion: Pose, colour: tuple[int, int, int], opacity: float

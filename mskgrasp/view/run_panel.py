@@ -17,7 +17,7 @@ from mskgrasp.trials.trial_files import read_trial
 from mskgrasp.view.dataset_panel import shift_text
 from mskgrasp.view.page import Page, Panel
 from mskgrasp.view.plan_view import PlanView, Shown
-from mskgrasp.view.scene import HandNode, add_region, part_mesh, place
+from mskgrasp.view.scene import HandNode, add_part, add_region, part_mesh, place
 from mskgrasp.view.stored_run import StoredTrial
 
 
@@ -64,6 +64,9 @@ class RunPanel(Panel):
             self.view.show(None)
             self._draw_without_frame(trial)
             return
+        mesh = None if trial.T_base_obj is None else self._mesh(trial.part)
+        if mesh is not None:
+            add_part(self.page.scene, f"{self._name}/before", mesh, trial.T_base_obj)
         frame, plan, _ = read_trial(trial.file)
         x, y, _ = frame.T_base_camera.position
         half = (REGION[1] - REGION[0]) / 2
@@ -73,7 +76,7 @@ class RunPanel(Panel):
                 table_z=TABLE_Z if plan is None else plan.view.table_z,
                 region=(x - half, x + half, y - half, y + half),
                 plan=plan,
-                mesh=self._mesh(trial.part) if trial.T_base_obj is not None else None,
+                mesh=mesh,
                 T_base_obj=trial.T_base_obj,
                 measured=trial.measured,
                 point_base=trial.point_base,

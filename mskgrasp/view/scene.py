@@ -89,9 +89,9 @@ def add_hulls(scene: SceneApi, name: str, part: Part) -> None:
 def add_cloud(
     scene: SceneApi, name: str, points: np.ndarray, colours: np.ndarray | Colour, pitch: float
 ) -> None:
-    """Add points (n, 3), metres, with colours (n, 3), as large as the distance between neighbours, metres."""
+    """Add points (n, 3), metres, with colours (n, 3), that leave gaps at a distance of neighbours, metres."""
     scene.add_point_cloud(
-        name, points.astype(np.float32), np.asarray(colours), point_size=pitch, point_shading="flat",
+        name, points.astype(np.float32), np.asarray(colours), point_size=0.6 * pitch, point_shading="flat",
         precision="float32",
     )  # fmt: skip
 
@@ -181,7 +181,7 @@ class ArmNode:
             # Its origin is its first end or its middle, depending on the version of trimesh.
             capsule.apply_translation(-capsule.bounds.mean(axis=0))
             pose = Pose(position=ends.mean(axis=0), quat_wxyz=quat_from_matrix(turn[:3, :3]))
-            add_part(scene, f"{name}/{one.frame}/{number}", capsule, pose, colour=(222, 225, 230))
+            add_part(scene, f"{name}/{one.frame}/{number}", capsule, pose, opacity=0.35)
 
     def place(self, joints: np.ndarray, T_base_tcp: Pose, width: float) -> None:
         """Put the arm at joints (7,), radians, its hand at a pose with the pads ``width`` metres apart."""
@@ -191,25 +191,37 @@ class ArmNode:
                 place(node, Pose.from_matrix(frame))
 
 
-def add_ellipsoid(
-    scene: SceneApi, name: str, centre: Pose, covariance: np.ndarray, colour: Colour, n_sigma: float = 2.0
+def add_shift(
+    scene: SceneApi, name: str, start: Pose, shift: np.ndarray, covariance: np.ndarray, colour: Colour
 ) -> None:
-    """Add the ellipsoid of ``n_sigma`` deviations of a position.
+    """Add an arrow of a shift, and the ellipsoid of twice the standard deviations of its end.
 
     Args:
         scene: The scene.
         name: Of the node.
-        centre: Its centre, and the axes of the covariance, in the frame of the node's parent.
-        covariance: (3, 3) square metres.
-        colour: Of its surface.
-        n_sigma: Standard deviations.
+        start: Where the arrow begins; shift and covariance are along its axes.
+        shift: (3,) metres.
+        covariance: (3, 3) square metres; NaN: not known, and no ellipsoid.
+        colour: Of both.
     """
+    node = scene.add_frame(name, show_axes=False)
+    place(node, start)
+    length = float(np.linalg.norm(shift))
+    if length > 0:
+        arrow = np.array([[np.zeros(3), shift]])
+        radius = min(1e-3, 0.1 * length)
+        scene.add_arrows(
+            f"{name}/arrow", arrow, colour, shaft_radius=radius, head_radius=2 * radius,
+            head_length=4 * radius,
+        )  # fmt: skip
+    if not np.isfinite(covariance).all():
+        return
     variances, axes = np.linalg.eigh(covariance)
     if np.linalg.det(axes) < 0:
         axes[:, 0] *= -1
-    radii = n_sigma * np.sqrt(np.maximum(variances, 0.0))
-    node = scene.add_icosphere(
-        name, 1.0, color=colour, opacity=0.45, cast_shadow=False, receive_shadow=False,
-        scale=tuple(np.maximum(radii, 1e-4).tolist()),
+    radii = np.maximum(2 * np.sqrt(np.maximum(variances, 0.0)), 1e-4)
+    ellipsoid = scene.add_icosphere(
+        f"{name}/ellipsoid", 1.0, color=colour, opacity=0.4, scale=tuple(radii.tolist()), cast_shadow=False,
+        receive_shadow=False,
     )  # fmt: skip
-    place(node, centre @ Pose(position=np.zeros(3), quat_wxyz=quat_from_matrix(axes)))
+    place(ellipsoid, Pose(position=np.asarray(shift), quat_wxyz=quat_from_matrix(axes)))
