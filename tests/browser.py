@@ -7,6 +7,7 @@ import json
 import os
 import select
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -22,6 +23,7 @@ for number, end in zip((3, 4), ends):
 os.execv(sys.argv[3], sys.argv[3:])
 """
 _PATIENCE_S = 120
+_WEBGL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 _NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 
 
@@ -42,6 +44,7 @@ class Page:
     Args:
         address: The HTML file, or a server's address that ends with a slash.
         width: Of the window, pixels.
+        height: The same.
         webgl: Draw in 3-D, in software, whether there is a GPU or not.
 
     Attributes:
@@ -49,28 +52,28 @@ class Page:
         errors: Those of them that are errors: the page's own, or requests to elsewhere.
     """
 
-    def __init__(self, address: Path | str, *, width: int = 1000, webgl: bool = False):
+    def __init__(self, address: Path | str, *, width: int = 1000, height: int = 900, webgl: bool = False):
         self.complaints: list[str] = []
         self.errors: list[str] = []
         self._url = address if isinstance(address, str) else address.resolve().as_uri()
-        self._draws = (
-            ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"] if webgl else ["--disable-gpu"]
-        )
+        self._webgl = webgl
         self._number = 0
         self._rest = b""
-        self._width = width
+        self._width, self._height = width, height
 
     def __enter__(self) -> Page:
         hear, says = os.pipe()
         reads, writes = os.pipe()
-        options = ["--headless", "--no-sandbox", *self._draws, "--disable-dev-shm-usage"]
-        options += ["--remote-debugging-pipe", f"--window-size={self._width},900", "about:blank"]
+        options = ["--headless", "--no-sandbox", "--disable-dev-shm-usage", "--remote-debugging-pipe"]
+        options += _WEBGL if self._webgl else ["--disable-gpu"]
+        options += [f"--window-size={self._width},{self._height}", "about:blank"]
         self._process = subprocess.Popen(
             [sys.executable, "-c", _CONNECT, str(hear), str(writes), browser(), *options],
             pass_fds=(hear, writes),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
+            start_new_session=True,
         )
         os.close(hear)
         os.close(writes)
@@ -92,7 +95,8 @@ class Page:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._process.terminate()
+        # The browser may be a shell script's child, and outlives it while it draws in 3-D.
+        os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         os.close(self._says)
         os.close(self._reads)
@@ -127,8 +131,8 @@ class Page:
         self._ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def screenshot(self, path: Path) -> None:
-        """The whole page as PNG."""
-        taken = self._ask("Page.captureScreenshot", format="png", captureBeyondViewport=True)
+        """The whole page as PNG; of one drawn in 3-D, what is in the window."""
+        taken = self._ask("Page.captureScreenshot", format="png", captureBeyondViewport=not self._webgl)
         path.write_bytes(base64.b64decode(taken["data"]))
 
     def pdf(self, path: Path) -> None:

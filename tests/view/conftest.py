@@ -22,8 +22,6 @@ def page() -> Iterator[Page]:
         server.stop()
 
 
-
-
 def work(page: Page) -> None:
     """Does all work that waits."""
     while True:

@@ -31,7 +31,9 @@ def test_the_moved_point_has_the_displacement_and_the_part_the_swing(swing: np.n
     motion = motion_of(GRASP.T_base_grasp, displacement, POINT, swing)
     found, swung = measured(motion, POINT, GRASP)
     np.testing.assert_allclose(found, displacement, atol=1e-12)
-    np.testing.assert_allclose(swung, [0.2, -0.1] if swing is not None and swing[0] > 0 else [0, 0], atol=1e-9)
+    np.testing.assert_allclose(
+        swung, [0.2, -0.1] if swing is not None and swing[0] > 0 else [0, 0], atol=1e-9
+    )
 
 
 def test_a_plan_expects_the_seen_centre_where_it_says():

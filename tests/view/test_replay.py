@@ -46,7 +46,9 @@ def test_an_attempt_ends_as_it_did_and_its_motion_ends_in_the_lifted_hand(
         np.testing.assert_allclose(replay.displacement, row["displacement"], atol=1e-5)
         motion = replay.motion
         assert motion.seconds[0] == 0 and np.diff(motion.seconds).min() > 0
-        assert len(motion.joints) == len(motion.width) == len(motion.T_base_obj.position) == len(motion.seconds)
+        assert (
+            len(motion.joints) == len(motion.width) == len(motion.T_base_obj.position) == len(motion.seconds)
+        )
         if row["success"]:
             raised = row["grasp"] + [0, 0, attempts.info(number).physics["lift_height"], 0]
             hand = forward_pose(motion.joints[-1])
