@@ -101,6 +101,11 @@ class Page:
         os.close(self._says)
         os.close(self._reads)
 
+    @property
+    def pid(self) -> int:
+        """Process id of the browser."""
+        return self._process.pid
+
     def evaluate(self, expression: str) -> Any:
         """The value of an expression of JavaScript on the page, from JSON; promises are awaited."""
         found = self._ask("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
@@ -131,8 +136,8 @@ class Page:
         self._ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def screenshot(self, path: Path) -> None:
-        """The whole page as PNG; of one drawn in 3-D, what is in the window."""
-        taken = self._ask("Page.captureScreenshot", format="png", captureBeyondViewport=not self._webgl)
+        """The whole page as PNG; one drawn in 3-D may never send the frame that this waits for."""
+        taken = self._ask("Page.captureScreenshot", format="png", captureBeyondViewport=True)
         path.write_bytes(base64.b64decode(taken["data"]))
 
     def pdf(self, path: Path) -> None:

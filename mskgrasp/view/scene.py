@@ -181,7 +181,7 @@ class ArmNode:
             # Its origin is its first end or its middle, depending on the version of trimesh.
             capsule.apply_translation(-capsule.bounds.mean(axis=0))
             pose = Pose(position=ends.mean(axis=0), quat_wxyz=quat_from_matrix(turn[:3, :3]))
-            add_part(scene, f"{name}/{one.frame}/{number}", capsule, pose, opacity=0.35)
+            add_part(scene, f"{name}/{one.frame}/{number}", capsule, pose, colour=(222, 225, 230))
 
     def place(self, joints: np.ndarray, T_base_tcp: Pose, width: float) -> None:
         """Put the arm at joints (7,), radians, its hand at a pose with the pads ``width`` metres apart."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from queue import Empty
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ def work(page: Page) -> None:
             return
 
 
-def node(page: Page, name: str):
+def node(page: Page, name: str) -> Any:
     """The node of a name; there is one."""
     found = page.scene.get_handle_by_name(name)
     assert found is not None, name

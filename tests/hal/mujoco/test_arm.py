@@ -92,6 +92,7 @@ def test_after_contact_the_arm_rests_where_it_met_something(cell: Cell, paths: l
     assert world.simulation.target == pytest.approx(world.simulation.joints, abs=JOINT_TOLERANCE)
     assert world.simulation.load() < world.physics.reflex_force
 
+
 def test_who_watches_a_motion_sees_the_arm_on_its_way_and_nothing_afterwards(cell: Cell):
     arm = cell.arm
     assert isinstance(arm, SimulatedArm)

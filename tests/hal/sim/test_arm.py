@@ -57,6 +57,7 @@ def test_a_second_grasp_presses_harder_and_does_not_drop_the_part(cell: Cell):
     cell.arm.move_gripper(0.08)
     go_home(cell)
 
+
 def test_who_watches_a_motion_sees_the_arm_on_its_way_and_nothing_afterwards(cell: Cell):
     arm = cell.arm
     assert isinstance(arm, SimulatedArm)
