@@ -10,14 +10,21 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from mskgrasp.core.errors import BadConfig
-from mskgrasp.core.files import write_whole
+from mskgrasp.core.errors import BadConfig, one_line, shown
+from mskgrasp.core.files import read_bounded, write_whole
+from mskgrasp.core.yaml_text import parse_yaml
+
+MOST_BYTES = 2**20
+"""Largest configuration file; one that names every part of the catalogue has a tenth of it."""
+_MOST_PROBLEMS = 4
+"""Problems of one file that a message lists."""
+_LONGEST_KEY = 100
 
 
 class Config(BaseModel):
-    """Base of every configuration: frozen, and an unknown key is an error."""
+    """Base of every configuration: frozen, numbers are finite, and an unknown key is an error."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
@@ -27,22 +34,19 @@ def read_yaml(path: Path) -> dict[str, Any]:
     """Read a YAML file that holds a mapping; an empty file holds an empty mapping.
 
     Raises:
-        BadConfig: The file is missing, is not YAML, or does not hold a mapping.
+        BadConfig: The file is missing, too large, is not YAML, or does not hold a mapping.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_bounded(path, MOST_BYTES).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise BadConfig(
             f"cannot read configuration {path}: {_reason(error)}; name a readable YAML file, such as those "
             "in configs/"
         ) from error
     try:
-        values = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"in line {mark.line + 1}, column {mark.column + 1}" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "syntax error"
-        raise BadConfig(f"{path} is not valid YAML: {problem} {where}".strip()) from error
+        values = parse_yaml(text)
+    except ValueError as error:
+        raise BadConfig(f"{path} is not valid YAML: {error}") from error
     if values is None:
         return {}
     if not isinstance(values, dict):
@@ -98,13 +102,14 @@ def _explain(
     model: type[BaseModel], error: ValidationError, name: Callable[[tuple[int | str, ...]], str]
 ) -> str:
     problems = []
-    for detail in error.errors():
+    found = error.errors()
+    for detail in found[:_MOST_PROBLEMS]:
         key = name(detail["loc"]) + ": " if detail["loc"] else ""
         if detail["type"] == "extra_forbidden":
             legal = ", ".join(sorted(_fields_at(model, detail["loc"][:-1])))
-            problems.append(
-                f"unknown key {name(detail['loc'])}" + (f"; legal keys here: {legal}" if legal else "")
-            )
+            key = name(detail["loc"])
+            key = key if len(key) <= _LONGEST_KEY else f"{key[:_LONGEST_KEY]}..."
+            problems.append(f"unknown key {key}" + (f"; legal keys here: {legal}" if legal else ""))
         elif detail["type"] in ("union_tag_invalid", "union_tag_not_found"):
             context = detail.get("ctx", {})
             tag = context.get("discriminator", "'type'").strip("'")
@@ -113,10 +118,12 @@ def _explain(
             problems.append(f"{key}{given}; legal: {legal}")
         else:
             value = detail.get("input")
-            shown = "" if detail["type"] == "missing" or isinstance(value, dict) else f", got {value!r}"
+            given = "" if detail["type"] == "missing" or isinstance(value, dict) else f", got {shown(value)}"
             cause = detail.get("ctx", {}).get("error")  # of a validator in this project
-            problems.append(f"{key}{cause or detail['msg'].lower()}{shown}")
-    return "; ".join(problems)
+            problems.append(f"{key}{cause or detail['msg'].lower()}{given}")
+    if len(found) > _MOST_PROBLEMS:
+        problems.append(f"and {len(found) - _MOST_PROBLEMS} more")
+    return one_line("; ".join(problems))
 
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> set[str]:

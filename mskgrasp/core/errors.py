@@ -2,6 +2,39 @@
 
 from __future__ import annotations
 
+import reprlib
+
+MOST_CHARACTERS = 1500
+"""Longest message: it fits on a screen of 80 columns and 24 lines."""
+
+_repr = reprlib.Repr()
+_repr.maxlevel = 3
+_repr.maxlist = _repr.maxtuple = _repr.maxdict = 4
+_repr.maxstring = _repr.maxother = 80
+
+
+def shown(value: object) -> str:
+    """A value as a message shows it: its ``repr``, abbreviated where it is long."""
+    return _repr.repr(value)
+
+
+def printable(text: str) -> str:
+    """Replace characters that would control a terminal, or cannot be encoded, by their escapes.
+
+    Names of files may hold line breaks, escape sequences, marks of right-to-left writing and bytes that
+    are no UTF-8.
+    """
+    return "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)
+
+
+def one_line(message: object) -> str:
+    """A message as one printable line that fits on a screen; the middle of a longer one is left out."""
+    text = str(message)
+    if len(text) > MOST_CHARACTERS:
+        half = MOST_CHARACTERS // 2
+        text = f"{text[:half]} ... {text[-half:]}"
+    return printable(text)
+
 
 class MskgraspError(Exception):
     """Base class; the message is one line with the value, the legal values and the remedy."""

@@ -1,7 +1,8 @@
-"""Atomic writing of files, and exclusive use of folders."""
+"""Atomic writing and bounded reading of files, and exclusive use of folders."""
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import uuid
@@ -30,6 +31,10 @@ def write_whole(path: Path, content: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        # An error of writing, as on a full disk, does not name the file.
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
@@ -38,6 +43,24 @@ def write_whole(path: Path, content: bytes) -> None:
         os.fsync(folder)
     finally:
         os.close(folder)
+
+
+def is_leftover(path: Path) -> bool:
+    """Whether a file is a lock, or was left behind by a process that was killed within `write_whole`."""
+    return path.name == LOCK or path.suffix == ".tmp"
+
+
+def read_bounded(path: Path, most_bytes: int) -> bytes:
+    """Read a file that others may have made; a larger one, or a device without an end, takes no memory.
+
+    Raises:
+        OSError: It cannot be read, or is larger.
+    """
+    with open(path, "rb") as file:
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise OSError(errno.EFBIG, f"larger than {most_bytes:,} bytes", str(path))
+    return content
 
 
 @contextmanager

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from mskgrasp.core.errors import MskgraspError, UsageError
+from mskgrasp.core.errors import MskgraspError, UsageError, one_line
 from mskgrasp.runtime.ctrl_c import repeat_dropped_ctrl_c
 
 
@@ -60,10 +61,14 @@ def run(program: str, main: Callable[[], int | None]) -> None:
             Ctrl-C meanwhile has the same effect as later.
     """
     sys.unraisablehook = repeat_dropped_ctrl_c
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A file's name need not be text; and what is printed shows at once, in a pipe, too.
+            stream.reconfigure(errors="backslashreplace", line_buffering=True)
     try:
         code = main() or 0
     except MskgraspError as error:
-        print(f"{program}: {error}", file=sys.stderr)
+        print(f"{program}: {one_line(error)}", file=sys.stderr)
         code = error.exit_code
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one must not interrupt the exit
@@ -75,6 +80,6 @@ def run(program: str, main: Callable[[], int | None]) -> None:
     except OSError as error:
         if error.filename is None and error.errno not in _FULL:
             raise
-        print(f"{program}: {explain_os_error(error)}", file=sys.stderr)
+        print(f"{program}: {one_line(explain_os_error(error))}", file=sys.stderr)
         code = 1
     sys.exit(code)

@@ -13,6 +13,8 @@ from rich.padding import Padding
 from rich.table import Table as ConsoleTable
 from rich.text import Text
 
+from mskgrasp.core.errors import printable
+
 Kind = Literal["number", "word", "prose"]
 _NUMBER = re.compile(r"[+\-−]?\d.*|[-–]?")
 _LONG = 40
@@ -71,7 +73,7 @@ def cell_text(cell: object) -> str:
     """A cell as plain text; a dash for None."""
     if isinstance(cell, Link):
         return cell.text
-    return "–" if cell is None else str(cell)
+    return "–" if cell is None else printable(str(cell))
 
 
 def report_console() -> Console:

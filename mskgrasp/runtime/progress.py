@@ -8,6 +8,8 @@ from typing import Any, TextIO
 
 from tqdm import tqdm
 
+from mskgrasp.core.errors import one_line
+
 Bar = tqdm
 """A progress bar."""
 _LINE_EVERY_S = 20.0
@@ -77,5 +79,5 @@ def advance_to(bar: Bar, done: int, total: int) -> None:
 
 
 def note(message: str, stream: TextIO | None = None) -> None:
-    """Write a line above any bar, to standard error or the given stream."""
-    Bar.write(message, file=sys.stderr if stream is None else stream)
+    """Write a message as one line above any bar, to standard error or the given stream."""
+    Bar.write(one_line(message), file=sys.stderr if stream is None else stream)

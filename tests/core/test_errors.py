@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import os
 
 import pytest
 
 from hal.errors import BadRecording, MissingRecording
 from mskgrasp.core import errors
 from mskgrasp.core.errors import (
+    MOST_CHARACTERS,
     BadConfig,
     BadDataset,
     BadModel,
@@ -18,6 +20,9 @@ from mskgrasp.core.errors import (
     MskgraspError,
     UnknownPart,
     UsageError,
+    one_line,
+    printable,
+    shown,
 )
 
 ALL = [one for _, one in inspect.getmembers(errors, inspect.isclass)]
@@ -49,3 +54,23 @@ def test_a_part_that_nobody_knows_is_a_bad_part_and_a_wrong_command():
         with pytest.raises(kind, match="no part 'x'"):
             raise UnknownPart("no part 'x'")
     assert issubclass(BadConfig, UsageError) and not issubclass(BadDataset, UsageError)
+
+
+@pytest.mark.parametrize(
+    "value", ["x" * 10_000, list(range(10_000)), [[[[["deep"]]]]], 10**4000, {"a": "b" * 999}]
+)
+def test_a_value_in_a_message_is_short(value: object):
+    assert len(shown(value)) < 400
+
+
+def test_a_short_value_is_shown_as_it_is():
+    for value in ("word", 3, 2.5, None, ["a", 1], {"a": 1}):
+        assert shown(value) == repr(value)
+
+
+def test_a_message_is_one_line_that_cannot_control_the_terminal():
+    name = os.fsdecode(b"\x1b[31m\n\xff") + "\u202e\u2028ü"
+    assert printable(name) == r"\x1b[31m\n\udcff\u202e\u2028ü"
+    assert one_line(f"{name}: cannot be read") == printable(name) + ": cannot be read"
+    long = one_line("first" + "x" * 10_000_000 + "last")
+    assert len(long) < MOST_CHARACTERS + 10 and long.startswith("first") and long.endswith("last")

@@ -3,12 +3,14 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
 import pytest
 
-from mskgrasp.core.files import write_whole
+from mskgrasp.core.files import LOCK, is_leftover, read_bounded, write_whole
 
 
 def write_for_ever(path: Path, letter: bytes) -> None:
@@ -48,6 +50,39 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one_and_nothing_else(tmp_p
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(OSError, match="No space") as raised:
         write_whole(path, b"new")
+    assert raised.value.filename == str(path) and raised.value.errno == 28
     assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_a_limit_of_the_system_is_an_error_with_the_files_name(tmp_path):
+    code = (
+        "import resource, sys\nfrom pathlib import Path\nfrom mskgrasp.core.files import write_whole\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
+        "try:\n    write_whole(Path(sys.argv[1]), bytes(5000))\n"
+        "except OSError as error:\n    print(error.filename)"
+    )
+    path = tmp_path / "data"
+    done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True)
+    assert done.stdout == f"{path}\n" and not list(tmp_path.iterdir())
+
+
+def test_no_more_is_read_than_is_allowed(tmp_path):
+    path = tmp_path / "data"
+    path.write_bytes(b"12345")
+    assert read_bounded(path, 5) == b"12345"
+    for large, most in ((path, 4), (Path("/dev/zero"), 1000)):
+        with pytest.raises(OSError, match=f"larger than {most:,} bytes") as raised:
+            read_bounded(large, most)
+        assert raised.value.filename == str(large)
+
+
+def test_what_a_killed_writer_leaves_is_known_by_its_name(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "replace", lambda *_: os.kill(os.getpid(), signal.SIGKILL))
+    if os.fork() == 0:
+        write_whole(tmp_path / "data", b"new")
+        os._exit(0)
+    os.wait()
+    (left,) = tmp_path.iterdir()
+    assert is_leftover(left) and is_leftover(tmp_path / LOCK) and not is_leftover(tmp_path / "data")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import io
+import os
 from pathlib import Path
 
 import pytest
@@ -41,6 +43,20 @@ def test_the_exit_code_is_that_of_the_program():
         with pytest.raises(SystemExit) as ended:
             run("program", lambda given=given: given)
         assert ended.value.code == code
+
+
+def test_what_is_printed_shows_at_once_and_may_hold_any_name(monkeypatch):
+    pipe = io.BytesIO()
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(pipe, encoding="utf-8"))
+    seen = []
+
+    def main() -> None:
+        print("wrote", os.fsdecode(b"a-file-called-\xff"))
+        seen.append(pipe.getvalue())
+
+    with pytest.raises(SystemExit):
+        run("program", main)
+    assert seen == [b"wrote a-file-called-\\udcff\n"]
 
 
 def test_a_folder_that_cannot_be_made_is_refused_and_none_is_made(tmp_path: Path):

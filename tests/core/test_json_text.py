@@ -1,0 +1,27 @@
+"""JSON of others."""
+
+from __future__ import annotations
+
+import pytest
+
+from mskgrasp.core.json_text import parse_json
+
+
+def test_sound_text_is_read():
+    assert parse_json(b'{"a": [1, {"a": null}], "b": "\\u00fc"}') == {"a": [1, {"a": None}], "b": "ü"}
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("[" * 100_000, "too many brackets"),
+        ('{"a": {"b": 1, "c": 2, "b": 3}}', "key 'b' occurs twice"),
+        ("{", "Expecting property name"),
+        (b"\xff\xff", "decode"),
+        ("", "Expecting value"),
+    ],
+)
+def test_what_cannot_be_used_is_a_value_error_of_one_line(text: str | bytes, problem: str):
+    with pytest.raises(ValueError, match=problem) as raised:
+        parse_json(text)
+    assert "\n" not in str(raised.value)
