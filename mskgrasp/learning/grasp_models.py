@@ -7,17 +7,19 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import torch
 from pydantic import Field, ValidationError, field_validator, model_validator
-from safetensors import SafetensorError
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadModel, MissingModel
+from mskgrasp.core.files import read_bounded
 from mskgrasp.core.grasp import HAND_GEOMETRY
+from mskgrasp.core.json_text import parse_json
 from mskgrasp.learning.label_source import LabelSource
 from mskgrasp.learning.network_config import NetworkConfig, Normalisation
 from mskgrasp.learning.networks import GraspDisplacementNetwork, GraspQualityNetwork
@@ -29,6 +31,8 @@ PRETRAINED = Path(__file__).parent / "pretrained"
 SCHEMA_VERSION = 1
 SAME_HAND = 2e-4
 """Dimensions of a hand may differ by this much, metres: drawings are rounded."""
+MOST_BYTES = 2**24
+"""Largest description of a model; one that names every part of the catalogue has a hundredth of it."""
 WEIGHTS = "model.safetensors"
 DESCRIPTION = "model.json"
 _FORMER_FIELDS = {
@@ -44,7 +48,7 @@ class ModelCalibration(Config):
     quality_slope: float = Field(default=1.0, gt=0.0)
     quality_offset: float = 0.0
     """Platt scaling of the quality (1999): its log odds become slope * log odds + offset."""
-    variance_scale: tuple[float, ...] = ()
+    variance_scale: tuple[Annotated[float, Field(gt=0.0)], ...] = ()
     """Factor of each variance, so that the central 90 % interval holds 90 %; empty: 1."""
 
 
@@ -143,10 +147,12 @@ class Models:
 
     def _probability(self, logits: Tensor) -> Tensor:
         calibration = self.meta.calibration
+        _check_predicted(logits)
         odds = torch.logit(self.gqn.quality(logits).double(), eps=1e-12)
         return torch.sigmoid(calibration.quality_slope * odds + calibration.quality_offset).to(logits.dtype)
 
     def _calibrated(self, mean: Tensor, variance: Tensor | None) -> tuple[Tensor, Tensor | None]:
+        _check_predicted(mean)
         scale = self.meta.calibration.variance_scale
         return mean, variance * mean.new_tensor(scale) if scale and variance is not None else variance
 
@@ -197,23 +203,18 @@ def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -
     require_hand(meta, HAND_GEOMETRY, folder)
     path = folder / WEIGHTS
     try:
+        # What the description needs is compared before any of it takes memory.
+        with safe_open(path, framework="pt") as file:
+            stored = {name: file.get_slice(name) for name in file.keys()}  # noqa: SIM118 - not a dict
+            with torch.device("meta"):
+                _check_weights(path, stored, meta)
         weights = load_file(path)
     except (SafetensorError, OSError) as error:
         raise BadModel(f"{path} is damaged ({error}); copy it again or train again") from error
-    models = build_models(meta)
-    expected = _weights(models)
-    for name in sorted(expected.keys() ^ weights.keys()):
-        state = "lacks" if name in expected else "has the unknown"
-        raise BadModel(f"{path} {state} weight {name}; it does not belong to the {DESCRIPTION} beside it")
-    for name, value in expected.items():
-        if weights[name].shape != value.shape:
-            raise BadModel(
-                f"{path}: {name} has shape {tuple(weights[name].shape)}, {DESCRIPTION} (patches of "
-                f"{meta.network.patch_pixels} pixels) needs {tuple(value.shape)}; use the pair that was saved"
-            )
     _check_finite(weights, str(path), "train again")
+    models = build_models(meta)
     with torch.no_grad():
-        for name, value in expected.items():
+        for name, value in _weights(models).items():
             value.copy_(weights[name])
     models.gqn.to(device)
     models.gdn.to(device)
@@ -240,9 +241,10 @@ def read_meta(path: Path) -> ModelMeta:
         BadModel: It is damaged or of another schema.
     """
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = parse_json(read_bounded(path, MOST_BYTES))
     except (OSError, ValueError) as error:
-        raise BadModel(f"{path} is damaged ({error}); copy it again or train again") from error
+        reason = getattr(error, "strerror", None) or error
+        raise BadModel(f"{path} is damaged ({reason}); copy it again or train again") from error
     version = values.get("schema_version") if isinstance(values, dict) else None
     if version != SCHEMA_VERSION:
         raise BadModel(f"{path} has schema version {version}, legal: {SCHEMA_VERSION}; train again")
@@ -280,6 +282,41 @@ def require_hand(meta: ModelMeta, hand: Mapping[str, float], folder: Path) -> No
 def _weights(models: Models) -> dict[str, Tensor]:
     pairs = (("gqn", models.gqn), ("gdn", models.gdn))
     return {f"{name}.{key}": value for name, net in pairs for key, value in net.state_dict().items()}
+
+
+def _check_predicted(values: Tensor) -> None:
+    if not torch.isfinite(values).all():
+        raise BadModel(
+            "the model predicts values that are not finite: its weights are too large; train again"
+        )
+
+
+_NUMBERS = {torch.float32: "F32", torch.int64: "I64"}
+"""Names of numbers in a file of weights."""
+
+
+def _check_weights(path: Path, stored: Mapping[str, Any], meta: ModelMeta) -> None:
+    """Compare a file's names, shapes and numbers with those that a description needs.
+
+    Raises:
+        BadModel: They differ.
+    """
+    expected = _weights(build_models(meta, torch.get_default_device()))
+    for name in sorted(expected.keys() ^ stored.keys()):
+        state = "lacks" if name in expected else "has the unknown"
+        raise BadModel(f"{path} {state} weight {name}; it does not belong to the {DESCRIPTION} beside it")
+    for name, value in expected.items():
+        shape, number = tuple(stored[name].get_shape()), stored[name].get_dtype()
+        if shape != tuple(value.shape):
+            raise BadModel(
+                f"{path}: {name} has shape {shape}, {DESCRIPTION} (patches of {meta.network.patch_pixels} "
+                f"pixels) needs {tuple(value.shape)}; use the pair that was saved"
+            )
+        if number != _NUMBERS[value.dtype]:
+            raise BadModel(
+                f"{path}: {name} holds numbers of type {number}, {_NUMBERS[value.dtype]} is needed; use the "
+                "weights that training saved"
+            )
 
 
 def _check_finite(weights: dict[str, Tensor], source: str, remedy: str) -> None:

@@ -17,9 +17,9 @@ class _NetworkConfig(Config):
 
     patch_side: float = Field(default=0.128, gt=0.0, le=1.0)
     """Length along the closing direction, metres."""
-    trunk_width: int = Field(default=1024, ge=1)
-    action_width: int = Field(default=64, ge=1)
-    head_width: int = Field(default=512, ge=1)
+    trunk_width: int = Field(default=1024, ge=1, le=8192)
+    action_width: int = Field(default=64, ge=1, le=8192)
+    head_width: int = Field(default=512, ge=1, le=8192)
     dropout: float = Field(default=0.5, ge=0.0, lt=1.0)
     variance: bool = True
     """False: the displacement network predicts the mean alone (the paper's GCIP-M)."""
@@ -73,7 +73,7 @@ class PatchNetworkConfig(_NetworkConfig):
     part, not rotated, with the grasp's angle (OCFI). The quality network always sees the grasp's."""
     patch_pixels: int = Field(default=64, ge=32, le=256)
     """Pixels along either side."""
-    channels: int = Field(default=32, ge=1)
+    channels: int = Field(default=32, ge=1, le=512)
     quality_stride: ClassVar[int] = 1
 
     @model_validator(mode="after")

@@ -60,5 +60,5 @@ def test_the_quality_network_gets_one_pixel_in_so_many_of_the_middle_columns():
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, float("inf"), float("nan")])
 def test_scales_that_cannot_be_divided_by_are_refused(scale):
-    with pytest.raises(ValidationError, match="positive and finite"):
+    with pytest.raises(ValidationError, match="positive and finite|finite number"):
         Normalisation(action_scale=(0.1, scale, 0.1))
