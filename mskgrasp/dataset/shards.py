@@ -37,6 +37,20 @@ def shard_path(folder: Path, part: str, index: int) -> Path:
     return Path(folder) / "shards" / f"{part}-{index:04d}.h5"
 
 
+def require_own_name(path: Path, info: ShardInfo) -> None:
+    """Refuse a shard under another name than its part and index give: a copy would count twice.
+
+    Raises:
+        BadDataset: It has another name, or its part's name cannot be a file name.
+    """
+    name = shard_path(path.parent, info.part, info.index).name
+    if path.name != name:
+        raise BadDataset(
+            f"{path} holds what {name} holds, shard {info.index} of part '{info.part}': delete the copy, or "
+            "give it this name"
+        )
+
+
 def list_shards(folder: Path) -> list[Path]:
     """List the finished shards of a dataset, sorted by name.
 

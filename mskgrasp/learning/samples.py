@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -25,6 +25,8 @@ from mskgrasp.core.grasp import (
     to_grasp_displacement,
 )
 from mskgrasp.dataset import Attempts, ShardInfo, list_shards, read_shard, u16_to_depth
+from mskgrasp.dataset.fingerprint import OUTCOMES
+from mskgrasp.dataset.shards import require_own_name
 from mskgrasp.learning.label_source import LabelSource, distinct, source_of
 from mskgrasp.learning.network_config import NetworkConfig
 from mskgrasp.parts.catalogue import Split, read_index
@@ -160,7 +162,7 @@ def read_samples(
         workers: Processes; None: one for each core, if there are enough shards.
 
     Raises:
-        BadDataset: A shard cannot be read, or no attempt shows a part.
+        BadDataset: A shard cannot be read, is there twice, or no attempt shows a part.
     """
     paths = list_shards(folder)
     if workers is None:
@@ -174,7 +176,17 @@ def read_samples(
                 raise piece
             pieces[index] = piece
             advance(len(pieces), len(paths))
-    return _joined([pieces[index] for index in range(len(paths))], folder, network)
+    in_order = [pieces[index] for index in range(len(paths))]
+    _refuse_copies(paths, in_order)
+    return _joined(in_order, folder, network)
+
+
+def _refuse_copies(paths: Sequence[Path], pieces: Sequence[_Piece]) -> None:
+    known: dict[bytes, Path] = {}
+    for path, piece in zip(paths, pieces, strict=True):
+        other = known.setdefault(piece.raw, path)
+        if piece.raw and other != path:
+            raise BadDataset(f"{path} holds the same attempts as {other.name}; delete one of them")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,10 +218,11 @@ def _reader(
         index, path = job
         try:
             attempts, info = read_shard(path)
+            require_own_name(path, info)
         except BadDataset as error:
             yield index, error
             return
-        outcomes = (attempts.grasp, attempts.success, attempts.displacement)
+        outcomes = [getattr(attempts, name) for name in OUTCOMES]
         arrays, skipped = _shard_samples(attempts, info, network)
         yield (
             index,

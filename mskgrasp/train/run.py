@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import math
-import os
 import sys
 from contextlib import closing
 from functools import partial
@@ -17,7 +16,9 @@ import torch
 
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import UsageError
-from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, save_model
+from mskgrasp.core.files import is_leftover, write_whole
+from mskgrasp.dataset.fingerprint import dataset_fingerprint
+from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, read_meta, save_model
 from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples, read_samples
@@ -28,7 +29,18 @@ from mskgrasp.runtime.progress import Bar, advance_to, note, progress
 from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
 from mskgrasp.train.figures import draw_curves, draw_uncertainty
 
+HELP = """Trains the grasp quality and displacement networks on a dataset.
+
+Writes the model, its metrics on held-out parts, its card and figures. A run that was stopped resumes when it
+is started again in the same way.
+
+python -m mskgrasp.train --data data/demo --out models/demo
+
+A first look within minutes: python -m mskgrasp.train --data data/demo --out models/quick --epochs 2"""
+
 CHECKPOINT = "checkpoint.safetensors"
+FEW_ATTEMPTS, FEW_PARTS = 1000, 10
+"""Data of fewer attempts or parts to train on are warned of."""
 
 
 class _ProgressBar(Reporter):
@@ -83,6 +95,8 @@ def run_training(config: TrainConfig) -> int:
     out = config.out
     _check_out(config, out)
     if (out / DESCRIPTION).exists() and (out / WEIGHTS).exists():
+        _check_trained_on(config.data, out)
+        (out / CHECKPOINT).unlink(missing_ok=True)
         print(f"{out} is trained already; choose another --out to train again")
         return 0
     device = _device(config.device)
@@ -93,6 +107,7 @@ def run_training(config: TrainConfig) -> int:
         f"{len(samples) - len(sides.training)} at held-out parts; "
         f"{float(samples.success.double().mean()):.0%} succeed; on {device}"
     )
+    _warn_of_few(len(sides.training), len(samples.part[sides.training].unique()))
     if samples.skipped:
         skipped = ", ".join(f"{n} ({why})" for why, n in samples.skipped.items())
         print(f"unusable attempts: {skipped}")
@@ -108,8 +123,8 @@ def run_training(config: TrainConfig) -> int:
             models, samples, sides.test if len(sides.test) else sides.validation, out / "uncertainty.png"
         )
     _write(out / "metrics.json", json.dumps(_finite(models.meta.metrics), indent=2, allow_nan=False) + "\n")
-    save_model(out, models)
     _write(out / "card.md", model_card(models.meta))
+    save_model(out, models)  # last: it says that the training is finished
     (out / CHECKPOINT).unlink(missing_ok=True)
     _summarise(models.meta.metrics, out)
     return 0
@@ -117,7 +132,7 @@ def run_training(config: TrainConfig) -> int:
 
 def _check_out(config: TrainConfig, out: Path) -> None:
     """Refuse a folder that holds anything but a run of the same settings."""
-    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+    if not out.exists() or (out.is_dir() and all(is_leftover(path) for path in out.iterdir())):
         return
     if not (out / "config.yaml").is_file():
         raise UsageError(f"{out} exists and holds no training run; choose another --out")
@@ -129,6 +144,28 @@ def _check_out(config: TrainConfig, out: Path) -> None:
         raise UsageError(
             f"{out} holds a run of other settings ({', '.join(differing)}); choose another --out, or repeat "
             f"its settings (--config {out / 'config.yaml'}) to go on"
+        )
+
+
+def _check_trained_on(data: Path, out: Path) -> None:
+    """Refuse a folder with a model of other data.
+
+    Raises:
+        UsageError: It was trained on other grasps.
+    """
+    known = read_meta(out / DESCRIPTION).training.get("data_fingerprint")
+    found = dataset_fingerprint(data, lambda paths: progress(paths, title="compare data", unit="shard"))
+    if known not in (None, found):
+        raise UsageError(
+            f"{out} holds a model that was trained on other data than {data}; choose another --out"
+        )
+
+
+def _warn_of_few(n_attempts: int, n_parts: int) -> None:
+    if n_attempts < FEW_ATTEMPTS or n_parts < FEW_PARTS:
+        note(
+            f"warning: {n_attempts} attempts at {n_parts} parts are few to learn from, and the figures will "
+            f"say little; collect {FEW_ATTEMPTS} at {FEW_PARTS} parts or more"
         )
 
 
@@ -159,9 +196,7 @@ def _table(history: list[EpochMetrics]) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    temporary = path.with_name(path.name + ".tmp")
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, path)
+    write_whole(path, text.encode())
 
 
 def _finite(value: Any) -> Any:
@@ -192,7 +227,7 @@ def main() -> int:
         parse(
             TrainConfig,
             prog="python -m mskgrasp.train",
-            description="Trains the grasp quality and displacement networks on a dataset.",
+            description=HELP,
             default_config=DEFAULT_CONFIG,
         )
     )

@@ -16,6 +16,7 @@ from mskgrasp.dataset import (
     shard_path,
     write_shard,
 )
+from mskgrasp.dataset.shards import require_own_name
 from tests import synthetic
 
 
@@ -232,3 +233,19 @@ def test_what_lies_in_another_file_is_not_read(shard, tmp_path):
         del file["tilt"]
         file["tilt"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "/tilt")
     assert "tilt lies in another file" in complaint(lambda: read_shard(shard))
+
+
+def test_a_copy_of_a_shard_under_another_name_is_refused(tmp_path):
+    own = synthetic.info("box", index=3)
+    require_own_name(shard_path(tmp_path, "box", 3), own)
+    for other in (
+        shard_path(tmp_path, "box", 4),
+        shard_path(tmp_path, "box2", 3),
+        tmp_path / "box-0003 (copy).h5",
+    ):
+        with pytest.raises(BadDataset, match=r"holds what box-0003.h5 holds, shard 3 of part 'box'"):
+            require_own_name(other, own)
+    with pytest.raises(BadDataset, match="cannot be a file name"):
+        require_own_name(
+            own_path := tmp_path / "x-0000.h5", dataclasses.replace(own, part=f"../{own_path.name}")
+        )

@@ -74,6 +74,26 @@ def test_a_small_dataset_is_learned_and_every_file_of_a_model_is_written(dataset
         train.run_training(program(config, data=dataset, out=out, seed=1))
 
 
+def test_a_finished_training_is_not_taken_for_that_of_other_data(dataset, tmp_path, capsys):
+    out, other = tmp_path / "model", tmp_path / "other"
+    few = program(SHORT, data=dataset, out=out, epochs=1)
+    assert train.run_training(few) == 0
+    assert "warning: 560 attempts at 7 parts are few to learn from" in capsys.readouterr().err
+    (out / "checkpoint.safetensors").touch()  # a kill after the model was written leaves it
+    assert train.run_training(few) == 0
+    assert "trained already" in capsys.readouterr().out and not (out / "checkpoint.safetensors").exists()
+    synthetic.write_dataset(other, n_parts=8, n_attempts=80, seed=2)
+    with pytest.raises(UsageError, match="trained on other data"):
+        train.run_training(few.model_copy(update={"data": other}))
+
+
+def test_a_training_that_was_killed_as_it_began_begins_again(dataset, tmp_path):
+    out = tmp_path / "model"
+    out.mkdir()
+    (out / "config.yaml.0123.tmp").touch()
+    assert train.run_training(program(SHORT, data=dataset, out=out, epochs=1)) == 0
+
+
 def test_mistakes_on_the_command_line_are_one_line_each(tmp_path, dataset):
     out = tmp_path / "out"
     full = tmp_path / "full"
