@@ -12,7 +12,8 @@ from typing import Any, TypeVar
 
 from mskgrasp.core.config import Config, read_config, write_config
 from mskgrasp.core.errors import BadDataset, UsageError
-from mskgrasp.core.files import LOCK, exclusive_lock, write_whole
+from mskgrasp.core.files import exclusive_lock, is_leftover, write_whole
+from mskgrasp.core.json_text import parse_json
 from mskgrasp.runtime.cli import make_folder
 
 RecordT = TypeVar("RecordT")
@@ -46,14 +47,18 @@ def opened_run(
         UsageError: The folder holds another run or other files, or another process writes to it.
         BadDataset: The record of the folder's inputs is damaged.
     """
-    known = _compatible_inputs(config, out, inputs, scene_version, may_change)
+    _compatible_inputs(config, out, inputs, scene_version, may_change)
     make_folder(out)
     with exclusive_lock(out) as alone:
         if not alone:
             raise UsageError(f"another run is writing to {out}; wait for it, or choose another --out")
-        write_config(config, out / SETTINGS)
+        # Once more: another run may have begun here since.
+        known = _compatible_inputs(config, out, inputs, scene_version, may_change)
+        for leftover in out.glob("*.tmp"):
+            leftover.unlink()
         record = known | dict(inputs) | {_SCENE_VERSION: scene_version}
         write_whole(out / INPUTS, (json.dumps(record, indent=1) + "\n").encode())
+        write_config(config, out / SETTINGS)  # last: with it, the run has begun
         yield
 
 
@@ -82,14 +87,15 @@ def _compatible_inputs(
                 "seed places parts differently; choose another --out"
             )
         return known
-    if out.is_dir() and any(path.name != LOCK for path in out.iterdir()):
+    # A run that was killed as it began has left its inputs at most.
+    if out.is_dir() and not all(is_leftover(path) or path.name == INPUTS for path in out.iterdir()):
         raise UsageError(f"--out {out} holds other files; choose a new folder")
     return {}
 
 
 def _read_inputs(path: Path) -> dict[str, Any]:
     try:
-        known = json.loads(path.read_text(encoding="utf-8"))
+        known = parse_json(path.read_bytes())
     except ValueError:
         known = None
     if not isinstance(known, dict):
@@ -110,9 +116,17 @@ def file_digest(path: Path) -> str:
 
 
 def append_trial(path: Path, values: Mapping[str, Any]) -> None:
-    """Append a line to a file of trials; NaN is refused, since JSON has none."""
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(values, allow_nan=False) + "\n")
+    """Append a line to a file of trials; NaN is refused, since JSON has none.
+
+    Raises:
+        OSError: The disk is full; the next `read_trials` removes what was written of the line.
+    """
+    line = json.dumps(values, allow_nan=False) + "\n"
+    try:
+        with path.open("a", encoding="utf-8") as file:
+            file.write(line)
+    except OSError as error:  # of writing, it does not name the file
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def rewrite_trials(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
@@ -132,7 +146,7 @@ def read_trials(path: Path, make: Callable[[dict[str, Any]], RecordT]) -> list[R
     found = []
     for i, line in enumerate(lines):
         try:
-            found.append(make(json.loads(line)))
+            found.append(make(parse_json(line)))
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise BadDataset(
                 f"{path}: line {i + 1} is not a trial; delete it or choose another --out"

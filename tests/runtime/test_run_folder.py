@@ -79,7 +79,7 @@ def test_a_folder_without_a_scene_version_counts_as_version_1(tmp_path: Path):
     assert json.loads((tmp_path / INPUTS).read_text()) == {"model": "a", "scene_version": 1}
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"model": '])
+@pytest.mark.parametrize("text", ["", "[]", '{"model": ', "[" * 100_000])
 def test_a_damaged_record_of_inputs_is_an_error_of_one_line(tmp_path: Path, text: str):
     open_run(tmp_path)
     (tmp_path / INPUTS).write_text(text)
@@ -93,6 +93,21 @@ def test_a_run_in_progress_keeps_its_settings_when_a_second_one_is_refused(tmp_p
         with pytest.raises(UsageError, match="another run is writing"):
             open_run(tmp_path, trials=9)
         assert "trials: 2" in (tmp_path / SETTINGS).read_text()
+
+
+def test_a_run_that_was_killed_as_it_began_begins_again(tmp_path: Path):
+    for number, left in enumerate((["inputs.json.01.tmp"], [INPUTS], [INPUTS, "config.yaml.02.tmp", ".lock"])):
+        out = tmp_path / str(number)
+        out.mkdir()
+        for name in left:
+            (out / name).write_text("")
+        open_run(out)
+        assert {path.name for path in out.iterdir()} == {SETTINGS, INPUTS, ".lock"}
+        with pytest.raises(UsageError, match="seed differ"):
+            open_run(out, seed=1)
+    (tmp_path / SETTINGS).write_text("of another program")
+    with pytest.raises(UsageError, match="holds other files"):
+        open_run(tmp_path)
 
 
 def test_a_folder_with_other_files_is_refused(tmp_path: Path):
