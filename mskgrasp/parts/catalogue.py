@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.errors import BadPart, UnknownPart
 from mskgrasp.core.files import write_whole
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import builtin_names, recipe_hash, starter_names, unknown_part
@@ -33,6 +33,8 @@ NEIGHBOUR = 1.10
 
 Split = Literal["train", "validation", "test", "new_sizes"]
 SPLITS: tuple[Split, ...] = ("train", "validation", "test", "new_sizes")
+SETS: tuple[str, ...] = ("starter", "catalogue", "all", *SPLITS)
+"""Words that stand for several parts, and cannot be the name of one."""
 _FAMILY_SHARES: dict[Split, float] = {"test": 0.15, "validation": 0.08}
 _KNOWN_SHARE = 0.08
 
@@ -273,6 +275,16 @@ def _hash(name: str) -> float:
     return int.from_bytes(hashlib.sha256(f"split {name}".encode()).digest()[:8], "big") / 2**64
 
 
+def require_name(word: str) -> None:
+    """Refuse an empty word, which as a path would be the current folder.
+
+    Raises:
+        UnknownPart: It is empty.
+    """
+    if not word.strip():
+        raise UnknownPart("the name of a part is empty: `python -m mskgrasp.parts list` shows the names")
+
+
 def chosen_names(words: Iterable[str]) -> list[str]:
     """Names of parts by names, folders, or the sets below.
 
@@ -281,9 +293,11 @@ def chosen_names(words: Iterable[str]) -> list[str]:
 
     Raises:
         BadPart: A set of the catalogue is named before the catalogue is built.
+        UnknownPart: A word is empty.
     """
     names: list[str] = []
     for word in words:
+        require_name(word)
         if word == "starter":
             names += starter_names()
         elif word == "catalogue" or word in SPLITS:

@@ -20,6 +20,7 @@ import numpy as np
 
 from mskgrasp.core.errors import BadPart, UnknownPart
 from mskgrasp.core.geometry import Pose
+from mskgrasp.core.json_text import parse_json
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
 
 FILES: tuple[str, ...] = ("mesh.ply", "hulls.glb", "part.json")
@@ -212,7 +213,7 @@ def _read(folder: Path, name: str) -> bytes:
 
 def _record(folder: Path, text: bytes) -> dict[str, Any]:
     try:
-        record = json.loads(text.decode())
+        record = parse_json(text)
     except ValueError as error:
         raise BadPart(f"{folder / 'part.json'} is damaged (not JSON): {_REMEDY}") from error
     if not isinstance(record, dict):

@@ -25,6 +25,7 @@ from mskgrasp.core.geometry import (
     wrap_half_turn,
 )
 from mskgrasp.core.grasp import HAND_GEOMETRY
+from mskgrasp.core.json_text import parse_json
 from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.parts import Part, parts_folder
 
@@ -157,7 +158,7 @@ def read_certified(part: Part, folder: Path | None = None) -> CertifiedGrasps:
     path = (folder or certified_folder(part)) / FILE
     remedy = f"make them: python -m mskgrasp.assess {part.name}"
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = parse_json(path.read_bytes())
         if values["schema_version"] != SCHEMA_VERSION:
             raise ValueError(f"schema version {values['schema_version']}, legal: {SCHEMA_VERSION}")
         found = CertifiedGrasps(

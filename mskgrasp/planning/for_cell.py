@@ -11,6 +11,7 @@ from hal.errors import HalError
 from mskgrasp.core.shipped import config_file, example_file
 from mskgrasp.learning.grasp_models import Models, load_models, require_hand
 from mskgrasp.learning.label_source import other_conditions, source_text
+from mskgrasp.parts.catalogue import require_name
 from mskgrasp.parts.importing.mesh_files import Unit
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
@@ -69,8 +70,9 @@ def part_name(text: str, unit: Unit | None = None) -> str:
     The name of a shipped example refers to that file where the current folder has no such file.
 
     Raises:
-        BadPart: The file cannot be imported as one part.
+        BadPart: The file cannot be imported as one part, or the name is empty.
     """
+    require_name(text)
     path = Path(text)
     if not path.exists() and (example := example_file(text)) is not None:
         print(f"{text} is not in this folder: using the shipped example {example}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import difflib
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mskgrasp.core.errors import BadPart, UsageError
+from mskgrasp.core.errors import BadPart, UsageError, shown
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import imported_names, is_built, starter_names
 from mskgrasp.parts.catalogue import SPLITS, THIN, Entry, Index, read_index
@@ -41,9 +42,10 @@ def run_list(command: List) -> int:
         index = _built_index()
         entries = [entry for entry in index.parts.values() if entry.family == command.family]
         if not entries:
-            raise UsageError(
-                f"no family {command.family!r}: give one of {', '.join(sorted(index.families()))}"
-            )
+            known = sorted(index.families())
+            similar = difflib.get_close_matches(command.family, known, n=5, cutoff=0.5) or known[:10]
+            more = "" if len(similar) == len(known) else "; `list --catalogue` shows all"
+            raise UsageError(f"no family {shown(command.family)}: give one of {', '.join(similar)}{more}")
         print_table(_entry_table(entries))
         print(f"{len(entries)} parts")
     elif command.catalogue or command.csv is not None:

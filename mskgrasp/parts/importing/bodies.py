@@ -163,7 +163,8 @@ def _joined(solids: list[Manifold]) -> list[Manifold]:
     if len(rest) > 1:
         raise BadPart(
             f"has {count_of(len(rest), 'body')} that do not touch even when joined "
-            f"({_volumes(sorted(rest, key=lambda solid: -solid.volume()))}): --split makes a part of each"
+            f"({_volumes(sorted(rest, key=lambda solid: -solid.volume()))}): mskgrasp.parts import --split "
+            "makes a part of each"
         )
     return rest
 
@@ -171,7 +172,7 @@ def _joined(solids: list[Manifold]) -> list[Manifold]:
 def _several(solids: list[Manifold]) -> str:
     return (
         f"has {len(solids)} separate bodies ({_volumes(solids)}): "
-        "--split makes a part of each, --union joins those that touch or overlap"
+        "mskgrasp.parts import --split makes a part of each, --union joins those that touch or overlap"
     )
 
 

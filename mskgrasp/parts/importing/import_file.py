@@ -14,9 +14,10 @@ import numpy as np
 import trimesh
 from scipy.spatial import QhullError
 
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.errors import BadPart, printable
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import LEGAL_NAME, builtin_names
+from mskgrasp.parts.catalogue import SETS
 from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
 from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, MeshFile, Unit, read_content, read_mesh
 from mskgrasp.parts.part import Part
@@ -156,6 +157,8 @@ def legal_name(text: str) -> str:
 def _check_available(name: str, check_name: Callable[[str], None]) -> None:
     if name in builtin_names():
         raise BadPart(f"the name {name!r} belongs to a built-in part: choose another with --name")
+    if name in SETS:
+        raise BadPart(f"the name {name!r} stands for a set of parts: choose another with --name")
     check_name(name)
 
 
@@ -179,7 +182,7 @@ def _make(
             Solid(mesh=mesh, hulls=mesh_pieces(for_collision(mesh))),
             name=name,
             family=family,
-            source=f"imported from {path.name}",
+            source=f"imported from {printable(path.name)}",
             licence=licence,
             density=density,
             dimensions={

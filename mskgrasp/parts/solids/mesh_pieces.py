@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 import trimesh
 
+from mskgrasp.core.errors import BadPart
 from mskgrasp.parts.solids.decompose import (
     CLOSE_P95_MM,
     CLOSE_VOLUME_RATIO,
@@ -74,9 +75,15 @@ def mesh_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
 
     Returns:
         Corners (n, 3) of each piece, millimetres.
+
+    Raises:
+        BadPart: It is a sheet too thin for any piece.
     """
     if mesh_mm.convex_hull.volume <= CONVEX_RATIO * mesh_mm.volume:
-        return convex_pieces(mesh_mm)
+        pieces = convex_pieces(mesh_mm)
+        if not pieces:
+            raise BadPart("it is too thin for its length to be cut into solid pieces: make it thicker")
+        return pieces
     search = _Search(mesh_mm)
     for tolerances in FINE:
         found = search.fine(tolerances)

@@ -17,7 +17,9 @@ def test_a_cavity_stays_a_cavity_whichever_way_the_file_was_wound():
 
 
 def test_a_body_inside_another_is_a_second_body_and_union_swallows_it():
-    assert "has 2 separate bodies (24, 1 cm^3): --split" in refusal(box(40, 30, 20), box(10, 10, 10))
+    assert "has 2 separate bodies (24, 1 cm^3): mskgrasp.parts import --split" in refusal(
+        box(40, 30, 20), box(10, 10, 10)
+    )
     joined = repair_bodies([soup(box(40, 30, 20), box(10, 10, 10))], bodies="union")
     assert joined.bodies[0].volume == pytest.approx(24_000)
     assert joined.notes == ("joined 2 bodies into one",)
