@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import shutil
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,6 +24,8 @@ from hal.replay.events import KIND, SCHEMA, Event, plain
 from mskgrasp.core.errors import UsageError
 
 T = TypeVar("T")
+LEAST_FREE = 2**26
+"""Least free space of the disk, bytes: HDF5 cannot close a file that it has failed to write."""
 
 
 class RecordingWriter:
@@ -62,10 +67,12 @@ class RecordingWriter:
         if self._file is None:
             try:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
+                self._check_space()
                 self._file = h5py.File(self.part, "x")
             except OSError as error:
                 self._users -= 1
-                raise UsageError(f"cannot write {self.part}: {error}; choose another file") from error
+                reason = error.strerror or error
+                raise UsageError(f"cannot write {self.part}: {reason}; choose another file") from error
             self._start_s = time.monotonic()
             self._file.attrs.update(
                 kind=KIND,
@@ -83,10 +90,11 @@ class RecordingWriter:
         self._users = max(0, self._users - 1)
         if self._users == 0 and self._file is not None:
             with self._lock:
-                events: Any = self._file["events"]
-                n_events = len(events)
-                self._file.close()
-                self._file = None
+                file, self._file = self._file, None
+                with self._named_in_errors():
+                    events: Any = file["events"]
+                    n_events = len(events)
+                    file.close()
             if n_events:
                 os.replace(self.part, self._path)
             else:
@@ -135,10 +143,15 @@ class RecordingWriter:
             )
 
     def frame(self, frame: RgbdFrame) -> int:
-        """Store a frame and return its index."""
+        """Store a frame and return its index.
+
+        Raises:
+            OSError: The disk is nearly full; what was recorded until then is kept.
+        """
         with self._lock:
             if self._file is None:
                 return -1
+            self._check_space()
             optional = dict(fine_colour=frame.fine_colour, infrared=frame.infrared)
             values = dict(
                 colour=frame.colour,
@@ -163,17 +176,36 @@ class RecordingWriter:
                         **(packed if array.ndim > 1 else {}),
                     )
             index = group["depth"].shape[0]  # pyright: ignore[reportAttributeAccessIssue]
-            for key, value in values.items():
-                dataset: Any = group[key]
-                dataset.resize(index + 1, axis=0)
-                dataset[index] = value
+            with self._named_in_errors():
+                for key, value in values.items():
+                    dataset: Any = group[key]
+                    dataset.resize(index + 1, axis=0)
+                    dataset[index] = value
             return index
+
+    def _check_space(self) -> None:
+        """Refuse to write while the file can still be closed.
+
+        Raises:
+            OSError: The disk is nearly full.
+        """
+        if shutil.disk_usage(self.part.parent).free < LEAST_FREE:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.part))
+
+    @contextmanager
+    def _named_in_errors(self) -> Iterator[None]:
+        """Give an error of HDF5, which is a page long, in a line with the file's name."""
+        try:
+            yield
+        except (OSError, RuntimeError) as error:
+            raise OSError(errno.EIO, "HDF5 cannot write", str(self.part)) from error
 
     def _append(self, event: Event) -> None:
         with self._lock:
             if self._file is None:
                 return
-            events: Any = self._file["events"]
-            events.resize(len(events) + 1, axis=0)
-            events[-1] = json.dumps(asdict(event))
-            self._file.flush()  # what is known must survive the program
+            with self._named_in_errors():
+                events: Any = self._file["events"]
+                events.resize(len(events) + 1, axis=0)
+                events[-1] = json.dumps(asdict(event))
+                self._file.flush()  # what is known must survive the program

@@ -54,6 +54,22 @@ def test_a_cell_that_does_not_open_leaves_no_recording(tmp_path: Path, monkeypat
     assert not list(tmp_path.iterdir())
 
 
+def test_a_full_disk_ends_the_recording_with_its_name_and_keeps_it(tmp_path: Path, monkeypatch):
+    out = tmp_path / "run.h5"
+    with (
+        pytest.raises(OSError, match="No space left on device") as raised,
+        recorded_cell(toy_cell(), out).connected() as cell,
+    ):
+        cell.camera.capture()
+        monkeypatch.setattr("hal.replay.writer.LEAST_FREE", 2**62)  # more than any disk has
+        cell.camera.capture()
+    assert raised.value.filename == f"{out}.part"
+    assert read_recording(out).n_frames == 1
+    with pytest.raises(UsageError, match="cannot write .*other.h5.part: No space left on device"):
+        recorded_cell(toy_cell(), tmp_path / "other.h5").camera.connect()
+    assert list(tmp_path.iterdir()) == [out]
+
+
 def test_a_recording_is_not_overwritten(recording: Path):
     with pytest.raises(UsageError, match="exists already"):
         recorded_cell(toy_cell(), recording)
