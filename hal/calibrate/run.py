@@ -43,7 +43,11 @@ DESCRIPTION = """Estimates the pose of the camera over the table with a ChArUco 
 Print the board with --print-board board.pdf. The arm closes its fingers on the board, shows it to the camera
 from many sides, and brings it back; keep a hand on the emergency stop. Ctrl-C stops the arm, and the pictures
 taken so far can be solved with --from FOLDER. Writes calibration.yaml, corners.png, residuals.png and the
-pictures. See docs/calibration.md."""
+pictures. See docs/calibration.md.
+
+python -m hal.calibrate --print-board board.pdf
+
+python -m hal.calibrate --cell configs/cells/panda_kinect2.yaml"""
 
 _MARGIN = 0.01
 """White paper around the simulated board, metres."""

@@ -46,7 +46,9 @@ next. The exit code is 0 if nothing failed, else 1.
 --gripper, on a real cell, measures instead what the hand truly does, for simulation to use: the hand is homed
 and closes three times on nothing, which gives its speed; then it closes three times on a spring scale or load
 cell that you hold between the pads and read, after you have measured with a tape how far it opens. The arm
-stands still. After a question workspace.measured_grip is written into the cell's file; its comments stay."""
+stands still. After a question workspace.measured_grip is written into the cell's file; its comments stay.
+
+python -m hal.doctor --cell configs/cells/sapien.yaml"""
 
 _COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 

@@ -12,7 +12,9 @@ DESCRIPTION = """Homes the hand of a cell: its fingers close and open, so that i
 
 Run it whenever the fingers were changed: until then the hand believes in the width of those before, opens to
 the wrong distance and reports wrong widths. The arm stands still; what is between the fingers falls. Asks
-before the fingers of a real cell move (--yes: does not ask), and prints the width that was found."""
+before the fingers of a real cell move (--yes: does not ask), and prints the width that was found.
+
+python -m hal.home --cell configs/cells/panda_kinect2.yaml"""
 
 
 def home(config: HomeConfig) -> tuple[ArmState, ArmState]:

@@ -23,7 +23,11 @@ from mskgrasp.runtime.options import parse
 DESCRIPTION = """Writes the frames of a cell's camera, or a whole run on the cell, into one file.
 
 The file plays back as a cell (type: replay), a camera or an arm (driver: replay): see docs/replay.md.
-Without --run the arm's state is read with every frame and the arm does not move."""
+Without --run the arm's state is read with every frame and the arm does not move.
+
+Ten frames: python -m hal.record --cell configs/cells/sapien.yaml --out frames.h5
+
+A whole run: python -m hal.record --cell configs/cells/sapien.yaml --out run.h5 --run mskgrasp.plan"""
 
 _INTERRUPTED_S = 2.0
 """A program that received Ctrl-C itself has stopped the arm and ended after this, s."""

@@ -33,7 +33,9 @@ and nothing is written.
 Before the first measurement the file says table_z: null, and the height by tape is given as --table-at Z,
 good to 3 cm. Writes table.json and table.png into --out; a real cell's file is rewritten after a question
 (--yes: without any): table_z, and table_slope where the tilt matters. The file of a simulated cell stays as
-it is. See docs/touch.md."""
+it is. See docs/touch.md.
+
+python -m hal.touch --cell configs/cells/panda_kinect2.yaml --table-at 0.01"""
 
 
 def measure(config: TouchConfig) -> tuple[TableReport, Operator]:

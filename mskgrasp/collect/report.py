@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from mskgrasp.collect.config import PartFilter
+from mskgrasp.core.files import write_whole
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.dataset import ShardInfo, list_shards, read_shard
@@ -25,6 +26,11 @@ _HEADER = (
     "part", "attempts", "success", "95 % interval", "median displacement", "median turn", "failures",
     "discarded attempts", "passes the part filter",
 )  # fmt: skip
+_EXPLAINED = (
+    "Success: share of the attempts that lifted the part. Median displacement and turn: of the part in the "
+    "hand, over the attempts that lifted it. Discarded attempts are not counted, and were drawn again. The "
+    "part filter compares the success with part_filter.min_success and max_success."
+)
 
 Columns = dict[str, np.ndarray]
 
@@ -125,7 +131,7 @@ def print_summary(summaries: list[PartSummary], console: Console | None = None) 
         _counts(failures), _counts(discarded), f"{sum(row.kept for row in summaries)} parts",
     )  # fmt: skip
     table = Table(header=_HEADER, rows=[*rows, total], total=True)
-    print_sections([Section(title="Random grasps by part", tables=[table])], console)
+    print_sections([Section(title="Random grasps by part", text=[_EXPLAINED], tables=[table])], console)
 
 
 def _counts(counts: dict[str, int]) -> str:
@@ -135,7 +141,7 @@ def _counts(counts: dict[str, int]) -> str:
 def write_summary(summaries: list[PartSummary], folder: Path) -> None:
     """Write the table's numbers as ``summary.json``."""
     text = json.dumps({"schema_version": 1, "parts": [asdict(row) for row in summaries]}, indent=1)
-    (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+    write_whole(folder / "summary.json", (text + "\n").encode())
 
 
 def draw_summary(folder: Path, seed: int) -> Path:

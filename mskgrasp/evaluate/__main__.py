@@ -15,7 +15,11 @@ dataset from whose grasps LOWESS predicts. All models predict the same grasp of 
 Every trial is stored at once with its frame: the same command resumes a stopped run, with more parts, trials
 or models if asked for, and --replay OUT TRIAL draws one again. Simulated cells run in parallel; their number
 does not change the results. A real cell asks its operator to place every part, and before the arm moves
-(--yes: it asks nothing)."""
+(--yes: it asks nothing).
+
+Ten held-out parts: python -m mskgrasp.evaluate --parts test --n-parts 10 --trials 2
+
+One part: python -m mskgrasp.evaluate --parts hex_nut_m30 --trials 5 --out out/nut"""
 
 
 def main() -> int:

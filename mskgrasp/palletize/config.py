@@ -28,7 +28,7 @@ class PalletizeConfig(Config):
     """Names or folders of parts, or sets: test and validation (held out), starter, catalogue."""
     n_parts: int = Field(default=0, ge=0)
     """Greatest number of parts, evenly chosen; 0: all."""
-    trials: int = Field(default=3, ge=1)
+    trials: int = Field(default=3, ge=1, le=100_000)
     """Trials per part; with --slots, number of pallets."""
     target: str = "0.5,0.06,90"
     """x and y of the centre, m (base), and the direction of the part's longer side from above, degrees."""
@@ -39,7 +39,7 @@ class PalletizeConfig(Config):
     tape: tuple[float, float] | None = None
     """Sides of the two tape squares on every part, m, such as 0.012 0.008, which measure the placement; by
     default the cell's tracker measures, and without a tracker placements stay unmeasured."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the parts' placements and the candidates."""
     workers: int = Field(default=1, ge=1, le=256)
     """Processes, each with its own simulated cell; the results do not depend on their number."""

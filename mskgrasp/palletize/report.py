@@ -30,6 +30,8 @@ from mskgrasp.reports.section import Figure, Section, settings_section
 from mskgrasp.runtime.console_table import Link, Table
 from mskgrasp.trials.trial import REFUSED
 
+LEAST_PARTS = 3
+"""Parts by which the goal is judged at least: an interval over two parts says nothing."""
 GOAL = 0.5
 """Greatest share of the median error that correcting by the prediction is meant to leave."""
 WORST = 10
@@ -142,8 +144,9 @@ def gain_lines(summary: PlacementSummary) -> list[str]:
         turn = _ratio_text(gain.rotation_ratio, gain.rotation_ratio_interval)
         text = f"Corrected by {_WORDS[name]}, the median error is {ratio} of that without, the turn's {turn}"
         if name == "predicted" and gain.translation_ratio is not None:
-            met = gain.translation_ratio <= GOAL
-            text += f"; the goal is {GOAL:g} at most: {'met' if met else 'not met'}"
+            met = "met" if gain.translation_ratio <= GOAL else "not met"
+            judged = met if parts >= LEAST_PARTS else f"not judged by {parts} parts, {LEAST_PARTS} are needed"
+            text += f"; the goal is {GOAL:g} at most: {judged}"
         lines.append(text + ".")
     return lines
 

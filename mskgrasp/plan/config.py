@@ -29,7 +29,7 @@ class PlanConfig(Config):
     """Unit of a CAD file's coordinates, where the format states none; mm if not given."""
     go_home: bool = False
     """Move the arm home first, out of the camera's view; the operator of a real cell is asked."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the candidates, and the place of --part."""
     planner: PlannerConfig = PlannerConfig()
     """Settings of the choice of the grasp."""

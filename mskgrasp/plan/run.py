@@ -9,6 +9,8 @@ import numpy as np
 from hal import Cell, capture_at_home, go_home, open_cell
 from hal.operator import Operator, StoppedByOperator
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.files import write_whole
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
 from mskgrasp.plan.config import PlanConfig
 from mskgrasp.planning.certified_planner import planner_of_part
@@ -37,6 +39,7 @@ def plan_grasp(config: PlanConfig) -> GraspPlan:
     """
     if config.planner.policy == "certified" and config.part is None:
         raise UsageError("--planner.policy certified needs the part on the table: --part NAME")
+    load_models(config.models)  # refused before a part is imported or a cell opened
     part = None if config.part is None else part_name(config.part, config.unit)
     make_folder(config.out)
     with open_cell(config.cell) as cell:
@@ -51,6 +54,6 @@ def plan_grasp(config: PlanConfig) -> GraspPlan:
         chooser = planner if part is None else planner_of_part(planner, cell, find_part(part))
         plan = chooser.plan(frame, np.random.default_rng(config.seed))
     text = json.dumps(dict(plan.to_json(), seed=config.seed), indent=1, allow_nan=False)
-    (config.out / "plan.json").write_text(text + "\n", encoding="utf-8")
+    write_whole(config.out / "plan.json", (text + "\n").encode())
     draw_plan(frame, plan, config.out / "plan.png")
     return plan

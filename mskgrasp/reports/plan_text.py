@@ -31,10 +31,21 @@ def plan_text(plan: GraspPlan) -> str:
             f"grasp         x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, theta {np.degrees(theta):.1f} deg (base)",
             f"quality       {plan.quality:.3f} ({of})"
             + ("" if plan.quality >= MIN_QUALITY else f"; under {MIN_QUALITY:g}, not worth trying"),
+            f"verdict       {verdict(plan.quality)}",
             f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
             *([] if np.isnan(plan.swing).any() else [f"tilt          {tilted}"]),
             f"planned in    {plan.seconds['total']:.2f} s ({stages})",
         ]
+    )
+
+
+def verdict(quality: float) -> str:
+    """Whether a grasp of this predicted quality is worth trying, in words."""
+    if quality >= MIN_QUALITY:
+        return f"worth trying: the part is lifted with a predicted probability of {quality:.0%}"
+    return (
+        f"not worth trying: the part is lifted with a predicted probability of {quality:.0%}, under "
+        f"{MIN_QUALITY:.0%}; place it another way"
     )
 
 

@@ -10,7 +10,11 @@ DESCRIPTION = """Answers requests for grasps over HTTP.
 POST /plan, /score and /place, GET /health, /models and /openapi.json: plans in clients' depth images,
 scores their grasps, computes where to place. It moves no arm and reads no path from a request. Only this
 machine can connect; another address needs --token-file. Needs the extra [serve]. docs/serve.md describes the
-requests; examples/serve_client.py is a client."""
+requests; examples/serve_client.py is a client.
+
+python -m mskgrasp.serve --port 8093
+
+For other machines: python -m mskgrasp.serve --host 0.0.0.0 --token-file token"""
 
 
 def main() -> int:

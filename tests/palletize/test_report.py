@@ -37,6 +37,8 @@ def test_the_gain_is_stated_with_its_interval_and_whether_the_goal_is_met():
     assert predicted.endswith("; the goal is 0.5 at most: met.") and "goal" not in truth
     poor = [dataclasses.replace(one, translation_error=0.004) for one in some()]
     assert gain_lines(summarise_placements(poor))[1].endswith("the goal is 0.5 at most: not met.")
+    two = gain_lines(summarise_placements([one for one in some() if one.part != "c"]))[1]
+    assert two.endswith("the goal is 0.5 at most: not judged by 2 parts, 3 are needed.")
 
 
 @pytest.fixture(scope="module")

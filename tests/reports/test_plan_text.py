@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from mskgrasp.reports.plan_text import plan_text
+from mskgrasp.reports.plan_text import plan_text, verdict
 from tests.planning.hand_made import FRAME, planner
 
 
@@ -22,3 +22,10 @@ def test_a_plan_is_described_in_millimetres_and_degrees():
     assert "dtheta -5.7 +- " in lines["displacement"]
     assert f"dx {1e3 * plan.displacement[0]:+.1f} +- {1e3 * plan.displacement_std[0]:.1f} mm" in text
     assert "best of 600" in lines["quality"] and "sample" in lines["planned in"] and "total" not in text
+
+
+def test_a_plan_says_whether_it_is_worth_trying():
+    assert verdict(0.5) == "worth trying: the part is lifted with a predicted probability of 50%"
+    assert verdict(0.31).startswith("not worth trying: ") and "31%, under 50%" in verdict(0.31)
+    plan = planner().plan(FRAME, np.random.default_rng(0))
+    assert f"verdict       {verdict(plan.quality)}" in plan_text(plan).splitlines()
