@@ -161,7 +161,7 @@ class SimulatedCellConfig(Config):
 
     part: str = "hex_nut_m30"
     """Part on the table when the cell is opened: a name or a folder."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the position and turn of the part."""
     region: tuple[float, float, float, float] = REGION
     """x_min, x_max, y_min, y_max where parts lie, base frame, m."""
@@ -186,9 +186,9 @@ class SimulatedCellConfig(Config):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        self.camera.check_sees(self.region)
         corners = [(x, y) for x in self.region[:2] for y in self.region[2:]]
         grasps = np.array([[x, y, z, t] for x, y in corners for z in (0.0105, 0.3) for t in (-1.57, 1.57)])
         if not top_down(grasps)[1].all():
             raise ValueError(f"region {list(self.region)} reaches beyond the arm")
+        self.camera.check_sees(self.region)
         return self

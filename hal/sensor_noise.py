@@ -17,7 +17,7 @@ class SensorNoise(Config):
 
     model: NoiseModel = "off"
     """off: perfect. iid: independent pixels, as in the paper. kinect2: a model of the Kinect v2."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the noise of all frames, with the seed of the part's placement."""
     iid_sigma: float = Field(default=0.003, ge=0, le=0.05)
     """Standard deviation of the model iid, m (the paper's: 3 mm)."""

@@ -53,7 +53,7 @@ class CalibrateConfig(Config):
     camera_turn_deg: float = Field(default=0.0, ge=-180, le=180)
     """With --camera-at: turn of the camera about its line of sight, clockwise as it sees; 0: top of its image
     away from the base, 180: towards the base."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the poses."""
 
     @model_validator(mode="after")

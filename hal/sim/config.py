@@ -30,7 +30,7 @@ class SapienCameraConfig(Config):
     driver: Literal["sapien"]
     part: str = "hex_nut_m30"
     """First part on the rendered table: a name or a folder."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the position and turn of the part."""
     overhead: Overhead = Overhead()
     """Pose and optics of the camera."""

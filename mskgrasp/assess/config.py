@@ -49,13 +49,13 @@ class AssessConfig(Config):
     """Unit of a CAD file's coordinates, where the format states none; mm if not given."""
     models: Path = PRETRAINED
     """Folder with model.safetensors and model.json; by default the shipped one."""
-    simulations: int = Field(default=0, ge=0)
+    simulations: int = Field(default=0, ge=0, le=1_000_000)
     """Simulated grasps that certify a part's grasps; 0: 1200, or 400 with --quick."""
-    trials: int = Field(default=0, ge=0)
+    trials: int = Field(default=0, ge=0, le=100_000)
     """Trials of each policy with an exact camera; 0: 24, or 8 with --quick."""
     workers: int = Field(default=0, ge=0)
     """Processes; 0: one per core. The results do not depend on their number."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines simulations and trials."""
 
     @field_validator("tolerance")

@@ -39,7 +39,7 @@ class BenchmarkConfig(Config):
     """Parts in place of the benchmark's list: names, folders and sets, such as validation."""
     n_parts: int = Field(default=0, ge=0)
     """Greatest number of parts, evenly chosen; 0: all, or 12 of the list with --quick."""
-    trials: int = Field(default=0, ge=0)
+    trials: int = Field(default=0, ge=0, le=100_000)
     """Trials of each part by each planner; 0: 7, or 2 with --quick."""
     quick: bool = False
     """12 parts, 2 trials, no certified grasps: under 15 minutes on two cores."""
@@ -60,7 +60,7 @@ class BenchmarkConfig(Config):
     that assess writes."""
     workers: int = Field(default=0, ge=0)
     """Processes; 0: one per core. The results do not depend on their number."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines scenes, targets and the errors of the camera that looks at the hand."""
 
     @field_validator("planners")

@@ -32,6 +32,16 @@ class PartFilter(Config):
         """Whether success rates matter."""
         return self.min_success is not None or self.max_success is not None
 
+    @model_validator(mode="after")
+    def _check(self) -> PartFilter:
+        for name in ("length", "success"):
+            low, high = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
+            if low is not None and high is not None and low > high:
+                raise ValueError(
+                    f"min_{name} {low:g} is above max_{name} {high:g}, no part is between: swap them"
+                )
+        return self
+
     def takes_length(self, longest_axis: float) -> bool:
         """Whether a part of this length, metres, is worth collecting."""
         return _between(longest_axis, self.min_length, self.max_length)
@@ -54,11 +64,11 @@ class CollectConfig(Config):
     """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
     sample: int = Field(default=0, ge=0)
     """Approximate number of parts, some of every family; 0: all. Only for the catalogue's parts."""
-    attempts_per_part: int = Field(default=200, ge=1)
+    attempts_per_part: int = Field(default=200, ge=1, le=1_000_000)
     """Grasps for each part."""
     shard_size: int = Field(default=100, ge=1)
     """Grasps in a file; a killed run loses at most the files being made."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of all random numbers; the data do not depend on the number of workers."""
     workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
     """Processes; 0: one per core."""
@@ -68,12 +78,12 @@ class CollectConfig(Config):
     """Files of `mskgrasp.dataset export --format labels`: their shards are rendered, not simulated again."""
     part_filter: PartFilter = PartFilter()
     """Bounds on the size of parts and on how easily they are grasped."""
-    physics: Physics = Physics()
-    """The simulated cell."""
     camera: Overhead = Overhead()
     """The overhead depth camera."""
     noise: ExecutionNoise = ExecutionNoise()
     """Errors of arm, gripper, friction and camera; all off."""
+    physics: Physics = Physics()
+    """The simulated cell."""
 
     @model_validator(mode="after")
     def _check(self) -> CollectConfig:

@@ -37,12 +37,21 @@ from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult
 from mskgrasp.simulation.shard_task import ShardTask
 from mskgrasp.simulation.versions import SIMULATION_VERSION, other_versions
 
+MOST_SHARDS = 200_000
+"""Files of a dataset."""
+
 DESCRIPTION = """Simulates random grasps of parts and records what happened.
 
 For each part and attempt: the part lies in a resting pose at a random position and yaw, the overhead
 camera takes a depth image, a grasp is drawn uniformly from the part's box in that image, the arm tries
 it, and one row is written: success, reason of failure, how the part moved in the hand. A run that was
-stopped resumes when it is started again with the same settings."""
+stopped resumes when it is started again with the same settings.
+
+A few grasps of two parts: python -m mskgrasp.collect --parts hex_nut_m30 washer_m36 --attempts-per-part 20
+
+Parts of your own, imported before: python -m mskgrasp.collect --parts my_bracket --out data/bracket
+
+The demo dataset: python -m mskgrasp.collect --config configs/collect/demo.yaml"""
 
 
 def main() -> int:
@@ -71,6 +80,7 @@ def collect(config: CollectConfig) -> None:
     config = config.model_copy(update={"parts": tuple(names), "sample": 0})
     parts = chosen_parts(config)
     config = config.model_copy(update={"parts": tuple(word for word, _ in parts)})
+    check_size(config)
     check_out(config)
     with contextlib.nullcontext() if config.cluster is None else connected(config.cluster):
         make_folder(config.out)
@@ -100,6 +110,21 @@ def check_labels(info: ShardInfo, config: CollectConfig) -> None:
         raise BadDataset(
             f"{name} are of simulation version {info.versions.get('simulation')}, not {SIMULATION_VERSION}: "
             "collect them again"
+        )
+
+
+def check_size(config: CollectConfig) -> None:
+    """Refuse a dataset of more files than a folder can hold.
+
+    Raises:
+        UsageError: It has more than `MOST_SHARDS` shards.
+    """
+    shards = len(config.parts) * -(-config.attempts_per_part // config.shard_size)
+    if shards > MOST_SHARDS:
+        raise UsageError(
+            f"{len(config.parts)} parts with {config.attempts_per_part} attempts each in files of "
+            f"{config.shard_size} are {shards:,} files, at most {MOST_SHARDS:,} are written; raise "
+            "shard_size, or lower attempts_per_part"
         )
 
 
@@ -304,7 +329,8 @@ def _simulate(config: CollectConfig, tasks: list[ShardTask], parts: list[Part], 
                     total[outcome] += 1
                     by_shard.setdefault(task, Counter())[outcome] += 1
                     rate = total[1] / max(total[0] + total[1], 1)
-                    bar.set_postfix_str(f"success {rate:.1%}", refresh=False)
+                    of = " of this run" if done else ""
+                    bar.set_postfix_str(f"success{of} {rate:.1%}", refresh=False)
                     bar.update(1)
                 case JobLost(job=task, reason=reason, n_results=undone):
                     total.subtract(by_shard.pop(task, Counter()))

@@ -39,7 +39,7 @@ class EvaluateConfig(Config):
     starter, catalogue. By default validation, for displacement train and validation."""
     n_parts: int = Field(default=0, ge=0)
     """Greatest number of parts, evenly chosen, an equal share of every set; 0: all."""
-    trials: int = Field(default=5, ge=1)
+    trials: int = Field(default=5, ge=1, le=100_000)
     """Trials per part."""
     compare: tuple[str, ...] = ()
     """Models of the displacement experiment, label=folder each; by default the one of --models."""
@@ -49,7 +49,7 @@ class EvaluateConfig(Config):
     """Simulated cells that run in parallel; 0: one per core."""
     yes: bool = False
     """Ask no operator: the arm moves as soon as a grasp is planned, on a real cell, too."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the parts' placements and the candidates."""
     planner: PlannerConfig = PlannerConfig(policy="quality")
     """Settings of the choice of grasps."""

@@ -146,10 +146,10 @@ def _make_trials(
     n = sum(map(len, missing))
     done = sum(map(len, tasks)) - n
     bar = progress(total=n + done, done=done, unit="trial", keep=True)
-    n_lifted = 0
+    n_lifted = sum(trials[task.key].success for scene in tasks for task in scene if task.key in trials)
     n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
     with closing(run_trials(setup, missing, n_workers)) as made, bar:
-        for k, trial in enumerate(made, 1):
+        for k, trial in enumerate(made, done + 1):
             append_trial(config.out / TRIALS, trial.to_json())
             trials[trial.key] = trial
             n_lifted += trial.success

@@ -28,7 +28,7 @@ class StageConfig(Config):
 class LearningConfig(Config):
     """Settings of training; the same settings, data and device type give the same model."""
 
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     sides: Literal["name", "catalogue"] = "name"
     """Split of the parts: by a hash of their name, or as the catalogue says (validation and test are whole
     families, `new_sizes` other sizes of families that are trained on)."""

@@ -15,7 +15,7 @@ MIN_QUALITY = 0.5
 class PlannerConfig(Config):
     """Settings of the search and the selection; the defaults are the paper's."""
 
-    n_candidates: int = Field(default=3200, ge=1)
+    n_candidates: int = Field(default=3200, ge=1, le=1_000_000)
     top_fraction: float = Field(default=0.03, gt=0.0, le=1.0)
     """Share of the candidates, best quality first, among which the variance score selects."""
     policy: Literal["low_variance", "quality", "certified"] = "low_variance"
@@ -28,7 +28,7 @@ class PlannerConfig(Config):
     """Exclude grasps whose open fingers would collide with something in the depth image."""
     refinements: int = Field(default=0, ge=0, le=20)
     """Rounds of the cross-entropy method: grasps are drawn near the best ones and scored."""
-    chunk_size: int = Field(default=640, ge=1)
+    chunk_size: int = Field(default=640, ge=1, le=65_536)
     """Grasps in a batch: many more do not fit a CPU's cache, few have too much overhead. (The
     paper's network, with patches seven times larger, is fastest with 32.)"""
 

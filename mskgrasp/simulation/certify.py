@@ -72,7 +72,7 @@ class CertifyConfig(Config):
     )
     """Errors of the arm, and what a cell does not know."""
     physics: Physics = Physics()
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
 
 
 @dataclass(frozen=True, kw_only=True)

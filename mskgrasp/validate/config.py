@@ -100,11 +100,11 @@ class ValidateConfig(Config):
     """Folder of the report and of the outcomes, from which a stopped run resumes."""
     parts: tuple[str, ...] = ()
     """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
-    grasps_per_part: int = Field(default=20, ge=1)
+    grasps_per_part: int = Field(default=20, ge=1, le=100_000)
     """Grasps of each part that are drawn, and tried under production's setting; no setting gets more."""
     variant_grasps_per_part: int = Field(default=8, ge=1)
     """Grasps of each part that are tried under each variant."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the starts and grasps."""
     workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
     """Processes; 0: one for each core."""
@@ -140,7 +140,9 @@ class ValidateConfig(Config):
                 "physics.friction_table_part must be above 0: closed-form checks slide on the table"
             )
         if not self.rates_hz or not self.iterations or not self.references:
-            raise ValueError("rates_hz, iterations and references need at least one value each")
+            raise ValueError(
+                "rates_hz, iterations and references need at least one value each: --rates-hz 500 1000"
+            )
         for rate in self.rates_hz:
             self.at(rate, self.iterations[0])
         finest = (max(*self.rates_hz, self.physics.rate_hz), self._most_iterations)

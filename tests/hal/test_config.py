@@ -16,7 +16,7 @@ def test_simulated_and_real_cells_have_the_same_home():
 
 @pytest.mark.parametrize(
     ("region", "message"),
-    [((0.5, 0.74, 0.3, 0.54), "reaches beyond the arm"), ((0.2, 0.8, -0.3, 0.3), "the camera sees 0.35 m")],
+    [((0.5, 0.74, 0.3, 0.54), "reaches beyond the arm"), ((0.33, 0.7, -0.1, 0.1), "the camera sees 0.35 m")],
 )
 def test_a_region_that_arm_or_camera_cannot_use_is_refused(
     region: tuple[float, float, float, float], message: str
