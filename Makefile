@@ -7,7 +7,7 @@ DOCUMENTABLE := $(VENV)/.documentable
 RUN := $(VENV)/bin/python -m
 
 .PHONY: help setup demo docs collect train plan evaluate palletize test test-all regression bench-parts bench-import bench-collect \
-	bench-train bench-plan bench-serve check format reference results clean
+	bench-train bench-plan bench-serve bench-soak check format reference results clean
 .DEFAULT_GOAL := help
 
 help: ## Explain the targets
@@ -55,7 +55,7 @@ palletize: $(READY) ## Grasp held-out parts and place them, corrected by the pre
 test: $(TESTABLE) ## Run the tests
 	$(RUN) pytest -n 2 --dist loadfile --no-loadscope-reorder --durations 15
 
-test-all: $(TESTABLE) ## Run the slow tests, too: every family, the faults of both drivers, 20 kills
+test-all: $(TESTABLE) ## Run the slow tests, too: every family, the faults of both drivers, 50 kills
 	MSKGRASP_FAMILIES=99 MSKGRASP_KILLS=10 $(RUN) pytest -n 2 --dist loadfile --no-loadscope-reorder \
 		--durations 15 -m "slow or not slow"
 
@@ -82,6 +82,9 @@ bench-plan: $(TESTABLE) ## Measure milliseconds of a plan, our networks and the 
 
 bench-serve: $(TESTABLE) ## Measure requests/s of the server, and what malformed requests do
 	$(RUN) tests.benchmarks.serve_load $(ARGS)
+
+bench-soak: $(READY) ## Plan and grasp for two hours in simulation, measure the growth of memory (ARGS="--minutes 10")
+	$(RUN) tests.benchmarks.soak $(ARGS)
 
 check: $(TESTABLE) ## Check style, types and the layers of imports
 	$(RUN) ruff format --check .

@@ -94,6 +94,8 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
         certify_missing(names, config.models, config.workers)
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
         make_folder(config.out / "placements")
+        for leftover in (config.out / "placements").glob("*.tmp"):
+            leftover.unlink()
         placements = _place_all(config, pallets, asks)
         return write_report(config, config.out, placements, slots)
 

@@ -68,8 +68,7 @@ def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | Non
         BadDataset: The file is missing, damaged, or of another schema.
     """
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
+        arrays = _read_arrays(path)
         if int(arrays["schema_version"]) != SCHEMA_VERSION:
             raise BadDataset(
                 f"{path} has schema version {int(arrays['schema_version'])}, legal: {SCHEMA_VERSION}"
@@ -90,6 +89,17 @@ def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | Non
         zlib.error,
     ) as error:
         raise BadDataset(f"{path} is damaged ({' '.join(str(error).split())}); copy it again") from error
+
+
+def _read_arrays(path: Path) -> dict[str, np.ndarray]:
+    content = path.read_bytes()
+    if not content.startswith(b"PK"):  # numpy would advise to read it as a pickle
+        raise ValueError("it is no archive of arrays")
+    with np.load(io.BytesIO(content), allow_pickle=False) as file:
+        try:
+            return {name: file[name] for name in file.files}
+        except ValueError as error:
+            raise ValueError("an array is cut off, or holds objects in place of numbers") from error
 
 
 def _frame_arrays(name: str, frame: RgbdFrame, *, fine: bool) -> dict[str, Any]:

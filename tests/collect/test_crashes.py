@@ -1,4 +1,7 @@
-"""The collector and its workers killed at random moments of their lives, and resumed each time."""
+"""The collector and its workers killed at random moments of their lives, and resumed each time.
+
+`tests.kills` does the same with other programs; here the moments are those of writing a shard.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +26,7 @@ KILLS = int(os.environ.get("MSKGRASP_KILLS", "4"))
 # start-up, the write and the rename of a shard, the time between shards.
 FIRST = ("start", 0.3)  # no Python program has read its settings by then
 ALWAYS = (("writing", 0.0), ("writing", 0.02))
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 OTHERS = (*[("start", 3.0)] * 3, *[("worker", 4.0)] * 2, *[("written", 1.0)] * 2)
 
 
@@ -55,12 +59,13 @@ class Life:
             time.sleep(float(rng.uniform(0, span)))
             # One in four loses the collector alone: its workers are still ending when the next one starts.
             kill = os.kill if rng.random() < 0.25 else os.killpg
+            number = signal.SIGKILL if event == "writing" else signal.Signals(int(rng.choice(SIGNALS)))
             if process.poll() is None:
-                kill(process.pid, signal.SIGKILL)
+                kill(process.pid, number)
             self.half_written += bool(list(self.out.glob("shards/*.tmp")))
             self.before_settings += not (self.out / "config.yaml").exists()
             process.wait(timeout=30)
-            assert process.returncode == -signal.SIGKILL or not self.missing(), self.log.read_text()
+            assert process.returncode or not self.missing(), self.log.read_text()
             self.look()
 
     def wait_for(self, event: str, process: subprocess.Popen[bytes]) -> None:

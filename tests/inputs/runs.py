@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import io
+import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 from tests.inputs.row import Place, Row
@@ -42,6 +46,26 @@ def _other_data(at: Place) -> list[str]:
     shutil.copytree(out, at.folder / "model")
     at.shard("box_9", "box_9-0000.h5")
     return ["--config", str(at.folder / "model" / "config.yaml"), "--data", data, "--out", "model"]
+
+
+def _replayed(content: bytes) -> Callable[[Place], list[str]]:
+    """A stored trial whose file is something else."""
+
+    def arguments(at: Place) -> list[str]:
+        trial = dict(part="nut", number=0, seed=0, success=False, reason="missed", point_base=None)
+        trial |= dict(predicted_std=None, measured=None)
+        at.file("out/trials.jsonl", json.dumps(trial) + "\n")
+        at.file("out/trials/nut-000.npz", content)
+        return ["--replay", str(at.folder / "out"), "nut-000"]
+
+    return arguments
+
+
+def _objects() -> bytes:
+    """An archive with an array of Python objects, which are stored as a pickle."""
+    packed = io.BytesIO()
+    np.savez(packed, schema_version=np.array([{}], dtype=object))
+    return packed.getvalue()
 
 
 BEGUN = yaml.safe_dump({})
@@ -94,4 +118,19 @@ ROWS = [
         "line 1 is not a trial",
         1,
     ),
+    Row(
+        "evaluate",
+        "a trial's file that is no archive",
+        _replayed(b"\x80\x04pickle"),
+        "nut-000.npz is damaged .it is no archive",
+        1,
+    ),
+    Row(
+        "evaluate",
+        "a trial's file that holds a pickle",
+        _replayed(_objects()),
+        "nut-000.npz is damaged .an array .* objects",
+        1,
+    ),
+    Row("evaluate", "a trial's file cut off", _replayed(_objects()[:100]), "nut-000.npz is damaged", 1),
 ]

@@ -96,7 +96,9 @@ def test_a_run_in_progress_keeps_its_settings_when_a_second_one_is_refused(tmp_p
 
 
 def test_a_run_that_was_killed_as_it_began_begins_again(tmp_path: Path):
-    for number, left in enumerate((["inputs.json.01.tmp"], [INPUTS], [INPUTS, "config.yaml.02.tmp", ".lock"])):
+    for number, left in enumerate(
+        (["inputs.json.01.tmp"], [INPUTS], [INPUTS, "config.yaml.02.tmp", ".lock"])
+    ):
         out = tmp_path / str(number)
         out.mkdir()
         for name in left:
