@@ -31,6 +31,7 @@ LONGEST = (
     "hal_contract/test_same_code.py",
     "validate/test_run.py",
     "collect/test_crashes.py",
+    "kills/test_kills.py",
     "collect/test_cluster.py",
     "evaluate/test_run.py",
     "palletize/test_run.py",

@@ -15,10 +15,11 @@ from mskgrasp.core.files import read_bounded, write_whole
 from mskgrasp.core.yaml_text import parse_yaml
 
 MOST_BYTES = 2**20
-"""Largest configuration file; one that names every part of the catalogue has a tenth of it."""
+"""Largest configuration file; one that names all 2328 parts of a catalogue has 50 kB."""
 _MOST_PROBLEMS = 4
 """Problems of one file that a message lists."""
 _LONGEST_KEY = 100
+"""Characters of a wrong key that a message shows."""
 
 
 class Config(BaseModel):
@@ -30,14 +31,18 @@ class Config(BaseModel):
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
 
 
-def read_yaml(path: Path) -> dict[str, Any]:
+def read_yaml(path: Path, most_bytes: int = MOST_BYTES) -> dict[str, Any]:
     """Read a YAML file that holds a mapping; an empty file holds an empty mapping.
+
+    Args:
+        path: The file.
+        most_bytes: A larger one is refused.
 
     Raises:
         BadConfig: The file is missing, too large, is not YAML, or does not hold a mapping.
     """
     try:
-        text = read_bounded(path, MOST_BYTES).decode()
+        text = read_bounded(path, most_bytes).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise BadConfig(
             f"cannot read configuration {path}: {_reason(error)}; name a readable YAML file, such as those "

@@ -19,6 +19,8 @@ from mskgrasp.core.panda_kinematics import TCP_OFFSET
 from mskgrasp.parts import Part
 from mskgrasp.planning.certified import CertifiedGrasps
 
+MOST_BYTES = 2**24
+"""Largest file that is read."""
 MOST_TILT = float(np.radians(5.0))
 """Greatest angle between the approach of a grasp that counts as top-down and the vertical, radians."""
 _ROUNDING = 1e-4
@@ -101,7 +103,7 @@ def read_isaac_grasp(path: Path) -> IsaacGrasps:
     Raises:
         BadConfig: The file is missing or not of the format, or its grasps are of another hand.
     """
-    values = read_yaml(path)
+    values = read_yaml(path, MOST_BYTES)
     if values.get("format") != "isaac_grasp":
         raise BadConfig(f"{path}: format is {values.get('format')!r}, legal: 'isaac_grasp'")
     link = values.get("gripper_frame_link")

@@ -63,9 +63,9 @@ def test_kills_lose_change_and_double_nothing(name: str, tmp_path: Path):
     rng = np.random.default_rng(0)
     signals = [SIGNALS[k % len(SIGNALS)] for k in range(KILLS)]
     lives, before = 0, dict[str, object]()
+    out = tmp_path / "life-0"
     for number in [signals[k] for k in rng.permutation(KILLS)]:
         while True:
-            out = tmp_path / f"life-{lives}"
             process = run.start(out)
             time.sleep(float(rng.uniform(0.3, 1.0)) * seconds)
             killed = kill(process, number, alone=rng.random() < 0.25)
@@ -75,6 +75,7 @@ def test_kills_lose_change_and_double_nothing(name: str, tmp_path: Path):
                 before = found
                 break
             lives, before = lives + 1, {}  # it was faster: another one is begun
+            out = tmp_path / f"life-{lives}"
     run.to_the_end(out)
     for life in range(lives + 1):
         assert program.finished(tmp_path / f"life-{life}") == whole

@@ -101,7 +101,7 @@ def run_import(command: Import) -> int:
     rows: list[_Row] = []
     for path, why in selected.refused:
         rows.append(_Row(file=str(path), result="refused", remarks=(_without(why, path),)))
-        print(f"error: {why}", file=sys.stderr)
+        note(f"error: {why}")
     found: dict[Path, FileResult] = {}
     try:
         for result in _import_all(command, selected.files):
@@ -111,7 +111,7 @@ def run_import(command: Import) -> int:
         if rows:
             _print_table(rows)
     if selected.skipped:
-        print(f"skipped {_listed(selected.skipped)}: not CAD files by their suffix", file=sys.stderr)
+        note(f"skipped {_listed(selected.skipped)}: not CAD files by their suffix")
     good = sum(row.result != "refused" for row in rows)
     print(f"{good} of {len(rows)} files imported, in {store.parts_folder()}")
     coarse = coarse_note(part for row in rows for part in row.parts)
