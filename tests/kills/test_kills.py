@@ -41,7 +41,7 @@ class Run:
     def to_the_end(self, out: Path) -> float:
         """Seconds that it takes."""
         begun = time.monotonic()
-        assert self.start(out).wait(timeout=600) == 0, self.log.read_text()
+        assert self.start(out).wait(timeout=1800) == 0, self.log.read_text()
         return time.monotonic() - begun
 
 
@@ -49,7 +49,7 @@ def kill(process: subprocess.Popen[bytes], number: signal.Signals, alone: bool) 
     """Kill a program, alone or with its processes as a terminal does; False: it had ended before."""
     if process.poll() is None:
         (os.kill if alone else os.killpg)(process.pid, number)
-    return process.wait(timeout=300) != 0
+    return process.wait(timeout=900) != 0
 
 
 @pytest.mark.slow
