@@ -70,7 +70,10 @@ def main() -> int:
     options = parser.parse_args()
     parts = options.parts or list(starter_names())
     hours, memory, lifted = soak(parts, 60 * options.minutes, options.candidates, options.seed)
-    found = growth(hours, memory)
+    try:
+        found = growth(hours, memory)
+    except ValueError as error:
+        parser.error(str(error))
     header = (
         "minutes",
         "trials",
