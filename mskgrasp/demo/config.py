@@ -21,5 +21,5 @@ class DemoConfig(Config):
     out: Path = Path("out/demo")
     """Folder for plan.png and grasp.gif."""
     # The bracket turns and shifts visibly, by 2 mm less than expected: of seeds 0 to 12 a middling error.
-    seed: int = Field(default=7, ge=0)
+    seed: int = Field(default=7, ge=0, lt=2**63)
     """Determines the candidates, and the place of the part."""

@@ -29,7 +29,7 @@ class ViewConfig(Config):
     """Folder with model.safetensors and model.json; by default the shipped one."""
     planner: PlannerConfig = PlannerConfig()
     """Settings of the choice of the grasp; min_quality is 0.5 if not set, where plans may be executed."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the place of the part and the candidates."""
     host: str = "127.0.0.1"
     """Address to listen on; any but one of this machine alone needs --allow-remote."""

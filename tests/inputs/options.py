@@ -201,4 +201,7 @@ ROWS = [
     Row("dataset", "an export without a file", _words("export", "data", "--format", "npz"), "missing: --out"),
     Row("parts", "no such command", _words("improt", "a.stl"), "unknown command 'improt'"),
     Row("parts", "no such part", _words("build", "hex_nut_m31"), "no built-in part is called 'hex_nut_m31'"),
+    Row("demo", "a seed below zero", _words("--seed", "-1"), "--seed: "),
+    Row("demo", "an unknown option", _words("--prat", "a.stl"), "unknown option --prat; similar: --part"),
+    Row("view", "a port that is none", _words("--port", "70000"), "--port: .*less than or equal to 65535"),
 ]

@@ -14,9 +14,9 @@ import numpy as np
 import torch
 from safetensors.torch import load_file, save_file
 
-from mskgrasp.__main__ import PROGRAMS
 from mskgrasp.dataset import shard_path, write_shard
 from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, save_model
+from mskgrasp.runtime.programs import PROGRAMS
 from tests import synthetic
 from tests.learning.small import small_models
 
@@ -86,7 +86,7 @@ class Row:
     """A malformed input.
 
     Attributes:
-        program: As in `mskgrasp.__main__.PROGRAMS`.
+        program: As in `mskgrasp.runtime.programs.PROGRAMS`.
         name: What is wrong, in a few words.
         arguments: Makes the input and returns the command line.
         says: What the line on standard error contains, a regular expression.
@@ -103,4 +103,4 @@ class Row:
 
     def main(self) -> Callable[[], int | None]:
         """The program."""
-        return importlib.import_module(f"{PROGRAMS[self.program][0]}.__main__").main
+        return importlib.import_module(f"{PROGRAMS[self.program].module}.__main__").main

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mskgrasp.__main__ import PROGRAMS
 from mskgrasp.core.errors import MOST_CHARACTERS
+from mskgrasp.runtime.programs import PROGRAMS
 from tests.inputs import cad_files, configurations, datasets, models, options, runs
 from tests.inputs.row import Place, Row
 from tests.programs import run_here
