@@ -107,7 +107,8 @@ def _explain(
     model: type[BaseModel], error: ValidationError, name: Callable[[tuple[int | str, ...]], str]
 ) -> str:
     problems = []
-    found = error.errors()
+    # Unknown keys first: a misspelt key is why another is missing.
+    found = sorted(error.errors(), key=lambda detail: detail["type"] != "extra_forbidden")
     for detail in found[:_MOST_PROBLEMS]:
         key = name(detail["loc"]) + ": " if detail["loc"] else ""
         if detail["type"] == "extra_forbidden":

@@ -21,7 +21,7 @@ Colour = tuple[int, int, int]
 
 
 def rgb(colour: str) -> Colour:
-    """Red, green and blue, 0 to 255, of a colour such as ``#1f6feb``."""
+    """Red, green and blue, 0 to 255, of a colour of `mskgrasp.core.palette`."""
     red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return red, green, blue
 

@@ -173,6 +173,7 @@ def short_folder() -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_a_node_makes_the_same_bytes_as_one_machine(collected, two_nodes, tmp_path):
     out = tmp_path / "data"
     driver = subprocess.Popen(

@@ -95,6 +95,7 @@ def started(out: Path, *options: str) -> subprocess.Popen[str]:
     return process
 
 
+@pytest.mark.slow
 def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(collected, tmp_path):
     out = tmp_path / "data"
     process = started(out, "--workers", "1")
@@ -212,6 +213,7 @@ def test_two_collections_do_not_write_into_one_folder(collected, tmp_path):
         assert alone
 
 
+@pytest.mark.slow
 def test_parts_that_the_first_shard_shows_outside_the_filter_get_no_further_shards(collected, tmp_path):
     export_labels(collected, tmp_path / "all.labels")
     rates = {part: read_success(shard_path(collected, part, 0))[0].mean() for part in PARTS}

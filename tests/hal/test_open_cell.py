@@ -21,7 +21,7 @@ from mskgrasp.core.errors import BadConfig
         ("type: sapien\nphysics: {gravity: 1}", "unknown key 'physics.gravity'"),
         ("type: sapien\nregion: [0.62, 0.38, -0.12, 0.12]", "region must be x_min < x_max"),
         ("type: sapien\nregion: [0.7, 0.9, -0.1, 0.1]", "reaches beyond the arm"),
-        ("type: sapien\nregion: [0.3, 0.7, -0.2, 0.2]", "the camera sees 0.35 m"),
+        ("type: sapien\nregion: [0.4, 0.6, -0.2, 0.2]", "the camera sees 0.35 m"),
         ("type: !!python/object/apply:os.system ['true']", "not valid YAML"),
     ],
 )

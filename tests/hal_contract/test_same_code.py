@@ -64,6 +64,7 @@ def pick_and_place(cell: Cell, planner: Planner) -> np.ndarray:
     return plan.grasp.as_vector()
 
 
+@pytest.mark.slow
 def test_the_same_program_sends_the_same_commands_to_both_arms(tmp_path: Path, monkeypatch):
     torch.manual_seed(0)
     models = load_models(PRETRAINED)

@@ -46,6 +46,7 @@ def config(out: Path, **changes: object) -> PalletizeConfig:
     return PalletizeConfig(**(values | changes))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_run_whose_cell_was_lost_is_resumed_and_reported(tmp_path, monkeypatch, capsys):
     out = tmp_path / "run"
     grasped: list[Grasp] = []

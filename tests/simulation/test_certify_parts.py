@@ -21,6 +21,7 @@ def box(tmp_path, monkeypatch):
     return make_box(tmp_path, "box", (0.07, 0.03, 0.02), 0.1)
 
 
+@pytest.mark.slow
 def test_a_stopped_certification_goes_on_and_gives_the_bytes_of_two_workers(box, monkeypatch):
     folder = str(box.folder)
     written = []

@@ -61,6 +61,7 @@ def test_speed_width_and_force_of_a_hand_are_written_into_its_cells_file(
     assert "readings 31, 33.5, 32 N" in done.stdout and "physics: {finger_force: 32.0" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_file_stays_as_it_is_where_nothing_is_held_or_the_operator_stops(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -78,6 +78,7 @@ def test_a_real_cells_file_gets_the_table_that_its_robot_feels(tmp_path: Path, d
     assert json.loads((tmp_path / "out" / "table.json").read_text())["stated_table_z"] is None
 
 
+@pytest.mark.slow
 def test_a_driver_that_dies_in_the_middle_of_a_touch_leaves_nothing_half_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
