@@ -41,8 +41,8 @@ class PalletizeConfig(Config):
     default the cell's tracker measures, and without a tracker placements stay unmeasured."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the parts' placements and the candidates."""
-    workers: int = Field(default=1, ge=1, le=256)
-    """Processes, each with its own simulated cell; the results do not depend on their number."""
+    workers: int = Field(default=0, ge=0)
+    """Simulated cells that run in parallel; 0: one per core. The results do not depend on their number."""
     yes: bool = False
     """Ask no operator: the arm moves as soon as a grasp is planned."""
     planner: PlannerConfig = PlannerConfig()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -165,7 +166,8 @@ def _place_all(config: PalletizeConfig, pallets: list[list[PlacementTask]], asks
     left = sum(key not in found for key in keys)
     if missing:
         work = Work(placement_bench, config, name=lambda one: one.title, rest=TaskGroup.after)
-        placed = results(work, missing, config.workers)
+        workers = (config.workers or os.cpu_count() or 1) if cell_from_yaml(config.cell).simulated else 1
+        placed = results(work, missing, min(workers, len(missing)))
         bar = progress(total=len(keys), done=len(keys) - left, unit="placement", keep=True, hidden=asks)
         with contextlib.closing(placed), bar:
             for placement in placed:

@@ -30,7 +30,7 @@ def test_tape_measures_only_where_its_sizes_are_given():
 
 
 @pytest.mark.parametrize(
-    "values", [dict(workers=0), dict(trials=0), dict(corrections=("best",)), dict(seed=-1)]
+    "values", [dict(workers=-1), dict(trials=0), dict(corrections=("best",)), dict(seed=-1)]
 )
 def test_what_cannot_be_run_is_refused(values):
     with pytest.raises(ValueError):
