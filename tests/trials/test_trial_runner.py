@@ -40,6 +40,7 @@ def hold_a_worker_at_its_first_trial(held: list[Process]) -> None:
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 def test_a_trial_whose_process_dies_is_repeated(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
     planner = PlannerConfig(policy="quality", n_candidates=20)
     (tmp_path / "trials").mkdir()

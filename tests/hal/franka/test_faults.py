@@ -242,6 +242,7 @@ def test_a_program_that_is_ended_in_mid_motion_leaves_an_arm_at_rest(
         arm.move_gripper(0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("op", ["state", "stop"])
 def test_a_driver_that_hangs_ends_after_its_program(
     driver: DriverName, robot: FakeRobot, tmp_path: Path, op: str
