@@ -34,7 +34,8 @@ from mskgrasp.planning.planner import GraspPlan, Planner
 from mskgrasp.runtime.progress import note
 
 AMBIGUOUS_FROM = 1.5e-3
-"""Poses whose surfaces lie farther apart may need different grasps, metres."""
+"""Expected distance (RMS) of the part's surface from where the best pose has it, metres: beyond it the
+networks, which err by some millimetres, are the better choice."""
 
 
 class CertifiedPlanner:
@@ -94,11 +95,12 @@ class CertifiedPlanner:
         return replace(plan, seconds=seconds)
 
     def _ambiguous(self, found: PartPose) -> bool:
-        """Whether the image fits poses that may need different grasps."""
-        return any(
-            self._surface.apart(found.T_base_obj, other.T_base_obj) > AMBIGUOUS_FROM
+        """Whether the image fits poses that may need different grasps, and that are likely enough."""
+        squared = sum(
+            other.share * self._surface.apart(found.T_base_obj, other.T_base_obj) ** 2
             for other in found.alternatives
         )
+        return squared > AMBIGUOUS_FROM**2
 
     def _tell(self, found: PartPose) -> None:
         """Say why the networks plan, unless that is what was asked for."""
