@@ -1,4 +1,4 @@
-"""Where a part is expected to be in the hand once the fingers have closed, and how far it may be off."""
+"""Poses in which a part is expected in the hand once the fingers have closed, and their spread."""
 
 from __future__ import annotations
 
