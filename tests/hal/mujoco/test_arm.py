@@ -12,9 +12,10 @@ from hal.arm import JOINT_TOLERANCE
 from hal.errors import MotionAborted
 from hal.mujoco import MujocoCellConfig, mujoco_cell
 from hal.mujoco.world import MujocoWorld
-from hal.simulated import JOINT_ACCELERATION, JOINT_SPEED, PEAK_ACCELERATION, WATCH_S, SimulatedArm
+from hal.simulated import JOINT_ACCELERATION, JOINT_SPEED, PEAK_ACCELERATION
 from mskgrasp.core.grasp import pose_base_tcp
 from mskgrasp.core.panda_kinematics import forward_pose
+from tests.hal.watching import check_watching
 
 
 @pytest.fixture(scope="module")
@@ -94,19 +95,4 @@ def test_after_contact_the_arm_rests_where_it_met_something(cell: Cell, paths: l
 
 
 def test_who_watches_a_motion_sees_the_arm_on_its_way_and_nothing_afterwards(cell: Cell):
-    arm = cell.arm
-    assert isinstance(arm, SimulatedArm)
-    arm.recover()
-    arm.move_to_joints(cell.workspace.home)
-    seen: list[float] = []
-    arm.watch(lambda: seen.append(arm.state().joints[0] - cell.workspace.home[0]))
-    try:
-        arm.move_to_joints(cell.workspace.home + np.array([0.3, 0, 0, 0, 0, 0, 0]), speed=0.3)
-    finally:
-        arm.watch(None)
-    n = len(seen)
-    on_the_way = [angle for angle in seen if 0.03 < angle < 0.27]
-    assert len(on_the_way) >= 10 and np.diff(on_the_way).min() > 0
-    assert max(np.diff(on_the_way)) < 0.3 * JOINT_SPEED * 2 * WATCH_S
-    arm.move_to_joints(cell.workspace.home)
-    assert len(seen) == n
+    check_watching(cell)

@@ -10,9 +10,9 @@ import pytest
 import hal.sim.arm
 from hal import Cell, execute_grasp, go_home
 from hal.sim import SapienCellConfig, sapien_cell
-from hal.simulated import JOINT_SPEED, WATCH_S, SimulatedArm
 from mskgrasp.core.geometry import pose_distance
 from mskgrasp.core.grasp import Grasp
+from tests.hal.watching import check_watching
 
 
 @pytest.fixture(scope="module")
@@ -59,19 +59,4 @@ def test_a_second_grasp_presses_harder_and_does_not_drop_the_part(cell: Cell):
 
 
 def test_who_watches_a_motion_sees_the_arm_on_its_way_and_nothing_afterwards(cell: Cell):
-    arm = cell.arm
-    assert isinstance(arm, SimulatedArm)
-    arm.recover()
-    arm.move_to_joints(cell.workspace.home)
-    seen: list[float] = []
-    arm.watch(lambda: seen.append(arm.state().joints[0] - cell.workspace.home[0]))
-    try:
-        arm.move_to_joints(cell.workspace.home + np.array([0.3, 0, 0, 0, 0, 0, 0]), speed=0.3)
-    finally:
-        arm.watch(None)
-    n = len(seen)
-    on_the_way = [angle for angle in seen if 0.03 < angle < 0.27]
-    assert len(on_the_way) >= 10 and np.diff(on_the_way).min() > 0
-    assert max(np.diff(on_the_way)) < 0.3 * JOINT_SPEED * 2 * WATCH_S
-    arm.move_to_joints(cell.workspace.home)
-    assert len(seen) == n
+    check_watching(cell)
