@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import sapien
 from sapien import physx
+from scipy.linalg import block_diag
+from scipy.spatial.transform import Rotation
 
 from mskgrasp.core.settings import Physics
-from tasks.scene.table_friction import TableFriction, _jacobian
+from tasks.scene.table_friction import ROUNDS, STILL, TableFriction, _friction
 from tests.benchmarks import pushing, spinning
 from tests.benchmarks.quasi_static import corners
 
@@ -114,8 +116,23 @@ def test_a_body_in_the_air_gets_no_friction():
     assert bar.body.linear_velocity[0] == pytest.approx(0.3, rel=1e-3)
 
 
-def test_the_jacobian_gives_the_velocity_of_points():
+def test_friction_is_the_least_squares_of_its_energy():
     rng = np.random.default_rng(0)
-    arms, linear, angular = rng.normal(size=(5, 3)), rng.normal(size=3), rng.normal(size=3)
-    slip = (_jacobian(arms) @ np.concatenate([linear, angular])).reshape(5, 2)
-    assert slip == pytest.approx((linear + np.cross(angular, arms))[:, :2])
+    axes = Rotation.random(rng=rng).as_matrix()
+    mass, moments, centre = 0.3, np.array([1e-4, 3e-4, 2e-4]), rng.normal(size=3)
+    points, most = centre + 0.03 * rng.normal(size=(5, 3)), rng.uniform(1e-6, 3e-4, 5)
+    now, free = 0.1 * rng.normal(size=(2, 6))
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = axes, centre
+    change, impulse = _friction(pose, mass, moments, now, free, points, most)
+    # The slip of a point at each unit velocity is a column of its Jacobian.
+    slips = [np.tile(unit[:3], (5, 1)) + np.cross(unit[3:], points - centre) for unit in np.eye(6)]
+    jacobian = np.stack(slips, axis=-1)[:, :2]
+    inertia = block_diag(mass * np.eye(3), axes @ np.diag(moments) @ axes.T)
+    velocity = now
+    for _ in range(ROUNDS):
+        drag = most / np.sqrt(np.sum((jacobian @ velocity) ** 2, axis=1) + STILL**2)
+        resistance = np.einsum("k,kia,kib->ab", drag, jacobian, jacobian)
+        velocity = np.linalg.solve(inertia + resistance, inertia @ free)
+    assert change == pytest.approx(velocity - free, abs=1e-12)
+    assert impulse == pytest.approx(inertia @ (velocity - free), abs=1e-12)
