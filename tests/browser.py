@@ -79,6 +79,7 @@ class Page:
         os.close(writes)
         self._says, self._reads = says, reads
         self._session: str | None = None
+        self._frame = ""
         try:
             targets = self._ask("Target.getTargets")["targetInfos"]
             page = next(target for target in targets if target["type"] == "page")
@@ -136,9 +137,22 @@ class Page:
         self._ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def screenshot(self, path: Path) -> None:
-        """The whole page as PNG; one drawn in 3-D may never send the frame that this waits for."""
-        taken = self._ask("Page.captureScreenshot", format="png", captureBeyondViewport=True)
-        path.write_bytes(base64.b64decode(taken["data"]))
+        """The page as PNG: all of it, or the window of one that is drawn in 3-D."""
+        if self._webgl:
+            taken = self._cast()
+        else:
+            taken = self._ask("Page.captureScreenshot", format="png", captureBeyondViewport=True)["data"]
+        path.write_bytes(base64.b64decode(taken))
+
+    def _cast(self) -> str:
+        """The frame that is drawn next: captureScreenshot waits without end for one drawn in 3-D."""
+        self._frame = ""
+        self._ask("Page.startScreencast", format="png")
+        deadline = time.monotonic() + _PATIENCE_S
+        while not self._frame:
+            self._take(deadline)
+        self._ask("Page.stopScreencast")
+        return self._frame
 
     def pdf(self, path: Path) -> None:
         """The page on paper."""
@@ -189,6 +203,8 @@ class Page:
 
     def _note(self, method: str, values: dict[str, Any]) -> None:
         match method:
+            case "Page.screencastFrame":
+                self._frame = values["data"]
             case "Log.entryAdded":
                 self._complain(values["entry"]["text"], error=values["entry"]["level"] == "error")
             case "Runtime.consoleAPICalled":

@@ -19,11 +19,11 @@ from mskgrasp.view.page import Page, Panel
 from mskgrasp.view.replay import AttemptSimulator, Replay
 from mskgrasp.view.scene import (
     HandNode,
-    add_candidates,
+    add_closing_lines,
     add_cloud,
     add_part,
     add_region,
-    near_region,
+    drawn_points,
     part_mesh,
     rgb,
 )
@@ -159,8 +159,8 @@ class DatasetPanel(Panel):
                 T_base_camera=info.T_base_camera, timestamp_s=0.0, serial=info.part,
             )  # fmt: skip
             points = seen_points(frame)
-            near = near_region(points, info.region)
-            add_cloud(scene, f"{name}/cloud", points[near], (120, 130, 145), pixel_pitch(frame))
+            drawn = drawn_points(points, info.region, info.table_z)
+            add_cloud(scene, f"{name}/cloud", points[drawn], (120, 130, 145), pixel_pitch(frame))
         if self.hand.value:
             HandNode(scene, f"{name}/hand", opacity=0.6).place(pose_base_tcp(grasp))
         if self.mesh is not None and self.before.value:
@@ -184,7 +184,7 @@ class DatasetPanel(Panel):
         w, z = there.quat_wxyz[:, 0], there.quat_wxyz[:, 3]
         colours = np.where(columns["success"][same, None], rgb(GREEN), rgb(RED)).astype(np.uint8)
         grasps = Grasp(position=there.position, theta=2 * np.arctan2(z, w))
-        add_candidates(self.page.scene, f"{self._name}/others", grasps, colours)
+        add_closing_lines(self.page.scene, f"{self._name}/others", grasps, colours)
 
 
 def attempt_text(columns: dict[str, np.ndarray], number: int, n_chosen: int, n_all: int) -> str:

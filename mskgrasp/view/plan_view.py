@@ -23,8 +23,7 @@ from mskgrasp.view.scene import (
     add_part,
     add_region,
     add_shift,
-    colours_of,
-    near_region,
+    drawn_points,
     rgb,
 )
 
@@ -104,18 +103,17 @@ class PlanView:
 
     def _draw_cloud(self, shown: Shown) -> None:
         points = seen_points(shown.frame)
-        near = near_region(points, shown.region)
-        colours = shown.frame.colour.reshape(-1, 3)[near]
+        drawn = drawn_points(points, shown.region, shown.table_z)
+        colours = shown.frame.colour.reshape(-1, 3)[drawn]
         pitch = pixel_pitch(shown.frame)
-        add_cloud(self._page.scene, f"{self._name}/cloud", points[near], colours, pitch)
+        add_cloud(self._page.scene, f"{self._name}/cloud", points[drawn], colours, pitch)
 
     def _draw_plan(self, shown: Shown, plan: GraspPlan) -> None:
         scene, name = self._page.scene, self._name
         if self.candidates.value:
             good = ~(plan.qualities < self.least.value)  # a planner that predicts none shows all
             if good.any():
-                colours = colours_of(plan.qualities[good])
-                add_candidates(scene, f"{name}/candidates", plan.candidates[good], colours)
+                add_candidates(scene, f"{name}/candidates", plan.candidates[good], plan.qualities[good])
         if self.chosen.value:
             HandNode(scene, f"{name}/chosen", opacity=0.6).place(plan.grasp.T_base_tcp)
         if self.expected.value:

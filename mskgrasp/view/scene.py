@@ -32,8 +32,14 @@ HAND = rgb(BLUE)
 """The hand."""
 CLOSING = 0.012
 """Length of the drawn line along which a candidate closes, metres: the whole opening would hide the part."""
+LINES = 100
+"""Candidates that are drawn as lines: thousands of lines take a browser without a GPU 70 ms."""
+TABLE_POINTS = 4000
+"""Greatest number of points of the table that are drawn."""
 AROUND = 0.06
 """Distance from the region up to which a depth image is drawn, metres."""
+TABLE_MARGIN = 0.003
+"""Points up to this height above the table are drawn as its own, metres."""
 _TCP_FRAME = 7
 
 
@@ -96,6 +102,16 @@ def add_cloud(
     )  # fmt: skip
 
 
+def drawn_points(points: np.ndarray, region: Region, table_z: float) -> np.ndarray:
+    """Which points (n, 3), base frame, to draw: near the region, all above the table, some of the table."""
+    near = near_region(points, region)
+    flat = np.flatnonzero(near & (points[:, 2] < table_z + TABLE_MARGIN))
+    if len(flat) > TABLE_POINTS:
+        left_out = np.random.default_rng(0).choice(flat, len(flat) - TABLE_POINTS, replace=False)
+        near[left_out] = False
+    return near
+
+
 def near_region(points: np.ndarray, region: Region) -> np.ndarray:
     """Whether points (n, 3), base frame, lie within `AROUND` of a region; False where not finite."""
     x_min, x_max, y_min, y_max = region
@@ -120,8 +136,18 @@ def closing_lines(grasps: Grasp, length: float = CLOSING) -> np.ndarray:
     return np.stack([pose_base_grasp(vectors).apply(end) for end in ends], axis=1)
 
 
-def add_candidates(scene: SceneApi, name: str, grasps: Grasp, colours: np.ndarray) -> None:
-    """Add n grasps as one node of short lines, with colours (n, 3): thousands are drawn at once."""
+def add_candidates(scene: SceneApi, name: str, grasps: Grasp, qualities: np.ndarray) -> None:
+    """Add n grasps as points coloured by their qualities (n,), and the `LINES` best as lines, too."""
+    scene.add_frame(name, show_axes=False)
+    colours = colours_of(qualities)
+    add_cloud(scene, f"{name}/points", grasps.position, colours, CLOSING / 6)
+    # Of a planner that predicts none, which leaves NaN, any.
+    best = np.argsort(-np.nan_to_num(qualities), kind="stable")[:LINES]
+    add_closing_lines(scene, f"{name}/lines", grasps[best], colours[best])
+
+
+def add_closing_lines(scene: SceneApi, name: str, grasps: Grasp, colours: np.ndarray) -> None:
+    """Add n grasps as one node of short lines, with colours (n, 3)."""
     lines = closing_lines(grasps)
     pairs = np.repeat(colours[:, None], 2, axis=1)
     scene.add_line_segments(name, lines, pairs, thickness=2.0, thickness_units="screen")

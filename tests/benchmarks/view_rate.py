@@ -17,14 +17,17 @@ from pathlib import Path
 import numpy as np
 
 from mskgrasp.core.grasp import Grasp
+from mskgrasp.core.settings import REGION
 from mskgrasp.view.page import Page
 from mskgrasp.view.page_server import PageServer
-from mskgrasp.view.scene import add_candidates, add_cloud, colours_of
+from mskgrasp.view.scene import add_candidates, add_cloud, drawn_points
 from tests import browser
 
 WIDTH, HEIGHT = 900, 600
 PIXELS = 160
 """Of the simulated camera's depth image, along a side."""
+PART = 0.06
+"""Length and width of the part, metres."""
 COUNT = "window.frames_drawn = 0; (function next() { window.frames_drawn++; requestAnimationFrame(next); })()"
 
 
@@ -48,13 +51,14 @@ def measure(n_candidates: int, seconds: float) -> tuple[float, float]:
     rng = np.random.default_rng(0)
     vectors = rng.normal([0.5, 0.0, 0.02, 0.0], [0.02, 0.02, 0.005, 0.8], (n_candidates, 4))
     points = rng.uniform([0.33, -0.17, 0.0], [0.67, 0.17, 0.0], (PIXELS**2, 3))
+    part = (np.abs(points[:, :2] - [0.5, 0.0]) < PART / 2).all(axis=1)
+    points[part, 2] = PART / 2
     server = PageServer("127.0.0.1", 0, "benchmark")
     try:
         page = Page(server)
-        add_candidates(
-            page.scene, "/c", Grasp.from_vector(vectors), colours_of(rng.uniform(size=n_candidates))
-        )
-        add_cloud(page.scene, "/p", points, (120, 120, 120), 0.0022)
+        add_candidates(page.scene, "/c", Grasp.from_vector(vectors), rng.uniform(size=n_candidates))
+        drawn = drawn_points(points, REGION, 0.0)
+        add_cloud(page.scene, "/p", points[drawn], (120, 120, 120), 0.0022)
         url = f"http://127.0.0.1:{server.get_port()}/"
         with browser.Page(url, width=WIDTH, height=HEIGHT, webgl=True) as shown:
             shown.wait_for("!!document.querySelector('canvas')")
@@ -80,7 +84,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=8.0)
     options = parser.parse_args()
     rate, used = measure(options.candidates, options.seconds)
-    scene = f"{options.candidates} candidates, {PIXELS**2} points, {WIDTH} x {HEIGHT} pixels, no GPU"
+    scene = f"{options.candidates} candidates, {PIXELS} x {PIXELS} depth, {WIDTH} x {HEIGHT} pixels, no GPU"
     load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
     print(f"{scene}: {rate:.1f} frames/s, {1e3 * used:.0f} ms of processor time a frame ({load})")
 

@@ -30,11 +30,11 @@ def view(page: Page) -> PlanView:
 
 def test_candidates_under_the_least_quality_are_not_drawn(page: Page, view: PlanView):
     view.show(SHOWN)
-    assert len(node(page, "/p/plan/candidates").points) == len(PLAN.candidates)
+    assert len(node(page, "/p/plan/candidates/points").points) == len(PLAN.candidates)
     least = float(np.median(PLAN.qualities))
     view.least.value = least
     work(page)
-    assert len(node(page, "/p/plan/candidates").points) == (PLAN.qualities >= least).sum()
+    assert len(node(page, "/p/plan/candidates/points").points) == (PLAN.qualities >= least).sum()
     view.candidates.value = False
     work(page)
     assert not has_node(page, "/p/plan/candidates") and has_node(page, "/p/plan/chosen")

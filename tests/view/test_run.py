@@ -7,6 +7,7 @@ import signal
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -42,7 +43,7 @@ def stored_run(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_every_panel_opens_in_a_browser_without_an_error(collected: Path, stored_run: Path):
+def test_every_panel_opens_in_a_browser_without_an_error(tmp_path: Path, collected: Path, stored_run: Path):
     options = ["--part", PARTS[1], "--data", str(collected), "--run", str(stored_run)]
     options += ["--cell", str(SIMULATED_CELL), "--planner.n-candidates", "300"]
     with running("mskgrasp.view", "--port", "0", *options) as program:
@@ -54,11 +55,16 @@ def test_every_panel_opens_in_a_browser_without_an_error(collected: Path, stored
             for name, text in PANELS.items():
                 page.press(name)
                 page.wait_for(f"document.body.innerText.includes({text!r})", 240)
+                if name == "cell":
+                    page.screenshot(tmp_path / "page.png")
             assert (
                 page.evaluate("document.querySelector('canvas').getContext('webgl2').isContextLost()")
                 is False
             )
             assert page.errors == []
+        # A page on which nothing is drawn in 3-D has some twenty colours of text and buttons.
+        picture = cv2.imread(str(tmp_path / "page.png"))
+        assert picture is not None and len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
         program.send_signal(signal.SIGINT)
         _, complaints = program.communicate(timeout=60)
         assert program.returncode == 130 and "stopped by Ctrl-C" in complaints, complaints

@@ -41,7 +41,7 @@ def test_each_trial_is_drawn_with_what_is_stored_of_it(page: Page, tmp_path: Pat
     panel = RunPanel(page, tmp_path, trials(tmp_path))
     panel.shown()
     np.testing.assert_array_equal(pose_of(page, "/run/trial/before").position, POSE.position)
-    assert len(node(page, "/run/plan/candidates").points) == len(PLAN.candidates)
+    assert len(node(page, "/run/plan/candidates/points").points) == len(PLAN.candidates)
     off = pose_of(page, "/run/plan/measured").position - POSE.position
     assert abs(np.linalg.norm(off) - 0.001) < 1e-9
     panel.choice.value = "two"

@@ -16,6 +16,8 @@ from mskgrasp.view.page import Page
 from mskgrasp.view.scene import (
     AROUND,
     CLOSING,
+    LINES,
+    TABLE_POINTS,
     ArmNode,
     HandNode,
     add_candidates,
@@ -23,6 +25,7 @@ from mskgrasp.view.scene import (
     add_shift,
     closing_lines,
     colours_of,
+    drawn_points,
     near_region,
     rgb,
 )
@@ -46,12 +49,24 @@ def test_a_candidate_is_a_line_through_its_grasp_along_which_the_fingers_close()
     np.testing.assert_allclose(lines[1, 1] - lines[1, 0], [-half, half, 0], atol=1e-12)
 
 
-def test_thousands_of_candidates_are_one_node(page: Page):
-    before = len(page.scene._handle_from_node_name)
-    vectors = np.random.default_rng(0).uniform(-0.2, 0.2, (3200, 4))
-    add_candidates(page.scene, "/c", Grasp.from_vector(vectors), np.zeros((3200, 3), np.uint8))
-    assert len(page.scene._handle_from_node_name) == before + 1
-    assert node(page, "/c").points.shape == (3200, 2, 3)
+@pytest.mark.parametrize("known", [True, False])
+def test_all_candidates_are_points_and_the_best_have_lines(page: Page, known: bool):
+    rng = np.random.default_rng(0)
+    grasps = Grasp.from_vector(rng.uniform(-0.2, 0.2, (3200, 4)))
+    qualities = rng.uniform(size=3200) if known else np.full(3200, np.nan)
+    add_candidates(page.scene, "/c", grasps, qualities)
+    assert len(node(page, "/c/points").points) == 3200
+    middles = node(page, "/c/lines").points.mean(axis=1)
+    best = grasps[np.argsort(-qualities)[:LINES]] if known else grasps[:LINES]
+    np.testing.assert_allclose(middles, best.position, atol=1e-6)
+
+
+def test_of_the_table_some_points_are_drawn_and_of_what_lies_on_it_all():
+    x, y = np.mean(REGION[:2]), np.mean(REGION[2:])
+    table = np.tile([x, y, 0.0], (2 * TABLE_POINTS, 1))
+    part = np.tile([x, y, 0.01], (10, 1))
+    drawn = drawn_points(np.concatenate([table, part]), REGION, 0.0)
+    assert drawn[: len(table)].sum() == TABLE_POINTS and drawn[len(table) :].all()
 
 
 @pytest.mark.parametrize("width", [0.0, 0.05])
