@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.dataset.labels import read_labels
+from mskgrasp.parts.store import read_record
 from mskgrasp.runtime.local_executor import LocalExecutor
 from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult, run_jobs
 from mskgrasp.simulation.shard_task import ShardTask
@@ -40,7 +42,7 @@ def _shard_maker(config: CollectConfig) -> Iterator[Callable[[ShardTask], Iterat
 
     def make(task: ShardTask) -> Iterator[int]:
         labels = known.get((task.part, task.index))
-        if labels is None:
+        if labels is None or labels.info.part_hash != read_record(Path(task.folder))["content_hash"]:
             return simulator.write(task, config.out)
         return simulator.restore(task, labels, config.out)
 
