@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from hal.charuco import Board
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.files import write_figure
 
 _INCH = 0.0254
 _PAPERS = {"A4": (0.297, 0.210), "A3": (0.420, 0.297), "A2": (0.594, 0.420)}
@@ -64,5 +65,5 @@ def print_board(board: Board, path: Path) -> str:
         va="top",
         fontsize=7,
     )
-    figure.savefig(path, dpi=600)
+    write_figure(figure, path, dpi=600)
     return paper

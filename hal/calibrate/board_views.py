@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +16,7 @@ from hal.camera import RgbdFrame
 from hal.cell import Cell
 from hal.charuco import MIN_CORNERS, Board, detect, infrared_grey
 from hal.errors import MotionAborted, OutOfWorkspace
+from mskgrasp.core.array_files import read_arrays, write_arrays
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose, pose_distance
 
@@ -212,19 +211,16 @@ def _still_picture(cell: Cell) -> Picture:
 def write_picture(path: Path, picture: Picture) -> None:
     """Write a picture; the file appears whole or not at all."""
     infrared: dict[str, Any] = {} if picture.infrared is None else {"infrared": picture.infrared}
-    unfinished = path.with_name(path.name + ".tmp")
-    with unfinished.open("wb") as file:
-        np.savez_compressed(
-            file,
-            colour=picture.colour,
-            depth=picture.depth,
-            intrinsics=picture.intrinsics,
-            T_base_camera=picture.T_base_camera.as_vector(),
-            T_base_tcp=picture.T_base_tcp.as_vector(),
-            serial=np.frombuffer(picture.serial.encode(), dtype=np.uint8),
-            **infrared,
-        )
-    unfinished.replace(path)
+    write_arrays(
+        path,
+        colour=picture.colour,
+        depth=picture.depth,
+        intrinsics=picture.intrinsics,
+        T_base_camera=picture.T_base_camera.as_vector(),
+        T_base_tcp=picture.T_base_tcp.as_vector(),
+        serial=np.frombuffer(picture.serial.encode(), dtype=np.uint8),
+        **infrared,
+    )
 
 
 def read_picture(path: Path) -> Picture:
@@ -234,17 +230,17 @@ def read_picture(path: Path) -> Picture:
         UsageError: The file is missing, damaged, or no picture.
     """
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
-            return Picture(
-                colour=arrays["colour"],
-                depth=arrays["depth"],
-                intrinsics=arrays["intrinsics"],
-                T_base_camera=Pose.from_vector(arrays["T_base_camera"]),
-                T_base_tcp=Pose.from_vector(arrays["T_base_tcp"]),
-                serial=arrays["serial"].tobytes().decode(),
-                infrared=arrays["infrared"] if "infrared" in arrays else None,
-            )
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        arrays = read_arrays(path)
+        return Picture(
+            colour=arrays["colour"],
+            depth=arrays["depth"],
+            intrinsics=arrays["intrinsics"],
+            T_base_camera=Pose.from_vector(arrays["T_base_camera"]),
+            T_base_tcp=Pose.from_vector(arrays["T_base_tcp"]),
+            serial=arrays["serial"].tobytes().decode(),
+            infrared=arrays.get("infrared"),
+        )
+    except (OSError, ValueError, KeyError) as error:
         raise UsageError(
             f"{path} cannot be read as a picture ({type(error).__name__}); delete it, or take the "
             "pictures again"

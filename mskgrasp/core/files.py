@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import io
 import os
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LOCK = ".lock"
 
@@ -43,6 +48,17 @@ def write_whole(path: Path, content: bytes) -> None:
         os.fsync(folder)
     finally:
         os.close(folder)
+
+
+def write_figure(figure: Figure, path: Path, **options: Any) -> None:
+    """Write a figure atomically, in the format of the path's suffix, by options of matplotlib's ``savefig``.
+
+    Raises:
+        OSError: The disk is full or not writable; matplotlib's own error would not name the file.
+    """
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=path.suffix.removeprefix(".").lower() or "png", **options)
+    write_whole(path, buffer.getvalue())
 
 
 def is_leftover(path: Path) -> bool:

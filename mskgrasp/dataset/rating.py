@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.files import write_figure
 from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.core.palette import FAINT, GREEN, PALE_GREEN
 from mskgrasp.dataset import list_shards, read_success
@@ -132,5 +133,5 @@ def draw_ratings(index: Index, bounds: tuple[float, float], path: Path) -> Path:
         axes.set_yticks(range(len(shown)), [family.replace("_", " ") for family in shown], fontsize=6.5)
         axes.set(xlabel="success, %", xlim=(-3, 103), ylim=(rows - 0.5, -0.5))
         axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, dpi=130)
+    write_figure(figure, path, dpi=130)
     return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
 from hal.sim import EDGE, FilmFrame, View
+from mskgrasp.core.files import write_whole
 from mskgrasp.core.grasp import object_displacement
 from mskgrasp.core.palette import BLUE, GREEN, INK, ORANGE, PALE, SLATE
 from mskgrasp.planning.place_pose import displacement_of_point
@@ -48,7 +50,9 @@ def write_animation(frames: Sequence[FilmFrame], plan: GraspPlan, path: Path) ->
     palette = Image.fromarray(sample).quantize(_COLOURS, dither=Image.Dither.NONE)
     first, *others = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]
     times = [_FRAME_MS] * len(others) + [_LAST_MS]
-    first.save(path, save_all=True, append_images=others, duration=times, loop=0, optimize=True)
+    gif = io.BytesIO()
+    first.save(gif, format="gif", save_all=True, append_images=others, duration=times, loop=0, optimize=True)
+    write_whole(path, gif.getvalue())
     return moved[-1]
 
 

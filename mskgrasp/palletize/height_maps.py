@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
-import zlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,8 +10,8 @@ import cv2
 import numpy as np
 
 from hal.camera import RgbdFrame
+from mskgrasp.core.array_files import read_arrays, write_arrays
 from mskgrasp.core.errors import BadDataset
-from mskgrasp.core.files import write_whole
 from mskgrasp.perception.footprint import pixel_pitch, seen_points
 from mskgrasp.planning.place_pose import Target
 from mskgrasp.planning.planner import GraspPlan
@@ -69,9 +66,7 @@ def write_height_maps(maps: HeightMaps, path: Path) -> None:
     values: dict[str, Any] = {name: np.asarray(value) for name, value in asdict(maps).items()}
     for name in ("before", "after"):
         values[name] = values[name].astype(np.float32)
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **values)
-    write_whole(path, buffer.getvalue())
+    write_arrays(path, **values)
 
 
 def read_height_maps(path: Path) -> HeightMaps:
@@ -81,21 +76,12 @@ def read_height_maps(path: Path) -> HeightMaps:
         BadDataset: The file is missing or damaged.
     """
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
-            values = {name: file[name] for name in file.files}
+        values = read_arrays(path)
         numbers = {name: float(values[name]) for name in ("side", "top", "turn", "theta")}
         return HeightMaps(
             before=values["before"], after=values["after"], grasp=values["grasp"].reshape(3), **numbers
         )
-    except (
-        OSError,
-        ValueError,
-        LookupError,
-        TypeError,
-        EOFError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
+    except (OSError, ValueError, LookupError, TypeError) as error:
         raise BadDataset(f"{path} is missing or damaged; start again in another --out") from error
 
 

@@ -13,6 +13,7 @@ import cv2
 from hal import cell_from_yaml
 from hal.operator import Operator
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.files import write_whole
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
@@ -198,6 +199,7 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
             engine.home()
             if pallet.name:
                 image = worker.picture(config.all_slots())
-                cv2.imwrite(str(config.out / "placements" / f"{pallet.name}.png"), image[..., ::-1])
+                _, png = cv2.imencode(".png", image[..., ::-1])
+                write_whole(config.out / "placements" / f"{pallet.name}.png", png.tobytes())
 
         yield fill

@@ -10,6 +10,7 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
+from mskgrasp.core.files import write_figure
 from mskgrasp.core.palette import FAINT, INK
 
 STYLE: dict[Any, Any] = {
@@ -46,4 +47,4 @@ def saved_figure(path: Path, width: float, height: float) -> Iterator[Figure]:
             figsize=(width, height), layout="constrained"
         )  # no pyplot: no global state, no window
         yield figure
-        figure.savefig(path)
+        write_figure(figure, path)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hal.camera import RgbdFrame
+from mskgrasp.core.array_files import read_arrays, write_arrays
 from mskgrasp.core.errors import BadDataset
-from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp, PartView
 from mskgrasp.dataset import depth_to_u16, u16_to_depth
@@ -55,10 +52,8 @@ def write_trial(path: Path, frame: RgbdFrame, plan: GraspPlan | None, after: Rgb
             "view_table_z": view.table_z,
             "view_table_offset": view.table_offset,
         }
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, buffer.getvalue())
+    write_arrays(path, **arrays)
 
 
 def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | None]:
@@ -68,7 +63,7 @@ def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | Non
         BadDataset: The file is missing, damaged, or of another schema.
     """
     try:
-        arrays = _read_arrays(path)
+        arrays = read_arrays(path)
         if int(arrays["schema_version"]) != SCHEMA_VERSION:
             raise BadDataset(
                 f"{path} has schema version {int(arrays['schema_version'])}, legal: {SCHEMA_VERSION}"
@@ -78,28 +73,8 @@ def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | Non
         return _frame("before", arrays), plan, after
     except FileNotFoundError as error:
         raise BadDataset(f"no {path}: the trial's file was removed; run it again in another --out") from error
-    except (
-        OSError,
-        ValueError,
-        LookupError,
-        TypeError,
-        AttributeError,
-        EOFError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise BadDataset(f"{path} is damaged ({' '.join(str(error).split())}); copy it again") from error
-
-
-def _read_arrays(path: Path) -> dict[str, np.ndarray]:
-    content = path.read_bytes()
-    if not content.startswith(b"PK"):  # numpy would advise to read it as a pickle
-        raise ValueError("it is no archive of arrays")
-    with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        try:
-            return {name: file[name] for name in file.files}
-        except ValueError as error:
-            raise ValueError("an array is cut off, or holds objects in place of numbers") from error
 
 
 def _frame_arrays(name: str, frame: RgbdFrame, *, fine: bool) -> dict[str, Any]:

@@ -6,7 +6,6 @@ import hashlib
 import importlib.metadata
 import json
 import logging
-import os
 import time
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -18,7 +17,8 @@ import gymnasium
 import numpy as np
 import torch
 
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.array_files import read_arrays, write_arrays
+from mskgrasp.core.errors import BadDataset, BadPart
 from mskgrasp.core.settings import Physics
 from mskgrasp.parts import read_part
 from mskgrasp.runtime.worker_pool import Work, results
@@ -129,8 +129,7 @@ def run_settings(
     jobs = []
     for trial in (trial for own in trials.values() for trial in own):
         if trial.file.exists():
-            with np.load(trial.file) as stored:
-                report(len(stored["success"]))
+            report(len(_stored(trial.file)["success"]))
         else:
             jobs.append((trial, trial.file))
     # The finest first: the longest job must not be the last to start.
@@ -212,8 +211,8 @@ def _draw(folder: str, n: int, seed: int, file: str) -> int:
 def _try_grasps(trial: _Trial, file: Path) -> int:
     torch.set_num_threads(1)
     setting = trial.setting
-    with np.load(trial.drawn.file) as stored:
-        poses, grasps = stored["pose"].astype(np.float64), stored["grasp"]
+    stored = _stored(trial.drawn.file)
+    poses, grasps = stored["pose"].astype(np.float64), stored["grasp"]
     # The direction of the shift is the same under every setting: it is part of the start.
     angle = np.random.default_rng([len(grasps), 1]).uniform(0, 2 * np.pi, len(grasps))
     poses[:, 0] += setting.shift * np.cos(angle)
@@ -249,9 +248,14 @@ def _try_grasps(trial: _Trial, file: Path) -> int:
 
 def _write(file: Path, **arrays: np.ndarray) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
-    temporary = file.with_suffix(f".{os.getpid()}.tmp.npz")
-    np.savez(temporary, allow_pickle=False, **arrays)
-    temporary.rename(file)
+    write_arrays(file, **arrays)
+
+
+def _stored(file: Path) -> dict[str, np.ndarray]:
+    try:
+        return read_arrays(file)
+    except ValueError as error:
+        raise BadDataset(f"{file} is damaged ({error}); delete it, and it is made again") from error
 
 
 def _outcome_file(out: Path, setting: Setting, drawn: Drawn, folder: Path) -> Path:
@@ -269,10 +273,10 @@ def _outcome_file(out: Path, setting: Setting, drawn: Drawn, folder: Path) -> Pa
 def _read(trials: Sequence[_Trial]) -> Outcomes:
     pieces: dict[str, list[np.ndarray]] = {field.name: [] for field in fields(Outcomes)}
     for trial in trials:
-        with np.load(trial.file) as stored:
-            for name in (*KEPT, "cpu_seconds"):
-                pieces[name].append(stored[name])
-            n = len(stored["success"])
+        stored = _stored(trial.file)
+        for name in (*KEPT, "cpu_seconds"):
+            pieces[name].append(stored[name])
+        n = len(stored["success"])
         pieces["part"].append(np.repeat(trial.drawn.folder.name, n))
         pieces["index"].append(np.arange(n))
     if not trials:

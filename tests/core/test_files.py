@@ -9,8 +9,9 @@ import time
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
-from mskgrasp.core.files import LOCK, is_leftover, read_bounded, write_whole
+from mskgrasp.core.files import LOCK, is_leftover, read_bounded, write_figure, write_whole
 
 
 def write_for_ever(path: Path, letter: bytes) -> None:
@@ -86,3 +87,13 @@ def test_what_a_killed_writer_leaves_is_known_by_its_name(tmp_path, monkeypatch)
     os.wait()
     (left,) = tmp_path.iterdir()
     assert is_leftover(left) and is_leftover(tmp_path / LOCK) and not is_leftover(tmp_path / "data")
+
+
+def test_a_figure_is_written_in_the_format_of_its_suffix_and_an_error_names_it(tmp_path):
+    figure = Figure(figsize=(1, 1))
+    for suffix, start in ((".png", b"\x89PNG"), (".PDF", b"%PDF"), (".svg", b"<?xml")):
+        write_figure(figure, tmp_path / f"one{suffix}", dpi=20)
+        assert (tmp_path / f"one{suffix}").read_bytes().startswith(start)
+    with pytest.raises(OSError) as raised:
+        write_figure(figure, tmp_path / "none" / "one.png")
+    assert raised.value.filename == str(tmp_path / "none" / "one.png")

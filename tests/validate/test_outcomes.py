@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.settings import Physics
 from mskgrasp.parts import find_part
 from mskgrasp.validate.config import Setting
@@ -28,6 +30,10 @@ def test_grasps_are_tried_once_and_read_afterwards(tmp_path):
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.npz")} == times
     np.testing.assert_array_equal(first["plain"].displacement, second["again"].displacement)
     assert draw_grasps(folders, 3, 0, tmp_path, 1, lambda _: None) == drawn
+    damaged = next((tmp_path / "outcomes").glob("*.npz"))
+    damaged.write_bytes(damaged.read_bytes()[:300])
+    with pytest.raises(BadDataset, match=f"{damaged.name} is damaged .*; delete it"):
+        run_settings(settings, drawn, {}, tmp_path, 1, counts.append)
 
 
 def test_parts_that_a_setting_does_not_change_are_left_out(tmp_path):

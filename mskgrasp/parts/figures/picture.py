@@ -11,6 +11,7 @@ import trimesh
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from mskgrasp.core.files import write_figure
 from mskgrasp.core.geometry import quat_to_matrix
 from mskgrasp.core.palette import INK, SLATE
 from mskgrasp.parts import store
@@ -68,7 +69,7 @@ def draw_part(part: Part, out: Path) -> None:
                     color=INK, ha="center", va="center")  # fmt: skip
         figure.text(left + span / 2, 0.019, alike, fontsize=9.5, color=SLATE, ha="center",
                     va="center")  # fmt: skip
-    figure.savefig(out, dpi=_DPI, metadata={"Software": None} if out.suffix.lower() == ".png" else None)
+    write_figure(figure, out, dpi=_DPI, metadata={"Software": None} if out.suffix.lower() == ".png" else None)
 
 
 def resting_classes(part: Part) -> list[RestingClass]:

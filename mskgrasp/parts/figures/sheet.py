@@ -11,6 +11,7 @@ from manifold3d import Manifold, Mesh64
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from mskgrasp.core.files import write_figure
 from mskgrasp.core.geometry import quat_to_matrix
 from mskgrasp.core.palette import INK, SLATE
 from mskgrasp.parts import store
@@ -64,7 +65,7 @@ def draw_sheet(index: Index, out: Path, parts: int, report_progress: Callable[[i
                     color=SLATE, ha="center", va="center")  # fmt: skip
     report_progress(len(chosen), len(chosen))
     metadata = {"Software": None} if out.suffix.lower() == ".png" else None
-    figure.savefig(out, dpi=_DPI, metadata=metadata)
+    write_figure(figure, out, dpi=_DPI, metadata=metadata)
 
 
 def _picture(entry: Entry, width: int, height: int) -> np.ndarray:

@@ -1,0 +1,43 @@
+"""Files of named arrays (npz)."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mskgrasp.core.files import write_whole
+
+
+def write_arrays(path: Path, **arrays: Any) -> None:
+    """Write arrays into one compressed file, atomically.
+
+    Raises:
+        OSError: The disk is full or not writable.
+    """
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    write_whole(path, buffer.getvalue())
+
+
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Read all arrays of a file; nothing in it is unpickled.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError: It is damaged, or holds something else.
+    """
+    content = path.read_bytes()
+    if not content.startswith(b"PK"):  # numpy would advise to read it as a pickle
+        raise ValueError("it is no archive of arrays")
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except ValueError as error:
+        raise ValueError("an array is cut off, or holds objects in place of numbers") from error
+    except (LookupError, EOFError, OSError, NotImplementedError, zipfile.BadZipFile, zlib.error) as error:
+        raise ValueError(" ".join(str(error).split())) from error

@@ -1,0 +1,42 @@
+"""Files of arrays are read back equal, anything else is refused in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mskgrasp.core.array_files import read_arrays, write_arrays
+
+
+def test_arrays_are_read_back_equal(tmp_path: Path):
+    arrays = {"a": np.arange(6).reshape(2, 3), "b": np.array(1.5, np.float32), "c": np.zeros(0)}
+    write_arrays(tmp_path / "one.npz", **arrays)
+    again = read_arrays(tmp_path / "one.npz")
+    assert list(again) == list(arrays)
+    for name, value in arrays.items():
+        np.testing.assert_array_equal(again[name], value)
+        assert again[name].dtype == value.dtype
+    assert [path.name for path in tmp_path.iterdir()] == ["one.npz"]
+
+
+def test_what_is_no_archive_of_arrays_is_a_value_error_of_one_line(tmp_path: Path):
+    path = tmp_path / "one.npz"
+    write_arrays(path, a=np.random.default_rng(0).uniform(size=1000))
+    whole = path.read_bytes()
+    flipped = whole[:200] + bytes(byte ^ 0xFF for byte in whole[200:300]) + whole[300:]
+    method = bytearray(whole)
+    method[8] = method[whole.rindex(b"PK\x01\x02") + 10] = 99  # an unknown compression
+    for content in (b"", whole[: len(whole) // 2], flipped, bytes(method), b"\x80\x04N."):
+        path.write_bytes(content)
+        with pytest.raises(ValueError) as raised:
+            read_arrays(path)
+        assert str(raised.value) and "\n" not in str(raised.value)
+    np.savez(path, allow_pickle=True, a=np.array([{}], dtype=object))
+    with pytest.raises(ValueError, match="objects in place of numbers"):
+        read_arrays(path)
+    with pytest.raises(OSError):
+        write_arrays(tmp_path / "none" / "one.npz", a=np.zeros(1))
+    with pytest.raises(ValueError):
+        write_arrays(path, a=np.array([{}], dtype=object))
