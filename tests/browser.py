@@ -136,6 +136,11 @@ class Page:
         """Press, move or release the left button of the mouse (``mousePressed``, ``mouseMoved``, ...)."""
         self._ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
+    def prefer(self, scheme: str) -> None:
+        """Show the page as to a reader who prefers ``light`` or ``dark``."""
+        preferred = {"name": "prefers-color-scheme", "value": scheme}
+        self._ask("Emulation.setEmulatedMedia", features=[preferred])
+
     def screenshot(self, path: Path) -> None:
         """The page as PNG: all of it, or the window of one that is drawn in 3-D."""
         if self._webgl:

@@ -46,7 +46,7 @@ def draw_shares(trials: Sequence[PlacedTrial], seed: int, path: Path) -> None:
 
 def draw_refusals(refused: Sequence[Refusal], path: Path) -> None:
     """Draw the share placed of the attempts that are tried against the share that is refused."""
-    with saved_figure(path, 5.0, 3.6) as figure:
+    with saved_figure(path, 11.0, 3.6) as figure:
         axis = figure.subplots()
         for name, (colour, style) in zip(dict.fromkeys(one.planner for one in refused), _LINES, strict=False):
             some = [one for one in refused if one.planner == name]

@@ -10,6 +10,11 @@ LINE = "#c5c9d0"
 """Rules and diagonals."""
 PALE = "#e3e6ea"
 """Separators and areas without data."""
+DARK = {
+    "PAPER": "#16181d", "INK": "#e4e6eb", "SLATE": "#a3a9b4", "FAINT": "#6b7280", "PALE": "#30343c",
+    "BLUE": "#79b0ff",
+}  # fmt: skip
+"""A page that is read in the dark, and what these names stand for on it."""
 BLUE = "#1f6feb"
 """The hand, the network, the first of several series."""
 ORANGE = "#e8590c"

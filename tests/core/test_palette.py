@@ -12,7 +12,7 @@ import pytest
 from mskgrasp.core import palette
 
 ROOT = Path(__file__).parents[2]
-COLOURS = {name: value for name, value in vars(palette).items() if name.isupper()}
+COLOURS = {name: value for name, value in vars(palette).items() if name.isupper() and name != "DARK"}
 
 
 def linear(colour: str) -> np.ndarray:
@@ -41,6 +41,12 @@ def test_the_ratio_is_that_of_the_standard():
 )
 def test_what_must_be_seen_on_white_has_the_contrast_of_the_standard(names: tuple[str, ...], least: float):
     assert all(contrast(COLOURS[name], "#ffffff") >= least for name in names)
+
+
+def test_what_must_be_seen_in_the_dark_has_it_too():
+    paper = palette.DARK["PAPER"]
+    assert all(contrast(palette.DARK[name], paper) >= 4.5 for name in ("INK", "SLATE", "BLUE"))
+    assert contrast(palette.DARK["FAINT"], paper) >= 3.0
 
 
 def test_text_can_be_read_on_every_area():

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from mskgrasp.core import palette
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.reports.html import write_html
 from mskgrasp.reports.section import Figure, Section, settings_section
@@ -88,6 +90,21 @@ def test_errors_of_a_page_are_reported(tmp_path):
 def test_it_fits_a_phone(report):
     with Page(report, width=390) as page:
         assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+
+
+def test_a_reader_who_prefers_the_dark_sees_a_dark_page(report):
+    def colours(page: Page, of: str) -> list[int]:
+        return [int(one) for one in re.findall(r"\d+", page.evaluate(of))[:3]]
+
+    with Page(report) as page:
+        for scheme, paper, ink in (
+            ("light", "#ffffff", palette.INK),
+            ("dark", palette.DARK["PAPER"], palette.DARK["INK"]),
+        ):
+            page.prefer(scheme)
+            style = "getComputedStyle(document.body)"
+            assert colours(page, f"{style}.backgroundColor") == list(bytes.fromhex(paper[1:]))
+            assert colours(page, f"{style}.color") == list(bytes.fromhex(ink[1:]))
 
 
 def test_what_cannot_be_shown_is_refused(tmp_path):
