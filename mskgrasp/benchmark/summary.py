@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.metrics import wilson_interval
+from mskgrasp.core.metrics import clustered_wilson_interval
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.trials.placed_trial import Correction, PlacedTrial
 
@@ -30,7 +30,6 @@ STAGES = ("seeing", "seizing", "carrying", "releasing", "total")
 _CORRECTION: dict[Column, Correction] = {
     "none": "none", "predicted": "predicted", "camera": "seen", "truth": "seen",
 }  # fmt: skip
-_DRAWS = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,8 +39,7 @@ class PlacedShare:
     Attributes:
         n: Number that count.
         of: Number of attempts.
-        interval: 95 %: the wider of Wilson's and that of a bootstrap over parts, since attempts at one part
-            are alike.
+        interval: 95 %, Wilson's by parts, since attempts at one part are alike (`clustered_wilson_interval`).
     """
 
     n: int
@@ -185,16 +183,9 @@ def _row(planner: str, trials: Sequence[PlacedTrial], seed: int) -> Row:
 
 def share(hits: np.ndarray, parts: Sequence[str]) -> PlacedShare:
     """Share of attempts (n,) that count, with the parts (n,) that were tried."""
-    n, of = int(hits.sum()), len(hits)
-    low, high = wilson_interval(n, of)
     _, which = np.unique(np.asarray(parts, dtype=str), return_inverse=True)
-    if of and which.max() > 0:
-        tried = np.bincount(which)
-        placed = np.bincount(which, weights=hits)
-        drawn = np.random.default_rng(0).integers(len(tried), size=(_DRAWS, len(tried)))
-        shares = placed[drawn].sum(axis=1) / tried[drawn].sum(axis=1)
-        low, high = min(low, float(np.quantile(shares, 0.025))), max(high, float(np.quantile(shares, 0.975)))
-    return PlacedShare(n=n, of=of, interval=(low, high))
+    interval = clustered_wilson_interval(np.bincount(which, weights=hits), np.bincount(which))
+    return PlacedShare(n=int(hits.sum()), of=len(hits), interval=interval)
 
 
 def refusals(trials: Sequence[PlacedTrial], seed: int) -> list[Refusal]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.stats import norm, rankdata
+from scipy.stats import norm, rankdata, t
 
 from mskgrasp.core.geometry import wrap_angle
 
@@ -188,10 +188,43 @@ def auroc(score: np.ndarray, success: np.ndarray) -> float:
 
 def wilson_interval(n_success: int, n: int, level: float = 0.95) -> tuple[float, float]:
     """Confidence interval of a share (Wilson 1927); valid for few trials and for shares near 0 and 1."""
+    return _wilson(n_success / n if n else 0.0, n, level)
+
+
+def _wilson(share: float, n: float, level: float) -> tuple[float, float]:
+    """Wilson's interval of a share of n trials; n need not be whole."""
     if n == 0:
         return 0.0, 1.0
     z = float(norm.ppf((1 + level) / 2))
-    share = n_success / n
     middle = (share + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * float(np.sqrt(share * (1 - share) / n + z * z / (4 * n * n)))
     return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def clustered_wilson_interval(
+    n_success: np.ndarray, n: np.ndarray, level: float = 0.95
+) -> tuple[float, float]:
+    """Confidence interval of a share over clusters of alike trials, such as those at one part.
+
+    Wilson's interval with the effective number of trials of Korn and Graubard (Survey Methodology 24, 1998):
+    the number over the design effect, reduced for few clusters by the squared ratio of the quantiles of the
+    normal distribution and of Student's t; never more than the number itself. A single cluster, and clusters
+    with equal shares, give Wilson's interval.
+
+    Args:
+        n_success: (k,) successes of each cluster.
+        n: (k,) its trials, at least one.
+        level: Confidence level.
+    """
+    won, tried = np.asarray(n_success, dtype=np.float64), np.asarray(n, dtype=np.float64)
+    k, total = len(tried), float(tried.sum())
+    share = float(won.sum()) / total if total else 0.0
+    effective = total
+    if k > 1:
+        # Of a ratio of sums over clusters, to first order.
+        variance = k / (k - 1) * float(((won - share * tried) ** 2).sum()) / total**2
+        if variance > 0:
+            tail = (1 + level) / 2
+            narrower = float(norm.ppf(tail) / t.ppf(tail, k - 1)) ** 2
+            effective = min(total, share * (1 - share) / variance * narrower)
+    return _wilson(share, effective, level)

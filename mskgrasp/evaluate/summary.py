@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.metrics import bootstrap_interval, coverage, wilson_interval
+from mskgrasp.core.metrics import bootstrap_interval, clustered_wilson_interval, coverage
 from mskgrasp.trials.lowess import TURN_LENGTH
 from mskgrasp.trials.trial import Prediction, Trial
 
@@ -34,7 +34,7 @@ class TrialStatistics:
     A quantity that no trial measured is None, not zero.
 
     Attributes:
-        success_interval: Wilson interval of the success rate.
+        success_interval: Wilson interval of the success rate, by parts, since trials of one part are alike.
         reasons: Numbers of failures by reason.
         unmeasured: Numbers of unmeasured successes by reason.
         measured: Number of trials with a measured and a predicted displacement, which the errors are of.
@@ -86,7 +86,7 @@ class TrialStatistics:
             trials=len(trials),
             successes=n_success,
             success_rate=n_success / len(trials) if trials else None,
-            success_interval=wilson_interval(n_success, len(trials)) if trials else None,
+            success_interval=_share_interval(trials) if trials else None,
             reasons=_counts(trial.reason for trial in trials if trial.reason),
             unmeasured=_counts(trial.unmeasured.split(":")[0] for trial in trials if trial.unmeasured),
             median_planning_s=float(np.median(planning)) if planning else None,
@@ -201,6 +201,12 @@ def _rms(errors: np.ndarray) -> float | None:
 def _interval(errors: np.ndarray, parts: np.ndarray) -> Interval | None:
     groups = [errors[parts == part] for part in np.unique(parts)]
     return bootstrap_interval(groups, rms) if len(groups) > 1 else None
+
+
+def _share_interval(trials: Sequence[Trial]) -> Interval:
+    _, which = np.unique([trial.part for trial in trials], return_inverse=True)
+    won = np.bincount(which, weights=[trial.success for trial in trials])
+    return clustered_wilson_interval(won, np.bincount(which))
 
 
 def compare_tape(trials: Sequence[Trial]) -> TapeComparison | None:

@@ -8,6 +8,7 @@ from mskgrasp.core.metrics import (
     auroc,
     balanced_accuracy,
     brier,
+    clustered_wilson_interval,
     coverage,
     gaussian_nll,
     rotation_rmse,
@@ -65,6 +66,29 @@ def test_wilson_interval_agrees_with_scipy(k, n):
 
 def test_no_trial_tells_nothing():
     assert wilson_interval(0, 0) == (0.0, 1.0)
+    assert clustered_wilson_interval(np.zeros(0), np.zeros(0)) == (0.0, 1.0)
+
+
+def test_clusters_that_are_all_or_nothing_count_as_one_trial_each():
+    low, high = clustered_wilson_interval(np.repeat([20, 0], 10), np.full(20, 20))
+    few = wilson_interval(10, 20)
+    # Of so few clusters the quantile is Student's t, not the normal one.
+    assert low < few[0] < 0.31 and high == pytest.approx(1 - low) and low > 0.24
+    assert clustered_wilson_interval(np.array([7]), np.array([9])) == wilson_interval(7, 9)
+    assert clustered_wilson_interval(np.array([5, 5]), np.array([5, 5])) == wilson_interval(10, 10)
+
+
+@pytest.mark.parametrize(("n_clusters", "n_each"), [(5, 5), (12, 2), (20, 5), (60, 7)])
+def test_a_share_over_clusters_is_in_its_interval_as_often_as_stated(n_clusters, n_each):
+    rng = np.random.default_rng(0)
+    share, alike = 0.8, 0.3  # the correlation of trials of one cluster
+    a, b = share * (1 - alike) / alike, (1 - share) * (1 - alike) / alike
+    won = rng.binomial(n_each, rng.beta(a, b, (600, n_clusters)))
+    tried = np.full(n_clusters, n_each)
+    intervals = np.array([clustered_wilson_interval(row, tried) for row in won])
+    naive = np.array([wilson_interval(int(row.sum()), int(tried.sum())) for row in won])
+    covered, without = (((one[:, 0] <= share) & (share <= one[:, 1])).mean() for one in (intervals, naive))
+    assert 0.93 < covered < 0.99 and without < covered
 
 
 def test_crps_is_the_integral_of_its_definition():

@@ -32,6 +32,21 @@ def test_intervals_are_over_parts_not_over_grasps():
     assert interval == pytest.approx((0.005, 0.010))
 
 
+def test_the_interval_of_the_success_rate_is_over_parts_too():
+    """Half of the parts is never lifted: fifty trials of them tell as much as ten parts do."""
+    trials = [
+        trial(part=f"part {k}", number=n, family="nut" if k < 5 else "bolt", success=k < 5, measured=None)
+        for k in range(10)
+        for n in range(5)
+    ]
+    summary = summarise_trials(trials)
+    overall = summary.overall
+    assert overall.success_interval is not None
+    assert overall.success_interval[0] < 0.24 and overall.success_interval[1] > 0.76
+    # All of a family alike: no more is known than the trials tell.
+    assert summary.families["bolt"].success_interval == pytest.approx((0.0, 0.133), abs=1e-3)
+
+
 def test_without_a_success_errors_are_absent_not_zero(tmp_path: Path):
     trials = [trial(**NOTHING)]
     summary = summarise_trials(trials)
