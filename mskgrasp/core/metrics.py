@@ -142,7 +142,10 @@ def bootstrap_interval(
 ) -> tuple[float, float]:
     """Bootstrap confidence interval of a statistic; whole objects are resampled with replacement.
 
-    Grasps of one part are correlated; resampling single grasps would make intervals too narrow.
+    Grasps of one part are correlated; resampling single grasps would make intervals too narrow. So do the
+    plain percentiles of the draws of few objects; those taken are expanded as a t interval is against a
+    normal one (Hesterberg, The American Statistician 69, 2015, "expanded percentile interval"). An RMSE over
+    few objects of which some are far worse than others is still covered less often than the level says.
 
     Args:
         values: One array (n_i, ...) of samples for each object.
@@ -158,7 +161,10 @@ def bootstrap_interval(
         statistic(np.concatenate([values[i] for i in rng.integers(len(values), size=len(values))]))
         for _ in range(repeats)
     ]
-    low, high = np.nanquantile(found, [(1 - level) / 2, (1 + level) / 2])
+    tail, n = (1 - level) / 2, len(values)
+    if n > 1:
+        tail = float(norm.cdf(np.sqrt(n / (n - 1)) * t.ppf(tail, n - 1)))
+    low, high = np.nanquantile(found, [tail, 1 - tail])
     return float(low), float(high)
 
 

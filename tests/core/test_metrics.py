@@ -128,6 +128,16 @@ def test_bootstrap_draws_whole_objects():
     assert 0.5 < high - low < 1.1 and low < np.mean(objects) < high
 
 
+def test_the_mean_of_few_objects_is_in_its_interval_nearly_as_often_as_stated():
+    rng = np.random.default_rng(0)
+    drawn = rng.normal(size=(300, 5, 1))  # plain percentiles cover four in five
+    found = [
+        metrics.bootstrap_interval(list(one), lambda values: float(values.mean()), repeats=300)
+        for one in drawn
+    ]
+    assert np.mean([low <= 0.0 <= high for low, high in found]) > 0.87
+
+
 def test_the_expected_calibration_error_is_the_mean_gap_of_the_bins():
     probability = np.array([0.1] * 10 + [0.9] * 30)
     success = np.array([True] * 3 + [False] * 7 + [True] * 24 + [False] * 6)
