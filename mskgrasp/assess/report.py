@@ -116,7 +116,7 @@ def trials_section(rows: Sequence[Row], tolerance: Tolerance, figure: Path) -> S
     table = [
         (
             row.condition,
-            "certified grasps" if row.means == "certified" else "networks",
+            row.planned_by,
             _share(row.lifted),
             *(_share(row.within[one]) for one in CORRECTIONS),
             "-" if row.translation_rmse is None else f"{1e3 * row.translation_rmse:.2f} mm",
@@ -149,7 +149,7 @@ def _distances_section(rows: Sequence[Row]) -> Section:
     table = [
         (
             row.condition,
-            "certified grasps" if row.means == "certified" else "networks",
+            row.planned_by,
             _HEADINGS[one],
             *(f"{share.value:.0%}" for share in row.within_distance[one]),
         )

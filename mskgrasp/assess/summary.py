@@ -79,6 +79,18 @@ class Row:
     reasons: dict[str, int]
 
     @property
+    def planned_by(self) -> str:
+        """What planned the grasps, in words: where a part has no certified grasp the networks did."""
+        n, of = self.certified.n, self.certified.of
+        if self.means == "networks":
+            return "the networks"
+        if n == 0:
+            return "the networks, for want of a certified grasp"
+        return (
+            "certified grasps" if n == of else f"certified grasps in {n} of {of} attempts, else the networks"
+        )
+
+    @property
     def advice(self) -> Correction | None:
         """The least effort by which enough attempts end within the tolerance; None where none does."""
         return next((one for one in CORRECTIONS if self.within[one].value >= ENOUGH), None)
@@ -167,11 +179,10 @@ def verdict(rows: Sequence[Row], condition: str, tolerance: Tolerance) -> str:
     share = best.within[shown]
     text = ADVICE[advice] if advice is not None else OTHERWISE
     low, high = share.interval
-    how = "certified grasps" if best.means == "certified" else "the networks"
     return (
         f"{text}: {share.n} of {share.of} attempts ({share.value:.0%}, 95 % interval {low:.0%} to "
         f"{high:.0%}) "
-        f"within {tolerance} by {how}" + ("" if advice is not None else f", {_HOW[shown]}")
+        f"within {tolerance} by {best.planned_by}" + ("" if advice is not None else f", {_HOW[shown]}")
     )
 
 

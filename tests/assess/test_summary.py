@@ -57,6 +57,16 @@ def test_the_better_means_counts():
     assert "by the networks" in verdict(rows([*poor, *good]), EXACT, TOLERANCE)
 
 
+def test_grasps_that_the_networks_planned_are_not_called_certified():
+    none = [made(number, certified=False) for number in range(20)]
+    assert verdict(rows(none), EXACT, TOLERANCE).endswith(" by the networks, for want of a certified grasp")
+    some = [made(number, certified=number < 15) for number in range(20)]
+    said = verdict(rows(some), EXACT, TOLERANCE)
+    assert said.endswith(" by certified grasps in 15 of 20 attempts, else the networks")
+    all_of_them = [made(number) for number in range(20)]
+    assert verdict(rows(all_of_them), EXACT, TOLERANCE).endswith(" by certified grasps")
+
+
 def test_parts_that_nothing_lifts_are_named_so():
     assert verdict(rows([failed(0)]), EXACT, TOLERANCE) == "no grasp lifted the part"
     assert verdict([], EXACT, TOLERANCE) == "no trial was made"
