@@ -17,13 +17,13 @@ from mskgrasp.core.errors import BadPart, MskgraspError, UsageError
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import Part, find_part
 from mskgrasp.parts.importing.mesh_files import LOADERS
-from mskgrasp.planning.certified import CertifiedGrasps
+from mskgrasp.planning.certified import FILE, CertifiedGrasps
 from mskgrasp.planning.for_cell import part_name
 from mskgrasp.planning.run_inputs import model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import note, progress
-from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials, rewrite_trials
 from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.simulation.certify_parts import certify
 from mskgrasp.trials.placed_trial import PlacedTrial
@@ -111,6 +111,7 @@ def _assess_one(source: str, config: AssessConfig, out: Path, tolerance: Toleran
     with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         settings = CertifyConfig(simulations=config.n_simulations, seed=config.seed)
         certified = certify([place], settings, config.models, workers)[part.name]
+        begin_trials(out, certified)
         trials = _trials(part, certified, config, out, workers)
         headline, rows = write_report(out, part, certified, trials, tolerance, config.model_dump(mode="json"))
     print_sections(
@@ -120,6 +121,24 @@ def _assess_one(source: str, config: AssessConfig, out: Path, tolerance: Toleran
         ]
     )
     return Assessed(part=part, headline=headline, rows=rows)
+
+
+def begin_trials(out: Path, certified: CertifiedGrasps) -> None:
+    """Write ``grasps.json``, and remove stored trials that were planned by other certified grasps.
+
+    More simulations give other grasps: a report of both would be of neither.
+    """
+    path = out / FILE
+    if path.exists() and path.read_bytes() == certified.contents():
+        return
+    stored = read_trials(out / TRIALS, PlacedTrial.from_json)
+    kept = [trial for trial in stored if trial.means != "certified"]
+    if len(kept) < len(stored):
+        note(
+            f"{len(stored) - len(kept)} trials are made again: '{certified.part}' has other certified grasps"
+        )
+        rewrite_trials(out / TRIALS, [trial.to_json() for trial in kept])
+    certified.write(out)  # last: a run that is stopped before it removes them then
 
 
 def _trials(

@@ -129,6 +129,10 @@ class CertifiedGrasps:
         Raises:
             OSError: The disk is full or not writable.
         """
+        write_whole(folder / FILE, self.contents())
+
+    def contents(self) -> bytes:
+        """Contents of ``grasps.json``."""
         values = dict(
             schema_version=SCHEMA_VERSION,
             part=self.part,
@@ -141,7 +145,7 @@ class CertifiedGrasps:
             stands=list(self.stands),
             conditions=self.conditions,
         )
-        write_whole(folder / FILE, (json.dumps(values, indent=1, allow_nan=False) + "\n").encode())
+        return (json.dumps(values, indent=1, allow_nan=False) + "\n").encode()
 
 
 def certified_folder(part: Part) -> Path:

@@ -11,11 +11,15 @@ import torch
 import trimesh
 
 from mskgrasp.assess.__main__ import main
-from mskgrasp.assess.trials import CONDITIONS, EXACT
+from mskgrasp.assess.run import begin_trials
+from mskgrasp.assess.trials import CONDITIONS, EXACT, MEANS
 from mskgrasp.core.errors import BadPart, MissingModel, UsageError
-from mskgrasp.runtime.run_folder import TRIALS, read_trials
+from mskgrasp.planning.certified import FILE
+from mskgrasp.runtime.run_folder import TRIALS, read_trials, rewrite_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
+from tests.assess.made_trials import made
 from tests.browser import Page
+from tests.planning.test_certified import certified, certified_grasp
 
 
 @pytest.fixture(autouse=True)
@@ -73,6 +77,21 @@ def test_a_block_too_wide_and_too_heavy_gets_a_report_that_says_so(cad, tmp_path
     with Page(out / "report.html") as page:
         line = page.evaluate("document.querySelector('.conclusion').textContent")
     assert line.startswith("block cannot be grasped")
+
+
+def test_trials_planned_by_other_certified_grasps_are_made_again(tmp_path, capsys):
+    few, more = certified(certified_grasp(n=10, lifted=10)), certified(certified_grasp())
+    begin_trials(tmp_path, few)
+    lines = [made(number, means=means).to_json() for number in range(2) for means in MEANS]
+    rewrite_trials(tmp_path / TRIALS, lines)
+    begin_trials(tmp_path, few)
+    assert len(read_trials(tmp_path / TRIALS, PlacedTrial.from_json)) == 4
+    begin_trials(tmp_path, more)
+    assert [one.key for one in read_trials(tmp_path / TRIALS, PlacedTrial.from_json)] == [
+        (EXACT, 0, "networks"), (EXACT, 1, "networks"),
+    ]  # fmt: skip
+    assert "2 trials are made again: 'hex_nut_m20' has other certified grasps" in capsys.readouterr().err
+    assert (tmp_path / FILE).read_bytes() == more.contents()
 
 
 @pytest.mark.parametrize(
