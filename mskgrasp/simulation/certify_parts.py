@@ -42,6 +42,8 @@ from mskgrasp.simulation.versions import versions
 
 LEAST_STREAM = 24
 """Least number of simulations of a stream."""
+_MEASURED_BY = ("certify_version", "pose_errors", "noise", "physics", "least_lifted", "most_error")
+"""Conditions that decide which grasps are certified and what is stored of them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,20 +114,33 @@ def certify(
 def certify_missing(parts: Sequence[str], models: Path, workers: int) -> None:
     """Certify grasps of the parts that have none of today's, with the settings by default.
 
+    Those of another number of simulations, or of candidates of other networks, remain; those that another
+    version of the simulation or of the certification measured, or under other conditions, are made again.
+
     Args:
         parts: Names or folders.
         models: Folder of the networks that choose candidates.
         workers: Processes; 0: one per core.
     """
-    missing = []
-    for name in parts:
-        try:
-            read_certified(find_part(name))
-        except BadPart:
-            missing.append(name)
+    missing = [name for name in parts if not _of_today(find_part(name))]
     if missing:
         note(f"certifying grasps of {len(missing)} of {len(parts)} parts, some minutes each")
         certify(missing, CertifyConfig(), models, workers or os.cpu_count() or 1)
+
+
+def _of_today(part: Part) -> bool:
+    """Whether a part's certified grasps in the cache are measured as today's would be."""
+    try:
+        known = read_certified(part).conditions
+    except BadPart:
+        return False
+    now = CertifyConfig().model_dump(mode="json") | dict(certify_version=CERTIFY_VERSION)
+    made_by = known.get("versions")
+    return (
+        isinstance(made_by, dict)
+        and made_by.get("simulation") == versions()["simulation"]
+        and all(known.get(name) == now[name] for name in _MEASURED_BY)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,9 @@ from mskgrasp.planning.certified import FILE, certified_folder, read_certified
 from mskgrasp.simulation import certify_parts
 from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.simulation.certify_parts import certify
+from mskgrasp.simulation.versions import versions
 from tests.boxes import make_box
+from tests.planning.test_certified import certified, certified_grasp
 
 CONFIG = CertifyConfig(simulations=48, per_stream=24, physics=Physics(rate_hz=500, position_iterations=15))
 
@@ -50,3 +52,29 @@ def test_a_stopped_certification_goes_on_and_gives_the_bytes_of_two_workers(box,
     assert read_certified(box).grasps[0].to_json() == found.grasps[0].to_json()
     best = found.grasps[0]
     assert best.lifted == best.n
+
+
+@pytest.mark.parametrize(
+    ("changes", "made_again"),
+    [
+        (dict(), False),
+        (dict(simulations=400), False),
+        (dict(versions=dict(simulation="0")), True),
+        (dict(versions=None), True),
+        (dict(certify_version=0), True),
+        (dict(pose_errors=dict(position=0.0, height=0.0, turn=0.0)), True),
+    ],
+)
+def test_grasps_of_another_simulation_or_conditions_are_made_again(box, monkeypatch, changes, made_again):
+    conditions = CertifyConfig().model_dump(mode="json") | dict(
+        certify_version=certify_parts.CERTIFY_VERSION, versions=versions()
+    )
+    stored = certified(
+        certified_grasp(), part=box.name, part_hash=box.content_hash, conditions=conditions | changes
+    )
+    certified_folder(box).mkdir(parents=True)
+    stored.write(certified_folder(box))
+    wanted = []
+    monkeypatch.setattr(certify_parts, "certify", lambda parts, *rest: wanted.extend(parts))
+    certify_parts.certify_missing([str(box.folder)], PRETRAINED, 1)
+    assert wanted == [str(box.folder)] * made_again
