@@ -106,7 +106,9 @@ def certify(
     found = {}
     for plan in plans.values():
         grasps = _merged(plan, config, conditions, digest)
-        grasps.write(certified_folder(plan.part))
+        folder = certified_folder(plan.part)
+        folder.mkdir(parents=True, exist_ok=True)  # a part whose poses are all rare has no streams
+        grasps.write(folder)
         found[plan.part.name] = grasps
     return found
 
