@@ -16,10 +16,10 @@ from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
 from mskgrasp.parts.catalogue import read_index
 from mskgrasp.parts.select_parts import part_names
-from mskgrasp.planning.run_inputs import model_digests, part_digests
+from mskgrasp.planning.run_inputs import certified_digests, model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials, record_inputs
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import CellFile, read_cell
 from mskgrasp.trials.placed_trial import PlacedTrial
@@ -70,6 +70,7 @@ def benchmark(config: BenchmarkConfig) -> None:
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         if "certified" in config.rows:
             certify_missing(sources, config.models, workers)
+            record_inputs(config.out, certified_digests(sources))
         trials = _trials(config, cell, scene_tasks(sources, config.n_trials, config.rows), workers)
         facts = RunFacts(
             cell=config.cell,

@@ -29,11 +29,18 @@ from mskgrasp.learning.grasp_models import load_models, require_model
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import tell_model
-from mskgrasp.planning.run_inputs import model_digests, part_digests
+from mskgrasp.planning.run_inputs import certified_digests, model_digests, part_digests
 from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials, rewrite_trials
+from mskgrasp.runtime.run_folder import (
+    TRIALS,
+    append_trial,
+    opened_run,
+    read_trials,
+    record_inputs,
+    rewrite_trials,
+)
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.simulation.versions import versions
 from mskgrasp.trials.cell_file import CellFile, check_loads, read_cell
@@ -96,6 +103,7 @@ def evaluate(config: EvaluateConfig) -> Report:
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=MAY_CHANGE):
         if config.planner.policy == "certified":
             certify_missing(list(parts.values()), config.models, config.workers)
+            record_inputs(config.out, certified_digests(parts.values()))
         tasks = scenes(parts, config.trials, config.seed, config.planner, compared)
         trials = _make_trials(config, cell, compared, tasks)
         if compared is not None:

@@ -25,7 +25,7 @@ from mskgrasp.palletize.summary import PlacementSummary
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import make_planner, tell_model
-from mskgrasp.planning.run_inputs import inputs_of
+from mskgrasp.planning.run_inputs import certified_digests, inputs_of
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import TRIALS, append_trial, file_digest, opened_run, read_trials
@@ -94,6 +94,7 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
     tell_model(models, cell_from_yaml(config.cell))
     if config.planner.policy == "certified":
         certify_missing(names, config.models, config.workers)
+        inputs |= certified_digests(names)
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
         make_folder(config.out / "placements")
         for leftover in (config.out / "placements").glob("*.tmp"):

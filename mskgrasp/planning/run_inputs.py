@@ -1,4 +1,4 @@
-"""Digests of the inputs of a run: cell file, model, parts."""
+"""Digests of the inputs of a run: cell file, model, parts, certified grasps."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mskgrasp.parts import find_part
+from mskgrasp.planning.certified import FILE, certified_folder
 from mskgrasp.runtime.run_folder import file_digest
 
 
@@ -25,3 +26,13 @@ def part_digests(parts: Iterable[str]) -> dict[str, str]:
     """Compute digests of parts, given by name or folder; a part is recorded by its name."""
     found = [find_part(part) for part in parts]
     return {f"part {part.name}": part.content_hash for part in found}
+
+
+def certified_digests(parts: Iterable[str]) -> dict[str, str]:
+    """Compute digests of the certified grasps, in the cache, of parts given by name or folder.
+
+    Raises:
+        UsageError: A part has none.
+    """
+    found = [find_part(part) for part in parts]
+    return {f"certified grasps of {part.name}": file_digest(certified_folder(part) / FILE) for part in found}

@@ -75,11 +75,7 @@ def _compatible_inputs(
             if name not in may_change and getattr(before, name) != getattr(config, name)
         ]
         known = _read_inputs(fingerprint)
-        changed += [name for name, value in inputs.items() if known.get(name, value) != value]
-        if changed:
-            raise UsageError(
-                f"{out} was started with other inputs ({', '.join(changed)} differ); choose another --out"
-            )
+        _refuse(out, [*changed, *_changed(known, inputs)])
         stored = known.get(_SCENE_VERSION, 1)
         if stored != scene_version:
             raise UsageError(
@@ -91,6 +87,32 @@ def _compatible_inputs(
     if out.is_dir() and not all(is_leftover(path) or path.name == INPUTS for path in out.iterdir()):
         raise UsageError(f"--out {out} holds other files; choose a new folder")
     return {}
+
+
+def record_inputs(out: Path, inputs: Mapping[str, str]) -> None:
+    """Record inputs of an opened run that are known only once it has begun.
+
+    Args:
+        out: The folder, within the block of `opened_run`.
+        inputs: As there.
+
+    Raises:
+        UsageError: The folder holds a run with others.
+    """
+    known = _read_inputs(out / INPUTS)
+    _refuse(out, _changed(known, inputs))
+    write_whole(out / INPUTS, (json.dumps(known | dict(inputs), indent=1) + "\n").encode())
+
+
+def _changed(known: Mapping[str, Any], inputs: Mapping[str, str]) -> list[str]:
+    return [name for name, value in inputs.items() if known.get(name, value) != value]
+
+
+def _refuse(out: Path, changed: Collection[str]) -> None:
+    if changed:
+        raise UsageError(
+            f"{out} was started with other inputs ({', '.join(changed)} differ); choose another --out"
+        )
 
 
 def _read_inputs(path: Path) -> dict[str, Any]:

@@ -1,5 +1,10 @@
-from mskgrasp.planning.run_inputs import inputs_of, part_digests
+import pytest
+
+from mskgrasp.core.errors import UsageError
+from mskgrasp.planning.certified import certified_folder
+from mskgrasp.planning.run_inputs import certified_digests, inputs_of, part_digests
 from tests.boxes import make_box
+from tests.planning.test_certified import certified, certified_grasp
 
 
 def test_the_digests_name_every_input_and_change_with_its_content(tmp_path, monkeypatch):
@@ -26,3 +31,16 @@ def test_another_folder_with_a_part_of_the_same_name_is_another_input(tmp_path):
     ]
     first, second = (part_digests([str(folder)]) for folder in folders)
     assert set(first) == set(second) == {"part block"} and first != second
+
+
+def test_other_certified_grasps_of_a_part_are_another_input(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    box = make_box(tmp_path, "block", (0.05, 0.03, 0.02), 0.1)
+    with pytest.raises(UsageError, match="cannot read"):
+        certified_digests([str(box.folder)])
+    certified_folder(box).mkdir(parents=True)
+    found = []
+    for lifted in (23, 23, 24):
+        certified(certified_grasp(lifted=lifted)).write(certified_folder(box))
+        found.append(certified_digests([str(box.folder)]))
+    assert set(found[0]) == {"certified grasps of block"} and found[0] == found[1] != found[2]

@@ -19,6 +19,7 @@ from mskgrasp.runtime.run_folder import (
     file_digest,
     opened_run,
     read_trials,
+    record_inputs,
     rewrite_trials,
 )
 
@@ -124,6 +125,17 @@ def test_an_input_that_joined_later_is_remembered(tmp_path: Path):
     open_run(tmp_path)
     with pytest.raises(UsageError, match="washer_m36 differ"):
         open_run(tmp_path, inputs={"model": "a", "washer_m36": "c"})
+
+
+def test_an_input_that_is_known_once_the_run_has_begun_is_remembered_too(tmp_path: Path):
+    open_run(tmp_path)
+    record_inputs(tmp_path, {"grasps of nut": "a"})
+    record_inputs(tmp_path, {"grasps of nut": "a", "grasps of bolt": "b"})
+    open_run(tmp_path)  # and not forgotten when the run is opened again
+    with pytest.raises(UsageError, match=r"\(grasps of nut differ\); choose another --out"):
+        record_inputs(tmp_path, {"grasps of nut": "c", "grasps of bolt": "b"})
+    with pytest.raises(UsageError, match="model differ"):
+        open_run(tmp_path, inputs={"model": "b"})
 
 
 def test_lines_come_back_in_order_and_nan_is_refused(tmp_path: Path):
