@@ -195,7 +195,8 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
             f"{1e3 * conditions['most_error']:g} mm. The expected error is the root of the mean squared "
             "distance by which the part's points miss their predicted places, with errors of the seen pose "
             f"of {1e3 * errors['position']:g} mm and {np.degrees(errors['turn']):.2g} degrees, friction 0.3 "
-            "to 0.8, force 30 to 70 N a pad, and the arm's 0.1 mm."
+            "to 0.8, force 30 to 70 N a pad, and the arm's 0.1 mm. The least of several is rather "
+            "too small; the trials are made afresh."
         ],
         tables=[
             Table(

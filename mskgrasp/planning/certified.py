@@ -35,7 +35,10 @@ FILE = "grasps.json"
 
 @dataclass(frozen=True, kw_only=True)
 class CertifiedGrasp:
-    """A grasp with its measured outcome, over simulations that had no part in its selection.
+    """A grasp with its measured outcome, over the last simulations.
+
+    They had no part in choosing the candidate, but decide whether it is certified, and which grasp is
+    planned: of many alike ones the best seems better than it is.
 
     Attributes:
         resting: Index of the part's resting pose.

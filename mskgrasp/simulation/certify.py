@@ -277,7 +277,7 @@ def measured(
 
     The line by which the displacement follows the error of the seen pose is fitted to all outcomes; how often
     the part is lifted, and how far outcomes lie from the line, is that of the last ones alone, by which the
-    grasp was not selected.
+    grasp was not chosen among the candidates.
 
     Args:
         resting: Index of the resting pose.
