@@ -40,7 +40,8 @@ class IndexEntry:
 def write_index(path: Path, entries: Sequence[IndexEntry], tolerance: Tolerance) -> None:
     """Write the index page."""
     ranked = sorted(
-        entries, key=lambda one: (-(one.share(EXACT) or -1.0), -(one.share(NOISY) or -1.0), one.name)
+        entries,
+        key=lambda one: (not one.rows, *(-(one.share(name) or 0.0) for name in (EXACT, NOISY)), one.name),
     )
     rows = [
         (

@@ -21,11 +21,12 @@ def test_the_most_precise_part_comes_first_and_one_without_a_report_last(tmp_pat
     broken = IndexEntry(name="broken.stl", headline="broken.stl: no triangles", rows=(), folder=None)
     good = entry("good", [made(number) for number in range(4)])
     poor = entry("poor", [made(0), failed(1), failed(2), failed(3)])
-    write_index(tmp_path / "index.html", [broken, poor, good], TOLERANCE)
+    never = entry("never", [failed(0)])  # no share at all is still more than no report
+    write_index(tmp_path / "index.html", [broken, never, poor, good], TOLERANCE)
     with Page(tmp_path / "index.html") as page:
         names = page.evaluate(
             "[...document.querySelectorAll('tbody tr')].map(row => row.children[0].innerText)"
         )
-        assert names == ["good", "poor", "broken.stl"]
-        assert "1 of 3 parts" in page.evaluate("document.querySelector('.conclusion').innerText")
+        assert names == ["good", "poor", "never", "broken.stl"]
+        assert "1 of 4 parts" in page.evaluate("document.querySelector('.conclusion').innerText")
         assert page.complaints == []
