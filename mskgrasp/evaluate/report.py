@@ -91,7 +91,7 @@ def conclusion(summary: SuccessSummary | DisplacementSummary) -> str:
         if overall.success_rate is None:
             return "No grasp was tried."
         text = (
-            f"{overall.success_rate:.1%} of {overall.trials} planned grasps lifted the part "
+            f"{overall.success_rate:.1%} of {overall.trials} trials lifted the part "
             f"(95 % interval {interval_text(overall.success_interval, digits=1)})"
         )
         if overall.translation_rmse is None:

@@ -24,9 +24,12 @@ def by_title(report: Report) -> dict[str, Section]:
 def test_the_conclusion_states_success_and_errors_with_their_units():
     summary = summarise_trials([trial(), trial(number=1, success=False, reason="missed", measured=None)])
     assert conclusion(summary) == (
-        "50.0% of 2 planned grasps lifted the part (95 % interval 9.5% - 90.5%); RMSE of the predicted "
+        "50.0% of 2 trials lifted the part (95 % interval 9.5% - 90.5%); RMSE of the predicted "
         "displacement in the hand: 5.0 mm and 11.5 deg."
     )
+    # A trial in which nothing was planned counts, too.
+    nothing = summarise_trials([trial(), trial(number=1, **NOTHING)])
+    assert conclusion(nothing).startswith("50.0% of 2 trials lifted the part")
     assert conclusion(summarise_trials([])) == "No grasp was tried."
     unmeasured = summarise_trials([trial(measured=None, unmeasured="no tracker: ...")])
     assert conclusion(unmeasured).endswith("; no displacement was measured.")
