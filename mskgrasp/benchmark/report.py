@@ -185,7 +185,8 @@ def _refusals_section(refused: Sequence[Refusal], figure: Path) -> Section:
         title="Precision against refusals",
         text=[
             "Of the recorded attempts of planners that predict a quality, those under a bound on it are left "
-            f"out. Placed: share of the others that end within {TOLERANCE}, corrected by the prediction."
+            "out, as are those that the planner refused itself. "
+            f"Placed: share of the others that end within {TOLERANCE}, corrected by the prediction."
         ],
         tables=[
             Table(

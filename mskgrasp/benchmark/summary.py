@@ -13,6 +13,7 @@ from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.metrics import clustered_wilson_interval
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.trials.placed_trial import Correction, PlacedTrial
+from mskgrasp.trials.trial import REFUSED as PLANNER_REFUSED
 
 DISTANCES = (2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3)
 """Tolerances of the place, metres."""
@@ -191,7 +192,8 @@ def share(hits: np.ndarray, parts: Sequence[str]) -> PlacedShare:
 def refusals(trials: Sequence[PlacedTrial], seed: int) -> list[Refusal]:
     """Precision of each planner that predicts qualities, by the share of attempts that it leaves out.
 
-    An attempt without a quality, such as one in which no part was found, is left out first.
+    An attempt without a quality, such as one in which no part was found, is left out first. Those that the
+    planner refused itself are never among those tried.
     """
     found = []
     for planner, some in by_planner(trials).items():
@@ -202,14 +204,17 @@ def refusals(trials: Sequence[PlacedTrial], seed: int) -> list[Refusal]:
         off, turn = np.array(errors).T
         hits = (off <= DISTANCE) & (turn <= ANGLE)
         order = np.argsort(qualities, kind="stable")
+        planned = np.array([one.reason != PLANNER_REFUSED for one in some])
         for part_refused in REFUSED:
             least = float(qualities[order[int(part_refused * len(order))]])
-            tried = qualities >= least
+            tried = planned & (qualities >= least)
+            if not tried.any():
+                continue
             names = [one.part for one, kept in zip(some, tried, strict=True) if kept]
             found.append(
                 Refusal(
-                    planner=planner, bound=max(0.0, least), refused=float(1 - tried.mean()),
-                    parts=len(set(names)), placed=share(hits[tried], names),
+                    planner=planner, bound=max(0.0, float(qualities[tried].min())),
+                    refused=float(1 - tried.mean()), parts=len(set(names)), placed=share(hits[tried], names),
                 )
             )  # fmt: skip
     return list(dict.fromkeys(found))

@@ -69,6 +69,18 @@ def test_precision_rises_as_attempts_of_low_quality_are_refused():
     assert all(a.placed.value <= b.placed.value for a, b in zip(found, found[1:], strict=False))
 
 
+def test_attempts_that_the_planner_refused_itself_are_not_among_those_tried():
+    good = [made(number, quality=0.9) for number in range(5)]
+    refused = [failed(number, quality=0.1 * number - 0.4, reason="refused") for number in range(5, 9)]
+    unseen = [failed(9, quality=None, reason="NoPartFound")]
+    found = refusals([*good, *refused, *unseen], 0)
+    assert [(round(one.refused, 2), one.bound, one.placed.n, one.placed.of) for one in found] == [
+        (0.4, 0.0, 5, 6),
+        (0.5, 0.9, 5, 5),
+    ]
+    assert refusals(refused, 0) == []
+
+
 def test_the_stages_add_up_to_the_total():
     found = stages(made(0))
     assert found["seeing"] == pytest.approx([0.0004, 0.0003, 0.0])
