@@ -52,6 +52,8 @@ class RunFacts:
         seed: Seed of the run.
         parts: The parts.
         trained_on: Numbers of parts that a planner's networks were trained on, by planner, where positive.
+        chosen_by: Numbers of parts by which a planner's networks were chosen (early stopping) and calibrated,
+            likewise.
         settings: Of the program.
     """
 
@@ -60,6 +62,7 @@ class RunFacts:
     seed: int
     parts: Sequence[BenchmarkPart]
     trained_on: Mapping[str, int]
+    chosen_by: Mapping[str, int]
     settings: Mapping[str, Any]
 
 
@@ -76,6 +79,7 @@ def write_report(out: Path, trials: Sequence[PlacedTrial], facts: RunFacts) -> t
     values = summary_json(
         rows, refused, budget, headline=headline, cell=facts.cell, noise=facts.noise, seed=facts.seed,
         parts=[part.name for part in facts.parts], trained_on=dict(facts.trained_on),
+        chosen_by=dict(facts.chosen_by),
     )  # fmt: skip
     write_whole(out / "report.json", (json.dumps(values, indent=1, allow_nan=False) + "\n").encode())
     sections = [
@@ -125,6 +129,10 @@ def _first_section(rows: Sequence[Row], facts: RunFacts, figure: Path) -> Sectio
         *(
             f"{name} is made of networks that were trained on {n} of these parts."
             for name, n in facts.trained_on.items()
+        ),
+        *(
+            f"{name} is made of networks that {n} of these parts chose (early stopping) and calibrated."
+            for name, n in facts.chosen_by.items()
         ),
     ]
     return Section(

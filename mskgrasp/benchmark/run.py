@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 
 from mskgrasp.benchmark.config import QUICK_PARTS, BenchmarkConfig
@@ -77,7 +77,8 @@ def benchmark(config: BenchmarkConfig) -> None:
             noise=cell.noise,
             seed=config.seed,
             parts=parts,
-            trained_on=_trained_on(config, training, parts),
+            trained_on=known_parts(config.rows, training, parts, "training_parts"),
+            chosen_by=known_parts(config.rows, training, parts, "validation_parts"),
             settings=config.model_dump(mode="json"),
         )
         headline, sections = write_report(config.out, trials, facts)
@@ -102,13 +103,21 @@ def _parts(config: BenchmarkConfig, training: dict) -> tuple[list[str], list[Ben
     return [part.name for part in listed], listed
 
 
-def _trained_on(
-    config: BenchmarkConfig, training: dict[str, dict], parts: Sequence[BenchmarkPart]
+def known_parts(
+    rows: Sequence[str], training: Mapping[str, Mapping], parts: Sequence[BenchmarkPart], use: str
 ) -> dict[str, int]:
+    """Numbers of parts that the networks of each planner know, by planner, where positive.
+
+    Args:
+        rows: Names of the planners.
+        training: Training of the networks of the planner ``paper``, and under an empty name of the others.
+        parts: The parts.
+        use: ``training_parts``, or ``validation_parts``.
+    """
     found = {}
     for name in ("paper", "ours", "ours-min-quality", "certified"):
-        if name in config.rows:
-            known = training["paper" if name == "paper" else ""].get("training_parts") or ()
+        if name in rows:
+            known = training["paper" if name == "paper" else ""].get(use) or ()
             found[name] = sum(part.name in known for part in parts)
     return {name: n for name, n in found.items() if n}
 

@@ -17,6 +17,8 @@ def test_there_are_60_parts_of_the_catalogue_and_20_are_standard():
     names = [part.name for part in PARTS]
     assert len(names) == len(set(names)) == 60 and set(names) <= set(builtin_names())
     assert sum(part.standard.startswith(("ISO", "DIN", "EN")) for part in PARTS) == 20
+    standard = {part.family for part in PARTS if part.standard}
+    assert len({part.family for part in PARTS} - standard) == 26
 
 
 def test_no_model_was_trained_on_them():

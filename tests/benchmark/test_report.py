@@ -27,7 +27,13 @@ def written(tmp_path_factory):
         *(failed(4, "centroid", part=part.name, quality=None) for part in PARTS),
     ]  # fmt: skip
     facts = RunFacts(
-        cell="sapien", noise="off", seed=0, parts=PARTS, trained_on={"ours": 1}, settings=dict(seed=0)
+        cell="sapien",
+        noise="off",
+        seed=0,
+        parts=PARTS,
+        trained_on={"ours": 1},
+        chosen_by={"certified": 2},
+        settings=dict(seed=0),
     )
     headline, sections = write_report(out, trials, facts)
     return out, headline, {section.title: section for section in sections}
@@ -48,7 +54,8 @@ def test_the_numbers_are_stored(written):
     ours, centroid = values["rows"]
     assert ours["within"]["predicted"][2][1]["n"] == 10 and centroid["lifted"]["n"] == 8
     assert centroid["reasons"] == {"slipped": 2}
-    assert values["trained_on"] == {"ours": 1} and values["parts"] == ["nut", "bracket"]
+    assert values["trained_on"] == {"ours": 1} and values["chosen_by"] == {"certified": 2}
+    assert values["parts"] == ["nut", "bracket"]
     assert {one["planner"] for one in values["refusals"]} == {"ours"}
     assert {one["part"] for one in values["budgets"]} == {"", "nut", "bracket"}
 

@@ -12,6 +12,8 @@ import pytest
 import torch
 
 from mskgrasp.benchmark.__main__ import main
+from mskgrasp.benchmark.part_list import BenchmarkPart
+from mskgrasp.benchmark.run import known_parts
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 from tests.programs import Ended, run_here
@@ -29,6 +31,17 @@ def threads() -> Iterator[None]:
 def run(out: Path, *arguments: object) -> Ended:
     words = ("--parts", "t_nut_m16x18", "--trials", 1, "--workers", 1, "--out", out, *arguments)
     return run_here(main, *map(str, words))
+
+
+def test_parts_that_the_networks_know_are_counted_for_each_planner_made_of_them():
+    parts = [BenchmarkPart(name=name, family=name, split="test", standard="") for name in "abc"]
+    training = {
+        "": dict(training_parts=["a"], validation_parts=["b", "c", "d"]),
+        "paper": dict(training_parts=["d"]),
+    }
+    rows = ("centroid", "paper", "ours", "certified")
+    assert known_parts(rows, training, parts, "training_parts") == {"ours": 1, "certified": 1}
+    assert known_parts(rows, training, parts, "validation_parts") == {"ours": 2, "certified": 2}
 
 
 def test_planners_are_compared_in_the_same_scene_and_stored_trials_are_kept(tmp_path):
