@@ -54,6 +54,7 @@ class RunFacts:
         trained_on: Numbers of parts that a planner's networks were trained on, by planner, where positive.
         chosen_by: Numbers of parts by which a planner's networks were chosen (early stopping) and calibrated,
             likewise.
+        known_families: Numbers of parts of whose families a planner's networks were trained on, likewise.
         settings: Of the program.
     """
 
@@ -63,6 +64,7 @@ class RunFacts:
     parts: Sequence[BenchmarkPart]
     trained_on: Mapping[str, int]
     chosen_by: Mapping[str, int]
+    known_families: Mapping[str, int]
     settings: Mapping[str, Any]
 
 
@@ -79,7 +81,7 @@ def write_report(out: Path, trials: Sequence[PlacedTrial], facts: RunFacts) -> t
     values = summary_json(
         rows, refused, budget, headline=headline, cell=facts.cell, noise=facts.noise, seed=facts.seed,
         parts=[part.name for part in facts.parts], trained_on=dict(facts.trained_on),
-        chosen_by=dict(facts.chosen_by),
+        chosen_by=dict(facts.chosen_by), known_families=dict(facts.known_families),
     )  # fmt: skip
     write_whole(out / "report.json", (json.dumps(values, indent=1, allow_nan=False) + "\n").encode())
     sections = [
@@ -133,6 +135,10 @@ def _first_section(rows: Sequence[Row], facts: RunFacts, figure: Path) -> Sectio
         *(
             f"{name} is made of networks that {n} of these parts chose (early stopping) and calibrated."
             for name, n in facts.chosen_by.items()
+        ),
+        *(
+            f"{name} is made of networks that were trained on parts of the families of {n} of these parts."
+            for name, n in facts.known_families.items()
         ),
     ]
     return Section(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 
 from mskgrasp.benchmark.config import QUICK_PARTS, BenchmarkConfig
@@ -14,6 +14,7 @@ from mskgrasp.benchmark.trials import BenchmarkSetup, SceneTask, key_of, run_sce
 from mskgrasp.core.errors import UsageError
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
+from mskgrasp.parts.builtin import builtin_names, recipe_of
 from mskgrasp.parts.catalogue import read_index
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.run_inputs import certified_digests, model_digests, part_digests
@@ -79,6 +80,7 @@ def benchmark(config: BenchmarkConfig) -> None:
             parts=parts,
             trained_on=known_parts(config.rows, training, parts, "training_parts"),
             chosen_by=known_parts(config.rows, training, parts, "validation_parts"),
+            known_families=known_families(config.rows, training, parts),
             settings=config.model_dump(mode="json"),
         )
         headline, sections = write_report(config.out, trials, facts)
@@ -114,11 +116,29 @@ def known_parts(
         parts: The parts.
         use: ``training_parts``, or ``validation_parts``.
     """
-    found = {}
-    for name in ("paper", "ours", "ours-min-quality", "certified"):
-        if name in rows:
-            known = training["paper" if name == "paper" else ""].get(use) or ()
-            found[name] = sum(part.name in known for part in parts)
+    return _counted(
+        rows, lambda record: sum(part.name in (training[record].get(use) or ()) for part in parts)
+    )
+
+
+def known_families(
+    rows: Sequence[str], training: Mapping[str, Mapping], parts: Sequence[BenchmarkPart]
+) -> dict[str, int]:
+    """Numbers of parts of whose families the networks of each planner were trained on, as `known_parts`."""
+    built_in = frozenset(builtin_names())
+
+    def count(record: str) -> int:
+        names = training[record].get("training_parts") or ()
+        families = {recipe_of(name).family for name in names if name in built_in}
+        return sum(part.family in families for part in parts)
+
+    return _counted(rows, count)
+
+
+def _counted(rows: Sequence[str], count: Callable[[str], int]) -> dict[str, int]:
+    """What is counted of the training record of each planner made of networks, where positive."""
+    networks = [name for name in ("paper", "ours", "ours-min-quality", "certified") if name in rows]
+    found = {name: count("paper" if name == "paper" else "") for name in networks}
     return {name: n for name, n in found.items() if n}
 
 

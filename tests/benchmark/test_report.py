@@ -33,6 +33,7 @@ def written(tmp_path_factory):
         parts=PARTS,
         trained_on={"ours": 1},
         chosen_by={"certified": 2},
+        known_families={"ours": 2},
         settings=dict(seed=0),
     )
     headline, sections = write_report(out, trials, facts)
@@ -55,6 +56,7 @@ def test_the_numbers_are_stored(written):
     assert ours["within"]["predicted"][2][1]["n"] == 10 and centroid["lifted"]["n"] == 8
     assert centroid["reasons"] == {"slipped": 2}
     assert values["trained_on"] == {"ours": 1} and values["chosen_by"] == {"certified": 2}
+    assert values["known_families"] == {"ours": 2}
     assert values["parts"] == ["nut", "bracket"]
     assert {one["planner"] for one in values["refusals"]} == {"ours"}
     assert {one["part"] for one in values["budgets"]} == {"", "nut", "bracket"}

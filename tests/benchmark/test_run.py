@@ -13,7 +13,7 @@ import torch
 
 from mskgrasp.benchmark.__main__ import main
 from mskgrasp.benchmark.part_list import BenchmarkPart
-from mskgrasp.benchmark.run import known_parts
+from mskgrasp.benchmark.run import known_families, known_parts
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 from tests.programs import Ended, run_here
@@ -42,6 +42,16 @@ def test_parts_that_the_networks_know_are_counted_for_each_planner_made_of_them(
     rows = ("centroid", "paper", "ours", "certified")
     assert known_parts(rows, training, parts, "training_parts") == {"ours": 1, "certified": 1}
     assert known_parts(rows, training, parts, "validation_parts") == {"ours": 2, "certified": 2}
+
+
+def test_other_parts_of_a_familiar_family_are_counted():
+    nuts = [
+        BenchmarkPart(name=name, family=family, split="test", standard="")
+        for name, family in (("hex_nut_m20", "hex_nut"), ("mine", "bracket"))
+    ]
+    training = {"": dict(training_parts=["hex_nut_m30", "a_part_of_mine"])}
+    assert known_families(("ours", "antipodal"), training, nuts) == {"ours": 1}
+    assert known_families(("antipodal",), training, nuts) == {}
 
 
 def test_planners_are_compared_in_the_same_scene_and_stored_trials_are_kept(tmp_path):
