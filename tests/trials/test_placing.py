@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, twist_and_swing
-from mskgrasp.core.grasp import Grasp
+from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, object_displacement
 from mskgrasp.core.shipped import config_file
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts import find_part
@@ -16,9 +16,10 @@ from mskgrasp.parts.alike_poses import alike_poses
 from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
+from mskgrasp.planning.place_pose import Target, displacement_of_point, place_pose
 from mskgrasp.trials.engine import connected_engine
-from mskgrasp.trials.placed_trial import PlacedTrial
-from mskgrasp.trials.placing import _moved, _pose_error, as_turned, grasp_and_place
+from mskgrasp.trials.placed_trial import CORRECTIONS, PlacedTrial
+from mskgrasp.trials.placing import _moved, _off, _pose_error, as_turned, grasp_and_place
 
 NUT = find_part("hex_nut_m20")
 
@@ -88,6 +89,41 @@ def test_an_error_of_the_found_pose_is_along_the_axes_of_the_grasp():
     grasp = Grasp.from_vector(np.array([0.5, 0.1, 0.01, np.pi / 2 - 1e-9]))
     off = _pose_error(grasp, pose(0, 0.32, off=0.001), pose(0, 0.3))
     assert off == pytest.approx([0.0, -0.001, 0.02], abs=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_columns_that_follow_from_one_placement_are_what_placing_so_would_give(seed):
+    """A part seen with an error slides in the hand; it is placed by a prediction, by none, by the truth."""
+    rng = np.random.default_rng(seed)
+
+    def motion(place: float, turn: float) -> Pose:
+        x, y, angle = rng.normal(size=3) * [place, place, turn]
+        return Pose(position=np.array([x, y, 0.0]), quat_wxyz=quat_about_z(np.asarray(angle)))
+
+    grasp = Grasp.from_vector(np.array([0.5, 0.05, 0.03, rng.uniform(-np.pi / 2, np.pi / 2)]))
+    lay = Pose(position=np.array([0.51, 0.04, 0.02]), quat_wxyz=motion(0.0, 2.0).quat_wxyz)
+    seen = lay @ motion(1e-3, 0.02)
+    point = np.asarray(seen.position) + np.append(0.01 * rng.normal(size=2), 0.0)
+    slid = grasp.T_base_grasp @ motion(5e-3, 0.2) @ grasp.T_base_grasp.inverse() @ lay
+    in_hand = grasp.T_base_tcp.inverse() @ slid
+    of_origin, _ = object_displacement(grasp.T_base_tcp.inverse() @ seen, in_hand)
+    places = [centre_in_grasp_frame(np.asarray(one), grasp.as_vector()) for one in (seen.position, point)]
+    held = displacement_of_point(np.asarray(of_origin), *places)
+    expected = held + rng.normal(size=4) * [2e-3, 2e-3, 0.0, 0.05]
+    target = Target(x=0.5, y=0.06, theta=float(rng.uniform(-0.7, 0.7)))
+
+    def placed(displacement: np.ndarray) -> np.ndarray:
+        hand = place_pose(grasp, displacement, point, target, 0.0)
+        return _off(hand, seen, point, hand.T_base_tcp @ in_hand, target)
+
+    trial = PlacedTrial(
+        part="any", condition="any", number=0, means="any", placed=placed(expected).tolist(),
+        held=held.tolist(), expected=expected.tolist(),
+    )  # fmt: skip
+    for correction, displacement in zip(CORRECTIONS, (np.zeros(4), expected, held), strict=True):
+        x, y, turn = placed(displacement)
+        assert trial.error(correction) == pytest.approx((np.hypot(x, y), abs(turn)), abs=1e-9)
+    assert trial.error("seen") == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
 def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(tmp_path: Path):
