@@ -28,7 +28,7 @@ from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.simulation.certify_parts import certify
 from mskgrasp.trials.placed_trial import PlacedTrial
 
-SCENE_VERSION = 1
+SCENE_VERSION = 2
 """Raised by every change after which a seed makes other trials."""
 _MAY_CHANGE = ("parts", "out", "tolerance", "trials", "workers", "quick", "simulations")
 

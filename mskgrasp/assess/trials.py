@@ -12,7 +12,7 @@ import yaml
 
 from hal.errors import HalError
 from mskgrasp.core.files import write_whole
-from mskgrasp.core.seeds import scene_seeds
+from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.parts import find_part
 from mskgrasp.planning.certified import CertifiedGrasps
 from mskgrasp.planning.certified_planner import CertifiedPlanner, reachable_by
@@ -135,7 +135,7 @@ def _bench(setup: AssessSetup) -> Iterator[Callable[[SceneTask], Iterator[Placed
 
         def run(task: SceneTask) -> Iterator[PlacedTrial]:
             engine, planners = bench(task.condition)
-            seeds = scene_seeds(setup.seed, part.name, task.number)
+            seeds = trial_seeds(setup.seed, part.name, task.number)
             for means in task.means:
                 trial = PlacedTrial(part=part.name, condition=task.condition, number=task.number, means=means)
                 yield grasp_and_place(engine, planners[means], part, seeds, trial, setup.certified.like)

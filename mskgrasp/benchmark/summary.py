@@ -11,7 +11,7 @@ import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.metrics import clustered_wilson_interval
-from mskgrasp.core.seeds import scene_seeds
+from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.trials.placed_trial import Correction, PlacedTrial
 from mskgrasp.trials.trial import REFUSED as PLANNER_REFUSED
 
@@ -144,7 +144,7 @@ def placing_error(trial: PlacedTrial, column: Column, seed: int) -> tuple[float,
     if off is None:
         return None
     if column == "camera":
-        rng = np.random.default_rng(scene_seeds(seed, trial.part, trial.number))
+        rng = np.random.default_rng(trial_seeds(seed, trial.part, trial.number))
         off = off + rng.normal(size=3) * [CAMERA_POSITION, CAMERA_POSITION, CAMERA_TURN]
     return float(np.hypot(off[0], off[1])), float(abs(wrap_angle(off[2])))
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hal.errors import HalError
 from mskgrasp.benchmark.planners import WITHOUT_POSE, Planners, PlannerSettings
-from mskgrasp.core.seeds import scene_seeds
+from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.parts import find_part
 from mskgrasp.parts.alike_poses import alike_poses
 from mskgrasp.runtime.worker_pool import Work, results
@@ -111,7 +111,7 @@ def _bench(setup: BenchmarkSetup) -> Iterator[Callable[[SceneTask], Iterator[Pla
             if task.source not in alike and not set(task.planners) <= set(WITHOUT_POSE):
                 alike[task.source] = alike_poses(part)
             like = alike.get(task.source, {})
-            seeds = scene_seeds(setup.seed, part.name, task.number)
+            seeds = trial_seeds(setup.seed, part.name, task.number)
             for name in task.planners:
                 trial = PlacedTrial(part=part.name, condition=setup.condition, number=task.number, means=name)
                 yield grasp_and_place(engine, planners.of(name, part), part, seeds, trial, like)

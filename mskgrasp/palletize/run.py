@@ -14,7 +14,7 @@ from hal import cell_from_yaml
 from hal.operator import Operator
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import write_whole
-from mskgrasp.core.seeds import scene_seeds
+from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.pallet_slots import Slot, check_room, check_slots_in_reach
@@ -34,7 +34,7 @@ from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import check_loads
 from mskgrasp.trials.engine import connected_engine
 
-SCENE_VERSION = 2
+SCENE_VERSION = 3
 """Raised by every change after which `_pallets` draws other scenes from a seed."""
 
 
@@ -131,7 +131,7 @@ def _pallets(
 
     def task(name: str, number: int, index: int, correction: Correction) -> PlacementTask:
         # A part may fill several slots of a pallet, each of them another scene.
-        seed, _ = scene_seeds(config.seed, find_part(name).name, number * len(slots) + index)
+        seed, _ = trial_seeds(config.seed, find_part(name).name, number * len(slots) + index)
         return PlacementTask(
             part=name, number=number, index=index, slot=slots[index], correction=correction, seed=seed,
             keep=index > 0,

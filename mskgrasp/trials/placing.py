@@ -51,7 +51,7 @@ def grasp_and_place(
         engine: Engine of a cell with a feeder and a tracker.
         planner: Plans the grasp.
         part: The part.
-        seeds: Of the scene and of the target's turn: `mskgrasp.core.seeds.scene_seeds`.
+        seeds: Of the scene and of the target's turn: `mskgrasp.core.seeds.trial_seeds`.
         trial: Names the trial; the outcome is filled in.
         like: Resting poses that equal another one, as in `mskgrasp.planning.certified.CertifiedGrasps`.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hal.errors import HalError
 from mskgrasp.core.errors import UsageError
-from mskgrasp.core.seeds import scene_seeds
+from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.core.settings import Tape
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
@@ -26,7 +26,7 @@ from mskgrasp.trials.predictors import LOWESS, LowessPredictor, NetworkPredictor
 from mskgrasp.trials.trial import Policy, Trial, trial_key
 from mskgrasp.trials.trial_files import trial_file, write_trial
 
-SCENE_VERSION = 1
+SCENE_VERSION = 2
 """Raised by every change after which `TrialRunner` draws other scenes from a seed."""
 
 
@@ -115,7 +115,7 @@ class TrialRunner:
             HalError: The cell was lost.
             StoppedByOperator: The operator ended the run.
         """
-        seed, _ = scene_seeds(task.seed, task.part, task.number)
+        seed, _ = trial_seeds(task.seed, task.part, task.number)
         planned = self._engine.present(task.source, seed, self._chooser(task), name=task.key)
         record = run_trial(self._engine, planned, part=task.part, number=task.number, seed=seed)
         trial = replace(

@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.stats import t as student
 
-from mskgrasp.core.seeds import scene_seeds
+from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.core.shipped import config_file
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts import find_part, starter_names
@@ -132,7 +132,7 @@ def trials(parts: Sequence[str], n_candidates: int, seed: int, folder: Path) -> 
         planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=n_candidates), engine.cell)
         for number in count():
             part = parts[number % len(parts)]
-            scene, _ = scene_seeds(seed, part, number)
+            scene, _ = trial_seeds(seed, part, number)
             planned = engine.present(part, scene, planner)
             record = run_trial(engine, planned, part=part, number=number, seed=scene)
             yield record.trial.success
