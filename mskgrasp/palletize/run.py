@@ -197,10 +197,12 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
                     continue
                 where = f"slot {number} of {len(pallet.tasks)}" if pallet.name else f"trial {task.number + 1}"
                 yield worker.run(task, f"{where}, correction {task.correction}")
-            engine.home()
             if pallet.name:
+                engine.home()
                 image = worker.picture(config.all_slots())
                 _, png = cv2.imencode(".png", image[..., ::-1])
                 write_whole(config.out / "placements" / f"{pallet.name}.png", png.tobytes())
+            else:
+                engine.leave()
 
         yield fill

@@ -153,6 +153,21 @@ class TrialEngine:
             self.recover(error)
             go_home(self.cell, tallest=self._tallest, take=self._operator.take)
 
+    def leave(self) -> None:
+        """Move the arm home before a new scene, or at the end.
+
+        A feeder sets a new scene with the arm at home, and takes a part away that hooks on a finger.
+
+        Raises:
+            MotionAborted: A second contact, and the cell has no feeder.
+        """
+        try:
+            self.home()
+        except MotionAborted as error:
+            if self.cell.feeder is None:
+                raise
+            self.recover(error)
+
     def recover(self, error: MotionAborted) -> None:
         """Recover the arm after a contact, with the operator's consent where one is asked.
 
@@ -227,7 +242,7 @@ class TrialEngine:
         known = find_part(part)
         self.cell.arm.check_load(known.mass)
         while True:
-            self.home()
+            self.leave()
             no_tape = ""
             try:
                 self._operator.present(self.cell, part, seed, name=name, keep=keep)

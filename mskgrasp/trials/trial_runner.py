@@ -177,4 +177,4 @@ def _trial_bench(setup: Setup) -> Iterator[Callable[[SceneTasks], Iterator[Trial
     with connected_engine(setup.cell, yes=setup.yes, picture=picture, tape=setup.tape) as engine:
         runner = TrialRunner(engine, setup)
         yield lambda scene: chain.from_iterable(map(runner.run, scene))
-        engine.home()
+        engine.leave()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +23,9 @@ from hal.operator import Operator
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
+from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.trials.engine import ExecutedGrasp, TrialEngine, connected_engine
 from tests.hal.real_cell import measured_cell
 from tests.hal.replay.toy import toy_cell
@@ -212,3 +215,20 @@ def test_a_real_cell_is_not_connected_where_nobody_can_be_asked(tmp_path, monkey
         connected_engine(measured_cell(tmp_path), yes=False, picture=tmp_path, tape=None),
     ):
         pass
+
+
+def test_a_part_that_hooks_on_a_finger_is_taken_away_by_the_next_scene(tmp_path: Path):
+    """The pads close within the bore of a nut that stands on its edge, from both sides, and cannot leave it."""
+    with connected_engine(SIMULATED_CELL, yes=True, picture=tmp_path / "next.png", tape=None) as engine:
+        seed, _ = trial_seeds(0, "hex_nut_m30", 0)
+        planned = engine.present("hex_nut_m30", seed, planner())
+        assert planned.plan is not None
+        grasp = Grasp.from_vector(np.array([0.42189, 0.07477, 0.02451, 1.32814]))
+        assert engine.grasp(dataclasses.replace(planned.plan, grasp=grasp)).reason == ""
+        with pytest.raises(MotionAborted, match="contact force") as raised:
+            engine.home()
+        engine.recover(raised.value)
+        engine.leave()
+        again = engine.present("hex_nut_m30", seed, planner())
+        np.testing.assert_array_equal(again.frame.depth, planned.frame.depth)
+        np.testing.assert_allclose(engine.cell.arm.state().joints, engine.cell.workspace.home, atol=0.01)
