@@ -23,7 +23,7 @@ from mskgrasp.planning.run_inputs import model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import note, progress
-from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials, rewrite_trials
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, resume_trials, rewrite_trials
 from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.simulation.certify_parts import certify
 from mskgrasp.trials.placed_trial import PlacedTrial
@@ -131,7 +131,7 @@ def begin_trials(out: Path, certified: CertifiedGrasps) -> None:
     path = out / FILE
     if path.exists() and path.read_bytes() == certified.contents():
         return
-    stored = read_trials(out / TRIALS, PlacedTrial.from_json)
+    stored = resume_trials(out / TRIALS, PlacedTrial.from_json)
     kept = [trial for trial in stored if trial.means != "certified"]
     if len(kept) < len(stored):
         note(
@@ -154,7 +154,7 @@ def _trials(
         seed=config.seed,
     )
     path = out / TRIALS
-    found = {trial.key: trial for trial in read_trials(path, PlacedTrial.from_json)}
+    found = {trial.key: trial for trial in resume_trials(path, PlacedTrial.from_json)}
     tasks = scene_tasks(config.n_trials)
     missing = [left for task in tasks if (left := task.without(found)) is not None]
     keys = [key for task in tasks for key in task.keys()]

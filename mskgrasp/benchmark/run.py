@@ -20,7 +20,7 @@ from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.run_inputs import certified_digests, model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, read_trials, record_inputs
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, record_inputs, resume_trials
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import CellFile, read_cell
 from mskgrasp.trials.placed_trial import PlacedTrial
@@ -156,7 +156,7 @@ def _trials(
         seed=config.seed,
     )
     path = config.out / TRIALS
-    found = {key_of(trial): trial for trial in read_trials(path, PlacedTrial.from_json)}
+    found = {key_of(trial): trial for trial in resume_trials(path, PlacedTrial.from_json)}
     missing = [left for task in tasks if (left := task.without(found)) is not None]
     # Planner by planner, as the report lists them.
     keys = [(task.part, task.number, name) for name in config.rows for task in tasks]

@@ -37,8 +37,8 @@ from mskgrasp.runtime.run_folder import (
     TRIALS,
     append_trial,
     opened_run,
-    read_trials,
     record_inputs,
+    resume_trials,
     rewrite_trials,
 )
 from mskgrasp.simulation.certify_parts import certify_missing
@@ -135,7 +135,7 @@ def _make_trials(
     make_folder(config.out / FOLDER)
     for leftover in (config.out / FOLDER).glob("*.tmp"):
         leftover.unlink()
-    trials = {trial.key: trial for trial in read_trials(config.out / TRIALS, Trial.from_json)}
+    trials = {trial.key: trial for trial in resume_trials(config.out / TRIALS, Trial.from_json)}
     missing = [tuple(task for task in scene if task.key not in trials) for scene in tasks]
     missing = [scene for scene in missing if scene]
     if not missing:

@@ -28,7 +28,7 @@ from mskgrasp.planning.for_cell import make_planner, tell_model
 from mskgrasp.planning.run_inputs import certified_digests, inputs_of
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append_trial, file_digest, opened_run, read_trials
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, file_digest, opened_run, resume_trials
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import check_loads
@@ -154,7 +154,7 @@ def _pallets(
 
 
 def _place_all(config: PalletizeConfig, pallets: list[list[PlacementTask]], asks: bool) -> list[Placement]:
-    found = {one.key: one for one in read_trials(config.out / TRIALS, Placement.from_json)}
+    found = {one.key: one for one in resume_trials(config.out / TRIALS, Placement.from_json)}
     keys = [task.key for pallet in pallets for task in pallet]
     missing = [
         TaskGroup(

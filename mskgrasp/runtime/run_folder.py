@@ -141,7 +141,7 @@ def append_trial(path: Path, values: Mapping[str, Any]) -> None:
     """Append a line to a file of trials; NaN is refused, since JSON has none.
 
     Raises:
-        OSError: The disk is full; the next `read_trials` removes what was written of the line.
+        OSError: The disk is full; `resume_trials` removes what was written of the line.
     """
     line = json.dumps(values, allow_nan=False) + "\n"
     try:
@@ -157,13 +157,33 @@ def rewrite_trials(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
 
 
 def read_trials(path: Path, make: Callable[[dict[str, Any]], RecordT]) -> list[RecordT]:
-    """Read the stored trials in order; remove an incomplete last line, which a killed run leaves.
+    """Read the stored trials in order; an incomplete last line, which is being written, is left out.
 
     Raises:
         BadDataset: A line of the file is not a trial.
     """
+    return _read_trials(path, make)[0]
+
+
+def resume_trials(path: Path, make: Callable[[dict[str, Any]], RecordT]) -> list[RecordT]:
+    """Read the trials of a run that this process has opened; remove an incomplete last line.
+
+    A killed run leaves such a line. Only the process that holds the run's lock may remove it: to any other
+    it may be a line that is being written.
+
+    Raises:
+        BadDataset: A line of the file is not a trial.
+    """
+    found, n_incomplete = _read_trials(path, make)
+    if n_incomplete:
+        os.truncate(path, path.stat().st_size - n_incomplete)
+    return found
+
+
+def _read_trials(path: Path, make: Callable[[dict[str, Any]], RecordT]) -> tuple[list[RecordT], int]:
+    """The trials, and the number of bytes of an incomplete last line."""
     if not path.exists():
-        return []
+        return [], 0
     *lines, incomplete = path.read_bytes().split(b"\n")
     found = []
     for i, line in enumerate(lines):
@@ -173,6 +193,4 @@ def read_trials(path: Path, make: Callable[[dict[str, Any]], RecordT]) -> list[R
             raise BadDataset(
                 f"{path}: line {i + 1} is not a trial; delete it or choose another --out"
             ) from error
-    if incomplete:
-        os.truncate(path, path.stat().st_size - len(incomplete))
-    return found
+    return found, len(incomplete)

@@ -20,6 +20,7 @@ from mskgrasp.runtime.run_folder import (
     opened_run,
     read_trials,
     record_inputs,
+    resume_trials,
     rewrite_trials,
 )
 
@@ -150,19 +151,30 @@ def test_lines_come_back_in_order_and_nan_is_refused(tmp_path: Path):
     assert [line["number"] for line in read_trials(path, dict)] == [2, 1, 0]
 
 
-def test_an_incomplete_last_line_is_removed_and_the_others_stay_where_they_are(tmp_path: Path):
+def test_an_incomplete_last_line_is_removed_by_the_run_and_the_others_stay_where_they_are(tmp_path: Path):
     path = tmp_path / TRIALS
-    assert read_trials(path, dict) == []
+    assert resume_trials(path, dict) == []
     append_trial(path, {"n": 1})
     append_trial(path, {"n": 2})
     inode, whole = path.stat().st_ino, path.read_bytes()
     with path.open("ab") as file:
         file.write(b'{"n": "\xc3')  # a kill may also divide a character
-    assert read_trials(path, dict) == [{"n": 1}, {"n": 2}]
+    assert resume_trials(path, dict) == [{"n": 1}, {"n": 2}]
     assert path.read_bytes() == whole and path.stat().st_ino == inode
     append_trial(path, {"n": 3})
-    rewrite_trials(path, reversed(read_trials(path, dict)))
-    assert [one["n"] for one in read_trials(path, dict)] == [3, 2, 1]
+    rewrite_trials(path, reversed(resume_trials(path, dict)))
+    assert [one["n"] for one in resume_trials(path, dict)] == [3, 2, 1]
+
+
+def test_a_reader_leaves_a_line_that_is_being_written_to_the_run_that_writes_it(tmp_path: Path):
+    path = tmp_path / TRIALS
+    append_trial(path, {"n": 1})
+    with path.open("ab") as file:
+        file.write(b'{"n": ')
+        file.flush()
+        assert read_trials(path, dict) == [{"n": 1}]
+        file.write(b"2}\n")
+    assert read_trials(path, dict) == [{"n": 1}, {"n": 2}]
 
 
 def test_a_line_that_is_no_trial_is_named(tmp_path: Path):

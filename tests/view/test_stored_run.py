@@ -62,3 +62,13 @@ def test_what_is_no_run_of_these_programs_is_refused(tmp_path: Path):
     (tmp_path / TRIALS).write_text("not json\n")
     with pytest.raises(BadDataset, match="line 1 is not a trial"):
         read_run(tmp_path)
+
+
+def test_a_run_that_is_being_made_is_read_and_nothing_in_it_is_changed(tmp_path: Path):
+    path = tmp_path / TRIALS
+    append_trial(path, trial().to_json())
+    with path.open("ab") as file:
+        file.write(b'{"part": "hex_')  # the next trial, half written
+    before = path.read_bytes()
+    assert len(read_run(tmp_path)) == 1
+    assert path.read_bytes() == before
