@@ -31,7 +31,7 @@ from mskgrasp.serve.planner_process import PlannerProcess, PlannerSettings
 LEAST_TOKEN = 16
 """Fewest characters of a token."""
 MOST_CONNECTIONS = 1000
-"""Connections at once, idle ones included; a request on one more is answered 503."""
+"""Connections at once, idle ones included; one more is closed."""
 LAST_ANSWERS_S = 3
 """Time for open requests after Ctrl-C, seconds."""
 
@@ -78,10 +78,9 @@ def serve(config: ServeConfig) -> None:
             print(f"http://{shown}:{port}: {n} workers, model {config.models.name}; Ctrl-C stops", flush=True)
             settings_of_uvicorn = uvicorn.Config(
                 guard,  # pyright: ignore[reportArgumentType]
-                http=closing_after(config.timeout_s),
+                http=closing_after(config.timeout_s, most=MOST_CONNECTIONS),
                 loop="asyncio", ws="none", lifespan="on", log_config=None, access_log=False,
-                proxy_headers=False, server_header=False, limit_concurrency=MOST_CONNECTIONS,
-                timeout_graceful_shutdown=LAST_ANSWERS_S,
+                proxy_headers=False, server_header=False, timeout_graceful_shutdown=LAST_ANSWERS_S,
             )  # fmt: skip
             uvicorn.Server(settings_of_uvicorn).run(sockets=[listener])
         finally:
