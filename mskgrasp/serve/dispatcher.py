@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ AGAIN_S = 5.0
 """Time until a process that could not be started again is tried once more, seconds."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Job:
     kind: str
     content_type: str
@@ -43,7 +44,8 @@ class Dispatcher:
         self._timeout_s = timeout_s
         self._n_open = 0
         self._n_working = len(processes)
-        self._jobs: asyncio.Queue[_Job] = asyncio.Queue()
+        self._jobs: deque[_Job] = deque()
+        self._offered = asyncio.Semaphore(0)
         self._threads = ThreadPoolExecutor(len(processes))
         self._tasks: list[asyncio.Task[None]] = []
 
@@ -57,13 +59,13 @@ class Dispatcher:
         self._tasks = [asyncio.create_task(self._serve(process)) for process in self._processes]
 
     async def close(self) -> None:
-        """Stop distributing; processes are killed, so that no thread waits for one."""
+        """Stop distributing; processes are killed, so that no thread waits for one or uses it later."""
         for task in self._tasks:
             task.cancel()
         for process in self._processes:
             process.kill()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        self._threads.shutdown(wait=False)
+        self._threads.shutdown()
 
     async def ask(self, kind: str, content_type: str, body: bytes) -> tuple[int, bytes]:
         """Have a request answered by the next free process.
@@ -77,21 +79,27 @@ class Dispatcher:
         if self._n_open >= self._most:
             raise Rejected(503, f"{self._n_open} requests are being answered or wait; try again in a second")
         self._n_open += 1
+        answer = asyncio.get_running_loop().create_future()
+        job = _Job(kind, content_type, body, answer)
+        self._jobs.append(job)
+        self._offered.release()
         try:
-            answer = asyncio.get_running_loop().create_future()
-            self._jobs.put_nowait(_Job(kind, content_type, body, answer))
             return await asyncio.wait_for(answer, self._timeout_s)
         except TimeoutError as error:
             raise Rejected(503, f"no answer within {self._timeout_s:g} s; try again later") from error
         finally:
             self._n_open -= 1
+            # Bodies of megabytes do not pile up while no process can be started.
+            if job in self._jobs:
+                self._jobs.remove(job)
 
     async def _serve(self, process: PlannerProcess) -> None:
         loop = asyncio.get_running_loop()
         while True:
-            job = await self._jobs.get()
-            if job.answer.done():  # it took too long while it waited
+            await self._offered.acquire()
+            if not self._jobs:  # it took too long while it waited
                 continue
+            job = self._jobs.popleft()
             try:
                 answer = await loop.run_in_executor(
                     self._threads, process.ask, job.kind, job.content_type, job.body, self._timeout_s

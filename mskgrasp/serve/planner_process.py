@@ -57,14 +57,23 @@ class PlannerProcess:
         return self._process.pid if self._process is not None else None
 
     def start(self) -> None:
-        """Start the process, or start it again; it loads the model meanwhile: see `wait_until_ready`."""
+        """Start the process, or start it again; it loads the model meanwhile: see `wait_until_ready`.
+
+        Raises:
+            OSError: The system has no memory, process or file left for it; it can be tried again.
+        """
         self.stop()
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
-        self._process = process = context.Process(target=_work, args=(theirs, self._settings), daemon=True)
-        with one_thread_a_process(), out_of_reach_of_ctrl_c():
-            process.start()
-        theirs.close()
+        process = context.Process(target=_work, args=(theirs, self._settings), daemon=True)
+        try:
+            with one_thread_a_process(), out_of_reach_of_ctrl_c():
+                process.start()
+        finally:
+            theirs.close()
+            # None: the system refused it. Otherwise it runs, though Ctrl-C may have come meanwhile.
+            if process.pid is not None:
+                self._process = process
 
     def wait_until_ready(self) -> None:
         """Wait until the model is loaded.

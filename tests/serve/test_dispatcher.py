@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 import os
+import shutil
 import signal
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
+from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.serve.config import ServeConfig
 from mskgrasp.serve.dispatcher import Dispatcher
 from mskgrasp.serve.planner_process import PlannerProcess
 from mskgrasp.serve.rejection import Rejected
+from mskgrasp.serve.run import planner_settings
 from tests.serve.bodies import ALONG, NPZ, npz
 
 BODY = npz(grasps=[ALONG])
@@ -57,5 +67,64 @@ def test_what_exceeds_queue_or_time_is_503_and_a_process_that_dies_is_replaced(p
         assert hasty.status["requests"] == 0
         await hasty.close()
         await dispatcher.close()
+
+    asyncio.run(story())
+
+
+def test_requests_that_nobody_can_answer_are_not_kept(tmp_path: Path, capsys):
+    models = tmp_path / "model"
+    shutil.copytree(PRETRAINED, models)
+    process = PlannerProcess(replace(planner_settings(ServeConfig()), models=models))
+
+    async def story() -> int:
+        dispatcher = Dispatcher([process], waiting=1, timeout_s=0.05)
+        dispatcher.open()
+        shutil.rmtree(models)
+        assert process.pid is not None
+        os.kill(process.pid, signal.SIGKILL)
+        await ask(dispatcher)  # it ends the process, which cannot be started again
+        body = bytes(1000)
+        before = sys.getrefcount(body)
+        for _ in range(5):
+            try:
+                await dispatcher.ask("plan", NPZ, body)
+            except Rejected as error:
+                assert error.status == 503
+        gc.collect()
+        kept = sys.getrefcount(body) - before
+        await dispatcher.close()
+        return kept
+
+    process.start()
+    try:
+        process.wait_until_ready()
+        assert asyncio.run(story()) == 0
+    finally:
+        process.stop()
+
+
+def test_once_it_is_closed_no_thread_uses_a_process(process: PlannerProcess, monkeypatch):
+    over: list[str] = []
+    plain = process.ask
+
+    def ask_and_note(*arguments: Any) -> tuple[int, bytes]:
+        try:
+            return plain(*arguments)
+        finally:
+            time.sleep(0.2)  # as on a machine with other work
+            over.append("asked")
+
+    monkeypatch.setattr(process, "ask", ask_and_note)
+
+    async def story() -> None:
+        dispatcher = Dispatcher([process], waiting=1, timeout_s=60.0)
+        dispatcher.open()
+        assert process.pid is not None
+        os.kill(process.pid, signal.SIGSTOP)
+        lost = asyncio.create_task(ask(dispatcher))
+        await asyncio.sleep(0.05)
+        await dispatcher.close()
+        assert over == ["asked"]
+        lost.cancel()
 
     asyncio.run(story())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import shutil
 import signal
 from dataclasses import replace
@@ -44,5 +45,25 @@ def test_a_model_that_is_damaged_is_reported_when_it_is_loaded(tmp_path: Path):
         process.start()
         with pytest.raises(MskgraspError, match="is damaged"):
             process.wait_until_ready()
+    finally:
+        process.stop()
+
+
+def test_a_process_that_the_system_refuses_can_be_started_later():
+    process = PlannerProcess(planner_settings(ServeConfig()))
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    free = os.dup(0)
+    os.close(free)
+    try:
+        for n_more in range(2, 8):  # the pipe of the requests may be opened, not those of the new process
+            resource.setrlimit(resource.RLIMIT_NOFILE, (free + n_more, hard))
+            with pytest.raises(OSError, match="Too many open files"):
+                process.start()
+            assert process.pid is None
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    try:
+        process.start()
+        process.wait_until_ready()
     finally:
         process.stop()
