@@ -60,6 +60,7 @@ def make_app(
         version=__version__,
         docs_url=None,
         redoc_url=None,
+        redirect_slashes=False,
         lifespan=open_and_close,
         telemetry=NO_TELEMETRY,
     )

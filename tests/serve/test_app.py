@@ -129,6 +129,7 @@ WRONG: dict[str, tuple[str, bytes, str, int, str]] = {
     "a long place": ("/place", placing() + b" " * 20_000, JSON, 413, "more than 10000 bytes"),
     "too large": ("/plan", bytes(int(BODY_MB * 1e6) + 1), NPZ, 413, "more than 1000000 bytes"),
     "an unknown path": ("/plans", text(), JSON, 404, "legal: POST /plan"),
+    "a path with a slash": ("/plan/", text(), JSON, 404, "POST /plan/: not found; legal: POST /plan"),
     "a path upwards": ("/../../etc/passwd", text(), JSON, 404, "not found"),
     "a page of documentation": ("/docs", text(), JSON, 404, "not found"),
     "the wrong method": ("/health", text(), JSON, 405, "method not allowed"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -56,6 +57,24 @@ def test_a_million_digits_and_deep_nesting_are_refused():
         with pytest.raises(Rejected) as refused:
             parse_frame(PlanRequest, JSON, body)
         assert refused.value.status == 400 and len(str(refused.value)) < 500
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_grasp_may_be_turned_by_the_whole_half_turn_in_any_precision(dtype: type):
+    grasps = np.array([[0.5, 0.0, 0.02, sign * np.pi / 2] for sign in (-1, 1)], dtype)
+    asked, _ = parse_frame(ScoreRequest, NPZ, npz(grasps=grasps))
+    np.testing.assert_allclose(asked.grasps, grasps)
+    with pytest.raises(Rejected, match="grasps.0.3"):
+        parse_frame(ScoreRequest, NPZ, npz(grasps=grasps * 1.001))
+
+
+def test_unknown_fields_are_refused_before_they_take_memory():
+    body = json.dumps({f"{k:x}": 0 for k in range(100_000)}).encode()
+    tracemalloc.start()
+    with pytest.raises(Rejected, match="0: extra inputs are not permitted; legal fields: depth_png"):
+        parse_frame(PlanRequest, JSON, body)
+    assert tracemalloc.get_traced_memory()[1] < 20 * len(body)
+    tracemalloc.stop()
 
 
 def test_the_fields_of_a_place_request_become_grasp_and_target():
