@@ -39,5 +39,8 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
             return {name: file[name] for name in file.files}
     except ValueError as error:
         raise ValueError("an array is cut off, or holds objects in place of numbers") from error
-    except (LookupError, EOFError, OSError, NotImplementedError, zipfile.BadZipFile, zlib.error) as error:
+    except (LookupError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        # RuntimeError: an unknown compression, or a changed bit that stands for encryption.
         raise ValueError(" ".join(str(error).split())) from error
+    except MemoryError as error:  # of the size in an array's header, before anything of it is read
+        raise ValueError(f"an array is larger than the memory: {error}") from error

@@ -9,8 +9,12 @@ import yaml
 MOST_DEPTH = 50
 """Most collections inside each other."""
 MOST_ALIASES = 100
+MOST_CHARACTERS = 1000
+"""Most characters of a number: one of minutes and seconds takes time that grows with their square, and one of
+5000 hexadecimal digits cannot be shown."""
 MOST_VALUES = 200_000
 """Most keys and values, those that aliases stand for counted as often as they are used."""
+_NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
 
 class _Loader(yaml.SafeLoader):
@@ -56,6 +60,20 @@ class _Loader(yaml.SafeLoader):
                     self._refuse(f"key {key.value!r} occurs twice", key)
                 known.add((key.tag, key.value))
         return node
+
+    def compose_scalar_node(self, anchor: Any) -> yaml.ScalarNode:
+        node = super().compose_scalar_node(anchor)
+        if len(node.value) > MOST_CHARACTERS and node.tag in _NUMBERS:
+            self._refuse(f"a number of more than {MOST_CHARACTERS} characters", node)
+        return node
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep)
+        except ValueError as error:
+            self._refuse(str(error), node)
+        except (LookupError, AttributeError):  # of PyYAML, where a tag is written that does not fit
+            self._refuse("a value that does not have the form of its tag", node)
 
     @staticmethod
     def _refuse(problem: str, at: Any) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.lib import format as npy
 
 from mskgrasp.core.array_files import read_arrays, write_arrays
 
@@ -28,7 +31,10 @@ def test_what_is_no_archive_of_arrays_is_a_value_error_of_one_line(tmp_path: Pat
     flipped = whole[:200] + bytes(byte ^ 0xFF for byte in whole[200:300]) + whole[300:]
     method = bytearray(whole)
     method[8] = method[whole.rindex(b"PK\x01\x02") + 10] = 99  # an unknown compression
-    for content in (b"", whole[: len(whole) // 2], flipped, bytes(method), b"\x80\x04N."):
+    encrypted = bytearray(whole)
+    encrypted[whole.rindex(b"PK\x01\x02") + 8] |= 1
+    damaged = (b"", whole[: len(whole) // 2], flipped, bytes(method), bytes(encrypted), b"\x80\x04N.")
+    for content in damaged:
         path.write_bytes(content)
         with pytest.raises(ValueError) as raised:
             read_arrays(path)
@@ -40,3 +46,12 @@ def test_what_is_no_archive_of_arrays_is_a_value_error_of_one_line(tmp_path: Pat
         write_arrays(tmp_path / "none" / "one.npz", a=np.zeros(1))
     with pytest.raises(ValueError):
         write_arrays(path, a=np.array([{}], dtype=object))
+
+
+def test_an_array_that_claims_to_be_larger_than_the_memory_is_a_value_error(tmp_path: Path):
+    header = io.BytesIO()
+    npy.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (10**15,)})
+    with zipfile.ZipFile(tmp_path / "one.npz", "w") as file:
+        file.writestr("a.npy", header.getvalue())
+    with pytest.raises(ValueError, match="larger than the memory"):
+        read_arrays(tmp_path / "one.npz")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from mskgrasp.core.json_text import parse_json
@@ -25,3 +27,12 @@ def test_what_cannot_be_used_is_a_value_error_of_one_line(text: str | bytes, pro
     with pytest.raises(ValueError, match=problem) as raised:
         parse_json(text)
     assert "\n" not in str(raised.value)
+
+
+def test_a_key_that_occurs_twice_is_found_among_many_in_no_time():
+    n = 100_000  # in 100 s, if every key is compared with every other
+    text = "{" + ", ".join(f'"{k}": 0' for k in (*range(n), n - 1)) + "}"
+    began = time.monotonic()
+    with pytest.raises(ValueError, match=f"key '{n - 1}' occurs twice"):
+        parse_json(text)
+    assert time.monotonic() - began < 10

@@ -7,7 +7,7 @@ import tracemalloc
 import pytest
 import yaml
 
-from mskgrasp.core.yaml_text import MOST_ALIASES, MOST_DEPTH, MOST_VALUES, parse_yaml
+from mskgrasp.core.yaml_text import MOST_ALIASES, MOST_CHARACTERS, MOST_DEPTH, MOST_VALUES, parse_yaml
 
 
 @pytest.mark.parametrize(
@@ -17,6 +17,8 @@ from mskgrasp.core.yaml_text import MOST_ALIASES, MOST_DEPTH, MOST_VALUES, parse
         "a: 1\nb: [x, 2.5, null, true]\nc: {d: {e: 2001-01-01}}\n",
         "base: &base {x: 1, y: 2}\nother: {<<: *base, y: 3}\nagain: *base\n",
         "'1': a\n1: b\n",
+        "a: !!int '12'\nb: 0x10\nc: 1:30\nd: " + "9" * MOST_CHARACTERS,
+        "a: " + "word " * MOST_CHARACTERS,
     ],
 )
 def test_sound_text_is_read_as_pyyaml_reads_it(text: str):
@@ -32,7 +34,15 @@ def test_sound_text_is_read_as_pyyaml_reads_it(text: str):
         ("- *a", "found undefined alias 'a' in line 1"),
         ("[" * 100_000, f"more than {MOST_DEPTH} collections"),
         ("a: &a 1\nb: [" + "*a, " * MOST_ALIASES + "*a]", f"more than {MOST_ALIASES} aliases in line 2"),
-        ("9" * 5000, "4300 digits"),
+        ("9" * 5000, f"a number of more than {MOST_CHARACTERS} characters in line 1"),
+        ("a: 0x" + "f" * 5000, f"a number of more than {MOST_CHARACTERS} characters"),
+        ("a: 1" + ":59" * 300_000, f"a number of more than {MOST_CHARACTERS} characters"),
+        ("a: 1" + ":59" * 3000 + ".5", f"a number of more than {MOST_CHARACTERS} characters"),
+        ("a: 2001-99-01", "month must be in 1..12 in line 1, column 4"),
+        ("a: !!int ''", "does not have the form of its tag in line 1, column 4"),
+        ("a: !!bool maybe", "does not have the form of its tag"),
+        ("a: !!timestamp [1]", "expected a scalar node"),
+        ("a: !!timestamp soon", "does not have the form of its tag"),
         ("a: \x00", "special characters"),
         ("{[1]: 2}", "unhashable key"),
         ("--- 1\n--- 2\n", "found another document in line 2"),
