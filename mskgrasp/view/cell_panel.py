@@ -50,6 +50,7 @@ class CellPanel(Panel):
         self._config, self._part = config, part
         self._seed = config.seed
         self.plan: GraspPlan | None = None
+        self._n_stops = 0
         self._frame: RgbdFrame | None = None
         planner = make_planner(config.models, config.planner.for_motion(), self.cell)
         if self._part is None and isinstance(self.cell.feeder, SimulatedWorld):
@@ -82,7 +83,7 @@ class CellPanel(Panel):
         self.execute_button.on_click(self._ask_to_execute)
         self.recover_button.on_click(self._ask_to_recover)
         # At once, from the callback's own thread: the main thread waits for the motion.
-        self.stop_button.on_click(lambda _: self.cell.arm.stop() if may_move else None)
+        self.stop_button.on_click(lambda _: self._stop())
 
     def shown(self) -> None:
         """Plan, if nothing has been planned yet."""
@@ -129,8 +130,10 @@ class CellPanel(Panel):
         def again() -> None:
             nonlocal last
             if self.root.visible and time.monotonic() - last > LIVE_S:
-                self.plan_once()
-                last = time.monotonic()
+                try:
+                    self.plan_once()
+                finally:  # an error is not met, and printed, thirty times a second
+                    last = time.monotonic()
 
         self.page.main.repeat("live", again if self.live.value else None)
 
@@ -214,6 +217,11 @@ class CellPanel(Panel):
             go_home(self.cell, tallest=self.engine.passed)
         self.page.tell("the arm is at home; plan again")
 
+    def _stop(self) -> None:
+        if self._config.allow_motion:
+            self._n_stops += 1
+            self.cell.arm.stop()
+
     def _ask_to_execute(self, event: GuiEvent[GuiButtonHandle]) -> None:
         self.live.value = False  # the plan stays as it is while the question is open
         plan = self.plan
@@ -239,7 +247,16 @@ class CellPanel(Panel):
 
         def agreed(_: GuiEvent) -> None:
             modal.close()
-            self.page.main.submit("motion", work)
+            before = self._n_stops
+
+            def move() -> None:
+                # The main thread may have had other work to do; a recovery would lift a stop of meanwhile.
+                if self._n_stops == before:
+                    work()
+                else:
+                    self.page.tell("the arm was stopped before it moved; nothing moved")
+
+            self.page.main.submit("motion", move)
 
         yes.on_click(agreed)
         no.on_click(lambda _: modal.close())

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hal.errors import CommunicationLost
 from hal.simulated import SimulatedArm
 from mskgrasp.core.config import Config
 from mskgrasp.parts import find_part
@@ -163,6 +164,40 @@ def test_stop_ends_a_motion_at_once_and_recovery_is_asked_for(page: Page, engine
     work(page)
     assert page.said == "the arm is at home; plan again"
     assert np.abs(arm.state().joints - engine.cell.workspace.home).max() < min(0.01, away + 0.01)
+
+
+def test_a_stop_after_a_yes_holds_though_the_motion_has_not_begun(
+    page: Page, engine: TrialEngine, monkeypatch
+):
+    panel = panel_of(page, engine, allow_motion=True)
+    arm = engine.cell.arm
+    moved: list[str] = []
+    monkeypatch.setattr(arm, "recover", lambda: moved.append("recovered"))
+    monkeypatch.setattr(arm, "stop", lambda: None)
+    asked(page, panel._ask_to_recover).buttons["yes, move"].value = True
+    panel.stop_button.value = True  # while the main thread has other work
+    work(page)
+    assert moved == [] and "nothing moved" in page.said
+
+
+def test_an_error_of_live_plans_is_met_no_more_often_than_a_plan(
+    page: Page, engine: TrialEngine, monkeypatch
+):
+    panel = panel_of(page, engine)
+    tries: list[int] = []
+
+    def fail() -> None:
+        tries.append(1)
+        raise CommunicationLost("the cable was pulled")
+
+    monkeypatch.setattr("mskgrasp.view.cell_panel.LIVE_S", 60.0)
+    monkeypatch.setattr(engine, "capture", fail)
+    panel.live.value = True
+    for _ in range(4):
+        page.main.work_once()
+    assert len(tries) == 1 and "the cable was pulled" in page.said
+    panel.live.value = False
+    work(page)
 
 
 def test_live_plans_follow_one_another_while_the_panel_is_shown(page: Page, engine: TrialEngine, monkeypatch):
