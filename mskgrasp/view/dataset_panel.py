@@ -50,6 +50,7 @@ class DatasetPanel(Panel):
         self._name = f"{self.root.name}/attempt"
         self._nodes = page.scene.add_frame(self._name, show_axes=False)
         self.simulator = AttemptSimulator()
+        self._without_mesh = ""
         gui = page.gui
         names = dataset.part_names
         first = names[0] if part is None else part
@@ -77,6 +78,10 @@ class DatasetPanel(Panel):
         self.on(self.next, lambda: self._step(1))
         self.on(self.again, self.simulate)
         self.read()
+
+    def shown(self) -> None:
+        """Say why the part has no mesh, if it has none."""
+        self.page.tell(self._without_mesh)
 
     def read(self) -> None:
         """Read the attempts at the chosen part."""
@@ -106,6 +111,7 @@ class DatasetPanel(Panel):
     def draw(self) -> None:
         """Draw the attempt as the controls say."""
         self.player.clear()
+        self.page.tell(self._without_mesh)  # in place of the outcome of another attempt
         with self.page.server.atomic():
             self._nodes.remove()
             self._nodes = self.page.scene.add_frame(self._name, show_axes=False)
@@ -136,13 +142,14 @@ class DatasetPanel(Panel):
     def _find_part(self) -> tuple[Part | None, trimesh.Trimesh | None]:
         """The part with its mesh; None where it is no longer what was grasped."""
         info = self.attempts.infos[0]
+        self._without_mesh = ""
         try:
             part = find_part(info.part)
         except BadPart as error:
-            self.page.tell(f"shown without its mesh: {error}")
+            self._without_mesh = f"shown without its mesh: {error}"
             return None, None
         if part.content_hash != info.part_hash:
-            self.page.tell(f"shown without its mesh: '{part.name}' has changed since these attempts")
+            self._without_mesh = f"shown without its mesh: '{part.name}' has changed since these attempts"
             return None, None
         return part, part_mesh(part)
 

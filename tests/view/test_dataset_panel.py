@@ -98,6 +98,7 @@ def test_an_attempt_is_simulated_again_and_played(page: Page, panel: DatasetPane
     panel.next.value = True
     work(page)
     assert not has_node(page, "/dataset/motion/part") and node(page, "/dataset/attempt").visible
+    assert page.said == ""  # it was of the other attempt
 
 
 @pytest.mark.parametrize(
@@ -111,6 +112,8 @@ def test_a_part_that_is_no_longer_what_was_grasped_is_shown_without_its_mesh_and
     changed = replace(found, infos=tuple(replace(info, **changes) for info in found.infos))
     monkeypatch.setattr(AttemptList, "of", lambda *_: changed)
     panel = DatasetPanel(page, open_dataset(collected))
+    work(page)
+    page.begin()
     work(page)
     assert message in page.said and panel.again.disabled
     assert has_node(page, "/dataset/attempt/hand") and not has_node(page, "/dataset/attempt/before")
