@@ -218,7 +218,7 @@ def test_a_real_cell_is_not_connected_where_nobody_can_be_asked(tmp_path, monkey
 
 
 def test_a_part_that_hooks_on_a_finger_is_taken_away_by_the_next_scene(tmp_path: Path):
-    """The pads close within the bore of a nut that stands on its edge, from both sides, and cannot leave it."""
+    """The pads close within the bore of a nut that stands on its edge, and cannot leave it."""
     with connected_engine(SIMULATED_CELL, yes=True, picture=tmp_path / "next.png", tape=None) as engine:
         seed, _ = trial_seeds(0, "hex_nut_m30", 0)
         planned = engine.present("hex_nut_m30", seed, planner())
