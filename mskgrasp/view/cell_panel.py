@@ -225,7 +225,9 @@ class CellPanel(Panel):
     def _ask_to_execute(self, event: GuiEvent[GuiButtonHandle]) -> None:
         self.live.value = False  # the plan stays as it is while the question is open
         plan = self.plan
-        if plan is not None:
+        if plan is None:  # pressed while a live plan was computed
+            self.page.tell("there is no plan to execute; plan again")
+        else:
             way = f"lifts by {self.cell.workspace.lift_height:g} m, puts the part down and goes home"
             question = f"{plan.summary}. The arm grasps, {way}. Keep clear of it. May it move?"
             self._ask(event, question, lambda: self.execute(plan))

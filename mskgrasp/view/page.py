@@ -73,7 +73,10 @@ class Page:
             choice.on_click(lambda _: self.main.submit("show", lambda: self.show(choice.value)))
         else:
             self._choice.remove()
-        self.show(names[0])
+        try:
+            self.show(names[0])
+        except MskgraspError as error:  # the other panels can be opened
+            self.fail(error)
 
 
 class Panel:

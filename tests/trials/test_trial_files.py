@@ -15,7 +15,7 @@ from mskgrasp.evaluate.replay_trial import draw_trial, find_trial
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import GraspPlan, Planner
-from mskgrasp.runtime.run_folder import TRIALS, append_trial, read_trials
+from mskgrasp.runtime.run_folder import TRIALS, append_trial, read_trials, resume_trials
 from mskgrasp.trials.trial import Prediction, Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file, write_trial
 from tests import synthetic
@@ -82,7 +82,7 @@ def test_trials_are_read_back_equal_and_an_incomplete_last_line_is_removed(tmp_p
     first = trial(predicted_std=[np.nan] * 4, measured=[0.1, 0.2, np.nan, 0.3])
     lines = [json.dumps(one.to_json(), allow_nan=False) for one in (first, trial(number=1))]
     path.write_text(lines[0] + "\n" + lines[1][:40])
-    (found,) = read_trials(path, Trial.from_json)
+    (found,) = resume_trials(path, Trial.from_json)
     assert found.key == "a-000" and np.isnan(found.predicted_std).all()
     np.testing.assert_array_equal(found.measured, first.measured)
     assert path.read_text() == lines[0] + "\n"

@@ -129,6 +129,7 @@ def test_a_yes_grasps_lifts_puts_down_and_goes_home(page: Page, engine: TrialEng
     assert max(heights) > heights[0] + 0.08 > heights[-1] + 0.07  # it was up, and lies again
     assert np.abs(engine.cell.arm.state().joints - engine.cell.workspace.home).max() < 0.01
     assert panel.plan is None and panel.execute_button.disabled
+    assert asked(page, panel._ask_to_execute).buttons == {} and page.said.startswith("there is no plan")
 
 
 def test_stop_ends_a_motion_at_once_and_recovery_is_asked_for(page: Page, engine: TrialEngine, monkeypatch):

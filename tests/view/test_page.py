@@ -27,6 +27,19 @@ def test_one_panel_with_its_nodes_is_shown_at_a_time(page: Page):
     assert (first.times, second.times) == (1, 1) and has_node(page, "/second")
 
 
+def test_a_first_panel_that_cannot_be_drawn_leaves_the_others(page: Page):
+    class Failing(Panel):
+        def shown(self) -> None:
+            raise NoPartFound("nothing lies on the table")
+
+    Failing(page, "first")
+    second = Counting(page, "second")
+    page.begin()
+    assert "nothing lies on the table" in page.said
+    page.show("second")
+    assert second.times == 1 and second.folder.visible
+
+
 def test_an_error_is_shown_on_the_page_and_printed(page: Page, capsys):
     def fail() -> None:
         raise NoPartFound("nothing lies on the table")
