@@ -34,7 +34,7 @@ CLOSING = 0.012
 """Length of the drawn line along which a candidate closes, metres: the whole opening would hide the part."""
 LINES = 100
 """Candidates that are drawn as lines: thousands of lines take a browser without a GPU 70 ms."""
-TABLE_POINTS = 4000
+TABLE_POINTS = 2000
 """Greatest number of points of the table that are drawn."""
 AROUND = 0.06
 """Distance from the region up to which a depth image is drawn, metres."""
