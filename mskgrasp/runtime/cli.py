@@ -12,6 +12,7 @@ from pathlib import Path
 
 from mskgrasp.core.errors import MskgraspError, UsageError, one_line
 from mskgrasp.runtime.ctrl_c import repeat_dropped_ctrl_c
+from mskgrasp.runtime.memory import keep_freed_memory
 
 
 def make_folder(path: Path) -> None:
@@ -61,6 +62,7 @@ def run(program: str, main: Callable[[], int | None]) -> None:
             Ctrl-C meanwhile has the same effect as later.
     """
     sys.unraisablehook = repeat_dropped_ctrl_c
+    keep_freed_memory()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # A file's name need not be text; and what is printed shows at once, in a pipe, too.

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from multiprocessing import resource_tracker
 
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
+from mskgrasp.runtime.memory import keep_freed_memory
 
 
 @contextmanager
@@ -69,7 +70,8 @@ def leave_with_parent() -> None:
 
 
 def use_one_core() -> None:
-    """Limit torch and the software renderer to one thread each in this process."""
+    """Limit torch and the software renderer to one thread each in this process, which keeps its memory."""
+    keep_freed_memory()
     os.environ.setdefault("LP_NUM_THREADS", "1")
     os.environ["OMP_NUM_THREADS"] = "1"  # torch reads it when it is loaded
     if "torch" in sys.modules:

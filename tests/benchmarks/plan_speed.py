@@ -29,6 +29,7 @@ from mskgrasp.parts import starter_names
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import present
 from mskgrasp.planning.planner import Planner
+from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import progress
 
 REPOSITORY = Path(__file__).parents[2]
@@ -121,4 +122,4 @@ def report(
 
 
 if __name__ == "__main__":
-    main()
+    cli.run("plan_speed", main)

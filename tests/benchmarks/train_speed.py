@@ -22,6 +22,7 @@ from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import build_models
 from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.trainer import Stage, describe_networks, split
+from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import progress
 
 REPOSITORY = Path(__file__).parents[2]
@@ -112,4 +113,4 @@ def random_samples(config: LearningConfig, n: int) -> Samples:
 
 
 if __name__ == "__main__":
-    main()
+    cli.run("train_speed", main)
