@@ -28,9 +28,9 @@ class PlannerConfig(Config):
     """Exclude grasps whose open fingers would collide with something in the depth image."""
     refinements: int = Field(default=0, ge=0, le=20)
     """Rounds of the cross-entropy method: grasps are drawn near the best ones and scored."""
-    chunk_size: int = Field(default=640, ge=1, le=65_536)
-    """Grasps in a batch: many more do not fit a CPU's cache, few have too much overhead. (The
-    paper's network, with patches seven times larger, is fastest with 32.)"""
+    chunk_size: int = Field(default=800, ge=1, le=65_536)
+    """Greatest number of grasps in a batch: many more do not fit a CPU's cache, few have too much overhead.
+    (The paper's network, with patches seven times larger, is fastest with 32.)"""
 
     @property
     def least_quality(self) -> float:

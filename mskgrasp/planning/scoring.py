@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -18,6 +19,12 @@ from mskgrasp.core.grasp import PartView, centre_in_grasp_frame
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.learning.network_config import NetworkConfig
 from mskgrasp.perception.height_patches import crop_patches, height_image
+from mskgrasp.planning.parallel import map_batches
+
+_BATCHES = 4
+"""Batches that grasps are shared out among, whatever the number of cores: rounding depends on their sizes."""
+_SMALL = 48
+"""Smaller batches cost more time for each grasp."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,10 +80,13 @@ class Scene:
 
 def qualities(models: Models, scene: Scene, grasps: np.ndarray, chunk: int) -> np.ndarray:
     """Predict probabilities of success (n,) of grasps (n, 4)."""
-    found = [
-        models.quality(scene.crop_for_quality(grasps[rows], models.meta.network), centre, height)
-        for rows, centre, height, _ in _chunks(models, scene, grasps, chunk)
-    ]
+    network = models.meta.network
+
+    def predict(batch: _Batch) -> Tensor:
+        patches = scene.crop_for_quality(grasps[batch.rows], network)
+        return models.quality(patches, batch.centre_grasp, batch.height)
+
+    found = map_batches(predict, _batches(models, scene, grasps, chunk), models.device)
     return torch.cat(found).cpu().double().numpy() if found else np.zeros(0)
 
 
@@ -91,25 +101,45 @@ def displacements(
     whole = None
     if network.sees_object:
         whole = scene.crop(np.append(scene.view.centre_base, 0.0)[None], network)
-    means, variances = [], []
-    for rows, centre, height, theta in _chunks(models, scene, grasps, chunk):
-        patches = scene.crop(grasps[rows], network) if whole is None else whole.expand(len(theta), -1, -1, -1)
-        mean, variance = models.grasp_displacement(patches, centre, height, theta)
-        means.append(mean)
-        variances.append(torch.full_like(mean, torch.nan) if variance is None else variance)
-    if not means:
+
+    def predict(batch: _Batch) -> tuple[Tensor, Tensor]:
+        if whole is None:
+            patches = scene.crop(grasps[batch.rows], network)
+        else:
+            patches = whole.expand(len(batch.theta), -1, -1, -1)
+        mean, variance = models.grasp_displacement(patches, batch.centre_grasp, batch.height, batch.theta)
+        return mean, torch.full_like(mean, torch.nan) if variance is None else variance
+
+    found = map_batches(predict, _batches(models, scene, grasps, chunk), models.device)
+    if not found:
         return np.zeros((0, network.n_outputs)), np.zeros((0, network.n_outputs))
-    return torch.cat(means).cpu().double().numpy(), torch.cat(variances).cpu().double().numpy()
+    mean, variance = (torch.cat(values).cpu().double().numpy() for values in zip(*found, strict=True))
+    return mean, variance
 
 
-def _chunks(
-    models: Models, scene: Scene, grasps: np.ndarray, size: int
-) -> Iterator[tuple[slice, Tensor, Tensor, Tensor]]:
-    """Generate rows, object centres (k, 3) in the grasp frame, heights (k,) above the table, angles (k,)."""
+class _Batch(NamedTuple):
+    """Some of the grasps, on the networks' device.
+
+    Attributes:
+        rows: Of the grasps.
+        centre_grasp: (k, 3) object centres in the grasp frame, metres.
+        height: (k,) of the grasps above the table, metres.
+        theta: (k,) their angles.
+    """
+
+    rows: slice
+    centre_grasp: Tensor
+    height: Tensor
+    theta: Tensor
+
+
+def _batches(models: Models, scene: Scene, grasps: np.ndarray, size: int) -> Iterator[_Batch]:
+    """Generate batches of at most ``size`` grasps, at least `_BATCHES` of them unless they become small."""
     values = np.column_stack(
         [centre_in_grasp_frame(scene.view.centre_base, grasps), grasps[:, 2] - scene.table_z, grasps[:, 3]]
     )
     known = torch.as_tensor(values, dtype=torch.float32, device=models.device)
+    size = min(size, max(_SMALL, -(-len(grasps) // _BATCHES)))
     for start in range(0, len(grasps), size):
         rows = slice(start, start + size)
-        yield rows, known[rows, :3], known[rows, 3], known[rows, 4]
+        yield _Batch(rows, known[rows, :3], known[rows, 3], known[rows, 4])

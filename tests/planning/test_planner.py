@@ -10,14 +10,16 @@ import torch
 
 from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound, TableTooHigh
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.planner import select, shortlist, variance_score
+from mskgrasp.planning.planner import Planner, select, shortlist, variance_score
 from mskgrasp.planning.refine import fingers_free
 from mskgrasp.planning.scoring import Scene
 from mskgrasp.reports.grasp_figures import draw_plan
 from tests import synthetic
 from tests.planning.hand_made import BOX, FRAME, hand_made_models, planner
+from tests.planning.threads import torch_threads
 from tests.synthetic import REGION, Box
 
 
@@ -48,6 +50,17 @@ def test_the_same_generator_gives_the_same_plan_whatever_the_chunks():
     ]
     assert np.array_equal(plans[0].grasp.as_vector(), plans[1].grasp.as_vector())
     assert np.allclose(plans[0].qualities, plans[1].qualities, atol=1e-6)
+
+
+def test_the_same_generator_gives_the_same_plan_whatever_the_number_of_threads():
+    plans = []
+    for n in (1, 2, 3):
+        with torch_threads(n):
+            one = Planner(load_models(), PlannerConfig(n_candidates=600), table_z=0.0, region=REGION)
+            plans.append(one.plan(FRAME, np.random.default_rng(5)))
+    for other in plans[1:]:
+        assert np.array_equal(other.qualities, plans[0].qualities)
+        assert np.array_equal(other.shortlist_scores, plans[0].shortlist_scores)
 
 
 def test_the_object_displacement_is_converted_with_the_estimated_centre():
