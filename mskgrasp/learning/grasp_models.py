@@ -24,7 +24,7 @@ from mskgrasp.learning.hand_features import HandFeatures
 from mskgrasp.learning.label_source import LabelSource
 from mskgrasp.learning.network_config import NetworkConfig, Normalisation
 from mskgrasp.learning.networks import GraspDisplacementNetwork, GraspQualityNetwork
-from mskgrasp.learning.symmetry import views
+from mskgrasp.learning.symmetry import N_VIEWS, views
 
 PRETRAINED = Path(__file__).parent / "pretrained"
 """Folder of the model that ships."""
@@ -118,7 +118,13 @@ class Models:
 
     @torch.inference_mode()
     def grasp_displacement(
-        self, patches: Tensor, centre_grasp: Tensor, height: Tensor, theta: Tensor | None = None
+        self,
+        patches: Tensor,
+        centre_grasp: Tensor,
+        height: Tensor,
+        theta: Tensor | None = None,
+        *,
+        all_views: bool = True,
     ) -> tuple[Tensor, Tensor | None]:
         """Mean and variance (n, k) of grasp displacement and swing, of patches (n, 1, r, c) in metres.
 
@@ -130,21 +136,21 @@ class Models:
             centre_grasp: (n, 3) object centre in the grasp frame, metres.
             height: (n,) of the grasps above the table, metres.
             theta: (n,) the grasps' angles, for ``image: object``.
+            all_views: With ``symmetric_views``: False predicts from one view, in a quarter of the time.
         """
         self._check(patches, (self.gdn.features.n_images, *self.meta.network.patch_shape))
         centre_grasp, height = (values.to(patches.dtype) for values in (centre_grasp, height))
-        if not self.meta.network.symmetric_views:
+        if not (self.meta.network.symmetric_views and all_views):
             return self._calibrated(*self.gdn(patches, centre_grasp, height, theta))
-        means, variances = [], []
-        for view, centre, signs in views(patches, centre_grasp):
-            mean, variance = self.gdn(view, centre, height)
-            means.append(signs[: mean.shape[1]] * mean)
-            variances.append(variance)
-        each = torch.stack(means)
+        seen, centres, signs = (list(values) for values in zip(*views(patches, centre_grasp), strict=True))
+        # In one pass: batches of a few grasps take a quarter longer for each.
+        mean, variance = self.gdn(torch.cat(seen), torch.cat(centres), height.repeat(N_VIEWS))
+        each = mean.unflatten(0, (N_VIEWS, -1)) * torch.stack(signs)[:, None, : mean.shape[1]]
         mean = each.mean(0)
-        if variances[0] is None:
+        if variance is None:
             return mean, None
-        return self._calibrated(mean, torch.stack(variances).mean(0) + (each - mean).square().mean(0))
+        variance = variance.unflatten(0, (N_VIEWS, -1)).mean(0) + (each - mean).square().mean(0)
+        return self._calibrated(mean, variance)
 
     def _probability(self, logits: Tensor) -> Tensor:
         calibration = self.meta.calibration

@@ -11,6 +11,9 @@ from collections.abc import Iterator
 import torch
 from torch import Tensor
 
+N_VIEWS = 4
+"""Number of views that `views` generates."""
+
 
 def mirror_and_turn(
     patches: Tensor, centre_grasp: Tensor, target: Tensor, generator: torch.Generator

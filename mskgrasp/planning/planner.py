@@ -32,6 +32,12 @@ from mskgrasp.planning.refine import fingers_free, grasps_near
 from mskgrasp.planning.refusal import refusal_reason
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 
+PROMISING = 24
+"""Candidates that the displacement network sees in every view, of those that one view ranks.
+
+Of 60 validation parts, 59 got the grasp that is best of all 96 in every view, one a score 1 % greater.
+"""
+
 
 @dataclass(frozen=True)
 class Shortlist:
@@ -70,7 +76,7 @@ class GraspPlan:
         view: The detected part.
         candidates: The n grasps considered, base frame.
         qualities: (n,) theirs.
-        shortlist: (k,) indices of the candidates of best quality, best first.
+        shortlist: (k,) indices of the candidates that it was selected from, best quality first.
         shortlist_scores: (k,) their variance scores, square metres.
         seconds: Time spent in each stage.
         pose: The part's pose as found with its CAD; None where it was planned from the image alone.
@@ -257,7 +263,7 @@ class Planner:
         sampled = time.perf_counter()
         found = qualities(self.models, scene, candidates, self.config.chunk_size)
         scored = time.perf_counter()
-        best = self._scored(scene, candidates, self._shortlist(scene, candidates, found))
+        best = self._scored(scene, candidates, found, self._shortlist(scene, candidates, found))
         if self.config.refinements:
             candidates, found, best = self._refined(scene, candidates, found, best, rng)
         self.refuse_poor(frame, view, candidates, found[best.rows])
@@ -319,10 +325,27 @@ class Planner:
             )
         return free[:n]
 
-    def _scored(self, scene: Scene, candidates: np.ndarray, rows: np.ndarray) -> Shortlist:
-        grasps = candidates[rows]
-        mean, variance = displacements(self.models, scene, grasps, self.config.chunk_size)
-        return Shortlist(rows, mean, variance, variance_score(mean, variance, grasps, scene.view))
+    def _scored(self, scene: Scene, candidates: np.ndarray, found: np.ndarray, rows: np.ndarray) -> Shortlist:
+        """Predict the displacements of some candidates, best quality first, or of the most promising of them.
+
+        Where a prediction is the mean of several views of a grasp, one of them says which are promising.
+        """
+        if self.models.meta.network.symmetric_views:
+            good = rows[found[rows] >= self.config.least_quality]
+            if len(good) > PROMISING and self.config.policy != "quality":
+                *_, scores = self._predicted(scene, candidates[good], all_views=False)
+                rows = good[np.sort(np.argsort(scores, kind="stable")[:PROMISING])]
+            rows = rows[:PROMISING]
+        return Shortlist(rows, *self._predicted(scene, candidates[rows], all_views=True))
+
+    def _predicted(
+        self, scene: Scene, grasps: np.ndarray, *, all_views: bool
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Predict mean, variance and variance score of grasps (n, 4)."""
+        mean, variance = displacements(
+            self.models, scene, grasps, self.config.chunk_size, all_views=all_views
+        )
+        return mean, variance, variance_score(mean, variance, grasps, scene.view)
 
     def _refined(
         self,
@@ -337,7 +360,8 @@ class Planner:
         The objective is that of the selection: the lowest variance score at a quality no lower than the first
         shortlist's, or the best quality.
         """
-        n_best, least = len(best.rows), float(found[best.rows].min())
+        first = shortlist(found, self.config.top_fraction)
+        n_best, least = len(first), float(found[first].min())
         for number in range(self.config.refinements):
             loss = -found[best.rows] if self.config.policy == "quality" else best.scores
             elite = candidates[best.rows[np.argsort(loss, kind="stable")[: max(1, n_best // 4)]]]
@@ -349,7 +373,7 @@ class Planner:
             kept = kept[quality[kept] >= least]
             rows = len(candidates) + np.arange(len(kept))
             candidates, found = np.append(candidates, drawn[kept], axis=0), np.append(found, quality[kept])
-            best = best.joined(self._scored(scene, candidates, rows), found)
+            best = best.joined(self._scored(scene, candidates, found, rows), found)
         return candidates, found, best
 
     def sample(self, frame: RgbdFrame, rng: np.random.Generator) -> tuple[PartView, Grasp]:

@@ -18,13 +18,14 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import PartView, centre_in_grasp_frame
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.learning.network_config import NetworkConfig
+from mskgrasp.learning.symmetry import N_VIEWS
 from mskgrasp.perception.height_patches import crop_patches, height_image
 from mskgrasp.planning.parallel import map_batches
 
 _BATCHES = 4
 """Batches that grasps are shared out among, whatever the number of cores: rounding depends on their sizes."""
 _SMALL = 48
-"""Smaller batches cost more time for each grasp."""
+"""Views of grasps in a batch; fewer cost more time for each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,11 +92,18 @@ def qualities(models: Models, scene: Scene, grasps: np.ndarray, chunk: int) -> n
 
 
 def displacements(
-    models: Models, scene: Scene, grasps: np.ndarray, chunk: int
+    models: Models, scene: Scene, grasps: np.ndarray, chunk: int, *, all_views: bool = True
 ) -> tuple[np.ndarray, np.ndarray]:
     """Predict mean and variance (n, k) of the grasps' displacement and, with k = 6, swing.
 
     Without a variance it is NaN.
+
+    Args:
+        models: The networks.
+        scene: The height image.
+        grasps: (n, 4).
+        chunk: Greatest number of grasps in a batch.
+        all_views: As in `Models.grasp_displacement`.
     """
     network = models.meta.network
     whole = None
@@ -107,10 +115,13 @@ def displacements(
             patches = scene.crop(grasps[batch.rows], network)
         else:
             patches = whole.expand(len(batch.theta), -1, -1, -1)
-        mean, variance = models.grasp_displacement(patches, batch.centre_grasp, batch.height, batch.theta)
+        mean, variance = models.grasp_displacement(
+            patches, batch.centre_grasp, batch.height, batch.theta, all_views=all_views
+        )
         return mean, torch.full_like(mean, torch.nan) if variance is None else variance
 
-    found = map_batches(predict, _batches(models, scene, grasps, chunk), models.device)
+    small = _SMALL // N_VIEWS if network.symmetric_views and all_views else _SMALL
+    found = map_batches(predict, _batches(models, scene, grasps, chunk, small), models.device)
     if not found:
         return np.zeros((0, network.n_outputs)), np.zeros((0, network.n_outputs))
     mean, variance = (torch.cat(values).cpu().double().numpy() for values in zip(*found, strict=True))
@@ -133,13 +144,15 @@ class _Batch(NamedTuple):
     theta: Tensor
 
 
-def _batches(models: Models, scene: Scene, grasps: np.ndarray, size: int) -> Iterator[_Batch]:
-    """Generate batches of at most ``size`` grasps, at least `_BATCHES` of them unless they become small."""
+def _batches(
+    models: Models, scene: Scene, grasps: np.ndarray, size: int, small: int = _SMALL
+) -> Iterator[_Batch]:
+    """Generate batches of at most ``size`` grasps, `_BATCHES` of them unless they become small."""
     values = np.column_stack(
         [centre_in_grasp_frame(scene.view.centre_base, grasps), grasps[:, 2] - scene.table_z, grasps[:, 3]]
     )
     known = torch.as_tensor(values, dtype=torch.float32, device=models.device)
-    size = min(size, max(_SMALL, -(-len(grasps) // _BATCHES)))
+    size = min(size, max(small, -(-len(grasps) // _BATCHES)))
     for start in range(0, len(grasps), size):
         rows = slice(start, start + size)
         yield _Batch(rows, known[rows, :3], known[rows, 3], known[rows, 4])

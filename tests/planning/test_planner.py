@@ -3,6 +3,7 @@ import dataclasses
 import json
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +14,16 @@ from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.planner import Planner, select, shortlist, variance_score
+from mskgrasp.planning.planner import (
+    PROMISING,
+    GraspPlan,
+    Planner,
+    select,
+    shortlist,
+    variance_score,
+)
 from mskgrasp.planning.refine import fingers_free
-from mskgrasp.planning.scoring import Scene
+from mskgrasp.planning.scoring import Scene, displacements
 from mskgrasp.reports.grasp_figures import draw_plan
 from tests import synthetic
 from tests.planning.hand_made import BOX, FRAME, hand_made_models, planner
@@ -61,6 +69,36 @@ def test_the_same_generator_gives_the_same_plan_whatever_the_number_of_threads()
     for other in plans[1:]:
         assert np.array_equal(other.qualities, plans[0].qualities)
         assert np.array_equal(other.shortlist_scores, plans[0].shortlist_scores)
+
+
+def test_one_view_of_the_best_qualities_says_which_are_seen_in_all():
+    def plan(**settings: Any) -> GraspPlan:
+        config = PlannerConfig(n_candidates=1000, top_fraction=0.06, **settings)
+        return Planner(load_models(), config, table_z=0.0, region=REGION).plan(
+            FRAME, np.random.default_rng(1)
+        )
+
+    first = plan()
+    best = shortlist(first.qualities, 0.06)
+    scene = Scene.of(FRAME, first.view, 0.0, torch.device("cpu"))
+    grasps = first.candidates.as_vector()[best]
+    one, every = (
+        variance_score(
+            *displacements(load_models(), scene, grasps, 800, all_views=all_views), grasps, first.view
+        )
+        for all_views in (False, True)
+    )
+    promising = np.sort(np.argsort(one)[:PROMISING])
+    assert first.shortlist.tolist() == best[promising].tolist()
+    assert np.allclose(first.shortlist_scores, every[promising], rtol=1e-4)
+    assert first.score == first.shortlist_scores.min()
+    # What is not good enough takes no one's place.
+    least = float(first.qualities[best[40]])
+    assert (first.qualities[first.shortlist] < least).any()
+    demanding = plan(min_quality=least)
+    assert len(demanding.shortlist) == PROMISING and demanding.quality >= least
+    assert (demanding.qualities[demanding.shortlist] >= least).all()
+    assert plan(policy="quality").shortlist.tolist() == best[:PROMISING].tolist()
 
 
 def test_the_object_displacement_is_converted_with_the_estimated_centre():
