@@ -6,9 +6,11 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
+import numpy as np
 import torch
 from pydantic import Field, ValidationError, field_validator, model_validator
 from safetensors import SafetensorError, safe_open
@@ -20,6 +22,7 @@ from mskgrasp.core.errors import BadModel, MissingModel
 from mskgrasp.core.files import read_bounded
 from mskgrasp.core.grasp import HAND_GEOMETRY
 from mskgrasp.core.json_text import parse_json
+from mskgrasp.core.metrics import INTERVAL_LEVELS, half_width_of, normal_half_width
 from mskgrasp.learning.hand_features import HandFeatures
 from mskgrasp.learning.label_source import LabelSource
 from mskgrasp.learning.network_config import NetworkConfig, Normalisation
@@ -51,6 +54,29 @@ class ModelCalibration(Config):
     """Platt scaling of the quality (1999): its log odds become slope * log odds + offset."""
     variance_scale: tuple[Annotated[float, Field(gt=0.0)], ...] = ()
     """Factor of each variance, so that the central 90 % interval holds 90 %; empty: 1."""
+    half_widths: tuple[tuple[Annotated[float, Field(gt=0.0)], ...], ...] = ()
+    """Half widths of the central intervals of `mskgrasp.core.metrics.INTERVAL_LEVELS`, in standard deviations
+    of each component; empty: a normal distribution's.
+
+    Most parts do not rise in the hand, some do by 10 mm: no normal distribution has such tails.
+    """
+
+    @model_validator(mode="after")
+    def _wider_intervals_hold_more(self) -> Self:
+        table = self.half_widths
+        if table and len(table) != len(INTERVAL_LEVELS):
+            raise ValueError(f"half_widths has {len(table)} rows, {len(INTERVAL_LEVELS)} are needed")
+        if len({len(row) for row in table}) > 1 or any(
+            wide < narrow for one, next_ in pairwise(table) for narrow, wide in zip(one, next_, strict=False)
+        ):
+            raise ValueError("half_widths must have rows of one length, each no less than the one before")
+        return self
+
+    def half_width(self, level: float) -> float | np.ndarray:
+        """Half widths (k,) of the central interval of a probability, in predicted standard deviations."""
+        if not self.half_widths:
+            return normal_half_width(level)
+        return half_width_of(np.array(self.half_widths), level)
 
 
 class ModelMeta(Config):
@@ -72,6 +98,7 @@ class ModelMeta(Config):
             "normalisation.target_mean": len(self.normalisation.target_mean),
             "normalisation.target_std": len(self.normalisation.target_std),
             "calibration.variance_scale": len(self.calibration.variance_scale) or n,
+            "calibration.half_widths": len((*self.calibration.half_widths, range(n))[0]),
         }
         for name, size in sizes.items():
             if size != n:

@@ -6,7 +6,6 @@ import numpy as np
 import torch
 from scipy.optimize import minimize
 from scipy.special import logit
-from scipy.stats import norm
 
 from mskgrasp.core import metrics
 from mskgrasp.core.displacement_covariance import object_displacement_covariance, swing_squared
@@ -88,18 +87,22 @@ def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> ModelCali
 
     The quality's log odds are stretched and shifted (Platt 1999); each variance is scaled by
     (q / 1.645)^2, q the 90 % quantile of |error| / deviation, so that heavy tails do not widen the whole
-    distribution.
+    distribution; the intervals of other probabilities get the widths that hold as much.
     """
     quality = predict_quality(models, samples, rows)
     slope, offset = _platt(logit(np.clip(quality, 1e-9, 1 - 1e-9)), samples.success[rows].numpy())
-    scale = ()
+    scale, half_widths = (), ()
     held = rows[samples.success[rows]]
     mean, variance = predict_grasp_displacement(models, samples, held)
     if np.isfinite(variance).all() and len(held) >= _LEAST_TO_SCALE:
         target = samples.targets(held, models.meta.network).double().numpy()
-        quantile = np.quantile(np.abs(metrics.standardised_error(mean, variance, target)), 0.9, axis=0)
-        scale = tuple(np.maximum((quantile / norm.ppf(0.95)) ** 2, 1e-6))
-    return ModelCalibration(quality_slope=slope, quality_offset=offset, variance_scale=scale)
+        widths = metrics.measured_half_widths(mean, variance, target)
+        deviation = metrics.half_width_of(widths, 0.9) / metrics.normal_half_width(0.9)
+        scale = tuple(np.maximum(deviation**2, 1e-6))
+        half_widths = tuple(map(tuple, np.maximum(widths / np.sqrt(scale), 1e-6).tolist()))
+    return ModelCalibration(
+        quality_slope=slope, quality_offset=offset, variance_scale=scale, half_widths=half_widths
+    )
 
 
 def _platt(odds: np.ndarray, success: np.ndarray) -> tuple[float, float]:
@@ -181,7 +184,7 @@ def displacement_metrics(
         n=len(rows),
         errors=prediction_errors(samples, rows, mean, variance),
         intervals=_rmse_intervals(samples, rows, mean, variance),
-        uncertainty=_uncertainty_metrics(samples, rows, mean, variance),
+        uncertainty=_uncertainty_metrics(samples, rows, mean, variance, models.meta.calibration.half_width),
         zero_displacement=zero,
         training_mean=training_mean,
     )
@@ -230,7 +233,11 @@ def variance_score(mean: np.ndarray, variance: np.ndarray, expected: np.ndarray)
 
 
 def _uncertainty_metrics(
-    samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
+    samples: Samples,
+    rows: torch.Tensor,
+    mean: np.ndarray,
+    variance: np.ndarray,
+    half_width: metrics.HalfWidth,
 ) -> UncertaintyMetrics | None:
     """Compute metrics of the predicted variances; None without variances or rows."""
     if not np.isfinite(variance).all() or not len(rows):
@@ -241,11 +248,11 @@ def _uncertainty_metrics(
     tilted = samples.swing[rows].norm(dim=1).numpy() > TILT_LIMIT
     axes = {
         "crps": metrics.crps(mean, variance, target),
-        "calibration_error": metrics.calibration_error(mean, variance, target),
+        "calibration_error": metrics.calibration_error(mean, variance, target, half_width),
         "sharpness": np.sqrt(variance).mean(axis=0),
         "rmse": np.sqrt((metrics.standardised_error(mean, variance, target) ** 2 * variance).mean(axis=0)),
     } | {
-        f"coverage_{level}": metrics.coverage(mean, variance, target, level / 100)
+        f"coverage_{level}": metrics.coverage(mean, variance, target, level / 100, half_width)
         for level in (50, 80, 90, 95)
     }
     return UncertaintyMetrics(

@@ -44,7 +44,7 @@ def draw_uncertainty(models: Models, samples: Samples, rows: torch.Tensor, path:
     with saved_figure(path, 11.5, 9.0) as figure:
         panels = figure.subplots(2, 2)
         _reliability(panels[0, 0], predict_quality(models, samples, rows), samples.success[rows].numpy())
-        _coverage(panels[0, 1], mean, variance, target)
+        _coverage(panels[0, 1], mean, variance, target, models.meta.calibration.half_width)
         predicted, expected = centroid_displacement(samples, held, mean, variance)
         error = samples.displacement[held].double().numpy() - predicted
         shift, turn = np.linalg.norm(error[:, :3], axis=1), np.abs(wrap_angle(error[:, 3]))
@@ -61,9 +61,11 @@ def _reliability(axes: Axes, probability: np.ndarray, success: np.ndarray) -> No
     axes.set_title("Quality: calibration")
 
 
-def _coverage(axes: Axes, mean: np.ndarray, variance: np.ndarray, target: np.ndarray) -> None:
+def _coverage(
+    axes: Axes, mean: np.ndarray, variance: np.ndarray, target: np.ndarray, half_width: metrics.HalfWidth
+) -> None:
     levels = np.linspace(0.05, 0.95, 19)
-    covered = np.stack([metrics.coverage(mean, variance, target, level) for level in levels])
+    covered = np.stack([metrics.coverage(mean, variance, target, level, half_width) for level in levels])
     axes.plot([0, 1], [0, 1], color=FAINT, lw=1, ls="--")
     for k, name in enumerate(AXES[: covered.shape[1]]):
         axes.plot(levels, covered[:, k], color=_COLOURS[k % 4], lw=1.5, ls="-" if k < 4 else ":", label=name)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mskgrasp.core import metrics
 from mskgrasp.core.files import write_whole
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models
@@ -63,35 +64,43 @@ class Predictions:
         quality: (n,) probabilities of success; empty without a quality network.
         mean: (m, k) grasp displacement, metres and radians.
         variance: (m, k), NaN where none is predicted.
+        half_widths: Of the intervals, as in `ModelCalibration`; empty: those of normal distributions.
     """
 
     quality: np.ndarray
     mean: np.ndarray
     variance: np.ndarray
+    half_widths: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def half_width(self, level: float) -> float | np.ndarray:
+        """Half widths (4,) of the central interval of a probability, in predicted standard deviations."""
+        if not self.half_widths.size:
+            return metrics.normal_half_width(level)
+        return metrics.half_width_of(self.half_widths[:, :4], level)
 
     def write(self, path: Path) -> None:
         """Store them atomically."""
         content = io.BytesIO()
-        np.savez(content, quality=self.quality, mean=self.mean, variance=self.variance)
+        np.savez(content, **{name: getattr(self, name) for name in self.__annotations__})
         write_whole(path, content.getvalue())
 
     @classmethod
     def read(cls, path: Path) -> Predictions:
         """Read stored predictions."""
         with np.load(path, allow_pickle=False) as stored:
-            return cls(**{name: stored[name] for name in ("quality", "mean", "variance")})
+            return cls(**{name: stored[name] for name in cls.__annotations__})
 
     def only(self, kept: np.ndarray, success: np.ndarray) -> Predictions:
         """Those for some of the n attempts: both masks (n,)."""
         held = kept[success]
         quality = self.quality[kept] if len(self.quality) else self.quality
-        return Predictions(quality=quality, mean=self.mean[held], variance=self.variance[held])
+        return replace(self, quality=quality, mean=self.mean[held], variance=self.variance[held])
 
     def __add__(self, other: Predictions) -> Predictions:
         """Both, one after the other."""
         both = ("quality", "mean", "variance")
-        return Predictions(
-            **{name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in both}
+        return replace(
+            self, **{name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in both}
         )
 
 

@@ -185,7 +185,10 @@ def _coverage(samples: Samples, rows: torch.Tensor, seeds: Sequence[Predictions]
     target = samples.grasp_displacement[rows].double().numpy()
     covered = np.mean(
         [
-            [metrics.coverage(one.mean[:, :4], one.variance[:, :4], target, level / 100) for level in LEVELS]
+            [
+                metrics.coverage(one.mean[:, :4], one.variance[:, :4], target, level / 100, one.half_width)
+                for level in LEVELS
+            ]
             for one in seeds
         ],
         axis=0,

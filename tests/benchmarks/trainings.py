@@ -129,7 +129,8 @@ def predicted(models: Models, samples: Samples, rows: Tensor, *, quality: bool) 
     """Predict for some rows: the quality of all, if wanted, and the displacement of the successful ones."""
     mean, variance = held_out.predict_grasp_displacement(models, samples, rows[samples.success[rows]])
     probability = held_out.predict_quality(models, samples, rows) if quality else np.zeros(0)
-    return Predictions(quality=probability, mean=mean, variance=variance)
+    half_widths = np.array(models.meta.calibration.half_widths, ndmin=2)
+    return Predictions(quality=probability, mean=mean, variance=variance, half_widths=half_widths)
 
 
 def _trained(

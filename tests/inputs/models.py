@@ -62,6 +62,24 @@ ROWS = [
         "'calibration.variance_scale.0': .*greater than 0",
     ),
     _of(
+        "plan",
+        "intervals that become narrower",
+        lambda at: at.model(calibration__half_widths=[[1.0 - 0.01 * k] * 4 for k in range(20)]),
+        "'calibration': .*no less than the one before",
+    ),
+    _of(
+        "plan",
+        "too few intervals",
+        lambda at: at.model(calibration__half_widths=[[1.0] * 4]),
+        "'calibration': .*20 are needed",
+    ),
+    _of(
+        "plan",
+        "intervals of too few components",
+        lambda at: at.model(calibration__half_widths=[[1.0, 1.0]] * 20),
+        "half_widths has 2 numbers, the network predicts 4",
+    ),
+    _of(
         "evaluate",
         "an infinite slope",
         lambda at: at.model(calibration__quality_slope=float("inf")),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from mskgrasp.core import metrics
 from mskgrasp.learning import held_out
 from mskgrasp.learning.grasp_models import ModelCalibration, Models, build_models
 from mskgrasp.learning.trainer import describe_networks, split
@@ -69,6 +70,24 @@ def test_a_calibrated_quality_agrees_with_the_share_that_succeeds_in_other_rows(
     assert held_out.predict_quality(calibrated, samples, others).mean() == pytest.approx(true, abs=0.08)
     first, second = (held_out.quality_metrics(each, samples, others).brier for each in (models, calibrated))
     assert second < first - 0.05
+
+
+def test_calibrated_intervals_of_every_probability_hold_that_share_of_other_rows(samples, halves):
+    models = constant_models(samples, variance_factor=25.0)
+    scaled, others = halves
+    calibrated = with_calibration(models, held_out.calibrate(models, samples, scaled))
+    held = others[samples.success[others]]
+    mean, variance = held_out.predict_grasp_displacement(calibrated, samples, held)
+    target = samples.targets(held, calibrated.meta.network).double().numpy()
+    half_width = calibrated.meta.calibration.half_width
+    for level in (0.5, 0.8, 0.9, 0.95):
+        covered = metrics.coverage(mean, variance, target, level, half_width)
+        # Some 100 rows on either side; z does not vary at all.
+        assert np.allclose(covered[[0, 1, 3]], level, atol=3.5 * np.sqrt(2 * level * (1 - level) / 100))
+        reported = held_out.displacement_metrics(calibrated, samples, scaled, others).uncertainty
+        assert reported is not None
+        found = list(reported.axes[f"coverage_{round(100 * level)}"].values())
+        np.testing.assert_allclose(found, covered)
 
 
 def test_too_few_successes_leave_the_variances_alone(samples, halves):
