@@ -58,7 +58,7 @@ class HandFeatures(nn.Module):
         normalisation: Normalisation,
         widths: tuple[int, ...],
         shape: tuple[int, int],
-        n_blocks: int = 0,
+        blocks: tuple[int, ...] = (),
     ):
         """Build the layers.
 
@@ -67,12 +67,12 @@ class HandFeatures(nn.Module):
             normalisation: Scale of the object centre.
             widths: Channels of the convolutions.
             shape: Rows and columns of the patches.
-            n_blocks: Number of residual blocks after each convolution.
+            blocks: Numbers of residual blocks after each convolution; empty: none.
         """
         super().__init__()
         layers: list[nn.Module] = []
         before = self.n_channels = 4
-        for number, width in enumerate(widths):
+        for number, (width, n_blocks) in enumerate(zip(widths, blocks or [0] * len(widths), strict=True)):
             kernel = 5 if number == 0 else 3
             layers += [nn.Conv2d(before, width, kernel, stride=2, padding=kernel // 2), nn.ReLU(inplace=True)]
             layers += [ResidualBlock(width) for _ in range(n_blocks)]

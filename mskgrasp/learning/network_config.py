@@ -124,8 +124,18 @@ class HandNetworkConfig(_NetworkConfig):
     """Channels of the quality network's convolutions, each of which halves the image."""
     displacement_layers: _Convolutions = (16, 32, 32)
     """Channels of the displacement network's convolutions."""
-    displacement_blocks: int = Field(default=0, ge=0, le=8)
-    """Residual blocks after each of them, of two convolutions that keep the size (He et al. 2016)."""
+    displacement_blocks: tuple[Annotated[int, Field(ge=0, le=8)], ...] = ()
+    """Residual blocks after each of them, of two convolutions that keep the size (He et al. 2016); empty: none."""
+
+    @model_validator(mode="after")
+    def _blocks_follow_layers(self) -> HandNetworkConfig:
+        n_blocks, n_layers = len(self.displacement_blocks), len(self.displacement_layers)
+        if n_blocks not in (0, n_layers):
+            raise ValueError(
+                f"displacement_blocks has {n_blocks} numbers, displacement_layers has {n_layers}; give one "
+                "for each, or none"
+            )
+        return self
 
     @model_validator(mode="after")
     def _quality_pixels_are_centred(self) -> HandNetworkConfig:

@@ -38,7 +38,8 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         network = changes.pop("network", {})
         return ours.model_copy(update=changes | {"network": ours.network.model_copy(update=network)})
 
-    deep = {"displacement_layers": (16, 32, 64), "displacement_blocks": 1}
+    deep = {"displacement_layers": (16, 32, 64), "displacement_blocks": (1, 1, 1)}
+    late = deep | {"displacement_blocks": (0, 1, 1)}
     assert isinstance(paper, PatchNetworkConfig)
     paper = paper.model_copy(update={"symmetric_views": ours.network.symmetric_views})
     return {
@@ -68,6 +69,9 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         "residual blocks": with_(network=deep),
         "residual blocks and a mixture": with_(beta=0.0, network=deep | {"mixture": 3}),
         "residual blocks, a mixture, swing": with_(beta=0.0, network=deep | {"mixture": 3, "swing": True}),
+        "fewer residual blocks, a mixture, swing": with_(
+            beta=0.0, network=late | {"mixture": 3, "swing": True}
+        ),
         "beta 1": with_(beta=1.0),
         "no noise": with_(noise_std=0.0),
         "no floor of the deviations": with_(network={"least_std": (0.0, 0.0)}),

@@ -1,3 +1,4 @@
+import pytest
 import torch
 
 from mskgrasp.learning.grasp_models import ModelMeta, build_models
@@ -27,17 +28,22 @@ def test_our_network_sees_what_the_hand_would_meet():
 
 def test_residual_blocks_change_nothing_until_they_have_learned():
     plain = HandNetworkConfig(patch_pixels=16, patch_columns=8, displacement_layers=(4, 8))
-    deep = plain.model_copy(update={"displacement_blocks": 2})
+    deep = plain.model_copy(update={"displacement_blocks": (2, 0)})
     torch.manual_seed(0)
     shallow = build_models(ModelMeta(network=plain, normalisation=NORMAL)).gdn
     blocks = build_models(ModelMeta(network=deep, normalisation=NORMAL)).gdn
     own = {
         name: value for name, value in blocks.named_parameters() if ".first." in name or ".second." in name
     }
-    assert len(own) == 2 * 2 * 4
+    assert len(own) == 2 * 4
     rest = [value for name, value in blocks.named_parameters() if name not in own]
     with torch.no_grad():
         for value, other in zip(rest, shallow.parameters(), strict=True):
             value.copy_(other)
     inputs = torch.rand(3, 1, 16, 8) * 0.05, torch.rand(3, 3) * 0.01, torch.full((3,), 0.02)
     assert torch.equal(blocks(*inputs)[0], shallow(*inputs)[0])
+
+
+def test_blocks_are_given_for_every_convolution_or_none():
+    with pytest.raises(ValueError, match="displacement_blocks has 1 numbers, displacement_layers has 2"):
+        HandNetworkConfig(displacement_layers=(4, 8), displacement_blocks=(1,))
