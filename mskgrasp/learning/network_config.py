@@ -125,7 +125,7 @@ class HandNetworkConfig(_NetworkConfig):
     displacement_layers: _Convolutions = (16, 32, 32)
     """Channels of the displacement network's convolutions."""
     displacement_blocks: tuple[Annotated[int, Field(ge=0, le=8)], ...] = ()
-    """Residual blocks after each of them, of two convolutions that keep the size (He et al. 2016); empty: none."""
+    """Residual blocks after each of them (He et al. 2016); empty: none."""
 
     @model_validator(mode="after")
     def _blocks_follow_layers(self) -> HandNetworkConfig:

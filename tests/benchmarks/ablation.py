@@ -1,6 +1,6 @@
 """Ablations of our network. Run: python -m tests.benchmarks.ablation --help.
 
-Every line trains both networks anew on the same attempts, with one choice of configs/train/default.yaml
+Every line trains both networks anew on the same attempts, with one choice of configs/train/pretrained.yaml
 undone, and scores them on the validation parts, which training never saw; test parts are not looked at.
 Every training is stored in --out as soon as it is finished; started again, the command goes on.
 """
@@ -85,7 +85,7 @@ def main() -> int:
     """Trains what is missing, prints the tables and writes report.json and report.md."""
     options = _options()
     torch.set_num_threads(options.threads)
-    ours = read_config(LearningConfig, CONFIGS / "default.yaml")
+    ours = read_config(LearningConfig, CONFIGS / "pretrained.yaml")
     epochs = {"gqn": options.gqn_epochs, "gdn": options.gdn_epochs}
     ours = ours.model_copy(
         update={name: getattr(ours, name).model_copy(update={"epochs": n}) for name, n in epochs.items()}
@@ -132,7 +132,7 @@ def _some(samples: Samples, sides: Sides, *, share: float) -> Sides:  # noqa: AR
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tests.benchmarks.ablation",
-        description="Train our networks with one choice of configs/train/default.yaml undone at a time.",
+        description="Train our networks with one choice of configs/train/pretrained.yaml undone at a time.",
     )
     parser.add_argument("--data", type=Path, required=True, help="dataset folder")
     parser.add_argument("--out", type=Path, required=True, help="folder of trainings, report.json, report.md")

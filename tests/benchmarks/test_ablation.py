@@ -10,7 +10,7 @@ from tests.programs import run_here
 
 
 def test_every_choice_differs_from_ours_and_from_the_others():
-    ours = read_config(LearningConfig, CONFIGS / "default.yaml")
+    ours = read_config(LearningConfig, CONFIGS / "pretrained.yaml")
     found = list(ablation.variants(ours).values())
     assert found[0] == ours
     assert len({one.model_dump_json() for one in found}) == len(found)
