@@ -21,12 +21,15 @@ from mskgrasp.trials.predictors import LOWESS, Predictor
 from mskgrasp.trials.trial import Policy, Prediction, Trial
 
 Side = Literal["known", "novel"]
+Group = Literal["all", "known", "novel"]
 POLICIES: tuple[Policy, ...] = ("quality", "low_variance")
 POLICY_NAMES: dict[Policy, str] = {
     "quality": "high quality", "low_variance": "high quality and low variance",
     "certified": "certified grasps",
 }  # fmt: skip
 SIDES: tuple[Side, ...] = ("known", "novel")
+GROUPS: tuple[Group, ...] = ("all", *SIDES)
+"""Pooled, as in the paper, and apart."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,10 +77,10 @@ class ModelStatistics:
     quality: PolicyStatistics
     low_variance: PolicyStatistics | None
 
-    def of(self, policy: Policy, side: Side) -> TrialStatistics | None:
-        """The statistics under a policy on known or on novel parts."""
+    def of(self, policy: Policy, group: Group) -> TrialStatistics | None:
+        """The statistics under a policy on all, on known or on novel parts."""
         found = self.quality if policy == "quality" else self.low_variance
-        return found and (found.known if side == "known" else found.novel)
+        return found and {"all": found.all, "known": found.known, "novel": found.novel}[group]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from mskgrasp.evaluate.comparison import POLICIES, POLICY_NAMES, SIDES, DisplacementSummary
-from mskgrasp.evaluate.summary import Interval, SuccessSummary, TrialStatistics
+from mskgrasp.core.grasp import TILT_LIMIT
+from mskgrasp.evaluate.comparison import GROUPS, POLICIES, POLICY_NAMES, SIDES, DisplacementSummary
+from mskgrasp.evaluate.summary import WITHIN, Interval, SuccessSummary, TrialStatistics
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.quantities import counted, degrees, millimetres
 from mskgrasp.reports.section import Figure, Section, settings_section
@@ -27,6 +28,15 @@ _ERROR_COLUMNS = (
     "model", "policy", "parts", "measured", "RMSE", "RMSE if none predicted", "turn RMSE",
     "turn RMSE if none predicted", "inside 90 % interval",
 )  # fmt: skip
+_ATTEMPT_COLUMNS = (
+    "attempts", "lifted", *(f"off by at most {1e3 * most:g} mm" for most in WITHIN),
+    f"askew by over {np.degrees(TILT_LIMIT):g} deg", "RMSE without those", "turn RMSE without those",
+)  # fmt: skip
+_ATTEMPTS_EXPLAINED = (
+    "Of all attempts, those that lifted nothing included: the share in which the part was lifted and the "
+    "predicted displacement is off by at most so much. Askew: share of the lifted parts that hang tilted in "
+    "the hand. In brackets: 95 % interval by parts."
+)
 _ERRORS_EXPLAINED = (
     "RMSE: of the predicted displacement in the hand, over the grasps that lifted the part and were "
     "measured; RMSE if none predicted: of predicting that nothing moves, over the same grasps."
@@ -125,6 +135,7 @@ def _success(summary: SuccessSummary, folder: Path) -> list[Section]:
             text=[*_success_text(summary), _ERRORS_EXPLAINED],
             tables=[_success_table("part", summary.parts, summary.overall)],
         ),
+        _attempts(("parts",), [(("all",), summary.overall)]),
         Section(
             title="Figures",
             figures=[
@@ -200,16 +211,17 @@ def _displacement(summary: DisplacementSummary, folder: Path) -> list[Section]:
          counted(one.reasons), counted(one.unmeasured))
         for name, one in summary.policies.items()
     ]  # fmt: skip
-    rows = [
-        (label, POLICY_NAMES[policy], side, *_error_row(found))
-        for side in SIDES
+    groups = [
+        ((label, POLICY_NAMES[policy], group), found)
+        for group in GROUPS
         for label, model in summary.models.items()
         for policy in POLICIES
-        if (found := model.of(policy, side)) is not None and found.trials
+        if (found := model.of(policy, group)) is not None and found.trials
     ]
     certified = summary.policies.get(POLICY_NAMES["certified"])
     if certified is not None and certified.trials:
-        rows.append(("with the CAD", POLICY_NAMES["certified"], "all", *_error_row(certified)))
+        groups.append((("with the CAD", POLICY_NAMES["certified"], "all"), certified))
+    rows = [(*name, *_error_row(found)) for name, found in groups]
     paper = [
         (label, POLICY_NAMES[policy], millimetres(bar.translation_rmse), degrees(bar.rotation_rmse))
         for label, bars in summary.paper.items()
@@ -239,12 +251,35 @@ def _displacement(summary: DisplacementSummary, folder: Path) -> list[Section]:
                 )
             ],
         ),
+        _attempts(("model", "policy", "parts"), groups),
         Section(
             title="Results of the paper",
             tables=[Table(header=("model", "policy", "RMSE", "turn RMSE"), rows=paper)],
             page_only=True,
         ),
     ]
+
+
+def _attempts(names: tuple[str, ...], groups: Sequence[tuple[tuple[str, ...], TrialStatistics]]) -> Section:
+    """Shares of all attempts, and errors without parts that hang askew; empty where none is measured."""
+    rows = [
+        (
+            *name, one.trials, share_text(one.successes, one.trials, one.success_interval),
+            *(share_text(each.n, each.of, each.interval) for each in one.within),
+            "-" if one.askew is None else share_text(one.askew.n, one.askew.of, one.askew.interval),
+            millimetres(one.flat_translation_rmse, one.flat_translation_interval),
+            degrees(one.flat_rotation_rmse, one.flat_rotation_interval),
+        )
+        for name, one in groups
+        if one.within is not None
+    ]  # fmt: skip
+    if not rows:
+        return Section(title="Of all attempts")
+    return Section(
+        title="Of all attempts",
+        text=[_ATTEMPTS_EXPLAINED],
+        tables=[Table(header=(*names, *_ATTEMPT_COLUMNS), rows=rows)],
+    )
 
 
 def _error_row(one: TrialStatistics) -> tuple[str, ...]:
@@ -295,6 +330,12 @@ def _worst(report: Report, folder: Path) -> Section:
     rows = [(Link(text=one.name, to=one.name), one.caption.removeprefix(f"{one.name}: ")) for one in figures]
     tables = [Table(header=("trial", "outcome"), rows=rows)] if rows else []
     return Section(title="Worst trials", tables=tables, figures=figures, page_only=True)
+
+
+def share_text(n: int, of: int, interval: Interval | None) -> str:
+    """Format a share with its interval."""
+    around = "" if interval is None else f" [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
+    return f"{n / of:.1%}{around}"
 
 
 def interval_text(interval: Interval | None, digits: int = 0) -> str:

@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.metrics import bootstrap_interval, clustered_wilson_interval, coverage
+from mskgrasp.core.grasp import TILT_LIMIT
+from mskgrasp.core.metrics import clustered_wilson_interval, coverage, rms_interval
 from mskgrasp.trials.lowess import TURN_LENGTH
 from mskgrasp.trials.trial import Prediction, Trial
 
@@ -24,7 +25,20 @@ TILTED = float(np.radians(1.0))
 PAPER_SUCCESS = {"simulated": 0.949, "real": 0.863}
 """Success rates on novel parts (Zhao et al. 2019, evaluation in simulation and on the robot)."""
 
+WITHIN = (1e-3, 2e-3)
+"""Errors of the predicted displacement up to which shares of all attempts are reported, metres."""
+
 Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Share:
+    """A share with its interval of 95 %, Wilson's by parts."""
+
+    n: int
+    of: int
+    value: float
+    interval: Interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,12 +52,20 @@ class TrialStatistics:
         reasons: Numbers of failures by reason.
         unmeasured: Numbers of unmeasured successes by reason.
         measured: Number of trials with a measured and a predicted displacement, which the errors are of.
-        translation_interval: Interval of the RMSE, by bootstrap over parts; None for a single part.
+        translation_interval: Interval of the RMSE over parts (`rms_interval`); None for a single part.
         rotation_interval: The same of the turn.
         translation_rmse_of_zero: RMSE of predicting no displacement for the same grasps.
         rotation_rmse_of_zero: The same of the turn.
         coverage_90: Share of the measurements within the predicted central 90 %, by component; None where a
             variance or a component is unknown.
+        within: Shares of all trials in which the part was lifted and its predicted displacement is off by at
+            most each of `WITHIN`; None where none is measured.
+        askew: Share of the lifted parts that hang tilted by more than `TILT_LIMIT`; None where none is known.
+        flat: Number of measured trials without those.
+        flat_translation_rmse: RMSE over them.
+        flat_translation_interval: Its interval, as above.
+        flat_rotation_rmse: The same of the turn.
+        flat_rotation_interval: The same of the turn.
     """
 
     trials: int
@@ -63,6 +85,13 @@ class TrialStatistics:
     rotation_rmse_of_zero: float | None
     tilt_rms: float | None
     coverage_90: list[float] | None
+    within: list[Share] | None = None
+    askew: Share | None = None
+    flat: int = 0
+    flat_translation_rmse: float | None = None
+    flat_translation_interval: Interval | None = None
+    flat_rotation_rmse: float | None = None
+    flat_rotation_interval: Interval | None = None
 
     @classmethod
     def of(
@@ -78,15 +107,17 @@ class TrialStatistics:
         n_success = sum(trial.success for trial in trials)
         planning = [trial.planning_s for trial in trials if trial.planning_s is not None]
         tilts = np.array([trial.tilt for trial in trials if trial.tilt is not None])
-        parts, measured, predicted, std = _measurements(trials, prediction or own_prediction)
+        compared, measured, predicted, std = _measurements(trials, prediction or own_prediction)
+        parts = np.array([trial.part for trial in compared])
         errors = displacement_errors(predicted, measured)
+        flat = np.array([(trial.tilt or 0.0) <= TILT_LIMIT for trial in compared], dtype=bool)
         errors_of_zero = displacement_errors(0 * predicted, measured)
         known = len(parts) > 0 and np.isfinite(std).all() and np.isfinite(measured).all()
         return cls(
             trials=len(trials),
             successes=n_success,
             success_rate=n_success / len(trials) if trials else None,
-            success_interval=_share_interval(trials) if trials else None,
+            success_interval=_share([t.success for t in trials], trials).interval if trials else None,
             reasons=_counts(trial.reason for trial in trials if trial.reason),
             unmeasured=_counts(trial.unmeasured.split(":")[0] for trial in trials if trial.unmeasured),
             median_planning_s=float(np.median(planning)) if planning else None,
@@ -100,6 +131,13 @@ class TrialStatistics:
             rotation_rmse_of_zero=_rms(errors_of_zero[1]),
             tilt_rms=_rms(tilts),
             coverage_90=coverage(predicted, std**2, measured, COVERED).tolist() if known else None,
+            within=_within(trials, compared, errors[0]),
+            askew=_askew([trial for trial in trials if trial.tilt is not None and trial.success]),
+            flat=int(flat.sum()),
+            flat_translation_rmse=_rms(errors[0][flat]),
+            flat_translation_interval=_interval(errors[0][flat], parts[flat]),
+            flat_rotation_rmse=_rms(errors[1][flat]),
+            flat_rotation_interval=_interval(errors[1][flat], parts[flat]),
         )
 
 
@@ -170,13 +208,13 @@ def _counts(words: Iterable[str]) -> dict[str, int]:
 
 def _measurements(
     trials: Sequence[Trial], prediction: Callable[[Trial], Prediction | None]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Parts (n,), measured displacements, predicted means and standard deviations (n, 4)."""
+) -> tuple[list[Trial], np.ndarray, np.ndarray, np.ndarray]:
+    """Measured trials (n), their displacements, predicted means and standard deviations (n, 4)."""
     pairs = [(trial, prediction(trial)) for trial in trials if trial.measured is not None]
-    rows = [(t.part, t.measured, one.mean, one.std) for t, one in pairs if one is not None]
-    parts, *vectors = zip(*rows, strict=True) if rows else ((), (), (), ())
+    rows = [(t, t.measured, one.mean, one.std) for t, one in pairs if one is not None]
+    compared, *vectors = zip(*rows, strict=True) if rows else ((), (), (), ())
     measured, mean, std = (np.array(values, dtype=np.float64).reshape(-1, 4) for values in vectors)
-    return np.array(parts), measured, mean, std
+    return list(compared), measured, mean, std
 
 
 def displacement_errors(predicted: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -200,13 +238,26 @@ def _rms(errors: np.ndarray) -> float | None:
 
 def _interval(errors: np.ndarray, parts: np.ndarray) -> Interval | None:
     groups = [errors[parts == part] for part in np.unique(parts)]
-    return bootstrap_interval(groups, rms) if len(groups) > 1 else None
+    return rms_interval(groups) if len(groups) > 1 else None
 
 
-def _share_interval(trials: Sequence[Trial]) -> Interval:
+def _within(trials: Sequence[Trial], compared: Sequence[Trial], distances: np.ndarray) -> list[Share] | None:
+    """Shares of all trials within each of `WITHIN`, of those compared with their errors (n,), metres."""
+    if not compared:
+        return None
+    off = dict(zip((trial.key for trial in compared), distances.tolist(), strict=True))
+    return [_share([off.get(trial.key, np.inf) <= most for trial in trials], trials) for most in WITHIN]
+
+
+def _askew(lifted: Sequence[Trial]) -> Share | None:
+    return _share([(trial.tilt or 0.0) > TILT_LIMIT for trial in lifted], lifted) if lifted else None
+
+
+def _share(hits: Sequence[bool], trials: Sequence[Trial]) -> Share:
+    """Share of trials that count."""
     _, which = np.unique([trial.part for trial in trials], return_inverse=True)
-    won = np.bincount(which, weights=[trial.success for trial in trials])
-    return clustered_wilson_interval(won, np.bincount(which))
+    interval = clustered_wilson_interval(np.bincount(which, weights=hits), np.bincount(which))
+    return Share(n=sum(hits), of=len(hits), value=sum(hits) / len(hits), interval=interval)
 
 
 def compare_tape(trials: Sequence[Trial]) -> TapeComparison | None:

@@ -171,6 +171,17 @@ def test_the_mean_of_few_objects_is_in_its_interval_nearly_as_often_as_stated():
     assert np.mean([low <= 0.0 <= high for low, high in found]) > 0.87
 
 
+def test_the_interval_of_an_rms_is_over_clusters_and_wide_where_they_differ():
+    alike = [np.array([1.0, 2.0])] * 8
+    assert metrics.rms_interval(alike) == pytest.approx((np.sqrt(2.5),) * 2)
+    low, high = metrics.rms_interval([*alike, np.array([9.0, 9.0])])
+    assert low < 2.0 and high > 9.0
+    assert np.isnan(metrics.rms_interval([np.array([1.0])])).all()
+    assert metrics.rms_interval([np.zeros(2), np.zeros(3)]) == (0.0, 0.0)
+    # All that is known is in one cluster: no lower bound but zero.
+    assert metrics.rms_interval([np.zeros(2), np.array([3.0, 3.0])])[0] == 0.0
+
+
 def test_the_expected_calibration_error_is_the_mean_gap_of_the_bins():
     probability = np.array([0.1] * 10 + [0.9] * 30)
     success = np.array([True] * 3 + [False] * 7 + [True] * 24 + [False] * 6)

@@ -30,7 +30,10 @@ def test_models_are_compared_on_shared_grasps_and_on_their_own():
     section = next(
         s for s in report_sections(report_of(summary), Path("out")) if s.title == "Displacement in the hand"
     )
-    assert ("one", "high quality", "novel") in [row[:3] for row in section.tables[0].rows]
+    rows = [row[:3] for row in section.tables[0].rows]
+    assert rows[:2] == [("one", "high quality", "all"), ("one", "high quality and low variance", "all")]
+    assert ("one", "high quality", "novel") in rows
+    assert one.of("quality", "all") is one.quality.all
 
 
 def test_labels_are_matched_with_the_papers_models():
