@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.files import read_bounded
 from mskgrasp.parts.builtin import find_part, starter_names
 from mskgrasp.parts.catalogue import SPLITS, chosen_names
+
+_MOST_BYTES = 2**20
+"""Largest file of names."""
+_SO_MANY = re.compile(r"(.+):(\d+)")
 
 
 def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int = 0) -> list[str]:
@@ -16,7 +23,9 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
 
     ``train``, ``validation``, ``test`` and ``new_sizes``: the sets of the model, where its training names
     them; otherwise those of the catalogue, all but the first without parts that the model was trained on.
-    ``all``: every part of the starter set. Other words as in `mskgrasp.parts.chosen_names`.
+    ``all``: every part of the starter set. Other words as in `mskgrasp.parts.chosen_names`. A set with a
+    number, as in ``train:50``, is so many of its parts, chosen as by ``n_parts``. A file ``.txt`` is the
+    names in it, one a line.
 
     Args:
         words: Names, folders and sets.
@@ -29,15 +38,23 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
         UsageError: Two parts have the same name.
     """
     sets = []
-    for word in words:
+    for text in words:
         known = training.get("training_parts") or ()
+        limited = _SO_MANY.fullmatch(text)
+        word = limited[1] if limited else text
         if word == "train" and known:
             sets.append(list(known))
         elif word in SPLITS and word != "train":
             unseen = training.get(f"{word}_parts")
             sets.append(unseen or [name for name in chosen_names((word,)) if name not in known])
+        elif word.endswith(".txt"):
+            sets.append(chosen_names(_listed(Path(word))))
         else:
             sets.append(starter_names() if word == "all" else chosen_names((word,)))
+        if limited:
+            if not 1 <= int(limited[2]) <= len(sets[-1]):
+                raise UsageError(f"--parts {text}: {word} has {len(sets[-1])} parts; legal: 1 to that number")
+            sets[-1] = evenly(list(sets[-1]), int(limited[2]))
     if n_parts:
         sets = [evenly(list(one), share) for one, share in zip(sets, _shares(sets, n_parts), strict=True)]
     names = list(dict.fromkeys(name for one in sets for name in one))
@@ -50,6 +67,14 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
             )
         sources[name] = source
     return names
+
+
+def _listed(path: Path) -> list[str]:
+    try:
+        lines = read_bounded(path, _MOST_BYTES).decode().splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"--parts: cannot read the names in {path} ({error}); name a text file") from error
+    return [name for line in lines if (name := line.strip())]
 
 
 def evenly(names: Sequence[str], n: int) -> list[str]:

@@ -39,6 +39,21 @@ def test_sets_are_those_of_the_model_and_share_the_number_of_parts():
     }  # fmt: skip
 
 
+def test_a_set_may_have_a_number_of_its_own():
+    found = part_names(("train:2", "validation:1"), TRAINING)
+    assert found == [*evenly(TRAINING["training_parts"], 2), *evenly(TRAINING["validation_parts"], 1)]
+    with pytest.raises(UsageError, match="--parts train:4: train has 3 parts; legal: 1 to that number"):
+        part_names(("train:4",), TRAINING)
+
+
+def test_a_file_of_names_is_those_parts(tmp_path: Path):
+    (tmp_path / "known.txt").write_text("hex_nut_m30\n\nwasher_m36\n")
+    words = (str(tmp_path / "known.txt"), "validation:1")
+    assert part_names(words, TRAINING)[:2] == ["hex_nut_m30", "washer_m36"]
+    with pytest.raises(UsageError, match="cannot read the names in .*none.txt"):
+        part_names((str(tmp_path / "none.txt"),), TRAINING)
+
+
 def test_an_unknown_part_is_an_error_that_names_a_similar_one():
     with pytest.raises(UnknownPart, match="hex_nut_m30"):
         part_names(("hex_nut_m3x",), TRAINING)
