@@ -27,11 +27,14 @@ def main() -> int:
     with ctrl_c_deferred():
         from mskgrasp.evaluate.config import EvaluateConfig
         from mskgrasp.evaluate.report import print_report
-        from mskgrasp.evaluate.run import evaluate, replay
+        from mskgrasp.evaluate.run import estimate, evaluate, replay
         from mskgrasp.runtime.options import parse
     config = parse(EvaluateConfig, prog="python -m mskgrasp.evaluate", description=DESCRIPTION)
     if config.replay is not None:
         return replay(*config.replay)
+    if config.estimate:
+        estimate(config)
+        return 0
     report = evaluate(config)
     print_report(report, config.out)
     pictures = "success.png, errors.png" if config.experiment == "success" else "displacement.png"

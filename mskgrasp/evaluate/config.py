@@ -36,17 +36,23 @@ class EvaluateConfig(Config):
     """Folder for trials.jsonl, report.json and the pictures."""
     parts: tuple[str, ...] = ()
     """Names or folders of parts, or sets: train (the model's training parts), validation and test (held out),
-    starter, catalogue. By default validation, for displacement train and validation."""
+    starter, catalogue; so many of a set: train:50; a .txt file of names. By default validation, for
+    displacement train and validation."""
     n_parts: int = Field(default=0, ge=0)
     """Greatest number of parts, evenly chosen, an equal share of every set; 0: all."""
     trials: int = Field(default=5, ge=1, le=100_000)
     """Trials per part."""
     compare: tuple[str, ...] = ()
     """Models of the displacement experiment, label=folder each; by default the one of --models."""
+    chooses: tuple[str, ...] = ()
+    """Trials per part in which a model of the displacement experiment chooses a grasp of its own by its
+    variances, label=number each (lowess=7); a model that is not named does in all."""
     lowess_data: Path | None = None
     """A collected dataset: LOWESS predicts the parts of which it holds grasps."""
     workers: int = Field(default=0, ge=0)
     """Simulated cells that run in parallel; 0: one per core."""
+    estimate: bool = False
+    """Only state how long the missing trials take, measured with two parts of the starter set."""
     yes: bool = False
     """Ask no operator: the arm moves as soon as a grasp is planned, on a real cell, too."""
     seed: int = Field(default=0, ge=0, lt=2**63)
@@ -56,7 +62,7 @@ class EvaluateConfig(Config):
     replay: tuple[Path, str] | None = None
     """Only draw a stored trial again: the folder of a run, and the trial's name."""
 
-    @field_validator("compare", mode="before")
+    @field_validator("compare", "chooses", mode="before")
     @classmethod
     def _from_mapping(cls, value: Any) -> Any:
-        return [f"{label}={folder}" for label, folder in value.items()] if isinstance(value, dict) else value
+        return [f"{label}={one}" for label, one in value.items()] if isinstance(value, dict) else value

@@ -7,10 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from mskgrasp.core.errors import UsageError
-from mskgrasp.core.geometry import Pose
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.run_inputs import model_digests
@@ -18,10 +15,10 @@ from mskgrasp.trials.predictors import (
     LOWESS,
     LowessPredictor,
     NetworkPredictor,
-    PartObservation,
     Predictor,
     fit_lowess,
-    predict_one,
+    missing_predictions,
+    predicted_by,
 )
 from mskgrasp.trials.trial import Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
@@ -80,9 +77,9 @@ class Compared:
         return found if isinstance(found, LowessPredictor) else None
 
     @property
-    def choosers(self) -> dict[str, Path]:
-        """Folders of the networks that can choose a grasp by its variance, by label."""
-        return {label: path for label, path in self.folders.items() if self.predictors[label].has_variance}
+    def choosers(self) -> list[str]:
+        """Labels of the networks that can choose a grasp by its variance."""
+        return [label for label in self.folders if self.predictors[label].has_variance]
 
 
 def load_compared(
@@ -120,8 +117,36 @@ def load_compared(
     return Compared(folders=folders, predictors=predictors, inputs=inputs)
 
 
+def own_choices(chooses: Iterable[str], compared: Compared) -> dict[str, int]:
+    """Parse the numbers of trials per part in which models choose a grasp of their own, by label.
+
+    Args:
+        chooses: ``label=number`` each.
+        compared: The models.
+
+    Raises:
+        UsageError: An item is not ``label=number`` with the label of a model that can choose.
+    """
+    legal = [*compared.choosers, *([LOWESS] if compared.lowess is not None else [])]
+    found: dict[str, int] = {}
+    for text in chooses:
+        label, _, number = text.partition("=")
+        if label not in legal or label in found or not (number.isascii() and number.isdecimal()):
+            raise UsageError(
+                f"--chooses {text!r}: give label=number once a model, for example "
+                f"{(legal or ['ours'])[0]}=7; labels of models with variances: {', '.join(legal) or 'none'}"
+            )
+        found[label] = int(number)
+    return found
+
+
 def scenes(
-    parts: Mapping[str, str], n_trials: int, seed: int, planner: PlannerConfig, compared: Compared | None
+    parts: Mapping[str, str],
+    n_trials: int,
+    seed: int,
+    planner: PlannerConfig,
+    compared: Compared | None,
+    chooses: Mapping[str, int] | None = None,
 ) -> list[tuple[TrialTask, ...]]:
     """List the trials of an experiment by scene: those of one part and number share a scene.
 
@@ -134,8 +159,9 @@ def scenes(
         seed: Seed of the run.
         planner: Settings with the policy of the success experiment.
         compared: Models of the displacement experiment; None for the success experiment.
+        chooses: Trials per part in which a model chooses, by label; a model without a number does in all.
     """
-    found = []
+    most, found = chooses or {}, []
     for number in range(n_trials):
         for name, source in parts.items():
             task = TrialTask(part=name, source=source, number=number, seed=seed, policy=planner.policy)
@@ -144,7 +170,11 @@ def scenes(
                 continue
             choosers = [*compared.choosers, *([LOWESS] if _knows(compared.lowess, name) else [])]
             best = replace(task, policy="quality")
-            more = [replace(task, policy="low_variance", chosen_by=one) for one in choosers]
+            more = [
+                replace(task, policy="low_variance", chosen_by=one)
+                for one in choosers
+                if number < most.get(one, n_trials)
+            ]
             if planner.policy == "certified":
                 more.append(replace(task, policy="certified", chosen_by=CERTIFIED))
             found.append((best, *more))
@@ -161,19 +191,9 @@ def with_predictions(trial: Trial, run: Path, predictors: Mapping[str, Predictor
     Raises:
         BadDataset: The trial's file cannot be read.
     """
-    if trial.measured is None or trial.point_base is None or trial.chosen_by:
-        return trial
-    missing = [
-        label
-        for label, one in predictors.items()
-        if label not in trial.predictions and (label != LOWESS or one.knows(trial.part))
-    ]
+    missing = missing_predictions(trial, predictors)
     if not missing:
         return trial
     frame, plan, _ = read_trial(trial_file(run, trial.key))
     assert plan is not None  # it was measured
-    pose = None if trial.pose_base_obj is None else Pose.from_vector(np.array(trial.pose_base_obj))
-    observation = PartObservation(part=trial.part, frame=frame, view=plan.view, pose_base_obj=pose)
-    point = np.array(trial.point_base)
-    more = {label: predict_one(predictors[label], observation, plan.grasp, point) for label in missing}
-    return replace(trial, predictions=trial.predictions | more)
+    return predicted_by(missing, trial, frame, plan)

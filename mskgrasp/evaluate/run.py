@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
 
 from hal.open_cell import cell_from_values
 from mskgrasp.core.errors import BadModel, UsageError
@@ -18,6 +23,7 @@ from mskgrasp.evaluate.experiments import (
     Compared,
     load_compared,
     model_folders,
+    own_choices,
     scenes,
     with_predictions,
 )
@@ -26,17 +32,18 @@ from mskgrasp.evaluate.replay_trial import describe_trial, draw_trial, find_tria
 from mskgrasp.evaluate.report import TITLES, Report, conclusion, report_sections
 from mskgrasp.evaluate.summary import SuccessSummary, largest_errors, summarise_trials, worst_trials
 from mskgrasp.learning.grasp_models import load_models, require_model
-from mskgrasp.parts import find_part
+from mskgrasp.parts import find_part, starter_names
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import tell_model
 from mskgrasp.planning.run_inputs import certified_digests, model_digests, part_digests
 from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
-from mskgrasp.runtime.progress import progress
+from mskgrasp.runtime.progress import note, progress
 from mskgrasp.runtime.run_folder import (
     TRIALS,
     append_trial,
     opened_run,
+    read_trials,
     record_inputs,
     resume_trials,
     rewrite_trials,
@@ -45,7 +52,7 @@ from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.simulation.versions import versions
 from mskgrasp.trials.cell_file import CellFile, check_loads, read_cell
 from mskgrasp.trials.trial import Trial
-from mskgrasp.trials.trial_files import FOLDER
+from mskgrasp.trials.trial_files import FOLDER, trial_file
 from mskgrasp.trials.trial_runner import SCENE_VERSION, Setup, TrialTask, run_trials
 
 PARTS: dict[Experiment, tuple[str, ...]] = {
@@ -54,7 +61,10 @@ PARTS: dict[Experiment, tuple[str, ...]] = {
 }
 
 
-MAY_CHANGE = ("out", "trials", "parts", "n_parts", "compare", "lowess_data", "workers", "yes", "replay")
+MAY_CHANGE = (
+    "out", "trials", "parts", "n_parts", "compare", "chooses", "lowess_data", "workers", "estimate", "yes",
+    "replay",
+)  # fmt: skip
 
 
 def replay(out: Path, key: str) -> int:
@@ -67,11 +77,32 @@ def replay(out: Path, key: str) -> int:
     return 0
 
 
-def evaluate(config: EvaluateConfig) -> Report:
-    """Execute the missing trials and report on all.
+@dataclass(frozen=True, kw_only=True)
+class Prepared:
+    """An experiment whose inputs are checked.
+
+    Attributes:
+        config: Settings, those of a real cell where it is one.
+        cell: The cell's file.
+        sources: Names or folders of the parts.
+        compared: Models of the displacement experiment.
+        tasks: Its trials by scene.
+        inputs: Digests of what the results depend on.
+    """
+
+    config: EvaluateConfig
+    cell: CellFile
+    sources: list[str]
+    compared: Compared | None
+    tasks: list[tuple[TrialTask, ...]]
+    inputs: dict[str, str]
+
+
+def prepare(config: EvaluateConfig) -> Prepared:
+    """Check the inputs of an experiment, and list its trials.
 
     Raises:
-        UsageError: Settings do not fit together, or the folder holds a run with other inputs.
+        UsageError: Settings do not fit together.
         MskgraspError: A model, a part or the cell cannot be used, or the arm cannot carry a part.
     """
     _check(config)
@@ -93,27 +124,81 @@ def evaluate(config: EvaluateConfig) -> Report:
     found = [find_part(source) for source in sources]
     check_loads(config.cell, found)
     parts = {part.name: source for part, source in zip(found, sources, strict=True)}
-    compared = None
+    compared, chooses = None, {}
     if config.experiment == "displacement":
         chunk = config.planner.chunk_size
         compared = load_compared(config.compare, config.models, config.lowess_data, list(parts), chunk)
+        chooses = own_choices(config.chooses, compared)
     inputs = {"cell": cell.digest} | model_digests(config.models) | part_digests(parts.values())
     inputs |= compared.inputs if compared is not None else {}
     tell_model(models, cell_from_values(cell.values, cell.path))
-    with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=MAY_CHANGE):
+    return Prepared(
+        config=config, cell=cell, sources=sources, compared=compared, inputs=inputs,
+        tasks=scenes(parts, config.trials, config.seed, config.planner, compared, chooses),
+    )  # fmt: skip
+
+
+def evaluate(config: EvaluateConfig) -> Report:
+    """Execute the missing trials and report on all.
+
+    Raises:
+        UsageError: Settings do not fit together, or the folder holds a run with other inputs.
+        MskgraspError: A model, a part or the cell cannot be used, or the arm cannot carry a part.
+    """
+    one = prepare(config)
+    config, compared, tasks = one.config, one.compared, one.tasks
+    with opened_run(config, config.out, one.inputs, scene_version=SCENE_VERSION, may_change=MAY_CHANGE):
         if config.planner.policy == "certified":
-            certify_missing(list(parts.values()), config.models, config.workers)
-            record_inputs(config.out, certified_digests(parts.values()))
-        tasks = scenes(parts, config.trials, config.seed, config.planner, compared)
-        trials = _make_trials(config, cell, compared, tasks)
+            certify_missing(one.sources, config.models, config.workers)
+            record_inputs(config.out, certified_digests(one.sources))
+        trials = _make_trials(one)
         if compared is not None:
             trials = _with_predictions(config, trials, compared)
-        return _report(config, cell, compared, [trials[task.key] for scene in tasks for task in scene])
+        return _report(config, one.cell, compared, [trials[task.key] for scene in tasks for task in scene])
+
+
+def estimate(config: EvaluateConfig) -> float:
+    """Measure trials of two parts of the starter set, and state how long the missing ones take.
+
+    Returns:
+        The time, seconds.
+
+    Raises:
+        UsageError: The cell is not simulated, or as `evaluate`.
+    """
+    one = prepare(config)
+    if not one.cell.simulated:
+        raise UsageError(f"--estimate: {config.cell} is not simulated; omit --estimate")
+    stored = {trial.key for trial in read_trials(config.out / TRIALS, Trial.from_json)}
+    missing = [task for scene in one.tasks for task in scene if task.key not in stored]
+    names = starter_names()[:: len(starter_names()) // 2][:2]
+    sample = scenes({name: name for name in names}, 2, config.seed, config.planner, one.compared)
+    seconds: dict[bool, list[float]] = {False: [], True: []}
+    with TemporaryDirectory() as folder:
+        before = time.perf_counter()
+        for trial in run_trials(_setup(one, Path(folder)), sample, 1):
+            now = time.perf_counter()
+            if trial.key != sample[0][0].key:  # the first one waits for the cell
+                seconds[bool(trial.chosen_by)].append(now - before)
+            before = now
+    n_workers = config.workers or os.cpu_count() or 1
+    total = 0.0
+    for chosen, what in ((False, "of the run's policy"), (True, "chosen by a model's variances")):
+        n = sum(bool(task.chosen_by) == chosen for task in missing)
+        if n:
+            each = float(np.mean(seconds[chosen]))
+            total += n * each / n_workers
+            print(f"{n} trials {what}, {each:.1f} s each (of {len(seconds[chosen])} measured)")
+    print(
+        f"{len(missing)} of {sum(map(len, one.tasks))} trials are missing: about {total / 3600:.1f} h with "
+        f"{n_workers} processes, if each is as fast as the one that was measured"
+    )
+    return total
 
 
 def _check(config: EvaluateConfig) -> None:
-    if config.experiment == "success" and (config.compare or config.lowess_data):
-        raise UsageError("--compare and --lowess-data need --experiment displacement; add it")
+    if config.experiment == "success" and (config.compare or config.chooses or config.lowess_data):
+        raise UsageError("--compare, --chooses and --lowess-data need --experiment displacement; add it")
     if config.experiment == "displacement" and config.planner.policy == "low_variance":
         raise UsageError("--experiment displacement runs this policy anyway; omit --planner.policy")
     if config.experiment == "displacement" and config.planner.searches:
@@ -128,10 +213,24 @@ def _check(config: EvaluateConfig) -> None:
         list_shards(config.lowess_data)
 
 
-def _make_trials(
-    config: EvaluateConfig, cell: CellFile, compared: Compared | None, tasks: Sequence[tuple[TrialTask, ...]]
-) -> dict[str, Trial]:
+def _setup(one: Prepared, out: Path) -> Setup:
+    config, cell, compared = one.config, one.cell, one.compared
+    return Setup(
+        cell=cell.write(out),
+        models=config.models,
+        planner=config.planner,
+        out=out,
+        compared=compared.folders if compared is not None else {},
+        lowess=compared.lowess.fits if compared is not None and compared.lowess is not None else {},
+        tape=cell.tape,
+        must_measure=compared is not None,
+        yes=config.yes,
+    )
+
+
+def _make_trials(one: Prepared) -> dict[str, Trial]:
     """Make the missing trials; all trials of the folder by key."""
+    config, cell, tasks = one.config, one.cell, one.tasks
     make_folder(config.out / FOLDER)
     for leftover in (config.out / FOLDER).glob("*.tmp"):
         leftover.unlink()
@@ -140,23 +239,12 @@ def _make_trials(
     missing = [scene for scene in missing if scene]
     if not missing:
         return trials
-    setup = Setup(
-        cell=cell.write(config.out),
-        models=config.models,
-        planner=config.planner,
-        out=config.out,
-        choosers=compared.choosers if compared is not None else {},
-        lowess=compared.lowess.fits if compared is not None and compared.lowess is not None else {},
-        tape=cell.tape,
-        must_measure=compared is not None,
-        yes=config.yes,
-    )
     n = sum(map(len, missing))
     done = sum(map(len, tasks)) - n
     bar = progress(total=n + done, done=done, unit="trial", keep=True)
     n_lifted = sum(trials[task.key].success for scene in tasks for task in scene if task.key in trials)
     n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
-    with closing(run_trials(setup, missing, n_workers)) as made, bar:
+    with closing(run_trials(_setup(one, config.out), missing, n_workers)) as made, bar:
         for k, trial in enumerate(made, done + 1):
             append_trial(config.out / TRIALS, trial.to_json())
             trials[trial.key] = trial
@@ -185,6 +273,13 @@ def _report(
     """Write the report and its pictures."""
     summary = summarise_trials(trials) if compared is None else compare_models(trials, compared.predictors)
     worst = worst_trials(trials) if compared is None else largest_errors(trials)
+    here = [trial for trial in worst if trial_file(config.out, trial.key).exists()]
+    if len(here) < len(worst):
+        note(
+            f"{len(worst) - len(here)} of the {len(worst)} worst trials were made on another machine and "
+            f"have no file in {config.out / FOLDER}: no picture"
+        )
+        worst = here
     settings = config.model_dump(mode="json", exclude={"replay"}) | dict(
         parts=sorted({trial.part for trial in trials}),
         noise=cell.noise or None,

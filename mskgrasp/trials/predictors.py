@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -22,9 +23,10 @@ from mskgrasp.core.grasp import (
 )
 from mskgrasp.dataset import list_shards, read_columns
 from mskgrasp.learning.grasp_models import Models
+from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.planning.scoring import Scene, displacements
 from mskgrasp.trials.lowess import Lowess
-from mskgrasp.trials.trial import Prediction
+from mskgrasp.trials.trial import Prediction, Trial
 
 LOWESS = "lowess"
 """The label of LOWESS among the models."""
@@ -132,6 +134,28 @@ def predict_one(
         mean=to_object_displacement(mean[0], point_grasp).tolist(),
         std=np.sqrt(np.diag(covariance)).tolist(),
     )
+
+
+def missing_predictions(trial: Trial, predictors: Mapping[str, Predictor]) -> dict[str, Predictor]:
+    """Models of which a trial lacks a prediction, by label: none unless its best grasp was measured."""
+    if trial.measured is None or trial.point_base is None or trial.chosen_by:
+        return {}
+    return {
+        label: one
+        for label, one in predictors.items()
+        if label not in trial.predictions and (label != LOWESS or one.knows(trial.part))
+    }
+
+
+def predicted_by(
+    predictors: Mapping[str, Predictor], trial: Trial, frame: RgbdFrame, plan: GraspPlan
+) -> Trial:
+    """Add the predictions of models for a trial's grasp, from its frame and plan."""
+    pose = None if trial.pose_base_obj is None else Pose.from_vector(np.array(trial.pose_base_obj))
+    observation = PartObservation(part=trial.part, frame=frame, view=plan.view, pose_base_obj=pose)
+    point = np.array(trial.point_base)
+    more = {label: predict_one(one, observation, plan.grasp, point) for label, one in predictors.items()}
+    return replace(trial, predictions=trial.predictions | more)
 
 
 def fit_lowess(data: Path, parts: list[str]) -> tuple[dict[str, Lowess], dict[str, str]]:

@@ -22,7 +22,14 @@ from mskgrasp.trials.engine import PlansGrasps, TrialEngine, connected_engine
 from mskgrasp.trials.lowess import Lowess
 from mskgrasp.trials.measurement import finish, run_trial
 from mskgrasp.trials.policies import Candidates, Chooser
-from mskgrasp.trials.predictors import LOWESS, LowessPredictor, NetworkPredictor, Predictor
+from mskgrasp.trials.predictors import (
+    LOWESS,
+    LowessPredictor,
+    NetworkPredictor,
+    Predictor,
+    missing_predictions,
+    predicted_by,
+)
 from mskgrasp.trials.trial import Policy, Trial, trial_key
 from mskgrasp.trials.trial_files import trial_file, write_trial
 
@@ -64,7 +71,8 @@ class Setup:
         cell: YAML file of the cell.
         models: Folder of the run's own model, which predicts all qualities.
         planner: Settings of the planner.
-        choosers: Folders of the models that choose grasps by their variances, by label.
+        compared: Folders of the models that predict the grasps of the best quality, by label; those with
+            variances choose grasps of their own, too.
         lowess: LOWESS of the known parts.
         tape: Sizes of the tape squares that measure; None: the cell's tracker measures.
         must_measure: Refuse a cell that cannot measure displacements.
@@ -76,7 +84,7 @@ class Setup:
     models: Path
     planner: PlannerConfig
     out: Path
-    choosers: dict[str, Path] = field(default_factory=dict)
+    compared: dict[str, Path] = field(default_factory=dict)
     lowess: dict[str, Lowess] = field(default_factory=dict)
     tape: Tape | None = None
     must_measure: bool = False
@@ -102,9 +110,11 @@ class TrialRunner:
         chunk, device = setup.planner.chunk_size, planner.models.device
         self._candidates = Candidates(planner)
         self._known: dict[str, PlansGrasps] = {}
-        self._predictors: dict[str, Predictor] = {"": NetworkPredictor(planner.models, chunk)}
-        for label, folder in setup.choosers.items():
-            self._predictors[label] = NetworkPredictor(load_models(folder, device), chunk)
+        self._own = NetworkPredictor(planner.models, chunk)
+        self._predictors: dict[str, Predictor] = {
+            label: NetworkPredictor(load_models(folder, device), chunk)
+            for label, folder in setup.compared.items()
+        }
         if setup.lowess:
             self._predictors[LOWESS] = LowessPredictor(setup.lowess)
 
@@ -124,6 +134,10 @@ class TrialRunner:
             policy=task.policy,
             chosen_by=task.chosen_by,
         )
+        # Here, in parallel, and before the frame may be left behind on another machine.
+        missing = missing_predictions(trial, self._predictors)
+        if missing and record.plan is not None:
+            trial = predicted_by(missing, trial, record.frame, record.plan)
         write_trial(trial_file(self._setup.out, trial.key), record.frame, record.plan, record.after)
         yield trial
         finish(self._engine, record)
@@ -139,7 +153,7 @@ class TrialRunner:
             return planner
         return Chooser(
             self._candidates,
-            self._predictors[task.chosen_by],
+            self._predictors[task.chosen_by] if task.chosen_by else self._own,
             task.policy,
             task.part,
             self._engine.cell.tracker,

@@ -14,6 +14,8 @@ from mskgrasp.evaluate.config import EvaluateConfig
 def test_models_to_compare_can_be_a_mapping_in_a_file():
     named = EvaluateConfig.model_validate(dict(models="m", compare={"gcip_mv": "models/a"}))
     assert named.compare == ("gcip_mv=models/a",)
+    fewer = EvaluateConfig.model_validate(dict(chooses={"lowess": 7}))
+    assert fewer.chooses == ("lowess=7",)
     with pytest.raises((BadConfig, ValueError)):
         EvaluateConfig.model_validate(dict(models="m", compare=[1]))
 

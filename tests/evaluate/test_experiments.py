@@ -11,6 +11,7 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.evaluate.experiments import (
     load_compared,
     model_folders,
+    own_choices,
     scenes,
     with_predictions,
 )
@@ -69,7 +70,21 @@ def test_every_model_with_variances_chooses_one_more_grasp_in_a_scene_and_lowess
     ]  # fmt: skip
     (novel,) = scenes({"washer_m36": "washer_m36"}, 1, 0, PlannerConfig(), compared)
     assert [task.chosen_by for task in novel] == ["", "net"]
-    assert compared.lowess is not None and list(compared.choosers) == ["net"]
+    assert compared.lowess is not None and compared.choosers == ["net"]
+
+
+def test_a_model_may_choose_grasps_of_its_own_in_the_first_trials_alone(compared):
+    chooses = own_choices(["lowess=1", "net=2"], compared)
+    found = scenes({PART: PART}, 3, 0, PlannerConfig(), compared, chooses)
+    assert [[task.chosen_by for task in scene] for scene in found] == [["", "net", LOWESS], ["", "net"], [""]]
+    # Of a larger run with the same scenes, they are the same trials.
+    assert found[0] == scenes({PART: PART}, 1, 0, PlannerConfig(), compared)[0]
+
+
+@pytest.mark.parametrize("text", ["net", "net=", "net=-1", "net=1.5", "other=3"])
+def test_who_chooses_in_how_many_trials_is_a_label_and_a_number(text: str, compared):
+    with pytest.raises(UsageError, match="give label=number once a model, for example net=7"):
+        own_choices([text], compared)
 
 
 def test_the_grasps_that_lowess_is_fitted_to_are_an_input_of_the_run(compared):

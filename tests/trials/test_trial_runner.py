@@ -64,7 +64,7 @@ def test_a_scenes_trials_are_run_here_by_one_worker_written_first_and_named_by_w
     """The shipped model as its own rival: both choose in one scene; the file is there before the trial."""
     planner = PlannerConfig(policy="quality", n_candidates=40)
     setup = Setup(
-        cell=SIMULATED_CELL, models=PRETRAINED, planner=planner, out=tmp_path, choosers={"net": PRETRAINED}
+        cell=SIMULATED_CELL, models=PRETRAINED, planner=planner, out=tmp_path, compared={"net": PRETRAINED}
     )
     best = TrialTask(part="hex_nut_m30", source="hex_nut_m30", number=0, seed=0, policy="quality")
     scene = (best, dataclasses.replace(best, policy="low_variance", chosen_by="net"))
@@ -83,6 +83,8 @@ def test_a_scenes_trials_are_run_here_by_one_worker_written_first_and_named_by_w
     np.testing.assert_array_equal(*frames)
     assert found[0].quality is not None and found[1].quality is not None
     assert found[0].quality >= found[1].quality
+    # The prediction is made with the trial, so that no frame is needed later.
+    assert set(found[0].predictions) == ({"net"} if found[0].measured is not None else set())
 
 
 def test_trials_that_must_be_measured_are_refused_on_a_cell_without_a_tracker(tmp_path: Path):
