@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,8 @@ from mskgrasp.benchmark.summary import (
     by_planner,
     refusals,
     share,
+    stored_row,
+    stored_share,
     summarise,
     summary_json,
 )
@@ -95,6 +97,26 @@ def write_report(out: Path, trials: Sequence[PlacedTrial], facts: RunFacts) -> t
     ]
     write_html(out / "report.html", title="Placed within a tolerance", conclusion=headline, sections=sections)
     return headline, sections
+
+
+def stored_sections(values: Mapping[str, Any]) -> list[Section]:
+    """The sections of a stored ``report.json``, without figures and parts.
+
+    Raises:
+        KeyError, TypeError, ValueError: It is not a report of `write_report`.
+    """
+    known = ("cell", "noise", "seed", "trained_on", "chosen_by", "known_families")
+    facts = RunFacts(parts=(), settings={}, **{name: values[name] for name in known})
+    rows = [stored_row(one) for one in values["rows"]]
+    refused = [Refusal(**dict(one, placed=stored_share(one["placed"]))) for one in values["refusals"]]
+    budget = [Budget(**one) for one in values["budgets"] if not one["part"]]
+    none = Path()
+    return [
+        _first_section(rows, facts, none),
+        replace(_tolerances_section(rows), page_only=False),
+        _refusals_section(refused, none),
+        _budget_section(budget),
+    ]
 
 
 def conclusion(rows: Sequence[Row], facts: RunFacts) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -259,6 +259,21 @@ def _budget(planner: str, part: str, trials: Sequence[PlacedTrial]) -> Budget:
         distance[stage] = float(np.median(np.hypot(known[:, 0], known[:, 1]))) if len(known) else None
         turn[stage] = float(np.median(np.abs(wrap_angle(known[:, 2])))) if len(known) else None
     return Budget(planner=planner, part=part, n=len(placed), distance=distance, turn=turn)
+
+
+def stored_share(values: Mapping[str, Any]) -> PlacedShare:
+    """The share that `PlacedShare.to_json` converted."""
+    low, high = values["interval"]
+    return PlacedShare(n=values["n"], of=values["of"], interval=(low, high))
+
+
+def stored_row(values: Mapping[str, Any]) -> Row:
+    """The row that `Row.to_json` converted."""
+    within: dict[Column, tuple[tuple[PlacedShare, ...], ...]] = {
+        column: tuple(tuple(map(stored_share, shares)) for shares in values["within"][column])
+        for column in COLUMNS
+    }
+    return Row(**dict(values, lifted=stored_share(values["lifted"]), within=within))
 
 
 def summary_json(

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from mskgrasp.benchmark.part_list import BenchmarkPart
-from mskgrasp.benchmark.report import RunFacts, write_report
+from mskgrasp.benchmark.report import RunFacts, stored_sections, write_report
 from tests.benchmark.made_trials import failed, made
 from tests.browser import Page
 
@@ -71,6 +71,17 @@ def test_the_tables_say_which_parts_can_be_bought_and_what_was_known(written):
     assert any("ours is made of networks that were trained on 1 of these parts" in one for one in first.text)
     (budget,) = sections["Error budget"].tables
     assert budget.rows[0][:3] == ("ours", 10, "0.50 mm, 0.00 deg")
+
+
+def test_the_stored_numbers_give_the_same_tables(written):
+    out, _, sections = written
+    stored = stored_sections(json.loads((out / "report.json").read_text()))
+    assert [one.title for one in stored] == [
+        "Placed within 1 mm and 2 degrees", "Other tolerances", "Precision against refusals", "Error budget",
+    ]  # fmt: skip
+    for one in stored:
+        assert one.tables == sections[one.title].tables and one.text == sections[one.title].text
+        assert not one.page_only
 
 
 def test_the_page_works_by_itself(written):

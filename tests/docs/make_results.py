@@ -11,9 +11,9 @@ rendered from ``reports/NAME.json``:
     record   rows of the table above the figures, for a run of runs.yaml those that its entry lacks; notes
     report   what the command wrote, or the path of a file in the repository that holds it
 
-Reports of evaluate, palletize and validate are shown as their programs show them. Any other report has
-``tables``, each with a header, rows and perhaps a title; tests.benchmarks write theirs with ``--out``. A run
-whose entry has a ``page`` adds its block to that page with its first record.
+Reports of evaluate, palletize, benchmark and validate are shown as their programs show them. Any other report
+has ``tables``, each with a header, rows and perhaps a title; tests.benchmarks write theirs with ``--out``. A
+run whose entry has a ``page`` adds its block to that page with its first record.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from mskgrasp.benchmark.report import stored_sections
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.settings import Physics
 from mskgrasp.dataset.label_error import STORED as LABEL_ERROR
@@ -108,6 +109,8 @@ def _sections(report: dict[str, Any] | str) -> list[Section]:
         return validation_sections(report)
     if "label_error" in report:
         return [label_error_section(report)]
+    if "budgets" in report:
+        return stored_sections(report)
     if "experiment" in report:
         kind = SuccessSummary if report["experiment"] == "success" else DisplacementSummary
         summary = TypeAdapter(kind).validate_python(report)
@@ -203,10 +206,16 @@ def _size(report: dict[str, Any]) -> str:
             f"{references}, {min(most, settings['variant_grasps_per_part'])} a variant; "
             f"seed {settings['seed']}"
         )
+    if "budgets" in report:
+        attempts = sum(row["lifted"]["of"] for row in report["rows"])
+        return f"{attempts} attempts at {len(report['parts'])} parts, seed {report['seed']}"
     if "experiment" in report:
         settings = report["settings"]
-        n_trials = len(report["trials"])
-        return f"{n_trials} trials, {settings['trials']} a part and policy, seed {settings['seed']}"
+        families = f" of {len(report['families'])} families" if "families" in report else ""
+        return (
+            f"{len(report['trials'])} trials, {settings['trials']} a part and policy; "
+            f"{len(settings['parts'])} parts{families}, seed {settings['seed']}"
+        )
     if "weights" in report:
         return f"{len(report['rows'])} grasps of {len({row['part'] for row in report['rows']})} parts"
     tried = sum(row["tried"] for row in report["corrections"].values())
