@@ -110,6 +110,9 @@ ROWS = [
     Row("train", "no data", _words("--out", "model"), "--data is needed"),
     Row("evaluate", "no such part", _words("--parts", "hex_nut_m31"), "hex_nut_m31"),
     Row("evaluate", "an empty name", _words("--parts", ""), "the name of a part is empty"),
+    Row(
+        "evaluate", "a missing file of names", _words("--parts", "no.txt"), "cannot read the names in no.txt"
+    ),
     Row("evaluate", "parts below zero", _words("--n-parts", "-1"), "--n-parts: "),
     Row(
         "evaluate",
