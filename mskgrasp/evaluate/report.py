@@ -30,11 +30,11 @@ _ERROR_COLUMNS = (
 )  # fmt: skip
 _ATTEMPT_COLUMNS = (
     "attempts", "lifted", *(f"off by at most {1e3 * most:g} mm" for most in WITHIN),
-    f"askew by over {np.degrees(TILT_LIMIT):g} deg", "RMSE without those", "turn RMSE without those",
+    f"tilted by over {np.degrees(TILT_LIMIT):g} deg", "RMSE without those", "turn RMSE without those",
 )  # fmt: skip
 _ATTEMPTS_EXPLAINED = (
     "Of all attempts, those that lifted nothing included: the share in which the part was lifted and the "
-    "predicted displacement is off by at most so much. Askew: share of the lifted parts that hang tilted in "
+    "predicted displacement is off by at most so much. Tilted: share of the lifted parts that hang tilted in "
     "the hand. In brackets: 95 % interval by parts."
 )
 _ERRORS_EXPLAINED = (
@@ -261,12 +261,12 @@ def _displacement(summary: DisplacementSummary, folder: Path) -> list[Section]:
 
 
 def _attempts(names: tuple[str, ...], groups: Sequence[tuple[tuple[str, ...], TrialStatistics]]) -> Section:
-    """Shares of all attempts, and errors without parts that hang askew; empty where none is measured."""
+    """Shares of all attempts, and errors without parts that hang tilted; empty where none is measured."""
     rows = [
         (
             *name, one.trials, share_text(one.successes, one.trials, one.success_interval),
             *(share_text(each.n, each.of, each.interval) for each in one.within),
-            "-" if one.askew is None else share_text(one.askew.n, one.askew.of, one.askew.interval),
+            "-" if one.tilted is None else share_text(one.tilted.n, one.tilted.of, one.tilted.interval),
             millimetres(one.flat_translation_rmse, one.flat_translation_interval),
             degrees(one.flat_rotation_rmse, one.flat_rotation_interval),
         )

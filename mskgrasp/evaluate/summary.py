@@ -60,7 +60,7 @@ class TrialStatistics:
             variance or a component is unknown.
         within: Shares of all trials in which the part was lifted and its predicted displacement is off by at
             most each of `WITHIN`; None where none is measured.
-        askew: Share of the lifted parts that hang tilted by more than `TILT_LIMIT`; None where none is known.
+        tilted: Share of the lifted parts tilted by more than `TILT_LIMIT`; None where no tilt is known.
         flat: Number of measured trials without those.
         flat_translation_rmse: RMSE over them.
         flat_translation_interval: Its interval, as above.
@@ -86,7 +86,7 @@ class TrialStatistics:
     tilt_rms: float | None
     coverage_90: list[float] | None
     within: list[Share] | None = None
-    askew: Share | None = None
+    tilted: Share | None = None
     flat: int = 0
     flat_translation_rmse: float | None = None
     flat_translation_interval: Interval | None = None
@@ -132,7 +132,7 @@ class TrialStatistics:
             tilt_rms=_rms(tilts),
             coverage_90=coverage(predicted, std**2, measured, COVERED).tolist() if known else None,
             within=_within(trials, compared, errors[0]),
-            askew=_askew([trial for trial in trials if trial.tilt is not None and trial.success]),
+            tilted=_tilted([trial for trial in trials if trial.tilt is not None and trial.success]),
             flat=int(flat.sum()),
             flat_translation_rmse=_rms(errors[0][flat]),
             flat_translation_interval=_interval(errors[0][flat], parts[flat]),
@@ -249,7 +249,7 @@ def _within(trials: Sequence[Trial], compared: Sequence[Trial], distances: np.nd
     return [_share([off.get(trial.key, np.inf) <= most for trial in trials], trials) for most in WITHIN]
 
 
-def _askew(lifted: Sequence[Trial]) -> Share | None:
+def _tilted(lifted: Sequence[Trial]) -> Share | None:
     return _share([(trial.tilt or 0.0) > TILT_LIMIT for trial in lifted], lifted) if lifted else None
 
 

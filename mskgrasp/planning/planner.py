@@ -33,7 +33,7 @@ from mskgrasp.planning.refusal import refusal_reason
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 
 PROMISING = 24
-"""Candidates that the displacement network sees in every view, of those that one view ranks.
+"""Number of candidates, best by the score of one view, whose displacement is predicted from all four views.
 
 Of 60 validation parts, 59 got the grasp that is best of all 96 in every view, one a score 1 % greater.
 """
@@ -326,9 +326,10 @@ class Planner:
         return free[:n]
 
     def _scored(self, scene: Scene, candidates: np.ndarray, found: np.ndarray, rows: np.ndarray) -> Shortlist:
-        """Predict the displacements of some candidates, best quality first, or of the most promising of them.
+        """Predict the displacements of some candidates, best quality first.
 
-        Where a prediction is the mean of several views of a grasp, one of them says which are promising.
+        Where a prediction is the mean over several views of a grasp, only `PROMISING` candidates are kept:
+        those of the least variance score by one view, or of the best quality if the policy asks for it.
         """
         if self.models.meta.network.symmetric_views:
             good = rows[found[rows] >= self.config.least_quality]

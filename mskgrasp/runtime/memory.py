@@ -10,7 +10,7 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 _KEPT = 256 * 2**20
 """Most freed memory that is kept, bytes: a plan or a step of training needs a quarter of it."""
 _LARGEST = 32 * 2**20
-"""Largest piece of memory that is kept, bytes: glibc takes no more."""
+"""Larger pieces are mapped by the system, and returned to it, unless freed memory holds them; bytes."""
 
 
 def keep_freed_memory() -> None:

@@ -47,17 +47,17 @@ def test_the_interval_of_the_success_rate_is_over_parts_too():
     assert summary.families["bolt"].success_interval == pytest.approx((0.0, 0.133), abs=1e-3)
 
 
-def test_shares_within_an_error_are_of_all_attempts_and_parts_that_hang_askew_are_reported_apart():
+def test_shares_within_an_error_are_of_all_attempts_and_parts_that_hang_tilted_are_reported_apart():
     precise = [trial(number=k, predicted=[0.0, 0.004 + 1e-3 * k, 0.0, -0.1]) for k in range(4)]
-    askew = trial(part="b", predicted=[0.0, 0.014, 0.0, -0.1], tilt=0.05)
+    tilted = trial(part="b", predicted=[0.0, 0.014, 0.0, -0.1], tilt=0.05)
     lost = trial(part="c", success=False, reason="slipped", measured=None, tilt=None)
-    found = summarise_trials([*precise, askew, lost]).overall
-    assert found.within is not None and found.askew is not None
+    found = summarise_trials([*precise, tilted, lost]).overall
+    assert found.within is not None and found.tilted is not None
     assert [(one.n, one.of) for one in found.within] == [(2, 6), (3, 6)]
-    assert (found.askew.n, found.askew.of, found.flat) == (1, 5, 4)
+    assert (found.tilted.n, found.tilted.of, found.flat) == (1, 5, 4)
     assert found.flat_translation_rmse == pytest.approx(1e-3 * np.sqrt(14 / 4))
     assert found.translation_rmse == pytest.approx(1e-3 * np.sqrt(114 / 5))
-    assert "50.0% [" in printed(summarise_trials([*precise, askew, lost]))
+    assert "50.0% [" in printed(summarise_trials([*precise, tilted, lost]))
 
 
 def test_without_a_success_errors_are_absent_not_zero(tmp_path: Path):
