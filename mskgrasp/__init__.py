@@ -28,8 +28,9 @@ if TYPE_CHECKING:
     from mskgrasp.parts.load import load_part
     from mskgrasp.parts.part import Part
     from mskgrasp.planning.config import PlannerConfig
+    from mskgrasp.planning.grasp_plan import GraspPlan
     from mskgrasp.planning.place_pose import Target, place_pose
-    from mskgrasp.planning.planner import GraspPlan, Planner
+from mskgrasp.planning.planner import Planner
 
 __version__ = "0.1.0"
 
@@ -52,6 +53,7 @@ _HOMES = {
     "mskgrasp.parts.part": ("Part",),
     "mskgrasp.planning.config": ("PlannerConfig",),
     "mskgrasp.planning.place_pose": ("Target", "place_pose"),
-    "mskgrasp.planning.planner": ("GraspPlan", "Planner"),
+    "mskgrasp.planning.grasp_plan": ("GraspPlan",),
+    "mskgrasp.planning.planner": ("Planner",),
 }
 __getattr__, __dir__ = lazy_names(__name__, _HOMES)

@@ -14,8 +14,8 @@ from hal.sim import EDGE, FilmFrame, View
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.grasp import object_displacement
 from mskgrasp.core.palette import BLUE, GREEN, INK, ORANGE, PALE, SLATE
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import displacement_of_point
-from mskgrasp.planning.planner import GraspPlan
 
 _PANEL = 320
 """Pixels along the edge of each picture."""

@@ -14,7 +14,7 @@ from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts import find_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import SIMULATED_CELL, make_planner, part_name, present
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress

@@ -13,8 +13,8 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.array_files import read_arrays, write_arrays
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.perception.footprint import pixel_pitch, seen_points
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import Target
-from mskgrasp.planning.planner import GraspPlan
 
 _N = 200
 

@@ -22,8 +22,9 @@ from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.footprint import seen_footprint
 from mskgrasp.perception.markers import planar_displacement
 from mskgrasp.planning.certified_planner import planner_of_part
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import Target, drop_of, place, place_error, place_pose, turned_by
-from mskgrasp.planning.planner import GraspPlan, Planner
+from mskgrasp.planning.planner import Planner
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.policies import RepeatedPlanner
 

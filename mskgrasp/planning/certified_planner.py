@@ -30,7 +30,8 @@ from mskgrasp.planning.certified import (
     to_base,
     turned,
 )
-from mskgrasp.planning.planner import GraspPlan, Planner
+from mskgrasp.planning.grasp_plan import GraspPlan
+from mskgrasp.planning.planner import Planner
 from mskgrasp.runtime.progress import note
 
 AMBIGUOUS_FROM = 1.5e-3

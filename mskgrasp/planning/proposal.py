@@ -17,7 +17,7 @@ from mskgrasp.core.errors import BadPlanner, MskgraspError
 from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, to_grasp_displacement
 from mskgrasp.perception.part_detection import view_part
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 
 GROUP = "planners"
 """Group of entry points, after ``mskgrasp.``."""

@@ -20,7 +20,7 @@ from mskgrasp.core.grasp import FAILURES, MAX_OPENING
 from mskgrasp.core.palette import BLUE, FAINT, GREEN, INK, ORANGE, RED
 from mskgrasp.dataset import Attempts, ShardInfo, u16_to_depth
 from mskgrasp.perception.height_patches import crop_patches, height_image
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.reports.style import saved_figure
 
 _PAD_WIDTH, _PAD_THICKNESS = 0.020, 0.008  # drawn size of a finger pad seen from above, metres

@@ -6,7 +6,7 @@ import numpy as np
 
 from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.planning.config import MIN_QUALITY
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 
 
 def plan_text(plan: GraspPlan) -> str:

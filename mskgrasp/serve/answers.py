@@ -13,8 +13,9 @@ from hal.camera import RgbdFrame
 from mskgrasp.core.displacement_covariance import object_displacement_covariance
 from mskgrasp.core.errors import MskgraspError, NoGraspFound, NoPartFound, TableTooHigh
 from mskgrasp.core.grasp import PartView, centre_in_grasp_frame, to_object_displacement
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import place_pose
-from mskgrasp.planning.planner import GraspPlan, Planner, variance_score
+from mskgrasp.planning.planner import Planner, variance_score
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 from mskgrasp.serve.rejection import Rejected, error_body
 from mskgrasp.serve.requests import PlaceRequest, PlanRequest, ScoreRequest, parse_frame

@@ -39,8 +39,8 @@ from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
 from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.markers import Markers, find_markers
 from mskgrasp.perception.tallest import tallest_thing
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import displacement_of_point
-from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.trials.trial import REFUSED
 

@@ -11,7 +11,7 @@ from hal.errors import MotionAborted
 from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.perception.markers import check_between_pads, planar_displacement
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.trials.engine import PlannedGrasp, TrialEngine
 from mskgrasp.trials.trial import Trial
 

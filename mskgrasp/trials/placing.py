@@ -21,6 +21,7 @@ from mskgrasp.core.geometry import (
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, object_displacement
 from mskgrasp.parts import Part
 from mskgrasp.perception.part_pose import PartPose
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import (
     Target,
     check_place,
@@ -29,7 +30,6 @@ from mskgrasp.planning.place_pose import (
     place,
     place_pose,
 )
-from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.trials.engine import PlansGrasps, TrialEngine
 from mskgrasp.trials.placed_trial import PlacedTrial
 

@@ -11,7 +11,8 @@ from hal.camera import RgbdFrame
 from hal.cell import PartTracker
 from mskgrasp.core.grasp import Grasp, PartView
 from mskgrasp.planning.certified_planner import CertifiedPlanner
-from mskgrasp.planning.planner import GraspPlan, Planner, Shortlist, select, shortlist, variance_score
+from mskgrasp.planning.grasp_plan import GraspPlan, Shortlist
+from mskgrasp.planning.planner import Planner, select, shortlist, variance_score
 from mskgrasp.planning.scoring import Scene, qualities
 from mskgrasp.trials.predictors import PartObservation, Predictor
 

@@ -23,7 +23,7 @@ from mskgrasp.core.grasp import (
 )
 from mskgrasp.dataset import list_shards, read_columns
 from mskgrasp.learning.grasp_models import Models
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.scoring import Scene, displacements
 from mskgrasp.trials.lowess import Lowess
 from mskgrasp.trials.trial import Prediction, Trial

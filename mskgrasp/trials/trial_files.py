@@ -13,7 +13,7 @@ from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp, PartView
 from mskgrasp.dataset import depth_to_u16, u16_to_depth
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 
 SCHEMA_VERSION = 3
 FOLDER = "trials"

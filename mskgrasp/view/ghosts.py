@@ -6,7 +6,7 @@ import numpy as np
 
 from mskgrasp.core.geometry import Pose, quat_about_z
 from mskgrasp.core.grasp import to_grasp_displacement
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 
 
 def motion_of(

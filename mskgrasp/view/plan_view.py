@@ -13,7 +13,7 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.palette import GREEN, ORANGE
 from mskgrasp.core.settings import Region
 from mskgrasp.perception.footprint import pixel_pitch, seen_points
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.view.ghosts import expected_motion, likely_motions, motion_of
 from mskgrasp.view.page import Page, Panel
 from mskgrasp.view.scene import (

@@ -11,7 +11,7 @@ from PIL import Image
 from hal.sim import FilmFrame, View
 from mskgrasp.core.geometry import Pose, quat_about_z
 from mskgrasp.demo.animation import write_animation
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 from tests.planning.hand_made import FRAME, planner
 
 N = 120

@@ -1,6 +1,5 @@
 import contextlib
 import dataclasses
-import json
 import subprocess
 import sys
 from typing import Any
@@ -14,17 +13,10 @@ from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.planner import (
-    PROMISING,
-    GraspPlan,
-    Planner,
-    select,
-    shortlist,
-    variance_score,
-)
+from mskgrasp.planning.grasp_plan import GraspPlan
+from mskgrasp.planning.planner import PROMISING, Planner, select, shortlist, variance_score
 from mskgrasp.planning.refine import fingers_free
 from mskgrasp.planning.scoring import Scene, displacements
-from mskgrasp.reports.grasp_figures import draw_plan
 from tests import synthetic
 from tests.planning.hand_made import BOX, FRAME, hand_made_models, planner
 from tests.planning.threads import torch_threads
@@ -101,32 +93,11 @@ def test_one_view_of_the_best_qualities_says_which_are_seen_in_all():
     assert plan(policy="quality").shortlist.tolist() == best[:PROMISING].tolist()
 
 
-def test_the_object_displacement_is_converted_with_the_estimated_centre():
-    plan = planner().plan(FRAME, np.random.default_rng(0))
-    centre = centre_in_grasp_frame(plan.view.centre_base, plan.grasp.as_vector())
-    assert np.allclose(plan.grasp_displacement, [0.001, 0.002, 0.0, 0.1])
-    assert plan.displacement[3] == pytest.approx(-0.1)
-    cos, sin = np.cos(-0.1), np.sin(-0.1)
-    x, y = centre[:2] - [0.001, 0.002]
-    assert np.allclose(plan.displacement[:2], np.array([cos * x - sin * y, sin * x + cos * y]) - centre[:2])
-
-
 def test_demands_that_no_candidate_meets_and_empty_tables_are_reported():
     with pytest.raises(NoGraspFound, match="min_quality"):
         planner(PlannerConfig(n_candidates=50, min_quality=0.99)).plan(FRAME, np.random.default_rng(0))
     with pytest.raises(NoPartFound):
         planner().plan(synthetic.frame([]), np.random.default_rng(0))
-
-
-def test_a_plan_is_plain_json_and_a_picture(tmp_path):
-    plan = planner().plan(FRAME, np.random.default_rng(0))
-    values = json.loads(json.dumps(plan.to_json(), allow_nan=False))
-    assert np.allclose(values["grasp"], plan.grasp.as_vector()) and len(values["displacement_std"]) == 4
-    for number, drawn in enumerate(
-        (plan, dataclasses.replace(plan, grasp_displacement_cov=np.full((4, 4), np.nan)))
-    ):
-        draw_plan(FRAME, drawn, tmp_path / f"{number}.png")
-        assert (tmp_path / f"{number}.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_shortlist_is_the_best_share_and_never_empty():

@@ -11,8 +11,8 @@ from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, wrap_angle
 from mskgrasp.core.grasp import object_displacement, to_grasp_displacement
 from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.markers import Markers, planar_displacement
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import Target, place_error, place_pose
-from mskgrasp.planning.planner import GraspPlan
 from mskgrasp.trials.engine import ExecutedGrasp
 from tests import synthetic
 from tests.planning.hand_made import planner

@@ -9,7 +9,7 @@ import numpy as np
 from hal import RgbdFrame
 from mskgrasp.core.grasp import Grasp
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.planner import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.trials.engine import PlannedGrasp, TrialEngine
 from tests.planning.hand_made import planner
 

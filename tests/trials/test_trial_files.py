@@ -14,7 +14,8 @@ from mskgrasp.core.errors import BadDataset
 from mskgrasp.evaluate.replay_trial import draw_trial, find_trial
 from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.planner import GraspPlan, Planner
+from mskgrasp.planning.grasp_plan import GraspPlan
+from mskgrasp.planning.planner import Planner
 from mskgrasp.runtime.run_folder import TRIALS, append_trial, read_trials, resume_trials
 from mskgrasp.trials.trial import Prediction, Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file, write_trial
