@@ -28,7 +28,7 @@ _MOST_BYTES, _MOST_TEXT = 2**26, 2**30
 
 
 def keep(out: Path, path: Path) -> int:
-    """Stores the state of a run; the number of its whole lines.
+    """Store the state of a run; return the number of its whole lines.
 
     Raises:
         UsageError: There is no run.
@@ -44,7 +44,7 @@ def keep(out: Path, path: Path) -> int:
 
 
 def restore(path: Path, out: Path) -> int:
-    """Writes the stored state of a run into a new folder; the number of its trials.
+    """Write the stored state of a run into a new folder; return the number of its trials.
 
     Raises:
         UsageError: Nothing is stored, or the folder exists.
@@ -70,7 +70,7 @@ def restore(path: Path, out: Path) -> int:
 
 
 def main() -> int:
-    """Stores or restores."""
+    """Store or restore."""
     runs = {name: run["out"] for name, run in read_yaml(RUNS).items() if "out" in run}
     parser = argparse.ArgumentParser(prog="python -m tests.docs.kept_runs", description="Keep long runs.")
     parser.add_argument("what", choices=("keep", "restore"))

@@ -25,11 +25,14 @@ def test_success_and_errors_follow_their_definitions():
 
 
 def test_intervals_are_over_parts_not_over_grasps():
-    """Two parts, one with twice the error: a hundred grasps tell hardly more than two would."""
+    """Two parts, one with twice the error: a hundred grasps tell no more than two would."""
     far = [trial(part="b", number=k, measured=[-0.003, 0.008, 0.0, 0.1]) for k in range(50)]
     near = [trial(number=k, measured=[0.0, 0.004, 0.0, 0.1]) for k in range(50)]
     interval = summarise_trials(far + near).overall.translation_interval
-    assert interval is not None and interval[0] < 0.002 and interval[1] > 0.02
+    # The logarithms of both parts lie ln 2 apart; Student's t of one degree of freedom, 12.706.
+    factor = np.exp(12.706 * np.log(2) / 2)
+    rmse = np.sqrt((0.005**2 + 0.010**2) / 2)
+    assert interval == pytest.approx((rmse / factor, rmse * factor), rel=1e-3)
 
 
 def test_the_interval_of_the_success_rate_is_over_parts_too():

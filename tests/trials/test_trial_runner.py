@@ -84,7 +84,8 @@ def test_a_scenes_trials_are_run_here_by_one_worker_written_first_and_named_by_w
     assert found[0].quality is not None and found[1].quality is not None
     assert found[0].quality >= found[1].quality
     # The prediction is made with the trial, so that no frame is needed later.
-    assert set(found[0].predictions) == ({"net"} if found[0].measured is not None else set())
+    assert found[0].measured is not None and set(found[0].predictions) == {"net"}
+    assert not found[1].predictions  # its own is that of the plan
 
 
 def test_trials_that_must_be_measured_are_refused_on_a_cell_without_a_tracker(tmp_path: Path):
