@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from mskgrasp.planning.config import PlannerConfig
     from mskgrasp.planning.grasp_plan import GraspPlan
     from mskgrasp.planning.place_pose import Target, place_pose
-from mskgrasp.planning.planner import Planner
+    from mskgrasp.planning.planner import Planner
 
 __version__ = "0.1.0"
 
