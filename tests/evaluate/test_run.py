@@ -17,7 +17,7 @@ from hal.operator import StoppedByOperator
 from hal.sim import SapienArm
 from mskgrasp.core.errors import MskgraspError, UsageError
 from mskgrasp.evaluate.config import EvaluateConfig
-from mskgrasp.evaluate.run import evaluate
+from mskgrasp.evaluate.run import estimate, evaluate
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
@@ -96,6 +96,16 @@ def test_a_run_with_other_settings_or_another_model_is_refused(alone: Path, tmp_
     (models / "model.json").write_text(json.dumps(dict(meta, metrics={})))
     with pytest.raises(UsageError, match="models, model.json differ"):
         evaluate(config(alone, trials=3, noise="kinect2", models=models))
+
+
+def test_an_estimate_counts_the_missing_trials_and_makes_none_of_them(
+    alone: Path, capsys: pytest.CaptureFixture[str]
+):
+    files = sorted(alone.rglob("*"))
+    seconds = estimate(config(alone, trials=5, noise="kinect2", workers=2))
+    printed = capsys.readouterr().out
+    assert "3 of 5 trials are missing" in printed and "with 2 processes" in printed
+    assert 0.1 < seconds < 100 and sorted(alone.rglob("*")) == files
 
 
 def test_models_are_compared_and_one_added_later_repeats_no_grasp(collected: Path, tmp_path: Path):
