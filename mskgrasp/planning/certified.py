@@ -8,7 +8,8 @@ covariance of what remains, all in the axes of the grasp, with the closing direc
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +30,18 @@ from mskgrasp.core.json_text import parse_json
 from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.parts import Part, parts_folder
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 FILE = "grasps.json"
+_LEAST_SPREAD = 1e-12
+"""Smaller spreads are alike: (1 um)^2."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CertifiedGrasp:
-    """A grasp with its measured outcome, over the last simulations.
+    """A grasp with its measured outcome, over the last simulations, by which the candidate was not chosen.
 
-    They had no part in choosing the candidate, but decide whether it is certified, and which grasp is
-    planned: of many alike ones the best seems better than it is.
+    They decide whether it is certified, and which grasp is planned; `without_selection_bias` makes up for
+    the best of many seeming better than it is.
 
     Attributes:
         resting: Index of the part's resting pose.
@@ -52,6 +55,7 @@ class CertifiedGrasp:
         residual: (4, 4) covariance of the displacement about that line.
         swing: (2,) mean swing of the part in the hand, radians about x and y of the grasp.
         swing_cov: (2, 2) its covariance.
+        spread_error: Standard error of `spread`, as a share of it.
     """
 
     resting: int
@@ -63,6 +67,7 @@ class CertifiedGrasp:
     residual: np.ndarray
     swing: np.ndarray
     swing_cov: np.ndarray
+    spread_error: float
 
     def covariance(self, pose_cov: np.ndarray) -> np.ndarray:
         """Covariance (4, 4) of the displacement, given that of the seen pose (3, 3), axes of the grasp."""
@@ -81,6 +86,11 @@ class CertifiedGrasp:
         turned = spread[3] + self.swing @ self.swing + np.trace(self.swing_cov)
         return float(spread[:3].sum() + radius**2 * turned)
 
+    def spread(self, radius: float) -> float:
+        """The part of `score` that simulations of a well-known pose and the mean swing leave open, m^2."""
+        variance = np.diag(self.residual)
+        return float(variance[:3].sum() + radius**2 * (variance[3] + np.trace(self.swing_cov)))
+
     @property
     def lifted_interval(self) -> tuple[float, float]:
         """95 % interval of the share lifted (Wilson)."""
@@ -95,6 +105,34 @@ class CertifiedGrasp:
 _SHAPES = {
     "grasp": (4,), "mean": (4,), "slope": (4, 3), "residual": (4, 4), "swing": (2,), "swing_cov": (2, 2),
 }  # fmt: skip
+
+
+def without_selection_bias(grasps: Sequence[CertifiedGrasp], radius: float) -> list[CertifiedGrasp]:
+    """The grasps with covariances of which the least is not flattered by being chosen as the least.
+
+    Of several measured spreads the least is likely to be one that was measured too small. Each becomes its
+    expectation given the others (empirical Bayes for log-normal spreads; Efron, Tweedie's formula and
+    selection bias, JASA 2011): it moves towards their mean by the share of their differences that so few
+    simulations explain.
+
+    Args:
+        grasps: All that are chosen from.
+        radius: The part's radius of gyration about the vertical, metres.
+    """
+    noise = float(np.mean([one.spread_error**2 for one in grasps])) if grasps else 0.0
+    if len(grasps) < 2 or not noise:
+        return list(grasps)
+    logs = np.log([max(one.spread(radius), _LEAST_SPREAD) for one in grasps])
+    differences = max(0.0, float(logs.var(ddof=1)) - noise)
+    weight = differences / (differences + noise)
+    # The mean of the logarithms lies half the noise below that of the true spreads, and the expectation of a
+    # log-normal quantity half its variance above its median.
+    expected = logs.mean() + noise / 2 + weight * (logs - logs.mean()) + weight * noise / 2
+    factors = np.exp(expected - logs)
+    return [
+        replace(one, residual=factor * one.residual, swing_cov=factor * one.swing_cov)
+        for one, factor in zip(grasps, factors, strict=True)
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,9 +238,12 @@ def grasp_from_json(values: dict[str, Any], n_resting: int) -> CertifiedGrasp:
         if array.shape != _SHAPES[name] or not np.isfinite(array).all():
             raise ValueError(f"{name} must be finite and of shape {_SHAPES[name]}")
     counts: dict[str, Any] = {name: int(values[name]) for name in ("resting", "n", "lifted")}
+    spread_error = float(values["spread_error"])
+    if not 0 <= spread_error < np.inf:
+        raise ValueError("spread_error must be finite and not negative")
     if not (0 <= counts["resting"] < n_resting and 0 <= counts["lifted"] <= counts["n"]):
         raise ValueError("resting, lifted or n is out of range")
-    return CertifiedGrasp(**arrays, **counts)
+    return CertifiedGrasp(**arrays, **counts, spread_error=spread_error)
 
 
 def rest_frame(T_base_obj: Pose, quat_table_obj: np.ndarray) -> Pose:

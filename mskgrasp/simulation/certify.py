@@ -34,13 +34,14 @@ from mskgrasp.planning.certified import (
     rest_frame,
     to_rest,
     turned,
+    without_selection_bias,
 )
 from mskgrasp.planning.planner import Planner, shortlist, variance_score
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 from mskgrasp.simulation.repeats import PoseErrors, Repeat, place_part, repeat_grasp
 from tasks import GraspDisplacementEnv
 
-CERTIFY_VERSION = 1
+CERTIFY_VERSION = 2
 """Raised by every change after which a seed makes other certified grasps."""
 FIRST, SECOND = 2, 4
 """Simulations of each candidate in the first round and of each of the best in the second."""
@@ -177,7 +178,7 @@ def run_stream(
     for candidate in _spread_out(ranked, n_last):
         before, candidate.repeats = candidate.repeats, []
         yield from simulate(candidate, FIRST + SECOND, last)
-        grasps.append(measured(stream.resting, candidate.grasp, candidate.repeats, before))
+        grasps.append(measured(stream.resting, radius, candidate.grasp, candidate.repeats, before))
     return grasps
 
 
@@ -271,7 +272,7 @@ def _without_motion(candidate: _Candidate, height: float) -> np.ndarray | None:
 
 
 def measured(
-    resting: int, grasp: np.ndarray, last: Sequence[Repeat], before: Sequence[Repeat] = ()
+    resting: int, radius: float, grasp: np.ndarray, last: Sequence[Repeat], before: Sequence[Repeat] = ()
 ) -> CertifiedGrasp:
     """Describe a grasp by its outcomes.
 
@@ -281,6 +282,7 @@ def measured(
 
     Args:
         resting: Index of the resting pose.
+        radius: The part's radius of gyration about the vertical in that pose, metres.
         grasp: (4,) in its rest frame.
         last: Outcomes of the last round.
         before: Those of the rounds before.
@@ -288,17 +290,22 @@ def measured(
     held = [one for one in last if not one.reason]
     known = held + [one for one in before if not one.reason]
     slope, mean, residual = np.zeros((4, 3)), np.zeros(4), np.zeros((4, 4))
-    swing, swing_cov = np.zeros(2), np.zeros((2, 2))
+    swing, swing_cov, spread_error = np.zeros(2), np.zeros((2, 2)), 0.0
     if len(known) >= 6 and len(held) >= 3:
         inputs = np.column_stack([np.ones(len(known)), [one.error[[0, 1, 3]] for one in known]])
         moved = np.stack([one.displacement for one in known])
         line, *_ = np.linalg.lstsq(inputs, moved, rcond=None)
         mean, slope = line[0], line[1:].T
         off = (moved - inputs @ line)[: len(held)]
-        # Of the line's four numbers the last outcomes bear their share.
-        residual = off.T @ off / max(1.0, len(held) * (1 - 4 / len(known)))
+        # Of the line's four numbers the last outcomes bear their share; a new outcome misses the line by its
+        # own spread and by the error of the line.
+        unbiased = off.T @ off / max(1.0, len(held) * (1 - 4 / len(known)))
+        residual = (1 + 4 / len(known)) * unbiased
         swings = np.stack([one.swing for one in held])
         swing, swing_cov = swings.mean(axis=0), np.cov(swings.T)
+        angles = np.column_stack([off[:, 3], swings - swing])
+        missed = np.square(off[:, :3]).sum(axis=1) + radius**2 * np.square(angles).sum(axis=1)
+        spread_error = float(missed.std(ddof=1) / np.sqrt(len(held)) / max(missed.mean(), 1e-12))
     return CertifiedGrasp(
         resting=resting,
         grasp=grasp,
@@ -309,6 +316,7 @@ def measured(
         residual=residual,
         swing=swing,
         swing_cov=swing_cov,
+        spread_error=spread_error,
     )
 
 
@@ -318,7 +326,8 @@ def select_certified(
     """Select the certified grasps of a resting pose.
 
     Returns:
-        The grasps, least expected error first, and where there is none the reason.
+        The grasps, least expected error first, their covariances as those of chosen ones are expected, and
+        where there is none the reason.
     """
     errors = config.pose_errors
     pose_cov = np.diag(np.square([errors.position, errors.position, errors.turn]))
@@ -335,6 +344,7 @@ def select_certified(
             [],
             f"it tilts by more than {np.degrees(TILT_LIMIT):g} degrees in every grasp that lifts it",
         )
+    flat = without_selection_bias(flat, radius)
     ranked = sorted(flat, key=lambda one: one.score(pose_cov, radius))
     steady = [one for one in ranked if one.score(pose_cov, radius) <= config.most_error**2]
     if not steady:

@@ -43,6 +43,7 @@ def certified_grasp(**changes) -> CertifiedGrasp:
         residual=np.diag(np.square([1e-4, 2e-5, 1e-4, 1e-3])),
         swing=np.array([0.001, -0.002]),
         swing_cov=1e-6 * np.eye(2),
+        spread_error=0.0,
     )
     return CertifiedGrasp(**(values | changes))
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mskgrasp.parts import find_part
+from mskgrasp.planning.certified import radius_about_vertical
 from mskgrasp.simulation.certify import CertifyConfig, measured, round_sizes, select_certified
 from mskgrasp.simulation.repeats import Repeat
 from tests.planning.test_certified import certified_grasp
@@ -39,7 +40,7 @@ def test_the_outcome_follows_the_error_of_the_pose_along_the_line_that_made_it()
     mean, std = np.array([1e-3, -2e-3, 1e-4, 0.05]), np.array([5e-5, 1e-5, 5e-5, 1e-3])
     last = outcomes(rng, 400, slope, mean, std)
     failed = Repeat(reason="slipped", error=np.zeros(4), displacement=np.full(4, np.nan), swing=np.zeros(2))
-    grasp = measured(0, GRASP, [*last, failed], outcomes(rng, 20, slope, mean, std))
+    grasp = measured(0, 0.01, GRASP, [*last, failed], outcomes(rng, 20, slope, mean, std))
     assert (grasp.n, grasp.lifted) == (401, 400)
     assert grasp.mean == pytest.approx(mean, abs=3e-4)
     assert grasp.slope[0] == pytest.approx(slope[0], abs=0.05)
@@ -47,26 +48,50 @@ def test_the_outcome_follows_the_error_of_the_pose_along_the_line_that_made_it()
     assert grasp.swing == pytest.approx([0.001, 0.0])
 
 
-def test_the_residual_of_few_outcomes_is_not_too_small():
+def test_the_residual_of_few_outcomes_is_that_of_a_new_one_about_the_fitted_line():
     rng = np.random.default_rng(1)
     std = np.array([1e-4, 1e-4, 1e-4, 1e-3])
     found = [
         np.diag(
             measured(
-                0, GRASP, outcomes(rng, 24, np.zeros((4, 3)), np.zeros(4), std),
+                0, 0.01, GRASP, outcomes(rng, 24, np.zeros((4, 3)), np.zeros(4), std),
                 outcomes(rng, 6, np.zeros((4, 3)), np.zeros(4), std),
             ).residual
         )
         for _ in range(200)
     ]  # fmt: skip
-    assert np.mean(found, axis=0) == pytest.approx(std**2, rel=0.1)
+    assert np.mean(found, axis=0) == pytest.approx((1 + 4 / 30) * std**2, rel=0.1)
+
+
+@pytest.mark.parametrize("differences", [0.0, 0.3, 0.6])
+def test_the_best_of_many_grasps_errs_by_as_much_as_is_stated(differences):
+    rng, radius, n = np.random.default_rng(2), radius_about_vertical(PART, 0), 60
+    chosen, least = np.zeros((n, 2)), np.zeros((n, 2))  # stated and true, m^2
+    for one in range(n):
+        stds = 1e-4 * np.exp(differences * rng.normal(size=12))
+        grasps = []
+        for k, std in enumerate(stds):
+            last, before = (
+                outcomes(rng, count, np.zeros((4, 3)), np.zeros(4), std * np.array([1, 1, 0, 0]))
+                for count in (24, 6)
+            )
+            grasps.append(measured(0, radius, GRASP + [0.01 * k, 0, 0, 0], last, before))
+        best = select_certified(PART, 0, grasps, CertifyConfig())[0][0]
+        seems_best = min(grasps, key=lambda grasp: grasp.spread(radius))
+        for row, grasp in ((chosen, best), (least, seems_best)):
+            std = stds[round(grasp.grasp[0] / 0.01)]
+            row[one] = grasp.spread(radius), (1 + 4 / 30) * 2 * std**2
+    stated, true = np.sqrt(chosen.mean(axis=0))
+    measured_alone, true_of_that = np.sqrt(least.mean(axis=0))
+    assert stated == pytest.approx(true, rel=0.06)
+    assert measured_alone < 0.97 * true_of_that
 
 
 def test_a_grasp_that_never_lifts_has_no_outcome():
     failed = Repeat(
         reason="missed", error=np.zeros(4), displacement=np.full(4, np.nan), swing=np.full(2, np.nan)
     )
-    grasp = measured(0, GRASP, [failed] * 5)
+    grasp = measured(0, 0.01, GRASP, [failed] * 5)
     assert (grasp.lifted, grasp.n) == (0, 5)
     assert np.isfinite(grasp.mean).all() and not grasp.mean.any()
 
