@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from mskgrasp.assess.summary import DISTANCES, Row, Share, summarise, summary_js
 from mskgrasp.assess.trials import EXACT, NOISY
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.grasp import TILT_LIMIT
+from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.parts import Part
 from mskgrasp.planning.certified import CertifiedGrasps, radius_about_vertical
 from mskgrasp.planning.isaac_grasp import write_isaac_grasp
@@ -99,13 +101,14 @@ def write_report(
 def conclusion(
     part: Part, certified: CertifiedGrasps, trials: Sequence[PlacedTrial], verdicts: dict[str, str]
 ) -> str:
-    """The result in a line or two: whether the part can be grasped at all, and the verdicts."""
+    """The result in a line or two: that no attempt lifted the part, or the verdicts."""
     if not any(trial.lifted for trial in trials):
-        reasons = sorted({trial.reason for trial in trials if trial.reason})
+        reasons = counted(Counter(trial.reason for trial in trials if trial.reason))
         why = next(iter(certified.without.values()), "")
+        most = wilson_interval(0, len(trials))[1]
         return (
-            f"{part.name} cannot be grasped by this hand in any of its resting poses: none of {len(trials)} "
-            f"attempts lifted it ({', '.join(reasons)}{'; ' + why if why else ''})."
+            f"{part.name} was not grasped: none of {len(trials)} attempts lifted it ({reasons}"
+            f"{'; ' + why if why else ''}); 95 % interval of the share lifted: 0 to {most:.0%}."
         )
     lines = [f"With {'an ' if name == EXACT else ''}{name}: {text}." for name, text in verdicts.items()]
     return " ".join(lines)
