@@ -187,6 +187,17 @@ def tables(card: Card) -> list[CardTable]:
     ]
 
 
+def report(card: Card) -> dict[str, Any]:
+    """Make the card's content as JSON: number of attempts, physics of the labels, tables."""
+    simulations = ", ".join(sorted({names.get("simulation", "unknown") for names, _ in card.versions}))
+    rate, iterations = (card.physics[name] for name in ("rate_hz", "position_iterations"))
+    return {
+        "n": f"{card.attempts} attempts at {card.parts} parts, seed {card.seed}",
+        "labels": f"{rate} Hz, {iterations} iterations; simulation version {simulations}",
+        "tables": [{"title": title, "header": header, "rows": rows} for title, header, rows in tables(card)],
+    }
+
+
 def markdown(card: Card) -> str:
     """Format the card as Markdown."""
     blocks = []

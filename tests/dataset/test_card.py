@@ -41,15 +41,16 @@ def test_displacements_are_those_of_successes(tmp_path):
 
 
 def test_the_printed_card_has_every_block(collected, capsys):
-    assert main(["info", str(collected)]) == 0
+    assert main(["card", str(collected)]) == 0
     printed = capsys.readouterr().out
     for word in ("12", "4 shards", "hex_nut", "Failures", "Discarded", "rate_hz", "sapien 3."):
         assert word in printed
 
 
-def test_markdown_is_made_of_well_formed_tables(collected, capsys):
-    assert main(["info", str(collected), "--markdown"]) == 0
-    page = capsys.readouterr().out
+def test_the_written_card_is_well_formed(collected, tmp_path, capsys):
+    assert main(["card", str(collected), "--out", str(tmp_path / "card")]) == 0
+    assert "card.md, report.json" in capsys.readouterr().out
+    page = (tmp_path / "card" / "card.md").read_text()
     assert page.startswith("# Dataset data\n")
     blocks = re.findall(r"(?:^\|.*\n)+", page, flags=re.MULTILINE)
     assert len(blocks) == 7
@@ -58,3 +59,6 @@ def test_markdown_is_made_of_well_formed_tables(collected, capsys):
         assert set(lines[1]) <= {"|", "-"}
         assert len({line.count("|") for line in lines}) == 1
     assert "| attempts | 12 |" in page
+    report = json.loads((tmp_path / "card" / "report.json").read_text())
+    assert report["n"] == "12 attempts at 2 parts, seed 5" and "Hz" in report["labels"]
+    assert ["attempts", "12"] in report["tables"][0]["rows"] and len(report["tables"]) == 7

@@ -1,17 +1,19 @@
-"""Command line of ``python -m mskgrasp.dataset``: check, info, export."""
+"""Command line of ``python -m mskgrasp.dataset``: check, card, export."""
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, assert_never
+from typing import Literal, assert_never
 
 import tyro
 
 from mskgrasp.core.errors import BadDataset
-from mskgrasp.dataset.card import markdown, read_card, tables
+from mskgrasp.core.files import write_whole
+from mskgrasp.dataset.card import markdown, read_card, report, tables
 from mskgrasp.dataset.check import check_dataset, require_dataset
 from mskgrasp.dataset.commands.maniskill import export_maniskill
 from mskgrasp.dataset.export import export_npz
@@ -19,6 +21,7 @@ from mskgrasp.dataset.labels import export_labels
 from mskgrasp.dataset.parquet import CARD, export_parquet
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.section import Section
+from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.options import parse_command
 from mskgrasp.runtime.progress import progress
@@ -43,16 +46,16 @@ class CheckCommand:
 
 
 @dataclass(frozen=True, kw_only=True)
-class InfoCommand:
+class CardCommand:
     """Print a dataset's card: attempts, parts, success by family, failures, physics, versions, size.
 
-    Example: python -m mskgrasp.dataset info data/demo --markdown > card.md
+    Example: python -m mskgrasp.dataset card data/demo --out out/card
     """
 
     folder: tyro.conf.Positional[Path]
     """Folder of the dataset."""
-    markdown: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Print it as Markdown, for a page."""
+    out: Path | None = None
+    """Folder to write it to, as card.md for people and report.json for programs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +78,7 @@ class ExportCommand:
     name, with .parquet a README.md."""
 
 
-VERBS = {"check": CheckCommand, "info": InfoCommand, "export": ExportCommand}
+VERBS = {"check": CheckCommand, "card": CardCommand, "export": ExportCommand}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -89,8 +92,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     match verb:
         case CheckCommand():
             return run_check(verb)
-        case InfoCommand():
-            return run_info(verb)
+        case CardCommand():
+            return run_card(verb)
         case ExportCommand():
             return run_export(verb)
         case _:
@@ -113,22 +116,25 @@ def run_check(verb: CheckCommand) -> int:
     return 0
 
 
-def run_info(verb: InfoCommand) -> int:
-    """Print the card."""
+def run_card(verb: CardCommand) -> int:
+    """Print the card, and write it where a folder is given."""
     require_dataset(verb.folder)
+    if verb.out is not None:
+        make_folder(verb.out)
     try:
         card = read_card(verb.folder, _with_progress)
     except BadDataset as error:
         raise BadDataset(f"{error}; find all bad shards with: {PROG} check {verb.folder}") from error
-    if verb.markdown:
-        print(markdown(card), end="")
-        return 0
     print_sections(
         [
             Section(title=title, tables=[Table(header=header, rows=rows)])
             for title, header, rows in tables(card)
         ]
     )
+    if verb.out is not None:
+        write_whole(verb.out / "card.md", markdown(card).encode())
+        write_whole(verb.out / "report.json", (json.dumps(report(card), indent=1) + "\n").encode())
+        print(f"wrote {verb.out}/card.md, report.json")
     return 0
 
 

@@ -37,8 +37,8 @@ def test_the_result_of_an_export_is_named_with_the_number_of_attempts(tmp_path, 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["chek"], "unknown command 'chek'; legal: check, info, export"),
-        ([], "a command is missing; legal: check, info, export"),
+        (["chek"], "unknown command 'chek'; legal: check, card, export"),
+        ([], "a command is missing; legal: check, card, export"),
         (["info", "nowhere"], "nowhere"),
         (
             ["export", "x", "--format", "csv", "--out", "y"],
