@@ -13,7 +13,7 @@ from mskgrasp.learning.label_source import LabelSource, source_text
 _LIMITS = """\
 - For a Franka Hand with its standard pads (80 mm opening), vertical grasps of a single part on a flat table,
   and a depth camera above it. Not for other grippers, inclined grasps or clutter.
-- Labels are simulated: rigid parts, uniform density, one friction for all. Soft, wet or magnetic ones behave
+- Labels are simulated: rigid parts of uniform density, Coulomb friction. Soft, wet or magnetic ones behave
   differently.
 - The displacement is that of grasps that succeed. What happens when a grasp fails is not predicted.
 - Large displacements, above all of round parts that roll between the pads, are predicted with a large

@@ -42,6 +42,7 @@ from mskgrasp.dataset.label_error import LabelError
 from mskgrasp.evaluate.comparison import DisplacementSummary
 from mskgrasp.evaluate.report import Report, report_sections
 from mskgrasp.evaluate.summary import SuccessSummary
+from mskgrasp.learning.label_source import LabelSource, source_text
 from mskgrasp.learning.model_card import result_rows
 from mskgrasp.palletize.report import result_section
 from mskgrasp.palletize.summary import PlacementSummary
@@ -63,6 +64,8 @@ from tests.sim_in_the_loop.regression import Row, stored_figures
 
 FACTS = ("command", "split", "n", "intervals", "model", "simulation", "recorded", "machine")
 """Rows of the table above the figures of a run."""
+MODEL_SIDES = {"test": "Parts of unknown families", "new_sizes": "Other sizes of known families"}
+"""Held-out parts by which a model is described, and their heading."""
 _BLOCK = re.compile(r"(<!-- run: ([a-z0-9_]+) -->\n).*?(<!-- end -->)", re.S)
 
 
@@ -99,8 +102,11 @@ def _sections(report: dict[str, Any] | str) -> list[Section]:
             for one in report["tables"]
         ]
     if "metrics" in report:
-        tables = [Table(header=head, rows=rows) for head, *rows in result_rows(report["metrics"]["test"])]
-        return [Section(title="", tables=tables)]
+        return [
+            Section(title=title, tables=[Table(header=head, rows=rows) for head, *rows in result_rows(side)])
+            for name, title in MODEL_SIDES.items()
+            if (side := report["metrics"].get(name))
+        ]
     if "weights" in report:
         return [Section(title="", tables=[stored_figures([Row(**row) for row in report["rows"]])])]
     if "engines" in report:
@@ -153,7 +159,7 @@ def record(name: str) -> None:
     values = dict(
         record=dict(
             n=facts.get("n") or _size(report),
-            simulation=report.get("labels")
+            simulation=_labels(report)
             or (
                 f"{physics.rate_hz} Hz, {physics.position_iterations} iterations; simulation version "
                 f"{SIMULATION_VERSION}, parts of version {PART_VERSION}"
@@ -163,6 +169,12 @@ def record(name: str) -> None:
         ),
         report=facts.get("stored", report),
     )
+    if "training" in report:
+        counts = report["training"]
+        values["record"]["model"] = (
+            f"shipped: trained on {counts['attempts']} attempts at {len(counts['training_parts'])} parts, "
+            f"early stopping and calibration on {len(counts['validation_parts'])} validation parts"
+        )
     if name == "label_error":  # a dataset's card states it, too
         known = report["label_error"] | {"simulation": report["versions"]["simulation"]}
         stored = {field.name: known[field.name] for field in fields(LabelError)}
@@ -186,9 +198,20 @@ def log_test_parts(name: str) -> None:
     log_use(date, recorded_by, stored.facts["command"].strip("`"), stored.facts["split"], figures)
 
 
+def _labels(report: dict[str, Any]) -> str:
+    """The simulation of the labels that a dataset or a model is made of; empty for other reports."""
+    labels = report.get("labels", "")
+    if isinstance(labels, str):
+        return labels
+    return "labels of " + "; ".join(source_text(LabelSource(**one)) for one in labels)
+
+
 def _size(report: dict[str, Any]) -> str:
     if "n" in report:
         return report["n"]
+    if "metrics" in report:
+        test = report["metrics"]["test"]
+        return f"{test['gqn']['n']} grasps, {test['gdn']['n']} of them successes"
     if "engines" in report:
         settings = report["settings"]
         grasps = settings["grasps_per_part"]
