@@ -58,6 +58,7 @@ class _Shard:
     path: Path
     info: ShardInfo
     n: int
+    rate: float  # of success
     grasps: str  # digest
 
 
@@ -94,7 +95,7 @@ def check_dataset(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]
     faults += _missing(folder, paths, shards, settings)
     versions = Counter(json.dumps(shard.info.versions, sort_keys=True) for shard in shards)
     if len(versions) > 1:
-        notes.append(f"the shards were made with {len(versions)} sets of software versions; see `info`")
+        notes.append(f"the shards were made with {len(versions)} sets of software versions; see `card`")
     if not shards and not faults:
         faults.append(Fault(path=folder / "shards", reason="holds no shard; collect some"))
     faults.sort(key=lambda fault: fault.path.name)
@@ -124,7 +125,8 @@ def _examine(path: Path) -> tuple[_Shard | None, list[str]]:
         reasons = list(problems(attempts)) or list(range_problems(attempts, info))
     n = len(attempts)
     digest = hashlib.sha256(np.ascontiguousarray(attempts.grasp).tobytes()).hexdigest() if n else ""
-    return _Shard(path=path, info=info, n=n, grasps=digest), reasons
+    rate = float(attempts.success.mean()) if n else 0.0
+    return _Shard(path=path, info=info, n=n, rate=rate, grasps=digest), reasons
 
 
 def _settings(folder: Path, faults: list[Fault]) -> dict[str, Any]:
@@ -241,8 +243,12 @@ def _in_parts_folder(part: str, key: str) -> str | None:
 def _missing(
     folder: Path, paths: list[Path], shards: list[_Shard], settings: dict[str, Any]
 ) -> Iterator[Fault]:
-    """Find missing shards, and those with too few attempts."""
+    """Find missing shards, and those with too few attempts.
+
+    Of a part whose first shard is outside the range of success that the settings keep, only that is asked for.
+    """
     plan = _plan(settings)
+    one_is_enough = {one.info.part for one in shards if one.info.index == 0 and not _kept(one.rate, settings)}
     names = {path.name for path in paths}
     highest: dict[str, int] = {}
     for shard in shards:
@@ -263,6 +269,7 @@ def _missing(
     asked = [str(word) for word in words if "/" not in str(word)] if isinstance(words, (list, tuple)) else []
     for part in sorted({*highest, *asked}):
         n = -(-plan[0] // plan[1]) if plan else highest.get(part, 0) + 1
+        n = 1 if part in one_is_enough else n
         for index in range(n):
             try:
                 path = shard_path(folder, part, index)
@@ -270,6 +277,16 @@ def _missing(
                 break  # an illegal name of a part is reported with its shard
             if path.name not in names:
                 yield Fault(path=path, reason="is missing; run the collection again to make it")
+
+
+def _kept(rate: float, settings: dict[str, Any]) -> bool:
+    """Whether a part of this success gets further shards."""
+    kept = settings.get("part_filter")
+    if not isinstance(kept, dict):
+        return True
+    low, high = kept.get("min_success"), kept.get("max_success")
+    number = (int, float)
+    return not (isinstance(low, number) and rate < low) and not (isinstance(high, number) and rate > high)
 
 
 def _plan(settings: dict[str, Any]) -> tuple[int, int] | None:

@@ -237,6 +237,16 @@ def test_a_shard_that_is_there_twice_is_named(data):
     assert f"holds the same attempts as {KEY}-0000.h5 (duplicate)" in only(data, f"{KEY}-0001.h5")
 
 
+@pytest.mark.parametrize(("difference", "missing"), [(-0.05, True), (0.05, False)])
+def test_a_part_outside_the_range_of_success_needs_its_first_shard_alone(data, difference, missing):
+    rate = float(read_shard(shard(data, f"{NUT}-0000.h5"))[0].success.mean())
+    settings = yaml.safe_load((data / "config.yaml").read_text())
+    settings["part_filter"] = dict(min_success=rate + difference)
+    (data / "config.yaml").write_text(yaml.safe_dump(settings))
+    shard(data, f"{NUT}-0001.h5").unlink()
+    assert (f"{NUT}-0001.h5" in faults(data)) == missing
+
+
 def test_missing_shards_and_parts_are_named(data):
     shard(data, f"{NUT}-0001.h5").unlink()
     assert "is missing" in only(data, f"{NUT}-0001.h5")
