@@ -245,7 +245,7 @@ def _missing(
 ) -> Iterator[Fault]:
     """Find missing shards, and those with too few attempts.
 
-    Of a part whose first shard is outside the range of success that the settings keep, only that is asked for.
+    Of a part whose first shard is outside the range of success that the settings keep only that is needed.
     """
     plan = _plan(settings)
     one_is_enough = {one.info.part for one in shards if one.info.index == 0 and not _kept(one.rate, settings)}
