@@ -38,8 +38,7 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         network = changes.pop("network", {})
         return ours.model_copy(update=changes | {"network": ours.network.model_copy(update=network)})
 
-    deep = {"displacement_layers": (16, 32, 64), "displacement_blocks": (1, 1, 1)}
-    late = deep | {"displacement_blocks": (0, 1, 1)}
+    plain = {"displacement_layers": (16, 32, 32), "displacement_blocks": ()}
     assert isinstance(paper, PatchNetworkConfig)
     paper = paper.model_copy(update={"symmetric_views": ours.network.symmetric_views})
     return {
@@ -56,26 +55,26 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
                 "patch_side": 0.132,
                 "quality_stride": 1,
                 "displacement_layers": (16, 32),
+                "displacement_blocks": (0, 1),
             }
         ),
         "quality with twice the channels at first": with_(network={"layers": (16, 32)}),
-        "half the channels": with_(network={"layers": (4, 16), "displacement_layers": (8, 16, 16)}),
-        "twice the channels": with_(network={"layers": (16, 64), "displacement_layers": (32, 64, 64)}),
+        "half the channels": with_(network={"layers": (4, 16), "displacement_layers": (8, 16, 32)}),
+        "twice the channels": with_(network={"layers": (16, 64), "displacement_layers": (32, 64, 128)}),
+        "no residual blocks": with_(network=plain),
+        "residual blocks after every layer": with_(network={"displacement_blocks": (1, 1, 1)}),
+        "no swing": with_(network={"swing": False}),
+        "one Gaussian": with_(network={"mixture": 1}),
+        "one Gaussian, beta 0.5": with_(beta=0.5, network={"mixture": 1}),
+        "one Gaussian, beta 0.5, no residual blocks, no swing": with_(
+            beta=0.5, network=plain | {"mixture": 1, "swing": False}
+        ),
         "no half turns and mirror images": with_(symmetric=False, network={"symmetric_views": False}),
         "one view of each grasp": with_(network={"symmetric_views": False}),
-        "the swing is predicted, too": with_(network={"swing": True}),
-        "plain likelihood (beta 0)": with_(beta=0.0),
-        "a mixture of three Gaussians": with_(beta=0.0, network={"mixture": 3}),
-        "residual blocks": with_(network=deep),
-        "residual blocks and a mixture": with_(beta=0.0, network=deep | {"mixture": 3}),
-        "residual blocks, a mixture, swing": with_(beta=0.0, network=deep | {"mixture": 3, "swing": True}),
-        "fewer residual blocks, a mixture, swing": with_(
-            beta=0.0, network=late | {"mixture": 3, "swing": True}
-        ),
-        "beta 1": with_(beta=1.0),
         "no noise": with_(noise_std=0.0),
         "no floor of the deviations": with_(network={"least_std": (0.0, 0.0)}),
         "no dropout": with_(network={"dropout": 0.0}),
+        "dropout 0.2": with_(network={"dropout": 0.2}),
         "not calibrated": with_(calibrate=False),
         "mixed precision": with_(mixed_precision=True),
     }
