@@ -243,7 +243,7 @@ def _uncertainty_metrics(
     if not np.isfinite(variance).all() or not len(rows):
         return None
     shift, turn, expected = centroid_errors(samples, rows, mean, variance)
-    target = _targets(samples, rows, mean)
+    target = true_outcomes(samples, rows, mean)
     score = variance_score(mean, variance, expected)
     tilted = samples.swing[rows].norm(dim=1).numpy() > TILT_LIMIT
     axes = {
@@ -273,8 +273,14 @@ def _errors_of_least(
     return [*(_root_mean(values[kept] ** 2) for values in (shift, turn)), float(tilted[kept].mean())]
 
 
-def _targets(samples: Samples, rows: torch.Tensor, predicted: np.ndarray) -> np.ndarray:
-    """Get true grasp displacements (n, 4), or with swing (n, 6), as many columns as are predicted."""
+def true_outcomes(samples: Samples, rows: torch.Tensor, predicted: np.ndarray) -> np.ndarray:
+    """Get true grasp displacements (n, 4), or with swing (n, 6), as many columns as are predicted.
+
+    Args:
+        samples: The dataset.
+        rows: Rows of attempts that lifted the part.
+        predicted: (n, 4) or (n, 6) predicted means.
+    """
     both = torch.cat([samples.grasp_displacement[rows], samples.swing[rows]], dim=1)
     return both[:, : predicted.shape[1]].double().numpy()
 
@@ -295,7 +301,7 @@ def prediction_errors(
     """Compute RMSE over the displacement of the true centroid, likelihood and coverage over the grasp's."""
     predicted, _ = centroid_displacement(samples, rows, mean, variance)
     displacement = samples.displacement[rows].double().numpy()
-    target = _targets(samples, rows, mean)
+    target = true_outcomes(samples, rows, mean)
     covered = metrics.coverage(mean, variance, target)
     known = bool(np.isfinite(variance).all())
     return PredictionErrors(

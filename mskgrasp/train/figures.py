@@ -19,6 +19,7 @@ from mskgrasp.learning.held_out import (
     centroid_displacement,
     predict_grasp_displacement,
     predict_quality,
+    true_outcomes,
 )
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples
@@ -40,7 +41,7 @@ def draw_uncertainty(models: Models, samples: Samples, rows: torch.Tensor, path:
     """
     held = rows[samples.success[rows]]
     mean, variance = predict_grasp_displacement(models, samples, held)
-    target = samples.grasp_displacement[held].double().numpy()
+    target = true_outcomes(samples, held, mean)
     with saved_figure(path, 11.5, 9.0) as figure:
         panels = figure.subplots(2, 2)
         _reliability(panels[0, 0], predict_quality(models, samples, rows), samples.success[rows].numpy())

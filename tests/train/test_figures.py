@@ -51,10 +51,20 @@ def test_curves_of_a_run_without_variances_are_drawn_beside_the_trivial_predicto
     picture(tmp_path / "curves.png")
 
 
-def test_uncertainty_of_a_network_is_drawn_against_its_errors(dataset, tmp_path, monkeypatch):
-    samples = read_samples(dataset, PATCH.network)
+@pytest.mark.parametrize(
+    ("components", "changes"),
+    [
+        (["x", "y", "z", "theta"], {}),
+        (["x", "y", "z", "theta", "swing_x", "swing_y"], {"swing": True, "mixture": 2}),
+    ],
+)
+def test_uncertainty_of_a_network_is_drawn_against_its_errors(
+    dataset, tmp_path, monkeypatch, components, changes
+):
+    config = PATCH.model_copy(update={"network": PATCH.network.model_copy(update=changes)})
+    samples = read_samples(dataset, config.network)
     rows = torch.arange(len(samples))
-    models = build_models(describe_networks(samples, rows, PATCH))
+    models = build_models(describe_networks(samples, rows, config))
     kept = keep_figures(figures, monkeypatch)
     draw_uncertainty(models, samples, rows, tmp_path / "uncertainty.png")
     reliability, coverage, sparsification, deviation = kept[0].axes
@@ -63,7 +73,7 @@ def test_uncertainty_of_a_network_is_drawn_against_its_errors(dataset, tmp_path,
     sizes = np.array(points.get_sizes()) - 8
     succeeded = np.average(points.get_offsets()[:, 1], weights=sizes)
     assert succeeded == pytest.approx(float(samples.success.double().mean()), abs=1e-6)
-    assert legend_labels(coverage) == ["x", "y", "z", "theta"]
+    assert legend_labels(coverage) == components
     levels, covered = coverage.lines[1].get_data()
     assert levels[0] == 0.05 and levels[-1] == 0.95 and (np.diff(covered) >= 0).all()
     predicted, oracle = (line.get_ydata() for line in sparsification.lines[:2])
