@@ -23,11 +23,11 @@ def _train(change: Change, says: str, name: str, code: int = 1) -> Row:
     return Row("train", name, arguments, says, code)
 
 
-def _info(change: Change, says: str, name: str) -> Row:
+def _card(change: Change, says: str, name: str) -> Row:
     def arguments(at: Place) -> list[str]:
         data = at.dataset()
         change(at, Path(data, "shards"))
-        return ["info", data]
+        return ["card", data]
 
     return Row("dataset", name, arguments, says, 1)
 
@@ -85,7 +85,7 @@ ROWS = [
     _train(
         lambda at, shards: at.file("data/shards/box_7-0000.h5", "hello"), "no HDF5 file", "a text as a shard"
     ),
-    _info(_cut, "is damaged", "a shard cut off"),
+    _card(_cut, "is damaged", "a shard cut off"),
     Row(
         "dataset",
         "a file as a dataset",

@@ -23,7 +23,7 @@ def test_nothing_is_overwritten(collected, tmp_path, form, name):
 def test_a_dataset_with_a_bad_shard_has_no_card_and_the_message_says_how_to_find_all(tmp_path):
     folder = synthetic.write_dataset(tmp_path / "boxes", n_parts=2, n_attempts=2, seed=0)
     list_shards(folder)[0].write_bytes(b"half a shard")
-    done = run_here(main, "info", str(folder))
+    done = run_here(main, "card", str(folder))
     assert done.returncode == 1 and done.stderr.count("\n") == 1
     assert f"find all bad shards with: python -m mskgrasp.dataset check {folder}" in done.stderr
 
@@ -39,7 +39,7 @@ def test_the_result_of_an_export_is_named_with_the_number_of_attempts(tmp_path, 
     [
         (["chek"], "unknown command 'chek'; legal: check, card, export"),
         ([], "a command is missing; legal: check, card, export"),
-        (["info", "nowhere"], "nowhere"),
+        (["card", "nowhere"], "nowhere"),
         (
             ["export", "x", "--format", "csv", "--out", "y"],
             "--format: 'csv' is not legal; legal: npz, maniskill",
