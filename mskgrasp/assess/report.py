@@ -16,9 +16,10 @@ from mskgrasp.assess.scene import scene_page
 from mskgrasp.assess.summary import DISTANCES, Row, Share, summarise, summary_json, verdict
 from mskgrasp.assess.trials import EXACT, NOISY
 from mskgrasp.core.files import write_whole
-from mskgrasp.core.grasp import TILT_LIMIT
+from mskgrasp.core.grasp import MAX_OPENING, TILT_LIMIT
 from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.parts import Part
+from mskgrasp.parts.least_width import least_widths
 from mskgrasp.planning.certified import CertifiedGrasps, radius_about_vertical
 from mskgrasp.planning.isaac_grasp import write_isaac_grasp
 from mskgrasp.reports.html import write_html
@@ -101,14 +102,22 @@ def write_report(
 def conclusion(
     part: Part, certified: CertifiedGrasps, trials: Sequence[PlacedTrial], verdicts: dict[str, str]
 ) -> str:
-    """The result in a line or two: that no attempt lifted the part, or the verdicts."""
+    """The result in a line or two: that no attempt lifted the part, and why, or the verdicts."""
     if not any(trial.lifted for trial in trials):
         reasons = counted(Counter(trial.reason for trial in trials if trial.reason))
         why = next(iter(certified.without.values()), "")
         most = wilson_interval(0, len(trials))[1]
+        width = least_widths(part).min()
+        lead = f"{part.name} was not grasped: none"
+        if width > MAX_OPENING:
+            lead = (
+                f"{part.name} is wider than the hand in every resting pose: where fingers could hold it, "
+                f"its faces are {1e3 * width:.0f} mm apart or more, and the hand opens "
+                f"{1e3 * MAX_OPENING:.0f} mm. None"
+            )
         return (
-            f"{part.name} was not grasped: none of {len(trials)} attempts lifted it ({reasons}"
-            f"{'; ' + why if why else ''}); 95 % interval of the share lifted: 0 to {most:.0%}."
+            f"{lead} of {len(trials)} attempts lifted it ({reasons}{'; ' + why if why else ''}); "
+            f"95 % interval of the share lifted: 0 to {most:.0%}."
         )
     lines = [f"With {'an ' if name == EXACT else ''}{name}: {text}." for name, text in verdicts.items()]
     return " ".join(lines)

@@ -72,11 +72,12 @@ def test_a_block_too_wide_and_too_heavy_gets_a_report_that_says_so(cad, tmp_path
     arguments = (cad / "block.stl", "--out", out, "--simulations", 24, "--trials", 1, "--workers", 1)
     assert run(monkeypatch, *arguments) == 0
     said = capsys.readouterr().out
-    assert "block was not grasped: none of" in said
+    assert "block is wider than the hand in every resting pose: where fingers could hold it, " in said
+    assert "its faces are 100 mm apart or more, and the hand opens 80 mm. None of" in said
     assert "too heavy for the arm (10.4 kg)" in said and "no grasp lifts it" in said
     with Page(out / "report.html") as page:
         line = page.evaluate("document.querySelector('.conclusion').textContent")
-    assert line.startswith("block was not grasped")
+    assert line.startswith("block is wider than the hand in every resting pose")
 
 
 def test_trials_planned_by_other_certified_grasps_are_made_again(tmp_path, capsys):
