@@ -100,9 +100,7 @@ def test_the_shipped_model_is_loaded_as_its_own_architecture():
     network = load_models(PRETRAINED).meta.network
     assert isinstance(network, HandNetworkConfig)
     read = {name: list(v) if isinstance(v, tuple) else v for name, v in network.model_dump().items()}
-    # Of a time before these settings.
-    assert (read.pop("swing"), read.pop("mixture"), read.pop("displacement_blocks")) == (False, 1, [])
-    assert read == {name: value for name, value in stored.items() if name not in ("channels", "image")}
+    assert read == stored
 
 
 def test_descriptions_that_list_both_architectures_are_read(folder):

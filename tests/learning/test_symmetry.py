@@ -16,11 +16,11 @@ from mskgrasp.learning.symmetry import mirror_and_turn
 from tests import synthetic
 
 VIEWS = {
-    "half a turn": ((-1, -2), (-1, -1, 1, 1)),
-    "mirror image": ((-2,), (1, -1, 1, -1)),
-    "both": ((-1,), (-1, 1, 1, -1)),
+    "half a turn": ((-1, -2), (-1, -1, 1, 1, -1, -1)),
+    "mirror image": ((-2,), (1, -1, 1, -1, -1, 1)),
+    "both": ((-1,), (-1, 1, 1, -1, 1, -1)),
 }
-"""Axes of a patch that are reversed, and signs of x, y, z and theta."""
+"""Axes of a patch that are reversed, and signs of x, y, z, theta and the swing about x and y."""
 
 
 def test_turned_and_mirrored_samples_are_what_the_turned_and_mirrored_scene_would_give():
@@ -125,17 +125,17 @@ def test_equal_grasps_are_reported_the_same_displacement(models, flipped, signs)
 
 
 @pytest.mark.parametrize(("flipped", "signs"), VIEWS.values(), ids=VIEWS)
-def test_equal_grasps_are_reported_the_same_swing(models, flipped, signs):
-    swinging = models.meta.network.model_copy(update={"swing": True})
+def test_a_network_without_the_swing_has_four_views_too(models, flipped, signs):
+    plain = models.meta.network.model_copy(update={"swing": False})
     targets = Normalisation(
-        action_scale=models.meta.normalisation.action_scale, target_mean=(0.0,) * 6, target_std=(1.0,) * 6
+        action_scale=models.meta.normalisation.action_scale, target_mean=(0.0,) * 4, target_std=(1.0,) * 4
     )
-    fresh = build_models(ModelMeta(network=swinging, normalisation=targets))
+    fresh = build_models(ModelMeta(network=plain, normalisation=targets))
     patches, centre, height = scenes(models)
-    signs = torch.tensor([*signs, signs[1], signs[1] * signs[3]], dtype=torch.float32)
+    signs = torch.tensor(signs[:4], dtype=torch.float32)
     mean, variance = fresh.grasp_displacement(patches, centre, height)
     other, other_variance = fresh.grasp_displacement(patches.flip(flipped), centre * signs[:3], height)
-    assert mean.shape == variance.shape == (len(patches), 6)
+    assert mean.shape == variance.shape == (len(patches), 4)
     assert torch.allclose(other, signs * mean, atol=1e-6)
     assert torch.allclose(other_variance, variance, rtol=1e-4)
 
@@ -144,7 +144,7 @@ def test_views_that_disagree_make_the_displacement_less_certain(models):
     patches, centre, height = scenes(models)
     single = asked(models, symmetric_views=False)
     means, variances = [], []
-    for flipped, signs in ((), (1, 1, 1, 1)), *VIEWS.values():
+    for flipped, signs in ((), (1, 1, 1, 1, 1, 1)), *VIEWS.values():
         signs = torch.tensor(signs, dtype=torch.float32)
         mean, variance = single.grasp_displacement(
             patches.flip(flipped) if flipped else patches, centre * signs[:3], height
@@ -171,4 +171,4 @@ def test_a_network_of_the_mean_alone_has_four_views_too(models):
 def test_no_grasps_have_no_displacement(models):
     patches, centre, height = scenes(models, 0)
     mean, variance = models.grasp_displacement(patches, centre, height)
-    assert mean.shape == variance.shape == (0, 4)
+    assert mean.shape == variance.shape == (0, 6)

@@ -26,7 +26,7 @@ def test_a_planner_samples_over_the_cells_own_table():
 
 def test_a_model_tells_its_labels_and_warns_of_a_cell_unlike_theirs(capsys):
     models, cell = load_models(PRETRAINED), cell_from_yaml(SIMULATED_CELL)
-    tell_model(models, cell)
+    tell_model(replace(models, meta=models.meta.model_copy(update={"labels": ()})), cell)
     assert "does not tell" in capsys.readouterr().out
     source = LabelSource(
         simulation="4", fidelity="cpu", physics=Physics().model_dump(), noise={}, hand={}, camera_height=0.8,

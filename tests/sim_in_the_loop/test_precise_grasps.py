@@ -1,7 +1,7 @@
 """The whole loop on real physics: open a cell, look, plan, execute, and compare with what was recorded.
 
 `recorded.json` was made with the weights that ship, by ``python -m tests.sim_in_the_loop.record``. The parts
-are some that the model never saw.
+are some that the model was not trained on.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ def errors(trials: list[dict]) -> tuple[float, float, int]:
     return translation_rmse(predicted, measured), rotation_rmse(predicted, measured), len(held)
 
 
-def test_the_parts_are_some_that_the_shipped_model_has_never_seen():
+def test_the_parts_are_validation_parts_of_the_shipped_model():
     training = load_models(PRETRAINED).meta.training
-    assert set(PARTS) <= set(training["test_parts"])
+    assert set(PARTS) <= set(training["validation_parts"])
 
 
 def test_the_scenario_is_the_recorded_one(trials, recorded):
