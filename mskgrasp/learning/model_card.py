@@ -37,7 +37,7 @@ def model_card(meta: ModelMeta) -> str:
         "# Model card",
         "",
         "Predicts, for grasps of a parallel gripper from above, the probability that they lift the part, and",
-        "a Gaussian over the displacement of the part in the hand. Loaded by `mskgrasp.plan`, `evaluate` and",
+        "how the part moves in the hand, with its uncertainty. Loaded by `mskgrasp.plan`, `evaluate` and",
         "`palletize`.",
         "",
         "## Data",
