@@ -170,7 +170,11 @@ def reliability(probability: np.ndarray, success: np.ndarray, bins: int = 10) ->
 
 def expected_calibration_error(probability: np.ndarray, success: np.ndarray, bins: int = 10) -> float:
     """Mean |predicted probability - share of successes| over bins, by their counts (Naeini et al. 2015)."""
-    rows = reliability(probability, success, bins)
+    return calibration_gap(reliability(probability, success, bins))
+
+
+def calibration_gap(rows: np.ndarray) -> float:
+    """The expected calibration error of rows (k, 3) of `reliability`; NaN where there is none."""
     if not len(rows):
         return float("nan")
     return float(np.average(np.abs(rows[:, 0] - rows[:, 1]), weights=rows[:, 2]))

@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from mskgrasp.core.grasp import TILT_LIMIT
+from mskgrasp.core.metrics import calibration_gap
 from mskgrasp.core.settings import Physics
 from mskgrasp.learning.grasp_models import ModelMeta
 from mskgrasp.learning.label_source import LabelSource, source_text
@@ -103,6 +106,7 @@ def _quality_rows(gqn: dict[str, Any]) -> list[tuple[str, ...]]:
         ("accuracy on balanced data", f"{gqn['balanced_accuracy']:.1%}", accuracy),
         ("AUROC", f"{gqn['auroc']:.3f}", _range(between.get("auroc"))),
         (base_rate, f"{gqn['brier']:.3f}", _range(between.get("brier"))),
+        ("expected calibration error, ten bins", f"{calibration_gap(np.array(gqn['reliability'])):.1%}", ""),
     ]
 
 

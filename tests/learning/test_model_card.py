@@ -14,6 +14,9 @@ def test_the_card_reports_test_parts_where_there_are_some_and_validation_parts_o
     assert f"{on_test:.3f}" != f"{on_validation:.3f}"
     card = model_card(meta)
     assert "## On held-out test parts" in card and f"| AUROC | {on_test:.3f} |" in card
+    gaps = [n * abs(said - came) for said, came, n in meta.metrics["test"]["gqn"]["reliability"]]
+    share = sum(gaps) / meta.metrics["test"]["gqn"]["n"]
+    assert f"| expected calibration error, ten bins | {share:.1%} |  |" in card
     without = {name: value for name, value in meta.metrics.items() if name not in ("test", "new_sizes")}
     card = model_card(meta.model_copy(update={"metrics": without}))
     assert "## On held-out validation parts" in card and f"| AUROC | {on_validation:.3f} |" in card
