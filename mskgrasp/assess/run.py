@@ -19,7 +19,7 @@ from mskgrasp.parts import Part, find_part
 from mskgrasp.parts.importing.mesh_files import LOADERS
 from mskgrasp.planning.certified import FILE, CertifiedGrasps
 from mskgrasp.planning.for_cell import part_name
-from mskgrasp.planning.run_inputs import model_digests, part_digests
+from mskgrasp.planning.run_inputs import BY_CONTENT, model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import note, progress
@@ -30,7 +30,7 @@ from mskgrasp.trials.placed_trial import PlacedTrial
 
 SCENE_VERSION = 2
 """Raised by every change after which a seed makes other trials."""
-_MAY_CHANGE = ("parts", "out", "tolerance", "trials", "workers", "quick", "simulations")
+_MAY_CHANGE = ("parts", "out", "tolerance", "trials", "workers", "quick", "simulations", *BY_CONTENT)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from mskgrasp.parts import find_part
 from mskgrasp.parts.builtin import builtin_names, recipe_of
 from mskgrasp.parts.catalogue import read_index
 from mskgrasp.parts.select_parts import part_names
-from mskgrasp.planning.run_inputs import certified_digests, model_digests, part_digests
+from mskgrasp.planning.run_inputs import BY_CONTENT, certified_digests, model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, record_inputs, resume_trials
@@ -40,6 +40,7 @@ _MAY_CHANGE = (
     "grasps",
     "part",
     "grasps_origin",
+    *BY_CONTENT,
 )
 
 

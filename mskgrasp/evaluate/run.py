@@ -35,7 +35,7 @@ from mskgrasp.learning.grasp_models import load_models, require_model
 from mskgrasp.parts import find_part, starter_names
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import tell_model
-from mskgrasp.planning.run_inputs import certified_digests, model_digests, part_digests
+from mskgrasp.planning.run_inputs import BY_CONTENT, certified_digests, model_digests, part_digests
 from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import note, progress
@@ -63,7 +63,7 @@ PARTS: dict[Experiment, tuple[str, ...]] = {
 
 MAY_CHANGE = (
     "out", "trials", "parts", "n_parts", "compare", "chooses", "lowess_data", "workers", "estimate", "yes",
-    "replay",
+    "replay", *BY_CONTENT,
 )  # fmt: skip
 
 

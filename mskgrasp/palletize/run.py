@@ -25,7 +25,7 @@ from mskgrasp.palletize.summary import PlacementSummary
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import make_planner, tell_model
-from mskgrasp.planning.run_inputs import certified_digests, inputs_of
+from mskgrasp.planning.run_inputs import BY_CONTENT, certified_digests, inputs_of
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import TRIALS, append_trial, file_digest, opened_run, resume_trials
@@ -88,7 +88,7 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
     inputs = inputs_of(config.cell, config.models, names)
     if config.slots is not None:
         inputs["slots"] = file_digest(config.slots)
-    may_change = ["out", "trials", "corrections", "workers", "yes"]
+    may_change = ["out", "trials", "corrections", "workers", "yes", *BY_CONTENT]
     # The parts determine which of them fills which slot.
     may_change += ["parts", "n_parts"] if config.slots is None else []
     tell_model(models, cell_from_yaml(config.cell))

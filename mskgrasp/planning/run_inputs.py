@@ -9,6 +9,9 @@ from mskgrasp.parts import find_part
 from mskgrasp.planning.certified import FILE, certified_folder
 from mskgrasp.runtime.run_folder import file_digest
 
+BY_CONTENT = ("models", "cell")
+"""Settings that name files: a run goes on with equal files in another place, so that only digests count."""
+
 
 def inputs_of(cell: Path, models: Path, parts: Iterable[str]) -> dict[str, str]:
     """Compute digests of a cell's file, a model and parts."""

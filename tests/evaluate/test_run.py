@@ -21,6 +21,7 @@ from mskgrasp.evaluate.config import EvaluateConfig
 from mskgrasp.evaluate.run import estimate, evaluate
 from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.simulation import certify_parts
 from mskgrasp.simulation.certify import CertifyConfig
@@ -87,15 +88,21 @@ def test_several_processes_resume_a_run_with_equal_trials(alone: Path, tmp_path:
         assert page.complaints == []
 
 
-def test_a_run_with_other_settings_or_another_model_is_refused(alone: Path, tmp_path: Path):
+def test_a_run_with_other_settings_or_another_model_is_refused_and_a_copy_of_its_own_is_not(
+    alone: Path, tmp_path: Path
+):
     for changes, what in ((dict(seed=1), "seed"), (dict(noise="off"), "noise, cell")):
         with pytest.raises(UsageError, match=f"{what} differ"):
             evaluate(config(alone, trials=3, **(dict(noise="kinect2") | changes)))
     models = tmp_path / "model"
     shutil.copytree(PRETRAINED, models)
+    cell = shutil.copy(SIMULATED_CELL, tmp_path / "cell.yaml")
+    stored = (alone / TRIALS).read_bytes()
+    evaluate(config(alone, trials=2, noise="kinect2", models=models, cell=cell))
+    assert (alone / TRIALS).read_bytes() == stored
     meta = json.loads((models / "model.json").read_text())
     (models / "model.json").write_text(json.dumps(dict(meta, metrics={})))
-    with pytest.raises(UsageError, match="models, model.json differ"):
+    with pytest.raises(UsageError, match=r"\(model.json differ\)"):
         evaluate(config(alone, trials=3, noise="kinect2", models=models))
 
 
