@@ -1,75 +1,85 @@
 """Time of a plan. Run: python -m tests.benchmarks.plan_speed --help.
 
-In one run, picture by picture in turn, on the same frames of the simulated cell with the same number of
-candidates: our planner and network, and the same planner around the paper's network in plain PyTorch. Timed
-is the whole of `Planner.plan`: finding the part, drawing candidates, cropping, both networks, choosing.
+In one run, in turn, on the same frames of the simulated cell with the same number of candidates: our
+planner and model, and the same planner around the paper's network in plain PyTorch, with weights that learned
+nothing. Timed is the whole of `Planner.plan`: finding the part, drawing candidates, cropping, both networks,
+choosing.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
-import resource
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
-from rich.console import Console
-from rich.table import Table
 
 from hal import RgbdFrame, open_cell
 from mskgrasp.core.config import read_config
+from mskgrasp.core.metrics import bootstrap_interval
 from mskgrasp.core.settings import REGION, TABLE_Z
 from mskgrasp.learning.config import LearningConfig
-from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models, load_models
+from mskgrasp.learning.grasp_models import PRETRAINED, ModelMeta, Models, build_models, load_models
 from mskgrasp.learning.network_config import Normalisation
 from mskgrasp.parts import starter_names
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import present
 from mskgrasp.planning.planner import Planner
 from mskgrasp.runtime import cli
+from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import progress
+from tests.benchmarks.report import show
 
 REPOSITORY = Path(__file__).parents[2]
+OURS, PAPER = "ours", "the paper's"
 STAGES = ("sample", "score", "select")
 SCALE = Normalisation(action_scale=(0.05, 0.05, 0.02))
 
 
-def main() -> None:
-    """Prints a table and, last, one JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--models", type=Path, help="trained model (default: fresh weights, as fast)")
+class Timed(NamedTuple):
+    """Seconds of a plan, and of its stages."""
+
+    whole: float
+    stages: dict[str, float]
+
+
+def main() -> int:
+    """Prints the tables."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks.plan_speed", description="Measure the time of a plan."
+    )
+    parser.add_argument(
+        "--models", type=Path, default=PRETRAINED, help="our model (default: the shipped one)"
+    )
     parser.add_argument("--frames", type=int, default=8, help="parts to look at (default 8)")
-    parser.add_argument("--repeats", type=int, default=5, help="plans of ours a frame (default 5)")
+    parser.add_argument("--repeats", type=int, default=5, help="plans of each frame (default 5)")
     parser.add_argument("--candidates", type=int, default=3200, help="grasps a plan (default 3200)")
+    parser.add_argument("--out", type=Path, help="folder of report.json and report.md")
     options = parser.parse_args()
     torch.set_num_threads(min(2, os.cpu_count() or 1))
     device = "cuda" if torch.cuda.is_available() else "cpu"
-    ours = load_models(options.models, device) if options.models else fresh("default", device)
     planners = {
-        "ours": planner(ours, PlannerConfig(n_candidates=options.candidates)),
-        "paper": planner(
-            fresh("paper", device), PlannerConfig(n_candidates=options.candidates, chunk_size=32)
-        ),
+        OURS: planner(load_models(options.models, device), PlannerConfig(n_candidates=options.candidates)),
+        PAPER: planner(fresh("paper", device), PlannerConfig(n_candidates=options.candidates, chunk_size=32)),
     }
-    seconds: dict[str, list[float]] = {name: [] for name in planners}
-    stages: dict[str, list[dict[str, float]]] = {name: [] for name in planners}
     shown = frames(options.frames)
+    timed: dict[str, list[list[Timed]]] = {name: [[] for _ in shown] for name in planners}
     for one in planners.values():
         one.plan(shown[0], np.random.default_rng(0))  # kernels are chosen, caches filled
     for number, frame in enumerate(progress(shown, unit="frame")):
-        for name, one in planners.items():
-            for repeat in range(options.repeats if name == "ours" else 1):
-                rng = np.random.default_rng([number, repeat])
+        for repeat in range(options.repeats):
+            for name, one in planners.items():
                 began = time.perf_counter()
-                plan = one.plan(frame, rng)
+                plan = one.plan(frame, np.random.default_rng([number, repeat]))
                 if device == "cuda":
                     torch.cuda.synchronize()
-                seconds[name].append(time.perf_counter() - began)
-                stages[name].append(plan.seconds)
-    report(seconds, stages, options.candidates, device)
+                timed[name][number].append(Timed(time.perf_counter() - began, plan.seconds))
+    show(tables_of(timed, f"{options.candidates} candidates, {device}"), options.out)
+    return 0
 
 
 def fresh(config: str, device: str) -> Models:
@@ -97,28 +107,32 @@ def frames(n: int) -> list[RgbdFrame]:
     return found
 
 
-def report(
-    seconds: dict[str, list[float]], stages: dict[str, list[dict[str, float]]], n: int, device: str
-) -> None:
-    """A table, and the numbers for programs."""
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column(f"{n} candidates, {device}")
-    for header in ("p50 ms", "p95 ms", *STAGES):
-        table.add_column(header, justify="right")
-    for name, times in seconds.items():
-        spent = [np.median([1e3 * one[stage] for one in stages[name]]) for stage in STAGES]
-        whole = [1e3 * np.percentile(times, share) for share in (50, 95)]
-        table.add_row(name, *(f"{value:.0f}" for value in (*whole, *spent)))
-    Console(width=100).print(table)
-    p50, paper = (float(np.median(seconds[name])) for name in ("ours", "paper"))
-    result = {
-        "p50_ms": round(1e3 * p50, 1),
-        "p95_ms": round(1e3 * float(np.percentile(seconds["ours"], 95)), 1),
-        "paper_p50_ms": round(1e3 * paper, 1),
-        "ratio": round(paper / p50, 1),
-        "peak_gib": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20, 2),
-    }
-    print(json.dumps(result))
+def tables_of(timed: Mapping[str, Sequence[Sequence[Timed]]], title: str) -> list[Table]:
+    """Times of each planner, by frame, and how many times as long the paper's network takes."""
+    whole = {name: [np.array([one.whole for one in frame]) for frame in each] for name, each in timed.items()}
+    rows = []
+    for name, each in timed.items():
+        all_of = [one for frame in each for one in frame]
+        low, high = bootstrap_interval(whole[name], np.median)
+        rows.append((
+            name, *(f"{1e3 * np.percentile([one.whole for one in all_of], share):.0f}" for share in (50, 95)),
+            f"{1e3 * low:.0f} - {1e3 * high:.0f}",
+            *(f"{1e3 * np.median([one.stages[stage] for one in all_of]):.0f}" for stage in STAGES),
+        ))  # fmt: skip
+    ratios = [np.array([np.median(b) / np.median(a)]) for a, b in zip(whole[OURS], whole[PAPER], strict=True)]
+    low, high = bootstrap_interval(ratios, np.median)
+    ratio = (f"{np.median(np.concatenate(ratios)):.0f}", f"{low:.0f} - {high:.0f}")
+    header = (
+        title,
+        "median, ms",
+        "95th percentile",
+        "interval of the median",
+        *(f"{s}, ms" for s in STAGES),
+    )
+    return [
+        Table(header=header, rows=rows),
+        Table(header=("the paper's network, times as long", "interval"), rows=[ratio]),
+    ]
 
 
 if __name__ == "__main__":

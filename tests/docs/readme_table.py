@@ -236,10 +236,13 @@ def _collect(stored: StoredReport) -> list[ReadmeRow]:
 
 
 def _plan(stored: StoredReport) -> list[ReadmeRow]:
-    cells = _cells(stored)
-    paper = cells["the paper's"]
-    text = f"{cells['ours']} on an {cells['machine']}; the paper's network {paper}"
-    return [ReadmeRow(name="planning", text=text, interval=stored.facts["intervals"])]
+    times, ratios = _report(stored)["tables"]
+    ours, paper = (dict(zip(times["header"], row, strict=True)) for row in times["rows"])
+    text = (
+        f"{ours['median, ms']} ms with the shipped model; the paper's network {paper['median, ms']} ms, "
+        f"{ratios['rows'][0][0]} times as long"
+    )
+    return [ReadmeRow(name="planning", text=text, interval=f"{ours['interval of the median']} ms")]
 
 
 def _cells(stored: StoredReport) -> dict[str, str]:
