@@ -222,8 +222,8 @@ def main() -> int:
     config = read_config(LearningConfig, CONFIGS / "pretrained.yaml")
     same = {"noise_std": 0.0, "calibrate": False, "success_range": (0.05, 0.40)}
     config = config.model_copy(update=same)
-    if options.quick:
-        config = with_stages(config, epochs=2)
+    if options.quick or options.epochs:
+        config = with_stages(config, epochs=2 if options.quick else options.epochs)
     check_parts(options.data)
     choices = oracle_choices(config, options.data, options.out / "images")
     choices = [one for one in choices if not options.only or one.name.startswith((BASELINE, *options.only))]
@@ -266,7 +266,11 @@ def main() -> int:
     about = facts(samples, sides) | {
         "n": f"trained on {n_success} successes at {n_parts} parts; {title.lower()}"
     }
-    show(tables, options.out, {"scores": values, "seeds": seeds, "quick": options.quick} | about)
+    show(
+        tables,
+        options.out,
+        {"scores": values, "seeds": seeds, "epochs": config.gdn.epochs, "quick": options.quick} | about,
+    )
     return 0
 
 
@@ -278,6 +282,9 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--data", type=Path, required=True, help="dataset folder")
     parser.add_argument("--out", type=Path, required=True, help="folder of images, trainings and reports")
     parser.add_argument("--seeds", type=int, default=3, help="trainings of each network (default 3)")
+    parser.add_argument(
+        "--epochs", type=int, help="of each training (default: as configs/train/pretrained.yaml says)"
+    )
     parser.add_argument("--only", nargs="+", metavar="NAME", help="how the wanted choices' names begin")
     add_cost_options(parser)
     return parser.parse_args()
