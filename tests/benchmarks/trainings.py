@@ -139,7 +139,7 @@ def _trained(
     """Stored networks, or those that are trained now, from a checkpoint if there is one."""
     folder = choice.folder(out, config.seed)
     if choice.build is not None:
-        return _displacement_trained(choice.build, config, samples, sides, reporter)
+        return displacement_trained(choice.build, config, samples, sides, reporter)
     if (folder / DESCRIPTION).exists():
         return load_models(folder)
     quality = None
@@ -153,7 +153,7 @@ def _trained(
     return models
 
 
-def _displacement_trained(
+def displacement_trained(
     build: Callable[[ModelMeta], Models],
     config: LearningConfig,
     samples: Samples,
