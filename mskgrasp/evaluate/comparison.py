@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from mskgrasp.evaluate.experiments import CERTIFIED
+from mskgrasp.evaluate.experiments import CERTIFIED, CHOSEN
 from mskgrasp.evaluate.summary import (
     SCHEMA_VERSION,
     TapeComparison,
@@ -22,10 +22,11 @@ from mskgrasp.trials.trial import Policy, Prediction, Trial
 
 Side = Literal["known", "novel"]
 Group = Literal["all", "known", "novel"]
-POLICIES: tuple[Policy, ...] = ("quality", "low_variance")
+PAPER_POLICIES: tuple[Policy, ...] = ("quality", "low_variance")
+POLICIES: tuple[Policy, ...] = (*PAPER_POLICIES, "recentred")
 POLICY_NAMES: dict[Policy, str] = {
     "quality": "high quality", "low_variance": "high quality and low variance",
-    "certified": "certified grasps",
+    "recentred": "low variance, recentred", "certified": "certified grasps",
 }  # fmt: skip
 SIDES: tuple[Side, ...] = ("known", "novel")
 GROUPS: tuple[Group, ...] = ("all", *SIDES)
@@ -50,7 +51,7 @@ _READ_OFF = {
 PAPER: dict[str, dict[Policy, PaperErrors | None]] = {
     label: {
         policy: bar and PaperErrors(translation_rmse=1e-2 * bar[0], rotation_rmse=float(bar[1]))
-        for policy, bar in zip(POLICIES, bars, strict=True)
+        for policy, bar in zip(PAPER_POLICIES, bars, strict=True)
     }
     for label, bars in _READ_OFF.items()
 }
@@ -71,15 +72,17 @@ class PolicyStatistics:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelStatistics:
-    """Statistics of one model; ``low_variance`` is None where its variances chose no grasp."""
+    """Statistics of one model by policy; None where its variances chose no grasp."""
 
     has_variance: bool
     quality: PolicyStatistics
     low_variance: PolicyStatistics | None
+    recentred: PolicyStatistics | None = None
 
     def of(self, policy: Policy, group: Group) -> TrialStatistics | None:
         """The statistics under a policy on all, on known or on novel parts."""
-        found = self.quality if policy == "quality" else self.low_variance
+        each = {"quality": self.quality, "low_variance": self.low_variance, "recentred": self.recentred}
+        found = each.get(policy)
         return found and {"all": found.all, "known": found.known, "novel": found.novel}[group]
 
 
@@ -100,13 +103,17 @@ def compare_models(trials: Sequence[Trial], predictors: Mapping[str, Predictor])
     best = [trial for trial in trials if not trial.chosen_by]
     models, policies = {}, {POLICY_NAMES["quality"]: TrialStatistics.of(best)}
     for label, predictor in predictors.items():
-        chosen = [trial for trial in trials if trial.chosen_by == label]
-        if chosen:
-            policies[f"{POLICY_NAMES['low_variance']}, of {label}"] = TrialStatistics.of(chosen)
+        chosen = {}
+        for policy in CHOSEN:
+            own = [trial for trial in trials if (trial.chosen_by, trial.policy) == (label, policy)]
+            if own:
+                policies[f"{POLICY_NAMES[policy]}, of {label}"] = TrialStatistics.of(own)
+                chosen[policy] = _statistics(own, label, predictor)
         models[label] = ModelStatistics(
             has_variance=predictor.has_variance,
             quality=_statistics(best, label, predictor),
-            low_variance=_statistics(chosen, label, predictor) if chosen else None,
+            low_variance=chosen.get("low_variance"),
+            recentred=chosen.get("recentred"),
         )
     certified = [trial for trial in trials if trial.chosen_by == CERTIFIED]
     if certified:

@@ -20,12 +20,14 @@ from mskgrasp.trials.predictors import (
     missing_predictions,
     predicted_by,
 )
-from mskgrasp.trials.trial import Trial
+from mskgrasp.trials.trial import Policy, Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file
 from mskgrasp.trials.trial_runner import TrialTask
 
 CERTIFIED = "certified"
 """The label of certified grasps among the models."""
+CHOSEN: tuple[Policy, ...] = ("low_variance", "recentred")
+"""Policies under which each model with variances chooses grasps of its own."""
 # No hyphen: it separates the label from the number in a trial's name.
 _TAKEN = (LOWESS, CERTIFIED)
 _LABEL = re.compile(r"[A-Za-z][A-Za-z0-9_+.]*")
@@ -150,8 +152,8 @@ def scenes(
 ) -> list[tuple[TrialTask, ...]]:
     """List the trials of an experiment by scene: those of one part and number share a scene.
 
-    In the displacement experiment all models predict the grasp of the best quality, and each model with
-    variances, and LOWESS, chooses one more grasp in the scene.
+    In the displacement experiment all models predict the grasp of the best quality. Each model with
+    variances, and LOWESS, chooses two more in the scene: among the best, and among these and those recentred.
 
     Args:
         parts: Name or folder of each part as given by the user, by its name.
@@ -171,9 +173,10 @@ def scenes(
             choosers = [*compared.choosers, *([LOWESS] if _knows(compared.lowess, name) else [])]
             best = replace(task, policy="quality")
             more = [
-                replace(task, policy="low_variance", chosen_by=one)
+                replace(task, policy=policy, chosen_by=one)
                 for one in choosers
                 if number < most.get(one, n_trials)
+                for policy in CHOSEN
             ]
             if planner.policy == "certified":
                 more.append(replace(task, policy="certified", chosen_by=CERTIFIED))

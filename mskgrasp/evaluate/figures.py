@@ -31,14 +31,14 @@ from mskgrasp.evaluate.comparison import (
 )
 from mskgrasp.evaluate.summary import Interval, SuccessSummary, displacement_errors, rms
 from mskgrasp.reports.style import saved_figure
-from mskgrasp.trials.trial import Trial
+from mskgrasp.trials.trial import Policy, Trial
 
 _COLOURS = {"dx": BLUE, "dy": ORANGE, "dz": FAINT, "turn": GREEN}
-_OURS = {"quality": BLUE, "low_variance": RED}
-_PAPERS = {"quality": MID_BLUE, "low_variance": MID_RED}
+_OURS: dict[Policy, str] = {"quality": BLUE, "low_variance": RED, "recentred": ORANGE}
+_PAPERS: dict[Policy, str] = {"quality": MID_BLUE, "low_variance": MID_RED}
 _CAD = "with\nthe CAD"
 _MOST_ROWS = 40
-_BAR = 0.2
+_BAR = 0.17
 """Width of a bar."""
 
 
@@ -140,11 +140,11 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
                         if found is not None and found.trials:
                             value = getattr(found, f"{kind}_rmse")
                             interval = getattr(found, f"{kind}_interval")
-                            _bar(axes, x + (k - 1.5) * _BAR, value, interval, scale, _OURS[policy])
+                            _bar(axes, x + (k - 2) * _BAR, value, interval, scale, _OURS[policy])
                         paper = PAPER.get(name, {}).get(policy)
                         if paper is not None and (name, side) != ("LOWESS", "novel"):  # fitted to known parts
                             value = getattr(paper, f"{kind}_rmse")
-                            _bar(axes, x + (k + 0.5) * _BAR, value, None, scale, _PAPERS[policy])
+                            _bar(axes, x + (k + 1) * _BAR, value, None, scale, _PAPERS[policy])
                 axes.set_title(f"{kind.capitalize()} RMSE, {side} parts")
                 axes.set_ylabel(unit)
                 labels = [name if ours.get(name, name) == name else f"{name}\n{ours[name]}" for name in order]
@@ -154,7 +154,7 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
         handles = [
             Patch(color=colours[policy], label=f"{POLICY_NAMES[policy]}, {who}")
             for who, colours in (("this run", _OURS), ("paper (all parts)", _PAPERS))
-            for policy in POLICIES
+            for policy in colours
         ]
         if certified is not None:
             label = f"{POLICY_NAMES['certified']}, this run (all parts)"

@@ -26,6 +26,9 @@ class PlannerConfig(Config):
     which measure what poor grasps do, as the paper did; 0.5 where the plan is carried out."""
     check_fingers: bool = False
     """Exclude grasps whose open fingers would collide with something in the depth image."""
+    recentre: bool = True
+    """Among the best grasps by variance, try those as well in which the part would hardly move: the same ones
+    at the place where it would come to lie between the pads."""
     refinements: int = Field(default=0, ge=0, le=20)
     """Rounds of the cross-entropy method: grasps are drawn near the best ones and scored."""
     chunk_size: int = Field(default=800, ge=1, le=65_536)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.grasp_plan import GraspPlan, Shortlist
-from mskgrasp.planning.refine import fingers_free, grasps_near
+from mskgrasp.planning.refine import fingers_free, grasps_near, where_held
 from mskgrasp.planning.refusal import refusal_reason
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 
@@ -32,6 +33,13 @@ PROMISING = 24
 
 Of 60 validation parts, 59 got the grasp that is best of all 96 in every view, one a score 1 % greater.
 """
+
+RECENTRED = 48
+"""Number of candidates of the shortlist, best by the score of one view, that are tried recentred, too."""
+SURE = 0.95
+"""Recentred grasps need this quality, or that of the shortlist's last, if it is lower."""
+Predict = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""Function that predicts mean and variance (n, k) and the variance score (n,) of grasps (n, 4)."""
 
 
 class Planner:
@@ -82,7 +90,12 @@ class Planner:
         sampled = time.perf_counter()
         found = qualities(self.models, scene, candidates, self.config.chunk_size)
         scored = time.perf_counter()
-        best = self._scored(scene, candidates, found, self._shortlist(scene, candidates, found))
+        rows, scores = self._shortlist(scene, candidates, found), None
+        if self.config.recentre and self.config.policy != "quality":
+            rough = partial(self._predicted, scene, all_views=False)
+            candidates, found, seen = self.recentred(scene, candidates, found, rows, rough)
+            rows, scores = seen.rows, seen.scores
+        best = self._scored(scene, candidates, found, rows, scores)
         if self.config.refinements:
             candidates, found, best = self._refined(scene, candidates, found, best, rng)
         self.refuse_poor(frame, view, candidates, found[best.rows])
@@ -144,17 +157,53 @@ class Planner:
             )
         return free[:n]
 
-    def _scored(self, scene: Scene, candidates: np.ndarray, found: np.ndarray, rows: np.ndarray) -> Shortlist:
+    def recentred(
+        self, scene: Scene, candidates: np.ndarray, found: np.ndarray, rows: np.ndarray, predict: Predict
+    ) -> tuple[np.ndarray, np.ndarray, Shortlist]:
+        """Add grasps at the places where the part would come to lie between the pads: there it moves less.
+
+        Args:
+            scene: The height image.
+            candidates: (n, 4) grasps.
+            found: (n,) their qualities.
+            rows: (k,) the shortlist.
+            predict: Predicts mean, variance and variance score of grasps.
+
+        Returns:
+            Candidates, qualities, and the shortlist, best quality first, the added ones among them.
+        """
+        mean, variance, scores = predict(candidates[rows])
+        best = np.argsort(scores, kind="stable")[:RECENTRED]
+        moved = self.cleared(where_held(candidates[rows[best]], mean[best]))
+        if self.config.check_fingers:
+            moved = moved[fingers_free(scene, moved)]
+        quality = qualities(self.models, scene, moved, self.config.chunk_size)
+        good = quality >= min(SURE, float(found[rows].min()))
+        more = Shortlist(len(candidates) + np.arange(int(good.sum())), *predict(moved[good]))
+        candidates = np.append(candidates, moved[good], axis=0)
+        found = np.append(found, quality[good])
+        return candidates, found, Shortlist(rows, mean, variance, scores).joined(more, found)
+
+    def _scored(
+        self,
+        scene: Scene,
+        candidates: np.ndarray,
+        found: np.ndarray,
+        rows: np.ndarray,
+        scores: np.ndarray | None = None,
+    ) -> Shortlist:
         """Predict the displacements of some candidates, best quality first.
 
         Where a prediction is the mean over several views of a grasp, only `PROMISING` candidates are kept:
         those of the least variance score by one view, or of the best quality if the policy asks for it.
+        ``scores`` are those by one view, where they are known.
         """
         if self.models.meta.network.symmetric_views:
-            good = rows[found[rows] >= self.config.least_quality]
+            good = np.flatnonzero(found[rows] >= self.config.least_quality)
             if len(good) > PROMISING and self.config.policy != "quality":
-                *_, scores = self._predicted(scene, candidates[good], all_views=False)
-                rows = good[np.sort(np.argsort(scores, kind="stable")[:PROMISING])]
+                if scores is None:
+                    *_, scores = self._predicted(scene, candidates[rows], all_views=False)
+                rows = rows[np.sort(good[np.argsort(scores[good], kind="stable")[:PROMISING]])]
             rows = rows[:PROMISING]
         return Shortlist(rows, *self._predicted(scene, candidates[rows], all_views=True))
 

@@ -49,6 +49,22 @@ def hand_room(scene: Scene, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return heights[:, fingers].max(axis=1) <= tips, heights[:, along < MAX_OPENING / 2].max(axis=1) > tips
 
 
+def where_held(grasps: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+    """Move grasps (n, 4) to where the hand would be to the part once it holds it, at the same height.
+
+    Args:
+        grasps: (n, 4).
+        displacement: (n, k) their predicted grasp displacements.
+    """
+    moved = grasps.copy()
+    cos, sin = np.cos(grasps[:, 3]), np.sin(grasps[:, 3])
+    x, y = displacement[:, 0], displacement[:, 1]
+    moved[:, 0] += cos * x - sin * y
+    moved[:, 1] += sin * x + cos * y
+    moved[:, 3] = wrap_half_turn(grasps[:, 3] + displacement[:, 3])
+    return moved
+
+
 def grasps_near(
     elite: np.ndarray, n: int, view: PartView, rng: np.random.Generator, *, width: float
 ) -> np.ndarray:

@@ -97,7 +97,8 @@ class Chooser:
     Attributes:
         candidates: Source of candidates and qualities.
         predictor: Predicts displacements, and the variances of the policy ``low_variance``.
-        policy: As in `mskgrasp.planning.config.PlannerConfig`.
+        policy: As in `mskgrasp.planning.config.PlannerConfig`; ``recentred`` is ``low_variance`` among the
+            same grasps and those recentred (`Planner.recentred`).
         part: Name of the part on the table.
         tracker: Source of its pose for a predictor that needs it; None: no pose.
     """
@@ -115,19 +116,27 @@ class Chooser:
             NoPartFound: No part is detected.
             GraspRefused: No candidate has the required quality.
         """
-        config = self.candidates.planner.config.model_copy(update={"policy": self.policy})
+        planner = self.candidates.planner
+        policy = "low_variance" if self.policy == "recentred" else self.policy
+        config = planner.config.model_copy(update={"policy": policy})
         scored_grasps = self.candidates.of(frame, rng)
         view, found, scoring_s = scored_grasps.view, scored_grasps.qualities, scored_grasps.seconds
         scored = time.perf_counter()
-        rows = shortlist(found, config.top_fraction)
-        self.candidates.planner.refuse_poor(frame, view, scored_grasps.grasps.as_vector(), found[rows])
+        rows, candidates = shortlist(found, config.top_fraction), scored_grasps.grasps.as_vector()
+        planner.refuse_poor(frame, view, candidates, found[rows])
         pose = None if self.tracker is None else self.tracker.part_pose()
         observation = PartObservation(part=self.part, frame=frame, view=view, pose_base_obj=pose)
-        best_grasps = scored_grasps.grasps[rows]
-        mean, variance = self.predictor.predict(observation, best_grasps)
-        scores = variance_score(mean, variance, best_grasps.as_vector(), view)
-        best = Shortlist(rows, mean, variance, scores)
-        chosen = select(found[rows], best.scores, config)
+
+        def predict(grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            mean, variance = self.predictor.predict(observation, Grasp.from_vector(grasps))
+            return mean, variance, variance_score(mean, variance, grasps, view)
+
+        if self.policy == "recentred":
+            scene = Scene.of(frame, view, planner.table_z, planner.models.device)
+            candidates, found, best = planner.recentred(scene, candidates, found, rows, predict)
+        else:
+            best = Shortlist(rows, *predict(candidates[rows]))
+        chosen = select(found[best.rows], best.scores, config)
         selecting_s = time.perf_counter() - scored
         seconds = {"score": scoring_s, "select": selecting_s, "total": scoring_s + selecting_s}
-        return GraspPlan.of(view, scored_grasps.grasps, found, best, chosen, seconds=seconds)
+        return GraspPlan.of(view, Grasp.from_vector(candidates), found, best, chosen, seconds=seconds)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-Policy = Literal["quality", "low_variance", "certified"]
+Policy = Literal["quality", "low_variance", "recentred", "certified"]
 REFUSED = "refused"
 """Reason of a trial in which no grasp was tried, as the best predicted quality was under the bound."""
 _LEGAL_KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
@@ -86,7 +86,7 @@ class Trial:
     @property
     def key(self) -> str:
         """Name of the trial in its run."""
-        return trial_key(self.part, self.number, self.chosen_by)
+        return trial_key(self.part, self.number, self.chosen_by, self.policy)
 
     def to_json(self) -> dict[str, Any]:
         """Convert to plain values; NaN (an unknown standard deviation, an unmeasured dz) becomes None."""
@@ -114,9 +114,10 @@ class Trial:
         return trial
 
 
-def trial_key(part: str, number: int, chosen_by: str = "") -> str:
-    """``<part>-<number>``, and ``-<model>`` where a model's variances chose the grasp."""
-    return f"{part}-{number:03d}" + (f"-{chosen_by}" if chosen_by else "")
+def trial_key(part: str, number: int, chosen_by: str = "", policy: Policy = "quality") -> str:
+    """``<part>-<number>``; ``-<model>`` where a model's variances chose the grasp, and ``-recentred``."""
+    parts = [f"{part}-{number:03d}", *([chosen_by] if chosen_by else [])]
+    return "-".join([*parts, *(["recentred"] if policy == "recentred" else [])])
 
 
 def _nan_to_none(value: Any) -> Any:

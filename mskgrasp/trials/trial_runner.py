@@ -60,7 +60,7 @@ class TrialTask:
     @property
     def key(self) -> str:
         """As `Trial.key`."""
-        return trial_key(self.part, self.number, self.chosen_by)
+        return trial_key(self.part, self.number, self.chosen_by, self.policy)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +149,7 @@ class TrialRunner:
                 part = find_part(task.source)
                 self._known = {task.source: planner_of_part(planner, self._engine.cell, part)}
             return self._known[task.source]
-        if planner.config.searches and planner.config.policy == task.policy and not task.chosen_by:
+        if not self._setup.compared:
             return planner
         return Chooser(
             self._candidates,

@@ -17,13 +17,16 @@ def test_models_are_compared_on_shared_grasps_and_on_their_own():
     expected = {"one": Prediction(mean=[0.0, 0.001, 0.0, -0.1], std=[0.01] * 4)}
     best = [trial(predictions=expected), trial(part="b", predictions=expected, measured=[0.0, 0.0, 0.0, 0.0])]
     chosen = trial(policy="low_variance", chosen_by="one", predicted=[0.0, 0.0039, 0.0, -0.1])
-    summary = compare_models([*best, chosen], {"one": Model(), "other": Model()})
+    recentred = trial(policy="recentred", chosen_by="one", predicted=[0.0, 0.0038, 0.0, -0.1])
+    summary = compare_models([*best, chosen, recentred], {"one": Model(), "other": Model()})
     one = summary.models["one"]
     assert one.quality.known.translation_rmse == pytest.approx(0.003)
     assert one.quality.novel.translation_rmse == pytest.approx(0.001)
     assert one.quality.novel.rotation_rmse == pytest.approx(0.1)
     assert one.low_variance is not None
     assert one.low_variance.known.translation_rmse == pytest.approx(0.0001)
+    assert one.recentred is not None and one.recentred.known.trials == 1
+    assert one.recentred.known.translation_rmse == pytest.approx(0.0002)
     assert one.quality.known.coverage_90 == [1.0, 1.0, 1.0, 1.0]
     assert summary.models["other"].low_variance is None
     assert summary.models["other"].quality.known.translation_rmse is None

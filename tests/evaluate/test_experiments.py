@@ -63,20 +63,23 @@ def compared(collected: Path):
     return load_compared([f"net={PRETRAINED}"], PRETRAINED, collected, [PART, "washer_m36"], 640)
 
 
-def test_every_model_with_variances_chooses_one_more_grasp_in_a_scene_and_lowess_of_parts_it_knows(compared):
+def test_every_model_with_variances_chooses_two_more_grasps_in_a_scene_and_lowess_of_parts_it_knows(compared):
     (known,) = scenes({PART: PART}, 1, 0, PlannerConfig(policy="low_variance"), compared)
     assert [(task.policy, task.chosen_by) for task in known] == [
-        ("quality", ""), ("low_variance", "net"), ("low_variance", LOWESS),
+        ("quality", ""), ("low_variance", "net"), ("recentred", "net"),
+        ("low_variance", LOWESS), ("recentred", LOWESS),
     ]  # fmt: skip
+    assert [task.key for task in known][:3] == [f"{PART}-000", f"{PART}-000-net", f"{PART}-000-net-recentred"]
     (novel,) = scenes({"washer_m36": "washer_m36"}, 1, 0, PlannerConfig(), compared)
-    assert [task.chosen_by for task in novel] == ["", "net"]
+    assert [task.chosen_by for task in novel] == ["", "net", "net"]
     assert compared.lowess is not None and compared.choosers == ["net"]
 
 
 def test_a_model_may_choose_grasps_of_its_own_in_the_first_trials_alone(compared):
     chooses = own_choices(["lowess=1", "net=2"], compared)
     found = scenes({PART: PART}, 3, 0, PlannerConfig(), compared, chooses)
-    assert [[task.chosen_by for task in scene] for scene in found] == [["", "net", LOWESS], ["", "net"], [""]]
+    each = [[task.chosen_by for task in scene if task.policy != "recentred"] for scene in found]
+    assert each == [["", "net", LOWESS], ["", "net"], [""]]
     # Of a larger run with the same scenes, they are the same trials.
     assert found[0] == scenes({PART: PART}, 1, 0, PlannerConfig(), compared)[0]
 

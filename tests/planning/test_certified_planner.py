@@ -105,7 +105,7 @@ def test_without_certified_grasps_the_networks_plan_and_say_why(cell, planner, c
     others = grasps((resting + 1) % len(PART.resting_probability))
     others = dataclasses.replace(others, without={resting: "no grasp lifts it"})
     plan = CertifiedPlanner(planner, PART, others).plan(frame, np.random.default_rng(0))
-    assert not plan.certified and plan.pose is not None and len(plan.candidates) == 400
+    assert not plan.certified and plan.pose is not None and len(plan.candidates) >= 400
     assert "gets no certified grasp: no grasp lifts it; planned by the networks" in capsys.readouterr().err
     network = planner.plan(frame, np.random.default_rng(0))
     assert np.array_equal(plan.grasp.as_vector(), network.grasp.as_vector())

@@ -1,9 +1,10 @@
 import numpy as np
+import pytest
 import torch
 
-from mskgrasp.core.grasp import lowest_grasp_z
+from mskgrasp.core.grasp import centre_in_grasp_frame, lowest_grasp_z, to_object_displacement
 from mskgrasp.perception.part_detection import view_part
-from mskgrasp.planning.refine import fingers_free, grasps_near
+from mskgrasp.planning.refine import fingers_free, grasps_near, where_held
 from mskgrasp.planning.scoring import Scene
 from tests import synthetic
 from tests.planning.hand_made import BOX, FRAME
@@ -41,3 +42,18 @@ def test_grasps_are_drawn_around_a_single_elite_grasp_too():
     elite = np.array([[BOX.x, BOX.y, 0.02, 0.3]])
     drawn = grasps_near(elite, 2000, view, np.random.default_rng(0), width=1.0)
     assert np.allclose(drawn.std(axis=0), [0.0005, 0.0005, 0.0005, 0.01], rtol=0.1)
+
+
+def test_a_grasp_at_the_place_where_the_part_is_held_moves_it_no_more():
+    rng = np.random.default_rng(0)
+    grasps = rng.uniform([-0.1, -0.1, 0.01, -1.0], [0.1, 0.1, 0.03, 1.0], size=(50, 4))
+    point = rng.uniform([-0.1, -0.1, 0.01], [0.1, 0.1, 0.01], size=(50, 3))
+    moved = rng.uniform([-0.01, -0.01, 0.0, -0.5], [0.01, 0.01, 0.0, 0.5], size=(50, 4))
+    held = where_held(grasps, moved)
+    # In both the part comes to lie alike in the hand.
+    before = centre_in_grasp_frame(point, grasps)
+    after = before + to_object_displacement(moved, before)[:, :3]
+    assert np.allclose(centre_in_grasp_frame(point, held)[:, :2], after[:, :2], atol=1e-12)
+    assert np.array_equal(held[:, 2], grasps[:, 2])
+    turned = where_held(np.array([[0, 0, 0.02, 1.4]]), np.array([[0, 0, 0, 0.5]]))
+    assert turned[0, 3] == pytest.approx(1.9 - np.pi)  # a jaw is the same after half a turn

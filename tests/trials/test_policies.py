@@ -67,9 +67,11 @@ def test_the_policy_of_the_best_quality_takes_it_whatever_the_variances():
     assert plan.quality == plan.qualities.max()
 
 
-@pytest.mark.parametrize("policy", ["quality", "low_variance"])
+@pytest.mark.parametrize("policy", ["quality", "low_variance", "recentred"])
 def test_with_the_planners_own_model_the_plan_is_the_planners(policy: str):
-    own: Planner = planner(CONFIG.model_copy(update=dict(policy=policy)))
+    recentre = policy == "recentred"
+    settings = dict(policy="low_variance" if recentre else policy, recentre=recentre)
+    own: Planner = planner(CONFIG.model_copy(update=settings))
     network = NetworkPredictor(own.models, CONFIG.chunk_size)
     chosen = Chooser(Candidates(own), network, policy, "nut", None).plan(FRAME, rng())
     expected = own.plan(FRAME, rng())
