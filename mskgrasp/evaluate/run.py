@@ -201,10 +201,9 @@ def _check(config: EvaluateConfig) -> None:
         raise UsageError("--compare, --chooses and --lowess-data need --experiment displacement; add it")
     if config.experiment == "displacement" and config.planner.policy == "low_variance":
         raise UsageError("--experiment displacement runs this policy anyway; omit --planner.policy")
-    if config.experiment == "displacement" and config.planner.searches:
+    if config.experiment == "displacement" and config.planner.check_fingers:
         raise UsageError(
-            "--experiment displacement gives all models the same candidates; omit --planner.refinements and "
-            "--planner.check-fingers"
+            "--experiment displacement gives all models the same candidates; omit --planner.check-fingers"
         )
     if config.experiment == "displacement":
         for folder in model_folders(config.compare, config.models).values():

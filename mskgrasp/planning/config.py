@@ -29,8 +29,6 @@ class PlannerConfig(Config):
     recentre: bool = True
     """Among the best grasps by variance, try those as well in which the part would hardly move: the same ones
     at the place where it would come to lie between the pads."""
-    refinements: int = Field(default=0, ge=0, le=20)
-    """Rounds of the cross-entropy method: grasps are drawn near the best ones and scored."""
     chunk_size: int = Field(default=800, ge=1, le=65_536)
     """Greatest number of grasps in a batch: many more do not fit a CPU's cache, few have too much overhead.
     (The paper's network, with patches seven times larger, is fastest with 32.)"""
@@ -45,8 +43,3 @@ class PlannerConfig(Config):
         if self.min_quality is not None:
             return self
         return self.model_copy(update={"min_quality": MIN_QUALITY})
-
-    @property
-    def searches(self) -> bool:
-        """Whether more than one grasp is scored at the end."""
-        return self.check_fingers or self.refinements > 0

@@ -24,7 +24,7 @@ from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.grasp_plan import GraspPlan, Shortlist
-from mskgrasp.planning.refine import fingers_free, grasps_near, where_held
+from mskgrasp.planning.refine import fingers_free, where_held
 from mskgrasp.planning.refusal import refusal_reason
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 
@@ -96,8 +96,6 @@ class Planner:
             candidates, found, seen = self.recentred(scene, candidates, found, rows, rough)
             rows, scores = seen.rows, seen.scores
         best = self._scored(scene, candidates, found, rows, scores)
-        if self.config.refinements:
-            candidates, found, best = self._refined(scene, candidates, found, best, rng)
         self.refuse_poor(frame, view, candidates, found[best.rows])
         chosen = select(found[best.rows], best.scores, self.config)
         selected = time.perf_counter()
@@ -215,35 +213,6 @@ class Planner:
             self.models, scene, grasps, self.config.chunk_size, all_views=all_views
         )
         return mean, variance, variance_score(mean, variance, grasps, scene.view)
-
-    def _refined(
-        self,
-        scene: Scene,
-        candidates: np.ndarray,
-        found: np.ndarray,
-        best: Shortlist,
-        rng: np.random.Generator,
-    ) -> tuple[np.ndarray, np.ndarray, Shortlist]:
-        """Refine candidates, qualities and shortlist by rounds of sampling near the best grasps.
-
-        The objective is that of the selection: the lowest variance score at a quality no lower than the first
-        shortlist's, or the best quality.
-        """
-        first = shortlist(found, self.config.top_fraction)
-        n_best, least = len(first), float(found[first].min())
-        for number in range(self.config.refinements):
-            loss = -found[best.rows] if self.config.policy == "quality" else best.scores
-            elite = candidates[best.rows[np.argsort(loss, kind="stable")[: max(1, n_best // 4)]]]
-            drawn = self.cleared(grasps_near(elite, 4 * n_best, scene.view, rng, width=0.5 ** (number + 1)))
-            if self.config.check_fingers:
-                drawn = drawn[fingers_free(scene, drawn)]
-            quality = qualities(self.models, scene, drawn, self.config.chunk_size)
-            kept = np.argsort(-quality, kind="stable")[:n_best]
-            kept = kept[quality[kept] >= least]
-            rows = len(candidates) + np.arange(len(kept))
-            candidates, found = np.append(candidates, drawn[kept], axis=0), np.append(found, quality[kept])
-            best = best.joined(self._scored(scene, candidates, found, rows), found)
-        return candidates, found, best
 
     def sample(self, frame: RgbdFrame, rng: np.random.Generator) -> tuple[PartView, Grasp]:
         """Detect the part and sample ``n_candidates`` grasps over it.

@@ -1,4 +1,4 @@
-"""Refinements of the planner's search: collision check of the fingers, and sampling near the best grasps.
+"""Refinements of the planner's search: collision check of the fingers, and grasps where the part is held.
 
 Grasps are arrays (n, 4), x y z theta in the base frame, as in `mskgrasp.planning.scoring`.
 """
@@ -13,14 +13,10 @@ from mskgrasp.core.grasp import (
     FINGER_THICKNESS,
     MAX_OPENING,
     PAD_REACH,
-    PartView,
-    lowest_grasp_z,
 )
 from mskgrasp.planning.scoring import Scene
 
 _STEP = 0.002
-_LEAST_STD = np.array([0.0005, 0.0005, 0.0005, 0.01])
-"""Least standard deviations, metres and radians: the elite may be a single grasp."""
 
 
 def fingers_free(scene: Scene, grasps: np.ndarray) -> np.ndarray:
@@ -63,31 +59,3 @@ def where_held(grasps: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     moved[:, 1] += sin * x + cos * y
     moved[:, 3] = wrap_half_turn(grasps[:, 3] + displacement[:, 3])
     return moved
-
-
-def grasps_near(
-    elite: np.ndarray, n: int, view: PartView, rng: np.random.Generator, *, width: float
-) -> np.ndarray:
-    """Sample grasps (n, 4) around elite ones: a round of the cross-entropy method.
-
-    The density is a mixture of Gaussians around the elite grasps, so that separate optima are kept.
-
-    Args:
-        elite: (k, 4).
-        n: Number of grasps.
-        view: The part; the grasps stay within its box.
-        rng: Random generator.
-        width: Standard deviations relative to those of the elite.
-    """
-    local = elite.copy()
-    local[:, :3] = view.T_base_box.inverse().apply(elite[:, :3])
-    # The angles relative to the first one: a jaw is the same after half a turn.
-    angles = wrap_half_turn(local[:, 3] - local[0, 3])
-    std = np.maximum(np.column_stack([local[:, :3], angles]).std(axis=0), _LEAST_STD)
-    found = local[rng.integers(len(local), size=n)] + width * std * rng.standard_normal((n, 4))
-    found[:, :2] = np.clip(found[:, :2], -view.size[:2] / 2, view.size[:2] / 2)
-    found[:, :3] = view.T_base_box.apply(found[:, :3])
-    lowest = lowest_grasp_z(view.table_z)
-    found[:, 2] = np.clip(found[:, 2], lowest, max(lowest, view.table_z + float(view.size[2])))
-    found[:, 3] = wrap_half_turn(found[:, 3])
-    return found

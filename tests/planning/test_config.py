@@ -5,11 +5,6 @@ from mskgrasp.core.errors import BadConfig
 from mskgrasp.planning.config import PlannerConfig
 
 
-def test_a_search_scores_more_than_one_grasp_at_the_end():
-    assert not PlannerConfig().searches
-    assert PlannerConfig(check_fingers=True).searches and PlannerConfig(refinements=1).searches
-
-
 @pytest.mark.parametrize(
     "values", [{"n_candidates": 0}, {"top_fraction": 0.0}, {"policy": "best"}, {"unknown": 1}]
 )

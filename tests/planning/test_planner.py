@@ -190,29 +190,6 @@ def test_a_grasp_beside_which_something_stands_is_left_out():
     assert not fingers_free(scene, free.candidates[free.shortlist].as_vector()).all()
 
 
-@pytest.mark.parametrize("policy", ["low_variance", "quality"])
-def test_refinement_finds_better_grasps_within_the_parts_box(policy):
-    plans = [
-        planner(PlannerConfig(n_candidates=200, refinements=rounds, policy=policy)).plan(
-            FRAME, np.random.default_rng(1)
-        )
-        for rounds in (0, 4)
-    ]
-    first, refined = plans
-    assert refined.quality >= first.qualities[first.shortlist].min()
-    if policy == "quality":
-        assert refined.quality > first.quality
-    else:
-        assert refined.score < first.score
-    assert np.array_equal(refined.candidates[:200].as_vector(), first.candidates.as_vector())
-    assert len(refined.candidates) > 200
-    local = refined.view.T_base_box.inverse().apply(refined.candidates.position)
-    assert (np.abs(local[:, :2]) <= refined.view.size[:2] / 2 + 1e-9).all()
-    assert (refined.candidates.position[:, 2] >= 0.0105 - 1e-9).all()
-    assert (np.abs(refined.candidates.theta) <= np.pi / 2).all()
-    assert (np.diff(refined.qualities[refined.shortlist]) <= 0).all()
-
-
 def test_planning_on_a_real_cell_loads_no_simulator():
     code = (
         "import sys\n"
@@ -232,10 +209,10 @@ def test_no_candidate_is_lower_than_the_cell_allows():
     def lowest(xy: np.ndarray) -> np.ndarray:
         return 0.02 + 0.01 * (xy[:, 0] - 0.5)
 
-    found = planner(PlannerConfig(n_candidates=600, refinements=2), lowest_grasp_z=lowest)
+    found = planner(PlannerConfig(n_candidates=600), lowest_grasp_z=lowest)
     candidates = found.plan(FRAME, np.random.default_rng(0)).candidates.as_vector()
     assert (candidates[:, 2] >= lowest(candidates[:, :2]) - 1e-12).all()
-    free = planner(PlannerConfig(n_candidates=600, refinements=2)).plan(FRAME, np.random.default_rng(0))
+    free = planner(PlannerConfig(n_candidates=600)).plan(FRAME, np.random.default_rng(0))
     assert (free.candidates.as_vector()[:, 2] < 0.0195).any()
 
 

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 import torch
 
-from mskgrasp.core.grasp import centre_in_grasp_frame, lowest_grasp_z, to_object_displacement
+from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.perception.part_detection import view_part
-from mskgrasp.planning.refine import fingers_free, grasps_near, where_held
+from mskgrasp.planning.refine import fingers_free, where_held
 from mskgrasp.planning.scoring import Scene
 from tests import synthetic
-from tests.planning.hand_made import BOX, FRAME
+from tests.planning.hand_made import BOX
 from tests.synthetic import REGION, Box
 
 
@@ -20,28 +20,6 @@ def test_fingers_that_would_stand_on_another_box_are_not_free():
     scene = Scene.of(frame, view, 0.0, torch.device("cpu"))
     on_the_other, above_it = [BOX.x, BOX.y, 0.015, 0.4], [BOX.x, BOX.y, 0.045, 0.4]
     assert fingers_free(scene, np.array([on_the_other, above_it])).tolist() == [False, True]
-
-
-def test_drawn_grasps_stay_near_an_elite_grasp_and_in_the_parts_box():
-    view = view_part(FRAME.depth, FRAME.intrinsics, FRAME.T_base_camera, table_z=0.0, region=REGION)
-    cos, sin = np.cos(BOX.yaw), np.sin(BOX.yaw)
-    ends = [(BOX.x + s * 0.02 * cos, BOX.y + s * 0.02 * sin) for s in (1, -1)]
-    elite = np.array([[x, y, 0.02, 1.5] for x, y in ends] * 3)
-    elite[::2, 3] = -1.55  # almost the same closing direction
-    drawn = grasps_near(elite, 400, view, np.random.default_rng(0), width=0.1)
-    distance = np.linalg.norm(drawn[:, None, :2] - elite[None, :2, :2], axis=-1)
-    assert distance.min(axis=1).max() < 0.01 and (np.bincount(distance.argmin(axis=1)) > 150).all()
-    assert (np.abs(drawn[:, 3]) > 1.45).all() and (np.abs(drawn[:, 3]) <= np.pi / 2).all()
-    local = view.T_base_box.inverse().apply(drawn[:, :3])
-    assert (np.abs(local[:, :2]) <= view.size[:2] / 2 + 1e-9).all()
-    assert (drawn[:, 2] >= lowest_grasp_z(0.0) - 1e-9).all() and (drawn[:, 2] <= view.size[2] + 1e-9).all()
-
-
-def test_grasps_are_drawn_around_a_single_elite_grasp_too():
-    view = view_part(FRAME.depth, FRAME.intrinsics, FRAME.T_base_camera, table_z=0.0, region=REGION)
-    elite = np.array([[BOX.x, BOX.y, 0.02, 0.3]])
-    drawn = grasps_near(elite, 2000, view, np.random.default_rng(0), width=1.0)
-    assert np.allclose(drawn.std(axis=0), [0.0005, 0.0005, 0.0005, 0.01], rtol=0.1)
 
 
 def test_a_grasp_at_the_place_where_the_part_is_held_moves_it_no_more():
