@@ -110,7 +110,7 @@ class Planners:
                 return OtherPlanner(AntipodalPlanner(workspace), workspace, name)
             case "paper":
                 assert settings.paper_models is not None
-                return make_planner(settings.paper_models, PlannerConfig(), self.cell)
+                return make_planner(settings.paper_models, PlannerConfig(recentre=False), self.cell)
             case "ours":
                 return make_planner(settings.models, PlannerConfig(), self.cell)
             case "ours-min-quality":

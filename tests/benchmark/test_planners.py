@@ -44,6 +44,11 @@ def test_a_bound_on_the_quality_is_all_that_tells_ours_apart(planners):
     assert planners.of("ours", PART) is ours  # loaded once
 
 
+def test_the_papers_planner_chooses_as_the_paper_does(planners):
+    paper, ours = planners.of("paper", PART), planners.of("ours", PART)
+    assert paper.config == ours.config.model_copy(update={"recentre": False})
+
+
 def test_certified_grasps_that_were_not_made_are_named(planners, tmp_path: Path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     with pytest.raises(BadPart, match="no certified grasps of 'hex_nut_m20'; make them"):
