@@ -41,7 +41,8 @@ def build_model(
     option.iterations = physics.solver_iterations
     option.noslip_iterations = physics.noslip_iterations
     option.tolerance = 1e-9
-    option.impratio = 10
+    # With 10 a part that is held by a strip of 2 mm creeps: 7 degrees a second at four fifths of the limit.
+    option.impratio = 100
     option.gravity = [0, 0, -9.81]
     add_panda(spec, physics)
     stated = np.array([0, 0, TABLE_Z])
