@@ -248,7 +248,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     default = read_yaml(config_file("validate/default.yaml"))
     parser.add_argument("--parts", nargs="+", default=default["parts"])
-    parser.add_argument("--grasps-per-part", type=int, default=default["grasps_per_part"])
+    parser.add_argument("--grasps-per-part", type=int, default=14)
     parser.add_argument("--out", type=Path, help="folder for report.json")
     given = parser.parse_args()
     tried = []
