@@ -37,10 +37,11 @@ class MujocoPhysics(Config):
     friction_table_part: float = Field(default=_COMMON.friction_table_part, ge=0, le=2)
     """Coulomb coefficient between table and part."""
     pad_patch_radius: float = Field(default=_COMMON.pad_patch_radius, ge=0)
-    """Radius of the pad's contact patch, m, which resists turning about a single contact point."""
+    """Radius of the pad's contact patch, m, which resists turning about a single contact point. Contacts of
+    more points do not depend on it, as in the SAPIEN cell."""
     pad_pieces: int = Field(default=2, ge=1, le=4)
     """Pieces of a pad along each edge. Contacts are at the corners of pieces: on a flat face one piece holds
-    twice the moment that evenly spread pressure does, 2 x 2 hold 1.5 times as much, 3 x 3 1.4 times."""
+    1.85 times the moment that evenly spread pressure does, 2 x 2 or 3 x 3 hold 1.15 times as much."""
     finger_speed: float = Field(default=_COMMON.finger_speed, gt=0)
     """Closing speed of each finger, m/s."""
     finger_armature: float = Field(default=_COMMON.finger_armature, ge=0)

@@ -7,6 +7,9 @@ v^2 / (2 mu g) is 1.3 mm at 0.1 m/s and 0.01 mm at 0.01 m/s.
 Each row also gives the bar turned upside down: the same body, whose corners an engine lists in another order.
 The task replaces PhysX's friction of part and table by its own (`tasks.scene.table_friction`).
 
+In a second table two pads close on a bar whose centre is in their middle. The pads' edges slip along the bar
+in opposite ways and turn it. Half a turn maps bar and pads onto themselves, so that its centre may not move.
+
 Run: python -m tests.benchmarks.pushing
 """
 
@@ -37,6 +40,8 @@ WAY = 0.0091
 SPEEDS = (0.1, 0.05, 0.02, 0.01)
 _CLEAR = 0.0003
 """Distance of pad and bar, and of pad and table, at the start, m."""
+BETWEEN = (0.0, 0.0, START[2])
+"""x, y, angle of a bar between two pads."""
 
 
 def inertia() -> np.ndarray:
@@ -45,21 +50,23 @@ def inertia() -> np.ndarray:
     return MASS / 12 * (square.sum() - square)
 
 
-def first_contact() -> float:
+def first_contact(start: tuple[float, float, float] = START) -> float:
     """y of the pad's face when its edge meets the bar, m."""
-    x, y, angle = START
+    x, y, angle = start
     return y + (SIZE[1] / 2 + (-PAD[0] / 2 - x) * np.sin(angle)) / np.cos(angle)
 
 
-def pad_centre(face: float) -> np.ndarray:
-    """Centre (3,) of the pad with its face at some y."""
-    return np.array([0.0, face + PAD[1] / 2, PAD[2] / 2 + _CLEAR])
+def pad_centre(face: float, side: int = 1) -> np.ndarray:
+    """Centre (3,) of the pad with its face at some y, or of the one on the other side (-1)."""
+    return np.array([0.0, side * (face + PAD[1] / 2), PAD[2] / 2 + _CLEAR])
 
 
-def steps(speed: float, rate_hz: float) -> Iterator[float]:
+def steps(speed: float, rate_hz: float, *, between: bool) -> Iterator[float]:
     """y of the pad's face after each step."""
-    n = round((WAY + _CLEAR) / speed * rate_hz)
-    return (first_contact() + _CLEAR - speed * (k + 1) / rate_hz for k in range(n))
+    first = first_contact(BETWEEN if between else START)
+    way = first - SIZE[1] / 2 - _CLEAR if between else WAY
+    n = round((way + _CLEAR) / speed * rate_hz)
+    return (first + _CLEAR - speed * (k + 1) / rate_hz for k in range(n))
 
 
 def on_paper(physics: Physics, points: np.ndarray) -> np.ndarray:
@@ -73,13 +80,16 @@ def on_paper(physics: Physics, points: np.ndarray) -> np.ndarray:
     return push.run(np.array(START), -PAD[0] / 2, WAY) - START
 
 
-def in_physx(physics: Physics, speed: float, over: bool) -> np.ndarray:
-    """The same in plain SAPIEN with PhysX's friction; the pad is kinematic."""
-    return in_sapien(physics, speed, over, own_friction=False)
+def in_physx(physics: Physics, speed: float, over: bool, *, between: bool = False) -> np.ndarray:
+    """The same in plain SAPIEN with PhysX's friction; pads are kinematic."""
+    return in_sapien(physics, speed, over, between=between, own_friction=False)
 
 
-def in_sapien(physics: Physics, speed: float, over: bool, *, own_friction: bool = True) -> np.ndarray:
-    """The same in plain SAPIEN with the settings of the task; the pad is kinematic."""
+def in_sapien(
+    physics: Physics, speed: float, over: bool, *, between: bool = False, own_friction: bool = True
+) -> np.ndarray:
+    """The same in plain SAPIEN with the settings of the task; pads are kinematic."""
+    start = BETWEEN if between else START
     physx.set_scene_config(enable_tgs=True, enable_pcm=physics.persistent_manifold, cpu_workers=0)
     physx.set_body_config(
         solver_position_iterations=physics.position_iterations,
@@ -103,34 +113,39 @@ def in_sapien(physics: Physics, speed: float, over: bool, *, own_friction: bool 
     builder.add_box_collision(half_size=np.array(SIZE) / 2, material=slippery)
     builder.set_mass_and_inertia(MASS, sapien.Pose(), inertia().astype(np.float32))
     bar = builder.build()
-    bar.set_pose(sapien.Pose([*START[:2], SIZE[2] / 2], _turned(START[2], over)))
-    builder = scene.create_actor_builder()
-    builder.add_box_collision(half_size=np.array(PAD) / 2, material=rubber)
-    pad = builder.build_kinematic()
-    pad.set_pose(sapien.Pose(pad_centre(first_contact() + _CLEAR)))
-    body = pad.find_component_by_type(physx.PhysxRigidDynamicComponent)
-    assert isinstance(body, physx.PhysxRigidDynamicComponent)
+    bar.set_pose(sapien.Pose([*start[:2], SIZE[2] / 2], _turned(start[2], over)))
+    bodies = {}
+    for side in (1, -1) if between else (1,):
+        builder = scene.create_actor_builder()
+        builder.add_box_collision(half_size=np.array(PAD) / 2, material=rubber)
+        pad = builder.build_kinematic()
+        pad.set_pose(sapien.Pose(pad_centre(first_contact(start) + _CLEAR, side)))
+        bodies[side] = pad.find_component_by_type(physx.PhysxRigidDynamicComponent)
     pushed = bar.find_component_by_type(physx.PhysxRigidDynamicComponent)
     assert isinstance(pushed, physx.PhysxRigidDynamicComponent)
     friction = TableFriction(system, pushed, table, physics.friction_table_part)
-    for face in steps(speed, physics.rate_hz):
-        body.set_kinematic_target(sapien.Pose(pad_centre(face)))
+    for face in steps(speed, physics.rate_hz, between=between):
+        for side, body in bodies.items():
+            assert isinstance(body, physx.PhysxRigidDynamicComponent)
+            body.set_kinematic_target(sapien.Pose(pad_centre(face, side)))
         if own_friction:
             friction.apply()
         scene.step()
-    return _moved(np.asarray(bar.pose.to_transformation_matrix(), dtype=np.float64))
+    return _moved(np.asarray(bar.pose.to_transformation_matrix(), dtype=np.float64), start)
 
 
-def in_mujoco(physics: Physics, speed: float, over: bool) -> np.ndarray:
-    """The same in plain MuJoCo with the settings of its cell; the pad is heavy and keeps its speed."""
+def in_mujoco(physics: Physics, speed: float, over: bool, *, between: bool = False) -> np.ndarray:
+    """The same in plain MuJoCo with the settings of its cell; pads are heavy and keep their speed."""
     import mujoco
 
-    own = MujocoPhysics()
+    from hal.mujoco.scene import FRICTION_STIFFNESS
+
+    own, start = MujocoPhysics(), BETWEEN if between else START
     spec = mujoco.MjSpec()
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     option = spec.option
     option.timestep, option.noslip_iterations = own.step_s, own.noslip_iterations
-    option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10
+    option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, FRICTION_STIFFNESS
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.iterations, option.tolerance = own.solver_iterations, 1e-9
     stiff = dict(solref=[own.contact_time_s, 1], solimp=[*own.contact_impedance, 0.5, 2], condim=3)
@@ -138,29 +153,40 @@ def in_mujoco(physics: Physics, speed: float, over: bool) -> np.ndarray:
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1], friction=table, priority=1, **stiff
     )
-    bar = spec.worldbody.add_body(name="bar", pos=[*START[:2], SIZE[2] / 2], quat=_turned(START[2], over))
+    bar = spec.worldbody.add_body(name="bar", pos=[*start[:2], SIZE[2] / 2], quat=_turned(start[2], over))
     bar.add_freejoint()
     bar.explicitinertial, bar.mass, bar.inertia = True, MASS, inertia()
     bar.ipos, bar.iquat = [0, 0, 0], [1, 0, 0, 0]  # by default those of the body
     points = trimesh.creation.box(np.array(SIZE)).vertices
     spec.add_mesh(name="bar", uservert=np.asarray(points).ravel())
     bar.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="bar", friction=table, **stiff)
-    pad = spec.worldbody.add_body(name="pad", pos=pad_centre(first_contact() + _CLEAR))
-    pad.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(PAD) / 2, friction=part, priority=2, **stiff)
-    pad.explicitinertial, pad.mass, pad.inertia, pad.ipos = True, 10.0, [10.0] * 3, [0, 0, 0]
-    pad.add_joint(name="slide", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 1, 0])
-    pad.gravcomp = 1
+    sides = (1, -1) if between else (1,)
+    for side in sides:
+        pad = spec.worldbody.add_body(pos=pad_centre(first_contact(start) + _CLEAR, side))
+        pad.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(PAD) / 2, friction=part, priority=2, **stiff
+        )
+        pad.explicitinertial, pad.mass, pad.inertia, pad.ipos = True, 10.0, [10.0] * 3, [0, 0, 0]
+        pad.add_joint(name=f"slide{side}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, side, 0])
+        pad.gravcomp = 1
     model = spec.compile()
     data = mujoco.MjData(model)
-    slide = model.joint("slide")
-    for face in steps(speed, 1 / own.step_s):
-        data.qvel[slide.dofadr[0]] = -speed
-        data.qpos[slide.qposadr[0]] = face - first_contact() - _CLEAR + speed * own.step_s
+    slides = [model.joint(f"slide{side}") for side in sides]
+    for face in steps(speed, 1 / own.step_s, between=between):
+        for slide in slides:
+            data.qvel[slide.dofadr[0]] = -speed
+            data.qpos[slide.qposadr[0]] = face - first_contact(start) - _CLEAR + speed * own.step_s
         mujoco.mj_step(model, data)
     pose = np.eye(4)
     mujoco.mj_kinematics(model, data)
     pose[:3, :3], pose[:3, 3] = data.body("bar").xmat.reshape(3, 3), data.body("bar").xpos
-    return _moved(pose)
+    return _moved(pose, start)
+
+
+def slid(moved: np.ndarray) -> float:
+    """Slide along itself, m, of a bar that was between two pads."""
+    x, y, angle = BETWEEN + moved
+    return float(x * np.cos(angle) + y * np.sin(angle))
 
 
 def _turned(angle: float, over: bool) -> list[float]:
@@ -169,9 +195,9 @@ def _turned(angle: float, over: bool) -> list[float]:
     return [0.0, c, s, 0.0] if over else [c, 0.0, 0.0, s]
 
 
-def _moved(pose: np.ndarray) -> np.ndarray:
+def _moved(pose: np.ndarray, start: tuple[float, float, float]) -> np.ndarray:
     """How far (x, y, angle) a bar at a pose (4, 4) has come."""
-    return np.array([*pose[:2, 3], np.arctan2(pose[1, 0], pose[0, 0])]) - START
+    return np.array([*pose[:2, 3], np.arctan2(pose[1, 0], pose[0, 0])]) - start
 
 
 def main() -> None:
@@ -186,7 +212,8 @@ def main() -> None:
         rate_hz=given.rate_hz, position_iterations=given.iterations, persistent_manifold=given.pcm
     )
     four = corners(*SIZE[:2])
-    rows = []
+    rows: list[tuple[str, ...]] = []
+    squeezed: list[tuple[str, ...]] = [("on paper", "0.00", "0.00")]
     for name, points in (
         ("even pressure", rectangle(*SIZE[:2])),
         ("four corners", four),
@@ -202,8 +229,11 @@ def main() -> None:
         for speed in SPEEDS:
             moved = [_row(run(physics, speed, over)) for over in (False, True)]
             rows.append((f"{name}, {speed:g} m/s", *moved[0], *moved[1]))
+            slides = [f"{1e3 * slid(run(physics, speed, over, between=True)):.2f}" for over in (False, True)]
+            squeezed.append((f"{name}, {speed:g} m/s", *slides))
     header = ("motion of the bar", "x, mm", "y, mm", "turn, deg", "upside down: x, mm", "y, mm", "turn, deg")
-    show([Table(header=header, rows=rows)], given.out)
+    between = ("bar between two pads", "slide along itself, mm", "upside down, mm")
+    show([Table(header=header, rows=rows), Table(header=between, rows=squeezed)], given.out)
 
 
 def _row(moved: np.ndarray) -> list[str]:

@@ -40,18 +40,23 @@ def on_table(
 
 
 def held(
-    part: Part, physics: MujocoPhysics | None = None, *, force: float = 20.0, y: float = 0.0
+    part: Part,
+    physics: MujocoPhysics | None = None,
+    *,
+    force: float = 20.0,
+    y: float = 0.0,
+    height: float = 0.02,
 ) -> Simulation:
-    """A box that was ``y`` metres off the middle, gripped and lifted by 10 cm."""
+    """A box that was ``y`` metres off the middle, gripped at a height and lifted by 10 cm."""
     simulation = on_table(part, physics, y=y)
 
     def joints(z: float) -> np.ndarray:
         return top_down(np.array([0.5, 0.0, z, 0.0]))[0]
 
-    simulation.data.qpos[:7] = simulation.target = joints(0.02)
+    simulation.data.qpos[:7] = simulation.target = joints(height)
     simulation.move_fingers(-0.08, force=force, stop=never)
     shares = np.concatenate([[0.0], minimum_jerk_steps(simulation.n_steps(0.75))])
-    assert simulation.follow(np.array([joints(0.02 + 0.1 * share) for share in shares]), stop=never)
+    assert simulation.follow(np.array([joints(height + 0.1 * share) for share in shares]), stop=never)
     simulation.stand(0.2, stop=never)
     return simulation
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,11 @@ from hal.config import READY
 from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.simulation import Simulation
 from mskgrasp.core.geometry import Pose, pose_distance
+from mskgrasp.core.grasp import PAD_REACH
 from mskgrasp.core.panda_kinematics import forward_pose, top_down
 from mskgrasp.parts import find_part
+from mskgrasp.parts.solids import shape as h
+from mskgrasp.validate.body_scene import Workshop
 from tests.hal.mujoco.conftest import MakeBox, held, never, on_table
 
 MM = 1e-3
@@ -72,16 +77,34 @@ def test_pads_hold_up_to_twice_mu_times_the_grip(box: MakeBox, force: float):
             assert (moved < 0.05 * MM) == holds
 
 
-def test_the_moment_that_flat_pads_hold_is_at_least_the_friction_limit_surface(box: MakeBox):
-    """Even pressure over the pad holds 2 mu F times the mean distance from its centre, 6.9 mm.
+@pytest.mark.parametrize(("width", "overlap"), [(17.5, 18.5), (10.0, 2.0), (2.0, 2.0), (2.0, 1.0)])
+def test_the_moment_that_pads_hold_is_that_of_their_contact(box: MakeBox, width: float, overlap: float):
+    """The pads' lower ends hold a box by its upper end, so that their contact is a rectangle, mm.
 
-    Contacts at the corners of four pieces hold up to 1.7 times as much.
+    Even pressure holds 2 mu F times the mean distance from the centre. Contacts at the corners of four pieces
+    hold more, but no pressure holds as much as all of it at the corners of the rectangle.
     """
-    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 401) * 17.5 * MM, np.linspace(-0.5, 0.5, 401) * 18.5 * MM)
-    limit = 2 * MU * 20.0 * float(np.hypot(x, y).mean())
-    block = box((0.03, 0.02, 0.04), 0.05)
-    assert shift(held(block), [0, 0, 0, 0, 0.95 * limit, 0])[1] < 0.01
-    assert shift(held(block), [0, 0, 0, 0, 1.7 * limit, 0])[1] > 0.1
+    contact = np.array([width, overlap]) * MM
+    x, y = (np.linspace(-0.5, 0.5, 401) * edge for edge in contact)
+    even = 2 * MU * 20.0 * float(np.hypot(*np.meshgrid(x, y)).mean())
+    most = 2 * MU * 20.0 * float(np.hypot(*contact)) / 2
+    block = box((max(contact[0], 2 * MM), 0.02, 0.04), 0.02)
+
+    def turned(moment: float) -> float:
+        simulation = held(block, height=0.04 + PAD_REACH - contact[1])
+        return shift(simulation, [0, 0, 0, 0, moment, 0])[1]
+
+    assert turned(0.95 * even) < 0.01
+    assert turned(min(1.35 * even, most) if width > 2 else most) > 0.1
+
+
+def test_pads_that_touch_at_one_point_resist_turning_by_the_radius_of_their_patch(tmp_path: Path):
+    """A slab with a pyramid's tip at each pad: 2 mu F r, as the forces have no lever."""
+    slab = [(x, y, z) for x in (-15, 15) for y in (-6, 6) for z in (-15, 15)]
+    tips = Workshop(tmp_path).part("tips", h.convex(np.array([*slab, (0, -10, 0), (0, 10, 0)], float)), 0.02)
+    limit = 2 * MU * 20.0 * MujocoPhysics().pad_patch_radius
+    assert shift(held(tips, height=0.015), [0, 0, 0, 0, 0.8 * limit, 0])[1] < 0.01
+    assert shift(held(tips, height=0.015), [0, 0, 0, 0, 1.1 * limit, 0])[1] > 0.1
 
 
 def test_a_held_part_does_not_creep(box: MakeBox):
