@@ -1,9 +1,9 @@
 """Time of a plan. Run: python -m tests.benchmarks.plan_speed --help.
 
 In one run, in turn, on the same frames of the simulated cell with the same number of candidates: our
-planner and model, and the same planner around the paper's network in plain PyTorch, with weights that learned
-nothing. Timed is the whole of `Planner.plan`: finding the part, drawing candidates, cropping, both networks,
-choosing.
+planner and model, and the planner as in the paper around its network in plain PyTorch, with weights that
+learned nothing. Timed is the whole of `Planner.plan`: finding the part, drawing candidates, cropping, both
+networks, choosing.
 """
 
 from __future__ import annotations
@@ -62,9 +62,11 @@ def main() -> int:
     options = parser.parse_args()
     torch.set_num_threads(min(2, os.cpu_count() or 1))
     device = "cuda" if torch.cuda.is_available() else "cpu"
+    ours = PlannerConfig(n_candidates=options.candidates)
+    paper = ours.model_copy(update={"chunk_size": 32, "recentre": False})
     planners = {
-        OURS: planner(load_models(options.models, device), PlannerConfig(n_candidates=options.candidates)),
-        PAPER: planner(fresh("paper", device), PlannerConfig(n_candidates=options.candidates, chunk_size=32)),
+        OURS: planner(load_models(options.models, device), ours),
+        PAPER: planner(fresh("paper", device), paper),
     }
     shown = frames(options.frames)
     timed: dict[str, list[list[Timed]]] = {name: [[] for _ in shown] for name in planners}
