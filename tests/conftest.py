@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import signal
 from pathlib import Path
 
-# One core a process: the tests measure nothing, and torch's and Mesa's threads only get in each other's way.
-os.environ.setdefault("LP_NUM_THREADS", "1")
+# One core a process, here and in all that are started: the tests measure nothing, and threads of torch,
+# OpenBLAS and Mesa only get in each other's way. Read when those are loaded.
+os.environ |= {"OMP_NUM_THREADS": "1", "LP_NUM_THREADS": "1"} | os.environ
 
 import pytest
-import torch
 from hypothesis import settings
 
 from tests.collecting import collect
@@ -46,9 +47,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: rank.get(item.path, len(rank)))
 
 
-@pytest.fixture(scope="session", autouse=True)
-def two_threads() -> None:
-    torch.set_num_threads(2)
+def pytest_collection_finish() -> None:
+    """Simulators collect garbage at every new scene; the modules loaded by now need no scan."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import cv2
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from hal.kinect2.images import HEIGHT, WIDTH
 
@@ -71,6 +70,10 @@ class Registration:
 
 def _filled(depth: np.ndarray) -> np.ndarray:
     """Depth with the nearest valid pixel where it is invalid."""
+    from scipy.ndimage import (
+        distance_transform_edt,
+    )  # not for the driver's process, which starts without SciPy
+
     invalid = ~np.isfinite(depth)
     nearest: np.ndarray = distance_transform_edt(invalid, return_distances=False, return_indices=True)  # pyright: ignore[reportAssignmentType]
     return depth[tuple(nearest)]

@@ -55,7 +55,8 @@ def demonstrate(config: DemoConfig) -> Demo:
         with open_cell(SIMULATED_CELL) as cell:
             world = cell.feeder
             assert isinstance(world, SapienWorld)
-            planner = make_planner(PRETRAINED, PlannerConfig(), cell)
+            # Recentred, the part would hardly move, and there would be little to see.
+            planner = make_planner(PRETRAINED, PlannerConfig(recentre=False), cell)
             present(cell, str(part.folder), config.seed)
             done()
             frame = capture_at_home(cell)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import torch
 import trimesh
 
 from mskgrasp.assess.__main__ import main
@@ -20,13 +18,6 @@ from mskgrasp.trials.placed_trial import PlacedTrial
 from tests.assess.made_trials import made
 from tests.browser import Page
 from tests.planning.test_certified import certified, certified_grasp
-
-
-@pytest.fixture(autouse=True)
-def threads() -> Iterator[None]:
-    before = torch.get_num_threads()
-    yield
-    torch.set_num_threads(before)  # the simulated cells set one
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import torch
 
 from mskgrasp.benchmark.__main__ import main
 from mskgrasp.benchmark.part_list import BenchmarkPart
@@ -19,13 +17,6 @@ from mskgrasp.trials.placed_trial import PlacedTrial
 from tests.programs import Ended, run_here
 
 PROGRAM = f"{shlex.quote(sys.executable)} {Path(__file__).parents[2] / 'examples' / 'planner_program.py'}"
-
-
-@pytest.fixture(autouse=True)
-def threads() -> Iterator[None]:
-    before = torch.get_num_threads()
-    yield
-    torch.set_num_threads(before)  # the simulated cells set one
 
 
 def run(out: Path, *arguments: object) -> Ended:

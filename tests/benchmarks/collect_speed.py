@@ -13,8 +13,6 @@ import argparse
 import json
 import logging
 import os
-import shlex
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -36,12 +34,11 @@ from sapien.physx import PhysxCpuSystem
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.run import plan_shards
 from mskgrasp.collect.workers import make_shards
-from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import PAD_REACH
 from mskgrasp.core.settings import REGION, ExecutionNoise, Overhead, Physics
 from mskgrasp.parts import Part, find_part, starter_names
-from mskgrasp.runtime.console_table import Table, print_table
+from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.worker_pool import JobResult
 from mskgrasp.simulation.shard import Simulator, draw_attempt
@@ -50,6 +47,7 @@ from mskgrasp.simulation.versions import versions
 from tasks import GraspDisplacementEnv
 from tasks.scene.renderer import render_backend
 from tests.benchmarks.raw_sapien import RawSapien
+from tests.benchmarks.report import show
 
 Draw = tuple[np.ndarray, np.ndarray, np.ndarray]
 """The part's pose (7,), the grasp (4,), and where the hand comes from (4,)."""
@@ -82,7 +80,7 @@ def main() -> None:
         "--shards", type=int, default=2,
         help="shards of 25 attempts a part for the scaling (default 2); 0: it is not measured",
     )  # fmt: skip
-    parser.add_argument("--out", type=Path, help="folder for report.json")
+    parser.add_argument("--out", type=Path, help="folder of report.json and report.md")
     parser.add_argument(
         "--endurance", type=int, default=0,
         help="only let one worker make so many attempts, 10000 say, and compare each tenth of them",
@@ -357,7 +355,7 @@ def largest_child(field: str = "VmHWM") -> float:
 def report(
     rows: list[Row], rates: list[dict[str, float]], parts: list[str], options: argparse.Namespace
 ) -> None:
-    """Prints tables and the numbers for programs, and writes ``report.json`` where a folder is given."""
+    """Prints tables and the numbers for programs, and writes them where a folder is given."""
     ours = rows[-1]
     rate = {row.program: row.grasps / row.seconds for row in rows}
     table = Table(
@@ -370,7 +368,7 @@ def report(
             for row in rows
         ],
     )  # fmt: skip
-    print_table(table)
+    tables = [table]
     default, same, raw = (round(rate[ours.program] / rate[row.program], 2) for row in rows[:-1])
     result = {
         "ours_over_maniskill_default": default,
@@ -382,18 +380,14 @@ def report(
     if rates:
         one, two = rates
         steady = [(n + 1, f"{one['grasps_per_s']:.2f}", f"{one['gib']:.2f}") for n, one in enumerate(rates)]
-        print_table(Table(header=("workers", "grasps/s, wall time", "largest worker, GiB"), rows=steady))
+        tables.append(Table(header=("workers", "grasps/s, wall time", "largest worker, GiB"), rows=steady))
         result["scaling_2"] = round(two["grasps_per_s"] / one["grasps_per_s"], 2)
         result["worker_gib"] = round(max(one["gib"], two["gib"]), 2)
-    if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)
-        stored = dict(
-            command="python -m tests.benchmarks.collect_speed " + shlex.join(sys.argv[1:]),
-            parts=parts, n=ours.grasps, seeds=[SEED], versions=versions(), physics=Physics().model_dump(),
-            maniskill_physics=MANISKILL, rows=[asdict(row) for row in rows], workers=rates, result=result,
-        )  # fmt: skip
-        write_whole(options.out / "report.json", (json.dumps(stored, indent=1) + "\n").encode())
-        print(f"wrote {options.out / 'report.json'}")
+    values = dict(
+        parts=parts, n=ours.grasps, seeds=[SEED], versions=versions(), physics=Physics().model_dump(),
+        maniskill_physics=MANISKILL, rows=[asdict(row) for row in rows], workers=rates, result=result,
+    )  # fmt: skip
+    show(tables, options.out, values)
     print(json.dumps(result))
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 import trimesh
 
 from mskgrasp.dataset import shard_path, write_shard
@@ -19,14 +17,6 @@ from tests import synthetic
 
 SIDES = ("train",) * 5 + ("validation",) * 2 + ("test",)
 ATTEMPTS = 48
-
-
-@pytest.fixture(autouse=True)
-def one_thread() -> Iterator[None]:
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -232,25 +232,32 @@ def test_parts_that_the_first_shard_shows_outside_the_filter_get_no_further_shar
             ]
 
 
-def test_a_dataset_is_made_again_from_its_labels(collected, tmp_path):
-    export_labels(collected, tmp_path / "all.labels")
-    done = collect(tmp_path / "again", "--labels", str(tmp_path / "all.labels"))
-    assert done.returncode == 0, done.stderr
-    for path in list_shards(collected):
-        (one, _), (two, _) = read_shard(path), read_shard(tmp_path / "again" / "shards" / path.name)
-        assert np.array_equal(one.depth, two.depth) and np.array_equal(one.failure, two.failure)
-    other = collect(tmp_path / "other", "--labels", str(tmp_path / "all.labels"), "--seed", "6")
-    assert other.returncode == 1 and "other settings (seed differ)" in other.stderr
-    with h5py.File(tmp_path / "all.labels", "r+") as file:
+def test_a_dataset_is_made_again_from_its_labels_but_for_a_part_that_has_changed(collected, tmp_path):
+    labels, again = tmp_path / "all.labels", tmp_path / "again"
+    export_labels(collected, labels)
+    with h5py.File(labels, "r+") as file:
         shards = json.loads(file["shards"][:].tobytes())
+        changed = shards[0]["part"]
         shards[0]["part_hash"] = "0" * 16
         del file["shards"]
         file["shards"] = np.frombuffer(json.dumps(shards).encode(), np.uint8)
-    changed = collect(tmp_path / "changed", "--labels", str(tmp_path / "all.labels"))
-    assert "1 of 2 parts are not exactly those of --labels" in changed.stderr
+    done = collect(again, "--labels", str(labels), "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    assert "1 of 2 parts are not exactly those of --labels" in done.stderr
     for path in list_shards(collected):
-        (one, _), (two, info) = read_shard(path), read_shard(tmp_path / "changed" / "shards" / path.name)
+        (one, _), (two, info) = read_shard(path), read_shard(again / "shards" / path.name)
         assert info.part_hash != "0" * 16 and np.array_equal(one.grasp, two.grasp)
-    nowhere = collect(tmp_path / "other", "--labels", str(tmp_path / "none.labels"))
-    assert nowhere.returncode == 2 and "no file of labels" in nowhere.stderr
+        if info.part != changed:
+            assert np.array_equal(one.depth, two.depth) and np.array_equal(one.failure, two.failure)
+
+
+@pytest.mark.parametrize(
+    ("labels", "seed", "code", "message"),
+    [("all", "6", 1, "other settings (seed differ)"), ("none", "5", 2, "no file of labels")],
+)
+def test_labels_of_another_dataset_or_none_are_refused(collected, tmp_path, labels, seed, code, message):
+    export_labels(collected, tmp_path / "all.labels")
+    chosen = ("--labels", str(tmp_path / f"{labels}.labels"), "--seed", seed)
+    done = run_here(main, *arguments(tmp_path / "other", *chosen))
+    assert done.returncode == code and message in done.stderr
     assert not (tmp_path / "other").exists()

@@ -6,7 +6,6 @@ import io
 import json
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import pytest
 from hal.operator import StoppedByOperator
 from hal.sim import SapienArm
 from mskgrasp.core.errors import MskgraspError, UsageError
+from mskgrasp.evaluate.__main__ import main
 from mskgrasp.evaluate.config import EvaluateConfig
 from mskgrasp.evaluate.run import estimate, evaluate
 from mskgrasp.learning.grasp_models import PRETRAINED
@@ -30,6 +30,7 @@ from mskgrasp.trials.trial_files import read_trial, trial_file
 from tests.boxes import make_box
 from tests.browser import Page
 from tests.hal.real_cell import measured_cell
+from tests.programs import run_here
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -44,11 +45,6 @@ def config(out: Path, **changes: Any) -> EvaluateConfig:
 
 def trials(out: Path) -> dict[str, Trial]:
     return {trial.key: trial for trial in read_trials(out / TRIALS, Trial.from_json)}
-
-
-def program(*options: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "mskgrasp.evaluate", *options]
-    return subprocess.run(command, capture_output=True, text=True, cwd=REPOSITORY, timeout=250)
 
 
 @pytest.fixture(scope="module")
@@ -172,12 +168,11 @@ def test_tape_agrees_with_the_tracker_or_measures_nothing(tmp_path: Path):
 
 
 def test_a_run_without_a_success_reports_and_its_trial_is_replayed(tmp_path: Path):
-    """As on the command line; no candidate has the required quality."""
+    """No candidate has the required quality."""
     out = tmp_path / "out"
-    done = program(
-        "--models", str(PRETRAINED), "--parts", "hex_nut_m30", "--trials", "1", "--workers", "1",
-        "--out", str(out), "--planner.n-candidates", "20",
-        "--planner.min-quality", "1",
+    done = run_here(
+        main, "--models", str(PRETRAINED), "--parts", "hex_nut_m30", "--trials", "1", "--workers", "1",
+        "--out", str(out), "--planner.n-candidates", "20", "--planner.min-quality", "1",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "0 of 1" in done.stdout and "refused 1" in done.stdout and "nan" not in done.stdout
@@ -185,7 +180,7 @@ def test_a_run_without_a_success_reports_and_its_trial_is_replayed(tmp_path: Pat
     (refused,) = trials(out).values()
     assert refused.reason == "refused" and refused.grasp is None and 0 < (refused.quality or 0) < 1
     assert "refused, as no grasp was worth trying: 1 of 1 (100%), counted as not lifted" in done.stdout
-    again = program("--replay", str(out), "hex_nut_m30-000")
+    again = run_here(main, "--replay", str(out), "hex_nut_m30-000")
     assert again.returncode == 0, again.stderr
     assert "not tried (refused: no grasp found (best quality 0." in again.stdout
     assert (out / "replay" / "hex_nut_m30-000.png").exists()

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.programs import running
+from mskgrasp.benchmark.__main__ import main
+from tests.programs import run_here, running
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -53,24 +54,16 @@ def test_the_maniskill_task_runs_in_a_loop():
     assert re.search(r"^[1-3] of 3 lifted, median shift [\d.]+ mm$", printed, re.MULTILINE)
 
 
-def placed_by(planner: str, folder: Path, **variables: str) -> dict:
+def placed_by(planner: str, folder: Path, *options: str) -> dict:
     """The row of a planner in the report of a small benchmark."""
-    arguments = ["--parts", "t_nut_m16x18", "--trials", "1", "--workers", "1", "--out", str(folder / "out")]
-    if planner == "program":
-        arguments += ["--program", f"{sys.executable} {EXAMPLES / 'planner_program.py'}"]
-    done = subprocess.run(
-        [sys.executable, "-m", "mskgrasp.benchmark", "--planners", planner, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([*variables.values(), str(EXAMPLES.parent)])},
-    )
+    few = ("--parts", "t_nut_m16x18", "--trials", "1", "--workers", "1")
+    done = run_here(main, "--planners", planner, *few, "--out", str(folder / "out"), *options)
     assert done.returncode == 0, done.stderr
     (row,) = json.loads((folder / "out" / "report.json").read_text())["rows"]
     return row
 
 
-def test_a_planner_of_ones_own_takes_part_in_the_benchmark(tmp_path):
+def test_a_planner_of_ones_own_takes_part_in_the_benchmark(tmp_path, monkeypatch):
     code = (EXAMPLES / "own_planner.py").read_text(encoding="utf-8")
     (name, value) = re.search(r'^    (\w+) = "(own_planner:\w+)"$', code, re.MULTILINE).groups()
     site = tmp_path / "site"
@@ -79,10 +72,12 @@ def test_a_planner_of_ones_own_takes_part_in_the_benchmark(tmp_path):
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: own_planner\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(f"[mskgrasp.planners]\n{name} = {value}\n")
     (site / "own_planner.py").write_text(code)
-    row = placed_by(name, tmp_path, site=str(site))
+    monkeypatch.syspath_prepend(site)
+    row = placed_by(name, tmp_path)
     assert row["planner"] == "highest" and row["lifted"]["of"] == 1
 
 
 def test_a_planner_program_takes_part_in_the_benchmark(tmp_path):
-    row = placed_by("program", tmp_path)
+    program = f"{sys.executable} {EXAMPLES / 'planner_program.py'}"
+    row = placed_by("program", tmp_path, "--program", program)
     assert row["planner"] == "program" and row["lifted"]["of"] == 1

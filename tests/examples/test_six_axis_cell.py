@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from mskgrasp.plan.__main__ import main
+from tests.programs import run_here
+
 REPOSITORY = Path(__file__).parents[2]
 PACKAGE = REPOSITORY / "examples" / "six_axis_cell"
 
@@ -69,12 +72,14 @@ def test_the_doctor_names_the_package_of_each_device(site: Path, tmp_path: Path)
     ],
 )
 def test_a_wrong_file_is_one_line_and_exit_code_2(
-    site: Path, tmp_path: Path, old: str, new: str, message: str
+    site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, old: str, new: str, message: str
 ):
+    monkeypatch.syspath_prepend(site)
+    monkeypatch.chdir(tmp_path)
     text = (PACKAGE / "cell.yaml").read_text()
     assert old in text
-    (tmp_path / "cell.yaml").write_text(text.replace(old, new))
-    done = python(site, tmp_path, "-m", "mskgrasp.plan", "--cell", "cell.yaml", "--out", "plan")
+    Path("cell.yaml").write_text(text.replace(old, new))
+    done = run_here(main, "--cell", "cell.yaml", "--out", "plan")
     assert done.returncode == 2 and message in done.stderr, done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
-    assert not (tmp_path / "plan" / "plan.json").exists()
+    assert not Path("plan", "plan.json").exists()

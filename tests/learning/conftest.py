@@ -1,21 +1,10 @@
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import torch
 
 from mskgrasp.learning.samples import Samples, read_samples
 from tests import synthetic
 from tests.learning.small import PATCH
-
-
-@pytest.fixture(autouse=True)
-def one_thread() -> Iterator[None]:
-    # On busy cores threads that wait for each other make such small networks ten times slower.
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 @pytest.fixture(scope="session")

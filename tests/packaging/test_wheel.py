@@ -81,7 +81,20 @@ def test_a_shipped_example_is_planned_from_an_empty_folder(installed, tmp_path):
     assert (folder / "out" / "plan" / "plan.png").stat().st_size > 0
 
 
-@pytest.mark.parametrize("program", ["collect", "train", "evaluate", "palletize", "validate"])
-def test_a_program_finds_its_shipped_settings_from_an_empty_folder(installed, tmp_path, program):
-    printed = _run([str(installed / "mskgrasp"), program, "--help"], tmp_path).stdout
-    assert "usage" in printed
+def test_programs_find_their_shipped_settings_from_an_empty_folder(installed, tmp_path):
+    """One after the other in one process, which imports torch and the simulator once."""
+    code = """
+import sys
+from mskgrasp.__main__ import main
+
+for program in ("collect", "train", "evaluate", "palletize", "validate"):
+    sys.argv = ["mskgrasp", program, "--help"]
+    try:
+        main()
+    except SystemExit as ended:
+        print(program, ended.code)
+"""
+    printed = _run([str(installed / "python"), "-c", code], tmp_path).stdout
+    assert printed.count("usage: ") == 5
+    for program in ("collect", "train", "evaluate", "palletize", "validate"):
+        assert f"\n{program} 0\n" in printed

@@ -5,13 +5,11 @@ from __future__ import annotations
 import io
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import torch
 import yaml
 
 from hal import Cell, GraspResult, execute_grasp
@@ -29,13 +27,6 @@ from tests.hal.test_operator import REAL
 
 REPOSITORY = Path(__file__).parents[2]
 PART = "t_nut_m16x18"
-
-
-@pytest.fixture(autouse=True)
-def threads() -> Iterator[None]:
-    before = torch.get_num_threads()
-    yield
-    torch.set_num_threads(before)  # the program sets one
 
 
 def config(out: Path, **changes: object) -> PalletizeConfig:

@@ -69,7 +69,10 @@ def test_a_held_out_set_of_the_catalogue_leaves_out_what_the_model_was_trained_o
     assert part_names(("train",), {}) == ["hex_nut_m20"]
 
 
-def test_all_is_the_starter_set_and_a_part_named_twice_counts_once():
+def test_all_is_the_starter_set_and_a_part_named_twice_counts_once(
+    shared_cache: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(shared_cache))
     assert part_names(("all", "washer_m36"), {}, 0) == list(starter_names())
 
 

@@ -130,3 +130,14 @@ def test_outside_the_image_is_table():
     heights = torch.full((160, 160), 0.02)
     patch = crop_patches(heights, torch.tensor([[0.455, 0.3, 0.0, 0.0]]), INTRINSICS, OVERHEAD)
     assert float(patch.abs().max()) == 0.0
+
+
+def test_an_image_ends_at_the_same_place_with_and_without_invalid_pixels():
+    heights = torch.full((160, 160), 0.02)
+    broken = heights.clone()
+    broken[-1, -1] = torch.nan  # in no patch
+    grasps = torch.tensor([[0.455, 0.13, 0.0, 0.2], [0.6, 0.13, 0.01, 0.7], [0.455, 0.0, 0.01, 0.7]])
+    whole, other = (crop_patches(image, grasps, INTRINSICS, OVERHEAD) for image in (heights, broken))
+    assert torch.allclose(whole, other, atol=1e-6)
+    edge = [float((patch == 0).float().mean()) for patch in whole]
+    assert 0.05 < edge[0] < 0.6 and 0.1 < edge[1] < 0.9 and edge[2] == 0

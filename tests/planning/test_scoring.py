@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import torch
 
-from mskgrasp.learning.grasp_models import ModelMeta, build_models
+from mskgrasp.learning.grasp_models import ModelMeta, build_models, load_models
 from mskgrasp.learning.network_config import HandNetworkConfig, Normalisation, PatchNetworkConfig
 from mskgrasp.perception.part_detection import view_part
-from mskgrasp.planning.scoring import Scene, displacements
+from mskgrasp.planning import scoring
+from mskgrasp.planning.scoring import Scene, displacements, qualities
 from tests import synthetic
 from tests.planning.hand_made import FRAME
 from tests.synthetic import REGION
@@ -48,3 +50,30 @@ def test_a_network_that_sees_the_part_is_reported_the_angle():
         x, y = models.gdn.outputs(models.gdn.features(prepared, action, height))[0][0, :2].tolist()
     cos, sin = np.cos(0.5), np.sin(0.5)
     np.testing.assert_allclose(mean[1, :2], [cos * x + sin * y, cos * y - sin * x], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("predict", "n", "sizes"),
+    [
+        (qualities, 1600, [400] * 4),
+        (qualities, 3601, [721] * 4 + [717]),
+        (displacements, 96, [24] * 4),  # seen in four views each
+        (displacements, 16, [8, 8]),
+        (displacements, 1, [1]),
+        (displacements, 0, []),
+    ],
+)
+def test_grasps_are_shared_out_evenly_among_two_batches_or_more(predict, n, sizes, monkeypatch):
+    seen = []
+
+    def noted(function, batches, device):
+        batches = list(batches)
+        seen.extend(len(batch.height) for batch in batches)
+        return [function(batch) for batch in batches]
+
+    monkeypatch.setattr(scoring, "map_batches", noted)
+    view = view_part(FRAME.depth, FRAME.intrinsics, FRAME.T_base_camera, table_z=0.0, region=REGION)
+    models = load_models()
+    scene = Scene.of(FRAME, view, 0.0, models.device)
+    predict(models, scene, np.tile(np.append(view.centre_base, 0.0), (n, 1)), 800)
+    assert seen == sizes

@@ -1,3 +1,3 @@
-from tests.learning.conftest import dataset, one_thread
+from tests.learning.conftest import dataset
 
-__all__ = ["dataset", "one_thread"]
+__all__ = ["dataset"]

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 from mskgrasp.validate.__main__ import main
 from tests.programs import run_here
 
-REPOSITORY = Path(__file__).parents[2]
-
 
 def test_the_production_settings_pass_every_closed_form_check(tmp_path):
-    done = validate("--no-convergence", "--parts", "hex_nut_m20", "--out", str(tmp_path / "out"))
+    done = run_here(main, "--no-convergence", "--parts", "hex_nut_m20", "--out", str(tmp_path / "out"))
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.splitlines()[-1] == "all checks passed"
     record = json.loads((tmp_path / "out" / "validate.json").read_text())
@@ -45,8 +40,3 @@ def test_an_output_folder_that_cannot_be_made_is_reported_before_any_part_is_loo
     (tmp_path / "file").write_text("in the way")
     done = run_here(main, "--parts", "no_such_part", "--out", str(tmp_path / "file" / "out"))
     assert done.returncode == 2 and "file is a file; choose another --out" in done.stderr
-
-
-def validate(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "mskgrasp.validate", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=REPOSITORY, timeout=300)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
-from scipy.stats import qmc
 
 from mskgrasp.perception.part_pose.known_part import MOST_COMPARED, KnownPart, Look, Lying
 from mskgrasp.perception.part_pose.likelihood import HeightTable, Pixels, Seen, view
@@ -17,8 +17,16 @@ LOOK_MODES = 6
 """The most of one look."""
 MOST_REFINED, NEAR_COST = 3, 30.0
 """So many resting poses of a look are refined at the end, if their cost exceeds the least by less."""
-_NORMALS = qmc.MultivariateNormalQMC(np.zeros(3), rng=np.random.default_rng(0)).random(64)
-_NORMALS[0] = 0.0
+
+
+@cache
+def _normals() -> np.ndarray:
+    """(64, 3) of a standard normal, the first in the middle."""
+    from scipy.stats import qmc  # takes most of a second to import
+
+    normals = qmc.MultivariateNormalQMC(np.zeros(3), rng=np.random.default_rng(0)).random(64)
+    normals[0] = 0.0
+    return normals
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,7 +170,7 @@ def improve(fit: Fit, seen: Seen, known: KnownPart, effort: Effort) -> Fit:
     table = HeightTable(seen_map, sigma=seen.sigma, soft=cell, flying=seen.pitch if seen.noisy else 0.0)
     chosen, weight = _informative(table, seen_map, pixels, fit.pose, seen, effort.pixels)
     some = pixels.take(chosen)
-    normals = _NORMALS[: effort.draws]
+    normals = _normals()[: effort.draws]
     reach = np.array([effort.reach, effort.reach, turns * min(1.5 * effort.reach / look.radius, 0.1)])
     least = 0.02e-3 / np.array([1.0, 1.0, look.radius])
     root, mean, covariance = np.diag(reach), fit.pose, np.diag(reach**2)

@@ -13,15 +13,18 @@ that the client loads for its dynamics. Faults are commanded on standard input, 
 
 from __future__ import annotations
 
+import math
 import selectors
 import struct
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from hal.franka.driver import column_major
 from hal.franka.frames import F_T_EE
 from mskgrasp.core.panda_kinematics import forward
 from tests.hal.franka.wire import Channel, GripperState, RobotState, Table, ask_for_priority
@@ -29,14 +32,26 @@ from tests.hal.franka.wire import Channel, GripperState, RobotState, Table, ask_
 VERSION, GRIPPER_VERSION = 5, 3
 CONNECT, MOVE, STOP_MOVE, SET_LOAD, RECOVER, LOAD_MODEL = 0, 1, 2, 10, 12, 13
 IDLE, MOVING, REFLEX, USER_STOPPED = 1, 2, 4, 5
-READY = np.array([0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398])
-INERTIA = np.array([1.0, 1.0, 1.0, 1.0, 0.3, 0.2, 0.1])
-FRICTION = np.array([0.5, 0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
+READY = [0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398]
+INERTIA = [1.0, 1.0, 1.0, 1.0, 0.3, 0.2, 0.1]
+FRICTION = [0.5, 0.5, 0.5, 0.5, 0.2, 0.2, 0.2]
 """N m of dry friction: leaves the impedance controller up to 4 mrad short of its goal."""
 COMMAND = struct.Struct("<Q 7d7d16d6d2d ?? 7d")
 TICK = 1e-3
 TURN_S = 3e-4
 ANSWERS = {"ok": 0, "fail": 1, "unsuccessful": 2, "aborted": 3}
+
+
+def pose_of(joints: Sequence[float]) -> list[float]:
+    """(16,) of the end effector in the base, column-major."""
+    return column_major(forward(np.array(joints))[0])
+
+
+def speed_after(speed: float, torque: float, friction: float, inertia: float) -> float:
+    """Of a joint a tick later, rad/s; friction stops it and does not turn it round."""
+    held = torque if speed == 0 else math.copysign(friction, speed)
+    after = speed + (torque - min(max(held, -friction), friction)) / inertia * TICK
+    return 0.0 if after * speed < 0 else after
 
 
 @dataclass
@@ -46,9 +61,9 @@ class Robot:
     model: bytes
     channel: Channel
     version: int = VERSION
-    q: np.ndarray = field(default_factory=READY.copy)
-    dq: np.ndarray = field(default_factory=lambda: np.zeros(7))
-    torque: np.ndarray = field(default_factory=lambda: np.zeros(7))
+    q: Sequence[float] = field(default_factory=READY.copy)
+    dq: Sequence[float] = (0.0,) * 7
+    torque: Sequence[float] = (0.0,) * 7
     mode: int = IDLE
     motion: int = 0
     generator: int = 0
@@ -56,8 +71,9 @@ class Robot:
     reflexes: tuple[int, ...] = ()
     answered: bool = False
     tick: int = 0
-    pose: np.ndarray = field(default_factory=lambda: forward(READY)[0])
-    f_t_ee: np.ndarray = field(default_factory=lambda: F_T_EE)
+    stale: bool = False
+    pose: Sequence[float] = field(default_factory=lambda: pose_of(READY))
+    f_t_ee: Sequence[float] = field(default_factory=lambda: column_major(F_T_EE))
     table: Table | None = None
     ee_mass: float = 0.73
     load: tuple[float, ...] = (0.0,) * 13
@@ -71,14 +87,12 @@ class Robot:
         if self.channel.left:
             self.channel.left = False
             self.finish(None, IDLE if self.mode == MOVING else self.mode)
-        push = self.torque - np.clip(
-            np.where(self.dq == 0, self.torque, np.sign(self.dq) * FRICTION), -FRICTION, FRICTION
-        )
-        speed = self.dq + push / INERTIA * TICK
-        self.dq = np.where(speed * self.dq < 0, 0.0, speed)
-        self.q = self.q + self.dq * TICK
-        if self.tick % 5 == 0:
-            self.pose = forward(self.q)[0]
+        if any(self.torque) or any(self.dq):
+            self.dq = [*map(speed_after, self.dq, self.torque, FRICTION, INERTIA)]
+            self.q = [q + dq * TICK for q, dq in zip(self.q, self.dq, strict=True)]
+            self.stale = True
+        if self.tick % 5 == 0 and self.stale:
+            self.pose, self.stale = pose_of(self.q), False
         self.channel.send_state(
             RobotState(
                 tick=self.tick,
@@ -91,7 +105,7 @@ class Robot:
                 controller=self.controller,
                 mode=self.mode,
                 reflexes=self.reflexes,
-                pushed_up=0.0 if self.table is None else self.table.push(self.pose[0, 3], self.pose[2, 3]),
+                pushed_up=0.0 if self.table is None else self.table.push(self.pose[12], self.pose[14]),
                 ee_mass=self.ee_mass,
                 load=self.load,
             ).pack()
@@ -135,7 +149,7 @@ class Robot:
         if values[40]:  # motion_generation_finished
             self.finish(0, IDLE)
         else:
-            self.torque = np.array(values[41:48])
+            self.torque = values[41:48]
 
     def finish(self, status: int | None, mode: int) -> None:
         """Ends the motion, if there is one, with its status; the brakes hold."""
@@ -143,7 +157,7 @@ class Robot:
             self.channel.reply(MOVE, self.motion, bytes([status]))
         self.motion, self.mode, self.generator, self.controller = 0, mode, 0, 3
         self.answered = False
-        self.torque, self.dq = np.zeros(7), np.zeros(7)
+        self.torque = self.dq = (0.0,) * 7
 
     def fault(self, words: list[str]) -> None:
         match words[0]:
@@ -159,7 +173,7 @@ class Robot:
             case "hand":
                 self.ee_mass = float(words[1])
             case "flange":
-                self.f_t_ee = np.eye(4)  # no end effector is chosen in Desk
+                self.f_t_ee = column_major(np.eye(4))  # no end effector is chosen in Desk
 
 
 @dataclass
@@ -184,7 +198,7 @@ class Hand:
             self.handle(command, number, payload)
         self.channel.left = False
         closed = max(self.goal, self.part)
-        self.width += float(np.clip(closed - self.width, -self.speed * TICK, self.speed * TICK))
+        self.width += min(max(closed - self.width, -self.speed * TICK), self.speed * TICK)
         if self.pending is not None and abs(self.width - closed) < 1e-6:
             command, number, _ = self.pending
             self.pending = None

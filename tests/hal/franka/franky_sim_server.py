@@ -31,6 +31,7 @@ from franky_sim.franka_robot_state import FrankaRobotState
 from franky_sim.franka_server import BaseCommand
 from franky_sim.mujoco_simulator import MujocoSimulator
 
+from tests.hal.franka.quick_franky_sim import QuickSimulator, pack_state, replace
 from tests.hal.franka.wire import Table, ask_for_priority
 
 _LATE_S = 0.005
@@ -123,8 +124,9 @@ class Answers:
 
 
 def main() -> None:
+    FrankaRobotState.replace, FrankaRobotState.pack_state = replace, pack_state  # type: ignore[method-assign]
     answers = Answers()
-    with MujocoSimulator() as simulator:
+    with QuickSimulator() as simulator:
         simulator.add_robot()
         with franky_sim.SimulationServer(simulator, hostname_candidates=[sys.argv[1]]) as server:
             robot = server.robot_servers[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import os
 import shutil
@@ -95,7 +96,8 @@ def franky_sim(host: str | None = None) -> Iterator[FakeRobot]:
 def fci5(host: str | None = None, version: int = 5) -> Iterator[FakeRobot]:
     """A Panda that panda_py can drive: our own server."""
     with tempfile.TemporaryDirectory() as folder:
-        model = build_model(Path(folder))
+        model = Path(folder, "model.so")
+        model.write_bytes(robot_model())
         arguments = [str(model), str(version)]
         with _serve("tests.hal.franka.fci5_server", host or next(HOSTS), arguments) as robot:
             yield robot
@@ -171,15 +173,17 @@ def plain_path(path: JointPath) -> dict[str, list]:
     return {key: np.asarray(value).tolist() for key, value in vars(path).items()}
 
 
-def build_model(folder: Path) -> Path:
+@functools.cache
+def robot_model() -> bytes:
     """The shared object with the robot's dynamics, which a client loads from the robot: here without any."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         pytest.fail("no C compiler for the stub of the robot's model: apt-get install gcc libc6-dev")
-    source, library = folder / "model.c", folder / "model.so"
-    source.write_text("".join(f"void {name}(void) {{}}\n" for name in _SYMBOLS))
-    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True)
-    return library
+    with tempfile.TemporaryDirectory() as folder:
+        source, library = Path(folder, "model.c"), Path(folder, "model.so")
+        source.write_text("".join(f"void {name}(void) {{}}\n" for name in _SYMBOLS))
+        subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True)
+        return library.read_bytes()
 
 
 @contextmanager

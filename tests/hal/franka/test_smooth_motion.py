@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from franky_sim.constants import DEFAULT_INITIAL_JOINT_POS
 from scipy.spatial.transform import Rotation
 
 from hal.franka import FrankyArmConfig
@@ -182,10 +183,12 @@ def test_panda_py_is_commanded_along_a_straight_line_as_smooth_as_planned(
 
 
 @pytest.fixture(scope="module")
-def free() -> Iterator[FakeRobot]:
-    """A robot of its own: one that a link holds takes no second client."""
-    with franky_sim() as robot:
-        yield robot
+def free(robot: FakeRobot, link: DriverLink, tmp_path_factory: pytest.TempPathFactory) -> FakeRobot:
+    """The same robot, let go by the link, as it takes no second client; it stands where it began."""
+    link.close()
+    with arm_at(tmp_path_factory.mktemp("free"), "franky", robot.host) as arm:
+        arm.move_to_joints(np.array(DEFAULT_INITIAL_JOINT_POS), speed=1.0)
+    return robot
 
 
 @pytest.mark.parametrize(

@@ -7,33 +7,35 @@ import os
 import select
 import socket
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from mskgrasp.core.grasp import PAD_REACH
 
 STATE = struct.Struct("<Q 96d d9d3d d9d3d 2d2d 56d 7d6d7d6d 7d6d6d6d3d 2d2d2d 16d6d6d 7d7d B B 41? 41? B d")
 GRIPPER_STATE = struct.Struct("<Idd?H")
 assert STATE.size == 2373 and GRIPPER_STATE.size == 23
+_EYE = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+_ZEROS = (0.0,) * 33
+_NO_ERRORS = (False,) * 41
 _STIFFNESS = 2e4
 """Stiffness of a table, N/m."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True)
 class RobotState:
     """What a tick of the robot tells; the rest of the message is zero.
 
-    A load is as the client states it: mass, centre (3,), inertia (9,).
+    A load is as the client states it: mass, centre (3,), inertia (9,). Poses are column-major (16,).
+    Packed a thousand times a second, hence without arrays.
     """
 
     tick: int
-    pose: np.ndarray
-    f_t_ee: np.ndarray
-    q: np.ndarray
-    dq: np.ndarray
-    torque: np.ndarray
+    pose: Sequence[float]
+    f_t_ee: Sequence[float]
+    q: Sequence[float]
+    dq: Sequence[float]
+    torque: Sequence[float]
     generator: int
     controller: int
     mode: int
@@ -43,24 +45,20 @@ class RobotState:
     load: tuple[float, ...] = (0.0,) * 13
 
     def pack(self) -> bytes:
-        pose, eye = self.pose.flatten(order="F"), np.eye(4).flatten()
-        tool = self.f_t_ee.flatten(order="F")
-        zeros = np.zeros(7)
-        numbers = np.concatenate(
-            [
-                *(pose, pose, tool, eye, tool, eye),
-                # The Franka Hand's mass, inertia and centre as Desk has them; then the load's.
-                *([self.ee_mass], np.diag([0.001, 0.0025, 0.0017]).flatten(), [-0.01, 0.0, 0.03]),
-                *(self.load[:1], self.load[4:], self.load[1:4], np.zeros(4)),
-                # The client limits the change of its torques against the last that it finds here.
-                *(self.torque, self.torque, zeros, self.q, self.q, self.dq, zeros, zeros),
-                *(np.zeros(26), zeros, [0.0, 0.0, self.pushed_up, 0.0, 0.0, 0.0], np.zeros(15), np.zeros(6)),
-                *(pose, np.zeros(12), self.q, zeros),
-            ]
-        )
-        reason = [k in self.reflexes for k in range(41)]
+        pose, tool = self.pose, self.f_t_ee
         return STATE.pack(
-            self.tick, *numbers, self.generator, self.controller, *[False] * 41, *reason, self.mode, 1.0
+            self.tick,
+            *(*pose, *pose, *tool, *_EYE, *tool, *_EYE),
+            # The Franka Hand's mass, inertia and centre as Desk has them; then the load's.
+            *(self.ee_mass, 0.001, 0, 0, 0, 0.0025, 0, 0, 0, 0.0017, -0.01, 0.0, 0.03),
+            *(self.load[0], *self.load[4:], *self.load[1:4], *_ZEROS[:4]),
+            # The client limits the change of its torques against the last that it finds here.
+            *(*self.torque, *self.torque, *_ZEROS[:7], *self.q, *self.q, *self.dq, *_ZEROS[:14]),
+            *(*_ZEROS[:33], 0.0, 0.0, self.pushed_up, 0.0, 0.0, 0.0, *_ZEROS[:21]),
+            *(*pose, *_ZEROS[:12], *self.q, *_ZEROS[:7]),
+            *(self.generator, self.controller, *_NO_ERRORS),
+            *(_NO_ERRORS if not self.reflexes else [k in self.reflexes for k in range(41)]),
+            *(self.mode, 1.0),
         )
 
 
