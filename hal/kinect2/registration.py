@@ -70,9 +70,7 @@ class Registration:
 
 def _filled(depth: np.ndarray) -> np.ndarray:
     """Depth with the nearest valid pixel where it is invalid."""
-    from scipy.ndimage import (
-        distance_transform_edt,
-    )  # not for the driver's process, which starts without SciPy
+    from scipy.ndimage import distance_transform_edt  # the driver's process starts sooner without SciPy
 
     invalid = ~np.isfinite(depth)
     nearest: np.ndarray = distance_transform_edt(invalid, return_distances=False, return_indices=True)  # pyright: ignore[reportAssignmentType]

@@ -22,7 +22,7 @@ class EvaluateConfig(Config):
     models: Path = PRETRAINED
     """Folder with model.safetensors and model.json; by default the shipped one. It predicts the qualities."""
     experiment: Experiment = "success"
-    """success: the policy of --planner.policy. displacement: both policies, known and novel parts apart, and
+    """success: the policy of --planner.policy. displacement: three policies, known and novel parts apart, and
     certified grasps where --planner.policy is certified."""
     cell: Path = SIMULATED_CELL
     """YAML file of the cell; by default the simulated one."""

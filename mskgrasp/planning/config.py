@@ -13,7 +13,7 @@ MIN_QUALITY = 0.5
 
 
 class PlannerConfig(Config):
-    """Settings of the search and the selection; the defaults are the paper's."""
+    """Settings of the search and the selection; the defaults are the paper's but for ``recentre``."""
 
     n_candidates: int = Field(default=3200, ge=1, le=1_000_000)
     top_fraction: float = Field(default=0.03, gt=0.0, le=1.0)
