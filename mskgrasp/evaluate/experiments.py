@@ -153,7 +153,8 @@ def scenes(
     """List the trials of an experiment by scene: those of one part and number share a scene.
 
     In the displacement experiment all models predict the grasp of the best quality. Each model with
-    variances, and LOWESS, chooses two more in the scene: among the best, and among these and those recentred.
+    variances, and LOWESS, chooses two more in the scene: among the best, and among these and those recentred
+    (without ``planner.recentre`` the first alone).
 
     Args:
         parts: Name or folder of each part as given by the user, by its name.
@@ -177,6 +178,7 @@ def scenes(
                 for one in choosers
                 if number < most.get(one, n_trials)
                 for policy in CHOSEN
+                if planner.recentre or policy != "recentred"
             ]
             if planner.policy == "certified":
                 more.append(replace(task, policy="certified", chosen_by=CERTIFIED))

@@ -1,4 +1,4 @@
-"""How far apart the faces of a part are by which two fingers could hold it."""
+"""Least width between two contacts by which a gripper could hold a part, for each resting pose."""
 
 from __future__ import annotations
 

@@ -70,6 +70,9 @@ def test_every_model_with_variances_chooses_two_more_grasps_in_a_scene_and_lowes
         ("low_variance", LOWESS), ("recentred", LOWESS),
     ]  # fmt: skip
     assert [task.key for task in known][:3] == [f"{PART}-000", f"{PART}-000-net", f"{PART}-000-net-recentred"]
+    as_paper = PlannerConfig(policy="low_variance", recentre=False)
+    (plain,) = scenes({PART: PART}, 1, 0, as_paper, compared)
+    assert plain == tuple(task for task in known if task.policy != "recentred")
     (novel,) = scenes({"washer_m36": "washer_m36"}, 1, 0, PlannerConfig(), compared)
     assert [task.chosen_by for task in novel] == ["", "net", "net"]
     assert compared.lowess is not None and compared.choosers == ["net"]
