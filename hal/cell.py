@@ -61,6 +61,8 @@ class PartFeeder(Protocol):
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
         """Place a part at a position and turn determined by the seed.
 
+        A simulated feeder takes away what the hand holds and leaves the arm at home.
+
         Args:
             part: Name or folder.
             seed: Determines position and turn.

@@ -36,6 +36,7 @@ from mskgrasp.core.panda_kinematics import (
     within_limits,
 )
 from mskgrasp.core.settings import TABLE_Z, Overhead, Region
+from mskgrasp.parts import Part, find_part
 
 JOINT_SPEED = 2.0
 """Greatest joint speed, rad/s (Panda datasheet: 2.175 rad/s for joints 1 to 4)."""
@@ -63,6 +64,7 @@ class SimulatedWorld(ABC):
         table_error: Difference of the table from what the cell states.
         presented: Number of parts placed so far.
         presented_seed: Seed of the last placement.
+        arm_reset: Called when the arm is put home, its hand empty, for a new part; None: there is no arm.
         watch: Called every `WATCH_S` of a motion, by the thread that commands it; None: nothing is.
     """
 
@@ -74,6 +76,7 @@ class SimulatedWorld(ABC):
     table_error: TableError = field(default_factory=TableError)
     presented: int = field(default=0, init=False)
     presented_seed: int = field(default=0, init=False)
+    arm_reset: Callable[[], None] | None = field(default=None, init=False)
     watch: Callable[[], None] | None = field(default=None, init=False)
     _users: int = field(default=0, init=False)
 
@@ -112,9 +115,30 @@ class SimulatedWorld(ABC):
         if self.watch is not None:
             self.watch()
 
-    @abstractmethod
     def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """See `PartFeeder.present`."""
+        """Place a part on the table, arm at home with an empty hand, everything at rest.
+
+        A new simulation each time, so that a trial does not depend on those before it.
+
+        Args:
+            part: Name or folder.
+            seed: Determines its position and turn, the same ones in every simulator.
+            keep: Parts outside the region, such as on a pallet, stay; else the table is cleared.
+
+        Raises:
+            BadPart: There is no such part.
+            DriverMissing: The simulator is not installed.
+            TapeDoesNotFit: The part is there, and has no room for the cell's tape.
+        """
+        new = find_part(part)
+        self.presented, self.presented_seed = self.presented + 1, seed
+        if self.arm_reset is not None:
+            self.arm_reset()
+        self._place(new, seed, keep)
+
+    @abstractmethod
+    def _place(self, part: Part, seed: int, keep: bool) -> None:
+        """Build the simulation anew, as in `present`."""
 
     @abstractmethod
     def part_pose(self) -> Pose:
@@ -203,6 +227,11 @@ class SimulatedArm(SharingDevice, Arm, Generic[WorldT]):
     def __init__(self, world: WorldT, limits: ArmLimits):
         super().__init__(limits)
         self._resource = self._world = world
+        world.arm_reset = self._reset
+
+    def _reset(self) -> None:
+        """The world puts the arm home, its hand empty."""
+        self._held = self._load = None
 
     def watch(self, call: Callable[[], None] | None) -> None:
         """Have a function called every `WATCH_S` of simulated time during motions; None ends that.

@@ -12,7 +12,7 @@ from hal.mujoco.config import MujocoPhysics
 from hal.simulated import SimulatedWorld
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.settings import TABLE_Z
-from mskgrasp.parts import Part, find_part
+from mskgrasp.parts import Part
 from mskgrasp.parts.hulls import hull_corners
 from mskgrasp.parts.resting_pose import random_resting_pose
 
@@ -52,36 +52,21 @@ class MujocoWorld(SimulatedWorld):
     def _free(self) -> None:
         self._simulation = None
 
-    def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """Place a part on the table, arm at home, everything at rest.
-
-        A new simulation each time, so that a trial does not depend on those before it.
-
-        Args:
-            part: Name or folder.
-            seed: Determines its position and turn, as in the SAPIEN cell.
-            keep: Parts outside the region, such as on a pallet, stay; else the table is cleared.
-
-        Raises:
-            BadPart: There is no such part.
-            DriverMissing: MuJoCo is not installed.
-        """
-        new = find_part(part)
-        corners = np.concatenate(hull_corners(new))
+    def _place(self, part: Part, seed: int, keep: bool) -> None:
+        corners = np.concatenate(hull_corners(part))
         drawn = random_resting_pose(
-            new.resting, new.resting_probability, corners, self.region, np.random.RandomState(seed)
+            part.resting, part.resting_probability, corners, self.region, np.random.RandomState(seed)
         )
         pose, moved = Pose.from_vector(drawn), self.table_motion
         staying = self._outside() if keep else []
         self._simulation = _simulation()(
             self.physics,
-            [new, *(one for one, _ in staying)],
+            [part, *(one for one, _ in staying)],
             [pose if moved is None else moved @ pose, *(pose for _, pose in staying)],
             self.home,
             moved,
         )
         self._simulation.watch = self.call_watch
-        self.presented, self.presented_seed = self.presented + 1, seed
 
     def part_pose(self) -> Pose:
         """``T_base_obj`` of the part, the simulator's ground truth."""

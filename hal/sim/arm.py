@@ -44,6 +44,10 @@ class SapienArm(SimulatedArm[SapienWorld]):
         super().__init__(world, limits)
         self._force = 0.0
 
+    def _reset(self) -> None:
+        super()._reset()
+        self._force = 0.0
+
     def _state(self) -> ArmState:
         env = self._world.env
         qpos = env.agent.robot.get_qpos()[0].cpu().numpy().astype(np.float64)

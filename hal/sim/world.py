@@ -24,7 +24,7 @@ from hal.simulated import SimulatedWorld
 from mskgrasp.core.errors import TapeDoesNotFit
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.settings import TABLE_Z, Physics, Tape
-from mskgrasp.parts import find_part
+from mskgrasp.parts import Part, find_part
 from mskgrasp.parts.hulls import hull_corners
 from tasks import GraspDisplacementEnv
 from tasks.attempt.clearance import hand_clearance
@@ -93,25 +93,12 @@ class SapienWorld(SimulatedWorld):
             self._gym.close()
             self._gym = None
 
-    def present(self, part: str, seed: int, *, keep: bool = False) -> None:
-        """Place a part on the table, arm at home, everything at rest.
-
-        Args:
-            part: Name or folder.
-            seed: Determines its position and turn.
-            keep: Parts outside the region, such as on a pallet, stay; else the table is cleared.
-
-        Raises:
-            BadPart: There is no such part, or no room for the tape on it.
-        """
-        folder = str(find_part(part).folder)
+    def _place(self, part: Part, seed: int, keep: bool) -> None:
         staying = (
             outside(self.region, [*self._beside, Lying(self.env.parts[0], self.env.part)]) if keep else []
         )
         self._fine_colour = None
-        self.presented, self.presented_seed = self.presented + 1, seed
-        # A fresh scene each time, so that a trial does not depend on those before it.
-        self.env.reset(seed=seed, options=dict(parts=[folder], reconfigure=True))
+        self.env.reset(seed=seed, options=dict(parts=[str(part.folder)], reconfigure=True))
         self._move_table()
         self._watch_motions()
         self._beside = [

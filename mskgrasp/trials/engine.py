@@ -154,9 +154,9 @@ class TrialEngine:
             go_home(self.cell, tallest=self._tallest, take=self._operator.take)
 
     def leave(self) -> None:
-        """Move the arm home before a new scene, or at the end.
+        """Move the arm home, and put down what it holds, before a new scene that keeps parts, or at the end.
 
-        A feeder sets a new scene with the arm at home, and takes a part away that hooks on a finger.
+        A part that hooks on a finger is taken away by the feeder, if the cell has one.
 
         Raises:
             MotionAborted: A second contact, and the cell has no feeder.
@@ -167,6 +167,11 @@ class TrialEngine:
             if self.cell.feeder is None:
                 raise
             self.recover(error)
+
+    @property
+    def _feeder_resets(self) -> bool:
+        """Whether the feeder itself empties the hand and puts the arm home."""
+        return self.cell.arm.simulated and self.cell.feeder is not None
 
     def recover(self, error: MotionAborted) -> None:
         """Recover the arm after a contact, with the operator's consent where one is asked.
@@ -242,7 +247,8 @@ class TrialEngine:
         known = find_part(part)
         self.cell.arm.check_load(known.mass)
         while True:
-            self.leave()
+            if keep or not self._feeder_resets:
+                self.leave()
             no_tape = ""
             try:
                 self._operator.present(self.cell, part, seed, name=name, keep=keep)
@@ -306,7 +312,7 @@ class TrialEngine:
 
         Not where a simulated feeder clears the hand as it places the next part.
         """
-        if self.cell.arm.simulated and self.cell.feeder is not None:
+        if self._feeder_resets:
             return
         try:
             put_down(self.cell, plan.grasp, tallest=self._tallest)

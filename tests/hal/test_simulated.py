@@ -10,6 +10,7 @@ from hal.errors import NotConnected
 from hal.simulated import PEAK_ACCELERATION, SimulatedArm, SimulatedCamera, SimulatedWorld, panda_limits
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.settings import REGION, Overhead
+from mskgrasp.parts import Part
 from tasks.robot import motion
 
 
@@ -18,7 +19,7 @@ class ToyWorld(SimulatedWorld):
 
     built = freed = 0
 
-    def present(self, part: str, seed: int, *, keep: bool = False) -> None:
+    def _place(self, part: Part, seed: int, keep: bool) -> None:
         pytest.fail("no part is asked for")
 
     def part_pose(self) -> Pose:

@@ -26,7 +26,7 @@ from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import SIMULATED_CELL
-from mskgrasp.trials.engine import ExecutedGrasp, TrialEngine, connected_engine
+from mskgrasp.trials.engine import ExecutedGrasp, PlannedGrasp, TrialEngine, connected_engine
 from tests.hal.real_cell import measured_cell
 from tests.hal.replay.toy import toy_cell
 from tests.planning.hand_made import FRAME, planner
@@ -228,7 +228,30 @@ def test_a_part_that_hooks_on_a_finger_is_taken_away_by_the_next_scene(tmp_path:
         with pytest.raises(MotionAborted, match="contact force") as raised:
             engine.home()
         engine.recover(raised.value)
-        engine.leave()
         again = engine.present("hex_nut_m30", seed, planner())
         np.testing.assert_array_equal(again.frame.depth, planned.frame.depth)
+        np.testing.assert_allclose(engine.cell.arm.state().joints, engine.cell.workspace.home, atol=0.01)
+
+
+@pytest.mark.parametrize("cell", ["sapien", "mujoco"])
+def test_a_new_scene_empties_the_hand_and_is_as_after_going_home(cell: str, tmp_path: Path):
+    path, (seed, _) = Path(f"configs/cells/{cell}.yaml"), trial_seeds(0, "washer_m36", 0)
+    with connected_engine(path, yes=True, picture=tmp_path / "next.png", tape=None) as engine:
+
+        def trial() -> tuple[PlannedGrasp, ExecutedGrasp]:
+            planned, lying = engine.present("washer_m36", seed, planner()), engine.part_pose()
+            assert planned.plan is not None and lying is not None
+            grasp = Grasp.from_vector(np.array([*lying.position[:2] + 0.003, 0.0115, 0.4]))
+            return planned, engine.grasp(dataclasses.replace(planned.plan, grasp=grasp), planned.part)
+
+        first, second = trial(), trial()  # the hand holds a part in between
+        engine.leave()
+        third = trial()
+        assert engine.cell.arm.in_hand() is not None
+        for planned, done in (second, third):
+            np.testing.assert_array_equal(planned.frame.depth, first[0].frame.depth)
+            assert done.reason == "" and done.displacement is not None
+            np.testing.assert_array_equal(done.displacement, first[1].displacement)
+        engine.present("washer_m36", seed, planner())
+        assert engine.cell.arm.in_hand() is None
         np.testing.assert_allclose(engine.cell.arm.state().joints, engine.cell.workspace.home, atol=0.01)
