@@ -12,7 +12,7 @@ from mskgrasp.assess.config import AssessConfig, Tolerance, parse_tolerance
 from mskgrasp.assess.index import IndexEntry, write_index
 from mskgrasp.assess.report import poses_section, trials_section, write_report
 from mskgrasp.assess.summary import Row
-from mskgrasp.assess.trials import AssessSetup, run_scenes, scene_tasks, write_cells
+from mskgrasp.assess.trials import AssessSetup, SceneTask, run_scenes, scene_tasks, write_cells
 from mskgrasp.core.errors import BadPart, MskgraspError, UsageError
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import Part, find_part
@@ -143,8 +143,7 @@ def begin_trials(out: Path, certified: CertifiedGrasps) -> None:
 
 def _trials(
     part: Part, certified: CertifiedGrasps, config: AssessConfig, out: Path, workers: int
-) -> Sequence[PlacedTrial]:
-    """All trials of a part; those that are stored are not made again."""
+) -> list[PlacedTrial]:
     setup = AssessSetup(
         source=str(part.folder),
         certified=certified,
@@ -153,9 +152,17 @@ def _trials(
         out=out,
         seed=config.seed,
     )
-    path = out / TRIALS
+    return make_trials(setup, scene_tasks(config.n_trials), workers)
+
+
+def make_trials(setup: AssessSetup, tasks: Sequence[SceneTask], workers: int) -> list[PlacedTrial]:
+    """All trials of scenes; those that the folder holds already are not made again.
+
+    Raises:
+        WorkerFailed: As in `run_scenes`.
+    """
+    path = setup.out / TRIALS
     found = {trial.key: trial for trial in resume_trials(path, PlacedTrial.from_json)}
-    tasks = scene_tasks(config.n_trials)
     missing = [left for task in tasks if (left := task.without(found)) is not None]
     keys = [key for task in tasks for key in task.keys()]
     bar = progress(
