@@ -13,6 +13,7 @@ from typing import Any
 
 from mskgrasp.benchmark.report import TOLERANCE
 from mskgrasp.benchmark.summary import stored_row
+from mskgrasp.evaluate.comparison import POLICY_NAMES
 from mskgrasp.validate.config import SHIFTED
 from tests.docs.pages import ROOT
 from tests.docs.stored_reports import REPORTS, StoredReport, page_of, read_stored
@@ -114,6 +115,19 @@ def _displacement(stored: StoredReport) -> list[ReadmeRow]:
             f"paper: {_mm(PAPER['translation'])}, {_degrees(PAPER['rotation'])})",
             interval=_rmse_intervals(found),
             n=f"{found['measured']} trials of {found['measured_parts']} parts",
+        )
+    ]
+
+
+def _certified(stored: StoredReport) -> list[ReadmeRow]:
+    found = _report(stored)["policies"][POLICY_NAMES["certified"]]
+    return [
+        ReadmeRow(
+            name="certified grasps, by the CAD",
+            text=f"{found['success_rate']:.1%} lifted, displacement RMSE {_mm(found['translation_rmse'])}, "
+            f"{_degrees(found['rotation_rmse'])}",
+            interval=f"{_between(found['success_interval'], 100, '%')}; {_rmse_intervals(found)}",
+            n=f"{found['trials']} trials of {found['measured_parts']} parts",
         )
     ]
 
@@ -280,6 +294,7 @@ def _between(ends: Any, scale: float, unit: str, digits: int = 1) -> str:
 ROWS: tuple[tuple[str, Callable[[StoredReport], list[ReadmeRow]]], ...] = (
     ("success", _success),
     ("displacement", _displacement),
+    ("certified", _certified),
     ("benchmark", _benchmark),
     ("palletize", _palletize),
     ("regression", _regression),
