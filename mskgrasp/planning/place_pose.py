@@ -193,7 +193,7 @@ def place(
         arrived: Called once the part is there, before the fingers open.
 
     Raises:
-        OutOfWorkspace: The pose is refused before anything moves.
+        OutOfWorkspace: The pose is out of reach, or no straight line leads there; the part is in the hand.
         MotionAborted: The part touched something more than `EARLY` above the pose.
     """
     check_place(cell, pose, tallest=tallest)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -24,7 +23,6 @@ from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import (
     Target,
-    check_place,
     displacement_of_point,
     drop_of,
     place,
@@ -122,15 +120,6 @@ def _placed(
     turn = np.random.default_rng(target_seed).uniform(-TURNS, TURNS)
     x, y = workspace.centre
     drop = drop_of(plan.grasp, plan.view, float(expected[3]), np.nan_to_num(plan.swing))
-    for theta in (turn, 0.0):
-        target = Target(x=float(x), y=float(y), theta=float(theta))
-        pose = place_pose(plan.grasp, expected, point, target, workspace.table_z, drop=drop)
-        with contextlib.suppress(OutOfWorkspace):
-            check_place(engine.cell, pose)
-            break
-    else:
-        engine.put_back(plan)
-        return replace(trial, reason="OutOfWorkspace")
     released: list[Pose] = []
 
     def arrived() -> None:
@@ -138,11 +127,21 @@ def _placed(
         assert there is not None
         released.append(engine.cell.arm.state().T_base_tcp.inverse() @ there)
 
-    try:
-        place(engine.cell, pose, engine.recover, part_height=float(plan.view.size[2]), arrived=arrived)
-    except MotionAborted as error:
-        engine.recover(error)
-        return replace(trial, reason="collided")
+    for theta in (turn, 0.0):
+        target = Target(x=float(x), y=float(y), theta=float(theta))
+        pose = place_pose(plan.grasp, expected, point, target, workspace.table_z, drop=drop)
+        try:
+            place(engine.cell, pose, engine.recover, part_height=float(plan.view.size[2]), arrived=arrived)
+            break
+        except OutOfWorkspace:
+            if released:
+                raise
+        except MotionAborted as error:
+            engine.recover(error)
+            return replace(trial, reason="collided")
+    else:
+        engine.put_back(plan)
+        return replace(trial, reason="OutOfWorkspace")
     after = engine.part_pose()
     assert after is not None
     point_tcp = in_hand.apply(seen.inverse().apply(point))
