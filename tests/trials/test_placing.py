@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from hal import Cell
+from hal.errors import OutOfWorkspace
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, twist_and_swing
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, object_displacement
 from mskgrasp.core.shipped import config_file
@@ -16,7 +19,8 @@ from mskgrasp.parts.alike_poses import alike_poses
 from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
-from mskgrasp.planning.place_pose import Target, displacement_of_point, place_pose
+from mskgrasp.planning.place_pose import Target, displacement_of_point, place, place_pose
+from mskgrasp.trials import placing
 from mskgrasp.trials.engine import connected_engine
 from mskgrasp.trials.placed_trial import CORRECTIONS, PlacedTrial
 from mskgrasp.trials.placing import _moved, _off, _pose_error, as_turned, grasp_and_place
@@ -149,3 +153,29 @@ def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(tmp_path: P
         lies = engine.part_pose()
         assert lies is not None
         assert np.hypot(*(lies.position[:2] - engine.cell.workspace.centre)) < 0.02
+
+
+@pytest.mark.parametrize(("n_refused", "reason"), [(1, ""), (2, "OutOfWorkspace")])
+def test_a_part_that_no_straight_line_leads_to_its_target_is_turned_less_or_not_placed(
+    n_refused: int, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """On the line the wrist may meet its limit, which the ends do not tell."""
+    part, targets = find_part("t_nut_m16x18"), []
+
+    def refusing(cell: Cell, pose: Grasp, *args: Any, **settings: Any) -> None:
+        targets.append(float(pose.theta))
+        if len(targets) <= n_refused:
+            raise OutOfWorkspace("no straight line from here")
+        place(cell, pose, *args, **settings)
+
+    monkeypatch.setattr(placing, "place", refusing)
+    with connected_engine(
+        config_file("cells/sapien.yaml"), yes=True, picture=tmp_path / "next.png", tape=None
+    ) as engine:
+        planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=200), engine.cell)
+        trial = PlacedTrial(part=part.name, condition="any", number=0, means="networks")
+        done = grasp_and_place(engine, planner, part, (3, 4), trial, {})
+        assert done.lifted and done.reason == reason and (done.placed is not None) == (reason == "")
+        assert len(targets) == 2 and abs(targets[0] - targets[1]) > 0.01
+        again = grasp_and_place(engine, planner, part, (3, 4), trial, {})  # the hand is emptied
+        assert again.reason == "" and again.placed is not None
