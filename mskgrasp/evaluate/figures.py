@@ -159,7 +159,7 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
         if certified is not None:
             label = f"{POLICY_NAMES['certified']}, this run (all parts)"
             handles.append(Patch(color=GREEN, label=label))
-        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)
+        figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9)
 
 
 def _bar(
