@@ -68,10 +68,13 @@ def table() -> str:
 
 
 def shown_rows() -> list[tuple[str, Callable[[StoredReport], list[ReadmeRow]]]]:
-    """The stored reports of `ROWS`; a run at full size is shown in place of the smaller one of its name."""
+    """The stored reports of `ROWS`, of each the run at full size or else the largest that there is."""
     known = {path.stem for path in REPORTS.glob("*.json")}
-    wanted = [(f"{name}_full" if f"{name}_full" in known else name, rows) for name, rows in ROWS]
-    return [(name, rows) for name, rows in wanted if name in known]
+    found = []
+    for name, rows in ROWS:
+        sizes = (f"{name}_full", name, f"{name}_quick")
+        found += [(one, rows) for one in sizes if one in known][:1]
+    return found
 
 
 def _line(row: ReadmeRow, stored: StoredReport) -> str:
