@@ -42,11 +42,15 @@ from mskgrasp.simulation.repeats import PoseErrors, Repeat, place_part, repeat_g
 from tasks import GraspDisplacementEnv
 
 CERTIFY_VERSION = 2
-"""Raised by every change after which a seed makes other certified grasps."""
+"""Raised by every change after which a seed simulates other grasps."""
+SELECT_VERSION = 1
+"""Raised by every change after which others of the simulated grasps are certified."""
 FIRST, SECOND = 2, 4
 """Simulations of each candidate in the first round and of each of the best in the second."""
 FAILED = 0.01
 """Distance that counts for a simulation that did not lift the part, m."""
+GRAVITY = 9.81
+"""m/s^2"""
 APART = (0.006, np.radians(12.0))
 """Candidates nearer to a better one than this, m and radians, are left out."""
 
@@ -320,6 +324,36 @@ def measured(
     )
 
 
+def moment_share(part: Part, one: CertifiedGrasp, config: CertifyConfig) -> float:
+    """Moment of a held part's weight about the closing direction, as a share of what the pads hold.
+
+    PhysX holds a flat contact by its two farthest points, nearly twice as well as even pressure does, and so
+    lifts parts far from their centre of mass that would turn. Here each pad holds by friction over a soft
+    patch of `Physics.pad_patch_radius`, the weight and its moment together as far as the ellipsoid of the
+    limit surface goes (Howe and Cutkosky, Practical force-motion models for sliding manipulation, 1996), with
+    as little friction and force as all but `CertifyConfig.least_lifted` of the simulations had.
+
+    Args:
+        part: The part, whose origin is its centre of mass.
+        one: Its grasp.
+        config: Settings of the certification.
+    """
+    x, y, _, theta = one.grasp
+    beside = -(np.cos(theta) * x + np.sin(theta) * y) + one.mean[0]  # along the pads
+    weight = part.mass * GRAVITY
+    friction, force = (
+        np.linspace(*(varied or (fixed, fixed)), 101)
+        for varied, fixed in (
+            (config.noise.friction_pad_part, config.physics.friction_pad_part),
+            (config.noise.finger_force, config.physics.finger_force),
+        )
+    )
+    least = float(np.quantile(np.outer(friction, force), 1 - config.least_lifted))
+    left = 1 - (weight / (2 * least)) ** 2
+    most = 2 * least * config.physics.pad_patch_radius * np.sqrt(max(left, 0.0))
+    return float(weight * abs(beside) / most) if most > 0 else np.inf
+
+
 def select_certified(
     part: Part, resting: int, grasps: Sequence[CertifiedGrasp], config: CertifyConfig
 ) -> tuple[list[CertifiedGrasp], str]:
@@ -344,8 +378,11 @@ def select_certified(
             [],
             f"it tilts by more than {np.degrees(TILT_LIMIT):g} degrees in every grasp that lifts it",
         )
-    flat = without_selection_bias(flat, radius)
-    ranked = sorted(flat, key=lambda one: one.score(pose_cov, radius))
+    firm = [one for one in flat if moment_share(part, one, config) <= 1]
+    if not firm:
+        return [], "its weight could turn it between the pads in every grasp that lifts it"
+    firm = without_selection_bias(firm, radius)
+    ranked = sorted(firm, key=lambda one: one.score(pose_cov, radius))
     steady = [one for one in ranked if one.score(pose_cov, radius) <= config.most_error**2]
     if not steady:
         least = 1e3 * np.sqrt(ranked[0].score(pose_cov, radius))

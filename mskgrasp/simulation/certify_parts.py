@@ -31,6 +31,7 @@ from mskgrasp.runtime.progress import note, progress
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.simulation.certify import (
     CERTIFY_VERSION,
+    SELECT_VERSION,
     CertifyConfig,
     Member,
     Stream,
@@ -42,7 +43,8 @@ from mskgrasp.simulation.versions import versions
 
 LEAST_STREAM = 24
 """Least number of simulations of a stream."""
-_MEASURED_BY = ("certify_version", "pose_errors", "noise", "physics", "least_lifted", "most_error")
+_VERSIONS = dict(certify_version=CERTIFY_VERSION, select_version=SELECT_VERSION)
+_MEASURED_BY = (*_VERSIONS, "pose_errors", "noise", "physics", "least_lifted", "most_error")
 """Conditions that decide which grasps are certified and what is stored of them."""
 
 
@@ -81,7 +83,9 @@ def certify(
         WorkerFailed: A stream failed for a reason that trying again does not remove.
     """
     conditions = _conditions(config, models)
+    # What is simulated does not depend on what is selected of it.
     digest = hashlib.sha256(json.dumps(conditions, sort_keys=True).encode()).hexdigest()[:16]
+    conditions |= _VERSIONS
     plans = {name: _plan(find_part(name), config) for name in parts}
     missing = [
         stream
@@ -136,7 +140,7 @@ def _of_today(part: Part) -> bool:
         known = read_certified(part).conditions
     except BadPart:
         return False
-    now = CertifyConfig().model_dump(mode="json") | dict(certify_version=CERTIFY_VERSION)
+    now = CertifyConfig().model_dump(mode="json") | _VERSIONS
     made_by = known.get("versions")
     return (
         isinstance(made_by, dict)

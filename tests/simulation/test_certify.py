@@ -7,9 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from mskgrasp.core.settings import ExecutionNoise
 from mskgrasp.parts import find_part
 from mskgrasp.planning.certified import radius_about_vertical
-from mskgrasp.simulation.certify import CertifyConfig, measured, round_sizes, select_certified
+from mskgrasp.simulation.certify import CertifyConfig, measured, moment_share, round_sizes, select_certified
 from mskgrasp.simulation.repeats import Repeat
 from tests.planning.test_certified import certified_grasp
 
@@ -113,6 +114,37 @@ def test_grasps_are_certified_by_lifting_by_hanging_flat_and_by_their_spread():
     assert "no grasp lifts it in 95%" in reasons["lifts"] and "83%" in reasons["lifts"]
     assert "2 degrees" in reasons["tilts"]
     assert "spreads by more than 2 mm" in reasons["spreads"]
+
+
+def test_a_grasp_is_not_certified_whose_part_its_weight_could_turn_between_the_pads():
+    """0.6 kg, 25 mm beside the pads, friction 0.4, 30 N: 0.147 N m; 2 x 12 N x 5 mm hold less."""
+    noise = ExecutionNoise(friction_pad_part=(0.4, 0.4), finger_force=(30.0, 30.0))
+    config = CertifyConfig(noise=noise)
+    heavy = dataclasses.replace(PART, mass=0.6)
+    turn = 0.7  # the pads' direction in the rest frame
+    beside = certified_grasp(
+        grasp=np.array([0.025 * np.cos(turn), 0.025 * np.sin(turn), 0.0105, turn]), mean=np.zeros(4)
+    )
+    carries = np.sqrt(1 - (0.6 * 9.81 / 24) ** 2)
+    assert moment_share(heavy, beside, config) == pytest.approx(0.6 * 9.81 * 0.025 / (0.12 * carries))
+    # Across the pads its centre of mass may lie where it will, and what it slides by counts.
+    across = certified_grasp(
+        grasp=np.array([-0.025 * np.sin(turn), 0.025 * np.cos(turn), 0.0105, turn]), mean=np.zeros(4)
+    )
+    assert moment_share(heavy, across, config) == pytest.approx(0.0, abs=1e-9)
+    slid = dataclasses.replace(beside, mean=np.array([0.025, 0.0, 0.0, 0.0]))
+    assert moment_share(heavy, slid, config) == pytest.approx(0.0, abs=1e-9)
+    assert select_certified(heavy, 0, [beside, across], config)[0] == [across]
+    kept, reason = select_certified(heavy, 0, [beside], config)
+    assert kept == [] and "its weight could turn it between the pads" in reason
+    # As little as 95 in 100 simulations have is counted on: half of these products are under 0.5 x 40 N.
+    halves = CertifyConfig(
+        noise=ExecutionNoise(friction_pad_part=(0.5, 0.5), finger_force=(30.0, 50.0)), least_lifted=0.5
+    )
+    light = dataclasses.replace(PART, mass=0.01)
+    assert moment_share(light, beside, halves) == pytest.approx(
+        0.01 * 9.81 * 0.025 / (2 * 20 * 0.005), rel=1e-3
+    )
 
 
 def test_certified_grasps_are_spread_over_the_part():

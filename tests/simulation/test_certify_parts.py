@@ -70,12 +70,15 @@ def test_a_part_all_of_whose_resting_poses_are_rare_has_a_file_that_says_so(box)
         (dict(versions=dict(simulation="0")), True),
         (dict(versions=None), True),
         (dict(certify_version=0), True),
+        (dict(select_version=0), True),
         (dict(pose_errors=dict(position=0.0, height=0.0, turn=0.0)), True),
     ],
 )
 def test_grasps_of_another_simulation_or_conditions_are_made_again(box, monkeypatch, changes, made_again):
     conditions = CertifyConfig().model_dump(mode="json") | dict(
-        certify_version=certify_parts.CERTIFY_VERSION, versions=versions()
+        certify_version=certify_parts.CERTIFY_VERSION,
+        select_version=certify_parts.SELECT_VERSION,
+        versions=versions(),
     )
     stored = certified(
         certified_grasp(), part=box.name, part_hash=box.content_hash, conditions=conditions | changes
