@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Iterable
 from typing import Any, TextIO
 
@@ -12,6 +13,8 @@ from mskgrasp.core.errors import one_line
 
 Bar = tqdm
 """A progress bar."""
+# Not tqdm's own lock, a semaphore among processes: a worker that is ended leaks it, and Python warns of that.
+Bar.set_lock(threading.RLock())
 _LINE_EVERY_S = 20.0
 """Interval of the lines where standard error is no terminal."""
 _TRANSIENT_DELAY_S = 1.0

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 from mskgrasp.runtime import progress as module
 from mskgrasp.runtime.progress import advance_to, progress
 
@@ -34,3 +37,15 @@ def test_a_total_may_be_known_late(capsys):
         advance_to(bar, 2, 8)
         advance_to(bar, 5, 8)
         assert (bar.n, bar.total) == (5, 8)
+
+
+def test_a_note_makes_no_semaphore_which_a_worker_that_is_ended_would_leak():
+    code = (
+        "import multiprocessing\n"
+        "from multiprocessing.resource_tracker import _resource_tracker as tracker\n"
+        "multiprocessing.set_start_method('spawn')\n"  # as in a worker
+        "from mskgrasp.runtime.progress import note, progress\n"
+        "note('read'); list(progress(range(2), unit='part', keep=True))\n"
+        "raise SystemExit(tracker._fd is not None)"  # running, for want of anything else: for a semaphore
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
