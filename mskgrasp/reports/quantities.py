@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+_UNKNOWN = 100.0
+"""An interval whose upper end is so many times the value, as of two parts, has none that tells anything."""
+
 
 def millimetres(value: float | None, interval: Sequence[float] | None = None) -> str:
     """A length, metres, with its interval, if any."""
@@ -25,5 +28,9 @@ def counted(counts: Mapping[str, int]) -> str:
 def _unit(value: float | None, interval: Sequence[float] | None, scale: float, unit: str) -> str:
     if value is None:
         return "-"
-    around = "" if interval is None else f" [{interval[0] * scale:.1f}, {interval[1] * scale:.1f}]"
+    around = ""
+    if interval is not None:
+        low, high = interval
+        end = "inf" if high > _UNKNOWN * abs(value) > 0 else f"{high * scale:.1f}"
+        around = f" [{low * scale:.1f}, {end}]"
     return f"{value * scale:.1f} {unit}{around}"

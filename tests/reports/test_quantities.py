@@ -14,6 +14,7 @@ from mskgrasp.reports.quantities import counted, degrees, millimetres
         (0.00123, None, "1.2 mm"),
         (0.0, None, "0.0 mm"),  # a measured zero is no missing value
         (-0.0047, (-0.01, 0.00004), "-4.7 mm [-10.0, 0.0]"),
+        (0.0023, (0.0, 277.0), "2.3 mm [0.0, inf]"),  # of two parts
         (None, None, "-"),
         (None, (0.1, 0.2), "-"),
     ],
