@@ -48,6 +48,22 @@ def test_a_part_in_free_fall_falls_by_half_g_t_squared(box: MakeBox):
     assert fallen == pytest.approx(G * seconds**2 / 2, abs=1.1 * G * seconds * simulation.step_s / 2)
 
 
+def test_parts_on_very_many_points_do_not_fall_through_the_table():
+    """What MuJoCo has no memory for it leaves out: every contact, with a warning in a file."""
+    gear = find_part("spur_gear_m2_z18")
+    flat = int(np.argmin(gear.resting.position[:, 2]))
+    z, quat = gear.resting.position[flat, 2], gear.resting.quat_wxyz[flat]
+    poses = [
+        Pose(position=np.array([0.35 + 0.06 * (k % 6), 0.06 * (k // 6) - 0.15, z]), quat_wxyz=quat)
+        for k in range(24)
+    ]
+    simulation = Simulation(MujocoPhysics(), [gear] * len(poses), poses, np.array(READY))
+    simulation.stand(0.01, stop=never)
+    assert simulation.data.ncon > 1500 and not simulation.data.warning.number.any()
+    heights = [simulation.part_pose(k).position[2] for k in range(len(poses))]
+    np.testing.assert_allclose(heights, z, atol=1e-4)
+
+
 @pytest.mark.parametrize("friction", [0.2, 0.4, 0.6])
 def test_a_sliding_block_stops_after_v_squared_over_two_mu_g(box: MakeBox, friction: float):
     flat = box((0.06, 0.06, 0.01), 0.2)
