@@ -60,7 +60,9 @@ def main() -> int:
         "--parts", nargs="+", default=["test:20"],
         help="names of parts, folders of CAD files, or sets such as test:20 (default)",
     )  # fmt: skip
-    parser.add_argument("--n-parts", type=int, default=0, help="so many of them, evenly spaced")
+    parser.add_argument(
+        "--n-parts", type=int, default=0, help="so many of them: of a set evenly spaced, of a folder by hash"
+    )
     parser.add_argument("--fresh", type=int, default=100, help="fresh trials of each part (default 100)")
     parser.add_argument("--quick", action="store_true", help="as in mskgrasp.assess")
     parser.add_argument("--tolerance", default="1mm,2deg", help="as in mskgrasp.assess (default 1mm,2deg)")
@@ -86,7 +88,9 @@ def main() -> int:
         fresh[part.name] = fresh_trials(part, options.out / "fresh" / part.name, options.fresh, workers)
     tables = [pooled(reported, fresh), agreement(reported, fresh, options.tolerance)]
     tables.append(by_part(reported, fresh, options.tolerance))
-    show(tables, options.out, dict(n=sum(map(len, reported.values())) + sum(map(len, fresh.values()))))
+    n_reported, n_fresh = (sum(map(len, trials.values())) for trials in (reported, fresh))
+    n = f"{n_reported} trials of the reports and {n_fresh} fresh ones; {len(parts)} parts"
+    show(tables, options.out, dict(n=n))
     return 0
 
 
@@ -212,14 +216,14 @@ def _errors(trials: Sequence[PlacedTrial]) -> tuple[np.ndarray, np.ndarray]:
     return displacement_errors(predicted, measured)
 
 
-def _rows(trials: Sequence[PlacedTrial], tolerance: str) -> Row:
+def _row(trials: Sequence[PlacedTrial], tolerance: str) -> Row:
     chosen = [one for one in trials if (one.condition, one.means) == (EXACT, "certified")]
     return summarise(chosen, parse_tolerance(tolerance), TILT_LIMIT)[0]
 
 
 def agreement(reported: Trials, fresh: Trials, tolerance: str) -> Table:
     """How many parts place as large a share within a distance in fresh scenes as their report says."""
-    pairs = [(_rows(reported[part], tolerance), _rows(fresh[part], tolerance)) for part in reported]
+    pairs = [(_row(reported[part], tolerance), _row(fresh[part], tolerance)) for part in reported]
     rows = []
     for i, distance in enumerate(DISTANCES):
         shares = [(a.within_distance["predicted"][i], b.within_distance["predicted"][i]) for a, b in pairs]
@@ -236,7 +240,7 @@ def by_part(reported: Trials, fresh: Trials, tolerance: str) -> Table:
     """A row a part, of its certified grasps with an exact camera."""
     rows = []
     for part in reported:
-        report, again = _rows(reported[part], tolerance), _rows(fresh[part], tolerance)
+        report, again = _row(reported[part], tolerance), _row(fresh[part], tolerance)
         told, found = report.within["predicted"], again.within["predicted"]
         low, high = told.interval
         errors = _errors(fresh[part])[0]

@@ -25,8 +25,8 @@ from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts import starter_names
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
+from mskgrasp.runtime import cli
 from mskgrasp.runtime.console_table import Table
-from mskgrasp.runtime.memory import keep_freed_memory
 from mskgrasp.runtime.progress import progress
 from mskgrasp.trials.engine import TrialEngine, connected_engine
 from mskgrasp.trials.measurement import finish, run_trial
@@ -55,7 +55,6 @@ def main() -> int:
     parser.add_argument("--trials", type=int, default=5, help="trials of each part (default 5)")
     parser.add_argument("--out", type=Path, help="folder of report.json and report.md")
     options = parser.parse_args()
-    keep_freed_memory()
     names = starter_names()
     parts = [names[int(i)] for i in np.linspace(0, len(names) - 1, min(options.parts, len(names)))]
     rows = []
@@ -113,4 +112,4 @@ def row(cell: str, costs: list[list[Cost]]) -> tuple[str, ...]:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    cli.run("trial_cost", main)

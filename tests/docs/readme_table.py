@@ -138,9 +138,8 @@ def _certified(stored: StoredReport) -> list[ReadmeRow]:
 def _assessed(stored: StoredReport) -> list[ReadmeRow]:
     whole, agreement, _ = _report(stored)["tables"]
     fresh = dict(zip(whole["header"], whole["rows"][-1], strict=True))
-    agree = {row[0]: dict(zip(agreement["header"], row, strict=True)) for row in agreement["rows"]}["1 mm"]
+    (agrees,) = (row[-1] for row in agreement["rows"] if row[0] == "1 mm")
     share, between = fresh["placed within 1 mm"].rstrip("]").split(" [")
-    *_, agrees = agree.values()
     return [
         ReadmeRow(
             name="assessed parts in fresh scenes",

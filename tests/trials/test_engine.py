@@ -24,6 +24,7 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.seeds import trial_seeds
+from mskgrasp.core.shipped import config_file
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.trials.engine import ExecutedGrasp, PlannedGrasp, TrialEngine, connected_engine
@@ -228,6 +229,7 @@ def test_a_part_that_hooks_on_a_finger_is_taken_away_by_the_next_scene(tmp_path:
         with pytest.raises(MotionAborted, match="contact force") as raised:
             engine.home()
         engine.recover(raised.value)
+        engine.leave()
         again = engine.present("hex_nut_m30", seed, planner())
         np.testing.assert_array_equal(again.frame.depth, planned.frame.depth)
         np.testing.assert_allclose(engine.cell.arm.state().joints, engine.cell.workspace.home, atol=0.01)
@@ -235,7 +237,7 @@ def test_a_part_that_hooks_on_a_finger_is_taken_away_by_the_next_scene(tmp_path:
 
 @pytest.mark.parametrize("cell", ["sapien", "mujoco"])
 def test_a_new_scene_empties_the_hand_and_is_as_after_going_home(cell: str, tmp_path: Path):
-    path, (seed, _) = Path(f"configs/cells/{cell}.yaml"), trial_seeds(0, "washer_m36", 0)
+    path, (seed, _) = config_file(f"cells/{cell}.yaml"), trial_seeds(0, "washer_m36", 0)
     with connected_engine(path, yes=True, picture=tmp_path / "next.png", tape=None) as engine:
 
         def trial() -> tuple[PlannedGrasp, ExecutedGrasp]:

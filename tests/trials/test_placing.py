@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -21,11 +21,18 @@ from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.place_pose import Target, displacement_of_point, place, place_pose
 from mskgrasp.trials import placing
-from mskgrasp.trials.engine import connected_engine
+from mskgrasp.trials.engine import TrialEngine, connected_engine
 from mskgrasp.trials.placed_trial import CORRECTIONS, PlacedTrial
 from mskgrasp.trials.placing import _moved, _off, _pose_error, as_turned, grasp_and_place
 
 NUT = find_part("hex_nut_m20")
+
+
+@pytest.fixture(scope="module")
+def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TrialEngine]:
+    picture = tmp_path_factory.mktemp("engine") / "next.png"
+    with connected_engine(config_file("cells/sapien.yaml"), yes=True, picture=picture, tape=None) as one:
+        yield one
 
 
 def pose(resting: int, turn: float, *, off: float = 0.0) -> Pose:
@@ -130,34 +137,31 @@ def test_the_columns_that_follow_from_one_placement_are_what_placing_so_would_gi
     assert trial.error("seen") == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
-def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(tmp_path: Path):
+def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(engine: TrialEngine):
     part = find_part("t_nut_m16x18")
-    with connected_engine(
-        config_file("cells/sapien.yaml"), yes=True, picture=tmp_path / "next.png", tape=None
-    ) as engine:
-        planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=800), engine.cell)
-        trial = PlacedTrial(part=part.name, condition="any", number=0, means="networks")
-        done = grasp_and_place(engine, planner, part, (3, 4), trial, {})
-        assert done.lifted and not done.certified and done.resting is None
-        assert done.placed is not None and done.held is not None and done.expected is not None
-        # In the hand it is off by what was not predicted; the release adds little.
-        off = np.array(done.held) - done.expected
-        assert done.placed[:2] == pytest.approx(off[:2], abs=1.5e-3)
-        assert done.placed[2] == pytest.approx(off[3], abs=0.05)
-        # The seen centre is that of the part's box; little changes on the way.
-        assert done.seeing is not None and done.seeing[:2] == pytest.approx([0.0, 0.0], abs=1.5e-3)
-        assert done.carried is not None and done.carried[:2] == pytest.approx([0.0, 0.0], abs=5e-4)
-        error = done.error("predicted")
-        assert error is not None and error[0] == pytest.approx(np.hypot(*done.placed[:2]))
-        # It lies where the target is.
-        lies = engine.part_pose()
-        assert lies is not None
-        assert np.hypot(*(lies.position[:2] - engine.cell.workspace.centre)) < 0.02
+    planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=800), engine.cell)
+    trial = PlacedTrial(part=part.name, condition="any", number=0, means="networks")
+    done = grasp_and_place(engine, planner, part, (3, 4), trial, {})
+    assert done.lifted and not done.certified and done.resting is None
+    assert done.placed is not None and done.held is not None and done.expected is not None
+    # In the hand it is off by what was not predicted; the release adds little.
+    off = np.array(done.held) - done.expected
+    assert done.placed[:2] == pytest.approx(off[:2], abs=1.5e-3)
+    assert done.placed[2] == pytest.approx(off[3], abs=0.05)
+    # The seen centre is that of the part's box; little changes on the way.
+    assert done.seeing is not None and done.seeing[:2] == pytest.approx([0.0, 0.0], abs=1.5e-3)
+    assert done.carried is not None and done.carried[:2] == pytest.approx([0.0, 0.0], abs=5e-4)
+    error = done.error("predicted")
+    assert error is not None and error[0] == pytest.approx(np.hypot(*done.placed[:2]))
+    # It lies where the target is.
+    lies = engine.part_pose()
+    assert lies is not None
+    assert np.hypot(*(lies.position[:2] - engine.cell.workspace.centre)) < 0.02
 
 
 @pytest.mark.parametrize(("n_refused", "reason"), [(1, ""), (2, "OutOfWorkspace")])
 def test_a_part_that_no_straight_line_leads_to_its_target_is_turned_less_or_not_placed(
-    n_refused: int, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    n_refused: int, reason: str, engine: TrialEngine, monkeypatch: pytest.MonkeyPatch
 ):
     """On the line the wrist may meet its limit, which the ends do not tell."""
     part, targets = find_part("t_nut_m16x18"), []
@@ -169,13 +173,10 @@ def test_a_part_that_no_straight_line_leads_to_its_target_is_turned_less_or_not_
         place(cell, pose, *args, **settings)
 
     monkeypatch.setattr(placing, "place", refusing)
-    with connected_engine(
-        config_file("cells/sapien.yaml"), yes=True, picture=tmp_path / "next.png", tape=None
-    ) as engine:
-        planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=200), engine.cell)
-        trial = PlacedTrial(part=part.name, condition="any", number=0, means="networks")
-        done = grasp_and_place(engine, planner, part, (3, 4), trial, {})
-        assert done.lifted and done.reason == reason and (done.placed is not None) == (reason == "")
-        assert len(targets) == 2 and abs(targets[0] - targets[1]) > 0.01
-        again = grasp_and_place(engine, planner, part, (3, 4), trial, {})  # the hand is emptied
-        assert again.reason == "" and again.placed is not None
+    planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=200), engine.cell)
+    trial = PlacedTrial(part=part.name, condition="any", number=0, means="networks")
+    done = grasp_and_place(engine, planner, part, (3, 4), trial, {})
+    assert done.lifted and done.reason == reason and (done.placed is not None) == (reason == "")
+    assert len(targets) == 2 and abs(targets[0] - targets[1]) > 0.01
+    again = grasp_and_place(engine, planner, part, (3, 4), trial, {})  # the hand is emptied
+    assert again.reason == "" and again.placed is not None
