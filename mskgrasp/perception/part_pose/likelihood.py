@@ -157,9 +157,15 @@ class HeightTable:
         return off
 
 
-def view(points: np.ndarray, pose: np.ndarray, eye: np.ndarray, *, plane: float, cell: float) -> HeightMap:
-    """Compute the heights of a part at a pose (3,), in the part's frame, as an eye (3,) in base sees them."""
+def view(
+    points: np.ndarray, pose: np.ndarray, eye: np.ndarray, *, plane: float, cell: float, reach: float
+) -> HeightMap:
+    """Compute the heights of a part at a pose (3,), in the part's frame, as an eye (3,) in base sees them.
+
+    The bounds of heights within ``reach``, metres, are those of the table at the map's border, to which what
+    lies outside is clipped.
+    """
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     x, y = eye[:2] - pose[:2]
     own = np.array([cos * x + sin * y, cos * y - sin * x, eye[2]])
-    return heights_from(points, own, plane=plane, cell=cell, margin=4 * cell)
+    return heights_from(points, own, plane=plane, cell=cell, margin=reach + 2 * cell)

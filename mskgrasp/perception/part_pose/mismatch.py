@@ -66,7 +66,7 @@ class Mismatch:
     def of(cls, fit: Fit, seen: Seen, known: KnownPart) -> Mismatch:
         """Compare an image with a fitted pose."""
         plane = fit.look.top / 2
-        seen_map = view(fit.lying.points, fit.pose, seen.eye, plane=plane, cell=known.cell)
+        seen_map = view(fit.lying.points, fit.pose, seen.eye, plane=plane, cell=known.cell, reach=seen.pitch)
         table = HeightTable(
             seen_map, sigma=seen.sigma, soft=known.cell, flying=seen.pitch if seen.noisy else 0.0
         )

@@ -17,6 +17,8 @@ LOOK_MODES = 6
 """The most of one look."""
 MOST_REFINED, NEAR_COST = 3, 30.0
 """So many resting poses of a look are refined at the end, if their cost exceeds the least by less."""
+_DEPENDS_WITHIN = 1.5
+"""A pixel's height depends on the pose where heights differ within so many pixels."""
 
 
 @cache
@@ -77,8 +79,9 @@ FINAL = Effort(rounds=3, draws=64, pixels=1000, reach=0.2e-3, fine=True)
 
 def search(seen: Seen, known: KnownPart) -> list[Fit]:
     """Find the poses that fit an image, the best first."""
-    fits = _best(_coarse(seen, known), MODES)
-    for effort, n in ((ROUGH, 6), (CLOSER, 3), (CLOSE, 2)):
+    fits = _best(_coarse(seen, known), MODES + len(known.looks) // 2)
+    n_looks = len(known.looks)  # of many some differ little
+    for effort, n in ((ROUGH, 6 + n_looks // 3), (CLOSER, 3 + n_looks // 4), (CLOSE, 2 + n_looks // 8)):
         fits = _best([improve(fit, seen, known, effort) for fit in fits], n)
     found = []
     for fit in fits:
@@ -108,7 +111,8 @@ def _coarse(seen: Seen, known: KnownPart) -> list[Fit]:
         poses = np.concatenate(
             [places, np.broadcast_to(turns[:, None, None], (*places.shape[:2], 1))], axis=-1
         )
-        table = HeightTable(look.from_above, sigma=max(seen.sigma, 1e-3), soft=seen.pitch, flying=0.0)
+        from_above = look.from_above.padded(seen.pitch)
+        table = HeightTable(from_above, sigma=max(seen.sigma, 1e-3), soft=seen.pitch, flying=0.0)
         costs = table.costs(pixels, poses.reshape(-1, 3)).sum(axis=1).reshape(len(turns), -1)
         best = costs.argmin(axis=1)
         found += [
@@ -166,7 +170,7 @@ def improve(fit: Fit, seen: Seen, known: KnownPart, effort: Effort) -> Fit:
     cell = known.cell * (1.0 if effort.fine else max(1.0, np.sqrt(len(look.poses[0].points) / len(points))))
     plane = look.top / 2
     pixels = Pixels.of(seen, plane, fit.pose[:2])
-    seen_map = view(points, fit.pose, seen.eye, plane=plane, cell=cell)
+    seen_map = view(points, fit.pose, seen.eye, plane=plane, cell=cell, reach=_DEPENDS_WITHIN * seen.pitch)
     table = HeightTable(seen_map, sigma=seen.sigma, soft=cell, flying=seen.pitch if seen.noisy else 0.0)
     chosen, weight = _informative(table, seen_map, pixels, fit.pose, seen, effort.pixels)
     some = pixels.take(chosen)
@@ -195,7 +199,7 @@ def _informative(
     table: HeightTable, seen_map: HeightMap, pixels: Pixels, pose: np.ndarray, seen: Seen, most: int
 ) -> tuple[np.ndarray, int]:
     """Pixels near edges and slopes, whose height depends on the pose, and how many each stands for."""
-    low, high = seen_map.bounds(1.5 * seen.pitch)
+    low, high = seen_map.bounds(_DEPENDS_WITHIN * seen.pitch)
     cells = table.cells(pixels, pose[None])[0]
     depends = np.flatnonzero((high - low).reshape(-1)[cells] > max(0.5e-3, 0.3 * seen.sigma))
     if not len(depends):

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+
+DEEP, MOST_MISSED = 1e-3, 3
+"""Gaps of one or two cells' width that are deeper, metres, and longer, cells, are slits, which may be seen to
+their bottom."""
 
 
 def sample_surface(triangles: np.ndarray, spacing: float) -> np.ndarray:
@@ -60,6 +64,11 @@ class HeightMap:
         square = np.ones((size, size), np.uint8)
         return cv2.erode(self.heights, square), cv2.dilate(self.heights, square)
 
+    def padded(self, border: float) -> HeightMap:
+        """The map with an empty border of ``border``, metres, more on every side."""
+        n = int(np.ceil(border / self.cell))
+        return replace(self, heights=np.pad(self.heights, n), corner=self.corner - n * self.cell)
+
 
 def heights_from(
     points: np.ndarray, eye: np.ndarray | None, *, plane: float, cell: float, margin: float
@@ -81,9 +90,23 @@ def heights_from(
     row = (y * scale - (first[1] - np.float32(0.5))).astype(np.int32)
     heights = np.zeros(width * height, np.float32)
     np.maximum.at(heights, row * width + column, points[:, 2])
-    # Between points that are nearly a cell apart a cell may be missed.
-    heights = cv2.morphologyEx(heights.reshape(height, width), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    return HeightMap(heights=heights, corner=low, cell=cell, plane=plane)
+    return HeightMap(
+        heights=_without_holes(heights.reshape(height, width)), corner=low, cell=cell, plane=plane
+    )
+
+
+def _without_holes(heights: np.ndarray) -> np.ndarray:
+    """Raise cells that were missed: between points that are nearly a cell apart one or two may be.
+
+    Many of them in a row are a slit.
+    """
+    closed = cv2.morphologyEx(heights, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    deep = (closed - heights > DEEP).astype(np.uint8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(deep, connectivity=8)
+    slit = stats[:, cv2.CC_STAT_AREA] > MOST_MISSED
+    slit[0] = False  # all other cells
+    closed[slit[labels]] = 0.0
+    return closed
 
 
 def on_plane(points: np.ndarray, eye: np.ndarray | None, plane: float) -> tuple[np.ndarray, np.ndarray]:

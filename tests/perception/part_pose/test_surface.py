@@ -2,12 +2,11 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.spatial import KDTree
+from trimesh.transformations import translation_matrix as translation
 
 from mskgrasp.perception.part_pose.surface import heights_from, on_plane, sample_surface
 
-BOX = trimesh.creation.box(
-    (0.06, 0.03, 0.02), transform=trimesh.transformations.translation_matrix([0, 0, 0.01])
-)
+BOX = trimesh.creation.box((0.06, 0.03, 0.02), transform=translation([0, 0, 0.01]))
 POINTS = sample_surface(np.asarray(BOX.triangles), 0.5e-3).astype(np.float32)
 
 
@@ -51,3 +50,31 @@ def test_bounds_hold_the_heights_of_the_surroundings():
     assert np.all(low <= seen.heights) and np.all(high >= seen.heights)
     grown = np.count_nonzero(high) * seen.cell**2
     assert grown == pytest.approx((0.06 + 6e-3) * (0.03 + 6e-3), rel=0.08)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.1, np.pi / 4])
+def test_a_slit_nearly_two_cells_wide_stays_open(turn):
+    cell, gap = 0.75e-3, 1.4e-3
+    halves = [
+        trimesh.creation.box((0.03, 0.03, 0.02), transform=translation([side * (0.03 + gap) / 2, 0, 0.01]))
+        for side in (-1, 1)
+    ]
+    both = trimesh.util.concatenate(halves)
+    both.apply_transform(trimesh.transformations.rotation_matrix(turn, [0, 0, 1]))
+    points = sample_surface(np.asarray(both.triangles), 0.5e-3).astype(np.float32)
+    seen = heights_from(points, None, plane=0.0, cell=cell, margin=3e-3)
+    low, _ = seen.bounds(cell)
+    along = np.linspace(-0.012, 0.012, 25)
+    x, y = -np.sin(turn) * along, np.cos(turn) * along
+    column, row = (np.rint((v - c) / cell).astype(int) for v, c in zip((x, y), seen.corner, strict=True))
+    assert np.all(low[row, column] == 0)
+
+
+def test_a_padded_map_shows_the_table_around_the_part():
+    seen = heights_from(POINTS, None, plane=0.0, cell=0.75e-3, margin=1e-3)
+    padded = seen.padded(3e-3)
+    _, high = padded.bounds(3e-3)
+    assert high[0].max() == high[-1].max() == high[:, 0].max() == high[:, -1].max() == 0
+    inside = padded.heights[4:-4, 4:-4]
+    assert np.array_equal(inside, seen.heights)
+    assert padded.corner == pytest.approx(seen.corner - 4 * seen.cell)
