@@ -1,8 +1,8 @@
 """Poses of parts with known CAD, in a simulated cell. Run: python -m tests.benchmarks.part_pose --help.
 
 Places parts at random in their resting poses, finds them in the rendered image with and without noise, and
-compares with the simulator's pose. Then shows what must be refused: other parts, at random and of the nearest
-size in the family, parts that lean, parts with a block under an edge, and parts that touch another.
+compares with the simulator's pose. Then shows what must be refused: other parts, at random and of another
+size, parts that lean, and parts that touch another.
 
 A turn counts up to the symmetry of the resting pose, and between resting poses that look alike (`Look`).
 Times are those of the whole call, on the given number of threads.
@@ -11,6 +11,7 @@ Times are those of the whole call, on the given number of threads.
 from __future__ import annotations
 
 import argparse
+import re
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -27,8 +28,9 @@ from hal.open_cell import open_cell
 from hal.sensor_noise import NoiseModel, SensorNoise, add_noise
 from mskgrasp.core.errors import NoPartFound, PartNotRecognised
 from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing, wrap_angle
-from mskgrasp.parts import chosen_names, find_part
-from mskgrasp.parts.catalogue import Entry, read_index, representative_entries
+from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.parts import find_part
+from mskgrasp.parts.select_parts import part_names
 from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import progress
@@ -42,6 +44,8 @@ BOUNDS = {
 """Errors that count as right, metres and radians, by noise."""
 LEANS = (2.0, 4.0, 8.0)
 """Degrees by which parts lean that must be refused."""
+_SIZE = re.compile(r"\d")
+"""Where the size begins in the name of a part of the catalogue."""
 CHI_SQUARED_95 = {2: 5.99, 3: 7.81}
 """What the squared error over the covariance exceeds in 5 %, by the number of unknowns."""
 
@@ -196,20 +200,20 @@ def accuracy_row(model: NoiseModel, results: Sequence[Result]) -> list[str]:
     ]  # fmt: skip
 
 
-def wrong_parts(names: Sequence[str], rng: np.random.Generator) -> dict[str, dict[str, str]]:
-    """Of every part, another one at random, and that of its family whose edges are nearest."""
-    index = read_index().parts
-    kinds: dict[str, dict[str, str]] = {"another part": {}, "the nearest size": {}}
+def wrong_parts(names: Sequence[str], sizes: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Of every part, another one at random, and one of the catalogue of another size."""
+    rng = np.random.default_rng(0)
+    kinds: dict[str, dict[str, str]] = {"another part": {}, "another size": {}}
+    families: dict[str, list[str]] = {}
+    for name in sorted(sizes):
+        families.setdefault(_SIZE.split(name)[0], []).append(name)
     for name in names:
         kinds["another part"][name] = str(rng.choice([one for one in names if one != name]))
-        family = [one for one in index.values() if one.family == index[name].family and one.name != name]
-        if family:
-            kinds["the nearest size"][name] = min(family, key=lambda one: _unlike(one, index[name])).name
+        family = families.get(_SIZE.split(name)[0], [])
+        if name in family and len(family) > 1:
+            number = family.index(name)
+            kinds["another size"][name] = family[number + 1 if number + 1 < len(family) else number - 1]
     return kinds
-
-
-def _unlike(a: Entry, b: Entry) -> float:
-    return float(np.abs(np.log(np.array(a.extents) / np.array(b.extents))).max())
 
 
 def leaning(cell: Cell, shown: Shown, degrees: float, known: KnownPart) -> Shown:
@@ -255,10 +259,7 @@ def main() -> None:
     """Prints a table of the right parts, and one of what must be refused."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument(
-        "--parts", nargs="+", default=["validation"], help="names or sets (default: validation)"
-    )
-    parser.add_argument(
-        "--n-parts", type=int, default=45, help="about so many of a catalogue's set (default 45)"
+        "--parts", nargs="+", default=["validation:45"], help="as of evaluate (default: validation:45)"
     )
     parser.add_argument("--poses", type=int, default=6, help="placements of each part (default 6)")
     parser.add_argument(
@@ -272,14 +273,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="folder for report.json")
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
-    names = chosen_names(options.parts)
-    index = read_index().parts
-    if len(names) > options.n_parts:
-        names = [one.name for one in representative_entries([index[name] for name in names], options.n_parts)]
+    training = load_models(PRETRAINED).meta.training
+    names = part_names(options.parts, training)
     known = {name: KnownPart.of(find_part(name)) for name in progress(names, unit="part", title="prepare")}
     results: dict[NoiseModel, list[Result]] = {model: [] for model in options.noise}
     refused: dict[tuple[str, NoiseModel], list[bool]] = {}
-    kinds = wrong_parts(names, np.random.default_rng(0))
+    kinds = wrong_parts(names, training["validation_parts"])
     extra = {other for pairs in kinds.values() for other in pairs.values()} - set(known)
     known |= {
         name: KnownPart.of(find_part(name)) for name in progress(sorted(extra), unit="part", title="others")
