@@ -273,7 +273,7 @@ def _engines(stored: StoredReport) -> list[ReadmeRow]:
 
 def _collect(stored: StoredReport) -> list[ReadmeRow]:
     cells = _cells(stored)
-    text = f"{cells['grasps/s']} grasps/s (simulation {stored.facts['simulation']})"
+    text = f"{cells['grasps/s']} grasps/s, {cells['time']} for the demo dataset"
     return [ReadmeRow(name="collecting", text=text, interval=stored.facts["intervals"])]
 
 

@@ -105,7 +105,7 @@ def _without_holes(heights: np.ndarray) -> np.ndarray:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(deep, connectivity=8)
     slit = stats[:, cv2.CC_STAT_AREA] > MOST_MISSED
     slit[0] = False  # all other cells
-    closed[slit[labels]] = 0.0
+    closed[slit[labels.astype(np.intp)]] = 0.0
     return closed
 
 
