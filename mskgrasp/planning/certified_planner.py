@@ -6,6 +6,7 @@ import copy
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from hal.camera import RgbdFrame
 from hal.cell import Cell
 from hal.errors import OutOfWorkspace
 from mskgrasp.core.displacement_covariance import displacement_jacobian
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.errors import BadPart, PartNotRecognised
 from mskgrasp.core.geometry import twist_and_swing
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, to_grasp_displacement
 from mskgrasp.parts import Part
@@ -86,9 +87,7 @@ class CertifiedPlanner:
         """
         started = time.perf_counter()
         planner = self._planner
-        found = find_part_pose(
-            frame, self._known, table_z=planner.table_z, region=planner.region, min_height=planner.min_height
-        )
+        found = self._find(frame)
         located = time.perf_counter()
         plan = None if self._ambiguous(found) else self._certified_plan(frame, found)
         if plan is None:
@@ -97,6 +96,26 @@ class CertifiedPlanner:
         now = time.perf_counter()
         seconds = {"pose": located - started, "select": now - located, "total": now - started}
         return replace(plan, seconds=seconds)
+
+    def _find(self, frame: RgbdFrame) -> PartPose:
+        """The part's pose: one that stands in the simulation or, if none fits, any resting pose.
+
+        On a real table a pose may stand that topples in the simulation. It has no certified grasp.
+        """
+        space = self._planner
+        found = partial(
+            find_part_pose, frame, table_z=space.table_z, region=space.region, min_height=space.min_height
+        )
+        try:
+            return found(self._known)
+        except PartNotRecognised:
+            if all(self._certified.stands):
+                raise
+            return found(self._in_any_pose)
+
+    @cached_property
+    def _in_any_pose(self) -> KnownPart:
+        return KnownPart.of(self._part)
 
     def _ambiguous(self, found: PartPose) -> bool:
         """Whether the image fits poses that may need different grasps, and that are likely enough."""

@@ -126,6 +126,17 @@ def test_where_an_image_fits_two_poses_the_networks_plan(cell, planner, capsys):
     assert "the image fits two poses of it; planned by the networks" in capsys.readouterr().err
 
 
+def test_in_a_pose_that_topples_in_the_simulation_the_networks_plan(cell, planner, capsys):
+    frame, true = present(cell, 2)
+    resting = resting_of(true)
+    stands = tuple(number != resting for number in range(len(PART.resting_probability)))
+    others = grasps((resting + 1) % len(stands))
+    toppling = dataclasses.replace(others, stands=stands, without={resting: "it topples in the simulation"})
+    plan = CertifiedPlanner(planner, PART, toppling).plan(frame, np.random.default_rng(0))
+    assert plan.pose is not None and plan.pose.resting == resting and not plan.certified
+    assert "it topples in the simulation; planned by the networks" in capsys.readouterr().err
+
+
 def test_another_part_is_refused(cell, planner):
     cell.feeder.present("hex_nut_m20", 0)
     own = CertifiedPlanner(planner, PART, grasps(0))
