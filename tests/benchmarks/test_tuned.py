@@ -27,7 +27,9 @@ def test_the_displacement_of_known_parts_is_learned_and_the_quality_is_left(boxe
     assert errors[1] < 0.9 * errors[0]
     for a, b in zip(before.gqn.state_dict().values(), after.gqn.state_dict().values(), strict=True):
         assert torch.equal(a, b)
-    assert after.meta.training["training_parts"] and not after.meta.metrics
+    training = after.meta.training
+    assert training["training_parts"] == list(samples.parts) and not training["validation_parts"]
+    assert not after.meta.metrics
 
 
 def test_too_few_attempts_are_refused(boxes, tmp_path: Path):

@@ -21,6 +21,7 @@ from mskgrasp.learning.grasp_models import PRETRAINED, ModelMeta, Models, load_m
 from mskgrasp.learning.held_out import calibrate
 from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.trainer import Sides, describe_networks
+from mskgrasp.parts.catalogue import SPLITS
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import advance_to, progress
 from tests.benchmarks.choice import Choice
@@ -49,9 +50,11 @@ def tuned(samples: Samples, config: LearningConfig, attempts: int) -> Models:
     cost = cost_of(Choice(name="tuned", config=config, build=start), samples, sides, 2.0)
     with progress(unit="s", total=round(cost.total_s), title="tune") as bar:
         models = displacement_trained(start, config, samples, sides, TimeLeft(bar, cost))
-    meta = shipped.meta.model_copy(
-        update={"training": describe_networks(samples, sides.training, config).training, "metrics": {}}
-    )
+    training = describe_networks(samples, sides.training, config).training
+    # Attempts are held out, no part.
+    training |= {f"{side}_parts": [] for side in SPLITS if side != "train"}
+    training["training_parts"] = list(samples.parts)
+    meta = shipped.meta.model_copy(update={"training": training, "metrics": {}})
     models = replace(models, meta=meta)
     found = calibrate(models, samples, sides.validation)
     # The quality network is the shipped one; its calibration rests on far more attempts.
@@ -77,6 +80,7 @@ def main() -> int:
     torch.set_num_threads(options.threads)
     config = read_config(LearningConfig, CONFIGS / "pretrained.yaml")
     config = with_stages(config, epochs=options.epochs, learning_rate=options.learning_rate)
+    config = config.model_copy(update={"sides": "name"})  # no catalogue is needed
     with progress(title="read shards", unit="shard") as bar:
         samples = read_samples(options.data, config.network, advance=partial(advance_to, bar))
     cli.make_folder(options.out)
