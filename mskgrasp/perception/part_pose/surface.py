@@ -102,10 +102,11 @@ def _without_holes(heights: np.ndarray) -> np.ndarray:
     """
     closed = cv2.morphologyEx(heights, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     deep = (closed - heights > DEEP).astype(np.uint8)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(deep, connectivity=8)
-    slit = stats[:, cv2.CC_STAT_AREA] > MOST_MISSED
-    slit[0] = False  # all other cells
-    closed[slit[labels.astype(np.intp)]] = 0.0
+    if np.count_nonzero(deep) > MOST_MISSED:
+        _, labels, stats, _ = cv2.connectedComponentsWithStats(deep, connectivity=8)
+        slit = stats[:, cv2.CC_STAT_AREA] > MOST_MISSED
+        slit[0] = False  # all other cells
+        closed[slit[labels.astype(np.intp)]] = 0.0
     return closed
 
 
