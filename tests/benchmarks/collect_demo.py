@@ -15,11 +15,12 @@ from pathlib import Path
 
 from mskgrasp.core.shipped import config_file
 from mskgrasp.dataset import list_shards, read_success
+from mskgrasp.runtime import cli
 from mskgrasp.runtime.console_table import Table
 from tests.benchmarks.report import show
 
 
-def main() -> None:
+def main() -> int:
     """Prints a table of one row."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, help="folder of report.json and report.md")
@@ -39,7 +40,8 @@ def main() -> None:
     row = (f"{seconds:.0f} s", f"{len(lifted) / seconds:.1f}", f"{sum(lifted) / len(lifted):.1%}")
     table = Table(header=("time", "grasps/s", "lifted"), rows=[row])
     show([table], options.out, {"n": f"{len(lifted)} grasps, seed 0; {os.cpu_count()} workers"})
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    cli.run("collect_demo", main)

@@ -32,6 +32,7 @@ from mskgrasp.learning.grasp_models import PRETRAINED, load_models
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
+from mskgrasp.runtime import cli
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import progress
 from tests.benchmarks.report import show
@@ -204,7 +205,8 @@ def wrong_parts(names: Sequence[str], sizes: Sequence[str]) -> dict[str, dict[st
     for name in sorted(sizes):
         families.setdefault(_SIZE.split(name)[0], []).append(name)
     for name in names:
-        kinds["another part"][name] = str(rng.choice([one for one in names if one != name]))
+        if len(names) > 1:
+            kinds["another part"][name] = str(rng.choice([one for one in names if one != name]))
         family = families.get(_SIZE.split(name)[0], [])
         if name in family and len(family) > 1:
             number = family.index(name)
@@ -251,7 +253,7 @@ def touching(shown: Shown, table_z: float) -> Shown:
     return replace(shown, frame=replace(frame, depth=np.fmin(frame.depth, moved)))
 
 
-def main() -> None:
+def main() -> int:
     """Prints a table of the right parts, and one of what must be refused."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument(
@@ -321,7 +323,8 @@ def main() -> None:
         ],
         options.out,
     )  # fmt: skip
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    cli.run("part_pose", main)
