@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import trimesh
 
@@ -36,6 +35,8 @@ _TANGENTS = (0.1, 0.18, 0.25)
 of a deep bore are seen from near the axis only."""
 _SIDES = np.arange(8) * np.pi / 4
 _FAR = 10.0
+_BELOW = 5e-6
+"""Points farther under the table, on which hulls lie and not the mesh, are not seen, metres."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +73,6 @@ class Look:
     Attributes:
         poses: The most probable first; its frame and points are those of the look.
         few: (m, 3) some of its points.
-        outline: (k, 2) corners of the convex hull of all of them as seen from straight above, metres.
         from_above: Heights of it as seen from straight above.
         top: Height of the highest point, metres.
         radius: Greatest distance of a point from the vertical through the part's origin, metres.
@@ -80,7 +80,6 @@ class Look:
 
     poses: tuple[Lying, ...]
     few: np.ndarray
-    outline: np.ndarray
     from_above: HeightMap
     top: float
     radius: float
@@ -243,6 +242,7 @@ class _Seen:
     def visible(self) -> np.ndarray:
         """The points that a camera above may see, from any side."""
         kept, cell = np.zeros(len(self.points), bool), 1.2 * self.from_above.cell
+        above = self.points[:, 2] > -_BELOW
         for tangent, side in [(0.0, 0.0), *((t, side) for t in _TANGENTS for side in _SIDES)]:
             eye = _FAR * np.array([tangent * np.cos(side), tangent * np.sin(side), 1.0])
             shown = heights_from(self.points, eye, plane=0.0, cell=cell, margin=2 * cell)
@@ -251,7 +251,7 @@ class _Seen:
             row = np.rint((y - shown.corner[1]) / cell).astype(int)
             # A cell on a wall spans this height.
             kept |= self.points[:, 2] >= shown.heights[row, column] - cell / (tangent or 0.5)
-        return np.ascontiguousarray(self.points[kept].T).T
+        return np.ascontiguousarray(self.points[kept & above].T).T
 
 
 def _look(group: list[tuple[_Seen, float]]) -> Look:
@@ -271,7 +271,6 @@ def _look(group: list[tuple[_Seen, float]]) -> Look:
     return Look(
         poses=tuple(poses),
         few=np.ascontiguousarray(points[:: max(1, len(points) // FEW_POINTS)].T).T,
-        outline=cv2.convexHull(np.ascontiguousarray(points[:, :2]))[:, 0],
         from_above=first.from_above,
         top=float(points[:, 2].max()),
         radius=float(np.linalg.norm(points[:, :2], axis=1).max()),
