@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -44,12 +44,18 @@ def draw_shares(trials: Sequence[PlacedTrial], seed: int, path: Path) -> None:
         figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 6), fontsize=9)
 
 
-def draw_refusals(refused: Sequence[Refusal], path: Path) -> None:
-    """Draw the share placed of the attempts that are tried against the share that is refused."""
+def draw_refusals(refused: Sequence[Refusal], planners: Iterable[str], path: Path) -> None:
+    """Draw the share placed of the attempts that are tried against the share that is refused.
+
+    ``planners`` are all of the benchmark, also those that predict no quality: a planner's line looks as in
+    `draw_shares`.
+    """
     with saved_figure(path, 11.0, 3.6) as figure:
         axis = figure.subplots()
-        for name, (colour, style) in zip(dict.fromkeys(one.planner for one in refused), _LINES, strict=False):
+        for name, (colour, style) in zip(planners, _LINES, strict=False):
             some = [one for one in refused if one.planner == name]
+            if not some:
+                continue
             axis.plot(
                 [one.refused for one in some], [one.placed.value for one in some], color=colour,
                 linestyle=style, marker="o", markersize=3, label=name,

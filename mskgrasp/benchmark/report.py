@@ -78,7 +78,7 @@ def write_report(out: Path, trials: Sequence[PlacedTrial], facts: RunFacts) -> t
     """
     rows, refused, budget = summarise(trials, facts.seed), refusals(trials, facts.seed), budgets(trials)
     draw_shares(trials, facts.seed, out / "shares.png")
-    draw_refusals(refused, out / "refusals.png")
+    draw_refusals(refused, by_planner(trials), out / "refusals.png")
     headline = conclusion(rows, facts)
     values = summary_json(
         rows, refused, budget, headline=headline, cell=facts.cell, noise=facts.noise, seed=facts.seed,

@@ -147,7 +147,7 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
                             _bar(axes, x + (k + 1) * _BAR, value, None, scale, _PAPERS[policy])
                 axes.set_title(f"{kind.capitalize()} RMSE, {side} parts")
                 axes.set_ylabel(unit)
-                labels = [name if ours.get(name, name) == name else f"{name}\n{ours[name]}" for name in order]
+                labels = [_tick_label(name, ours.get(name, name)) for name in order]
                 axes.set_xticks(range(len(order)), labels, fontsize=8)
                 axes.set_ylim(bottom=0)
                 axes.set_xlim(-0.6, len(order) - 0.4)
@@ -160,6 +160,10 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
             label = f"{POLICY_NAMES['certified']}, this run (all parts)"
             handles.append(Patch(color=GREEN, label=label))
         figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9)
+
+
+def _tick_label(name: str, label: str) -> str:
+    return name if label.lower() == name.lower() else f"{name}\n{label}"
 
 
 def _bar(

@@ -90,6 +90,15 @@ def _rgb(colour: str) -> tuple[float, ...]:
     return tuple(int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
 
 
+def test_a_label_that_is_the_papers_name_is_written_once(tmp_path: Path, monkeypatch):
+    kept = keep_figures(figures, monkeypatch)
+    predictions = {"lowess": Prediction(mean=[0.0, 0.001, 0.0, -0.1], std=[0.01] * 4)}
+    figures.draw_comparison(
+        compare_models([trial(predictions=predictions)], {"lowess": Model()}), tmp_path / "one.png"
+    )
+    assert [label.get_text() for label in kept[0].axes[2].get_xticklabels()][0] == "LOWESS"
+
+
 def test_certified_grasps_have_a_green_bar_beside_the_models(tmp_path: Path, monkeypatch):
     kept = keep_figures(figures, monkeypatch)
     predictions = {"gcip_mv": Prediction(mean=[0.0, 0.001, 0.0, -0.1], std=[0.01] * 4)}
