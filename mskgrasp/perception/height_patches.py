@@ -81,38 +81,39 @@ def crop_patches(
     distance = axes[..., 2] @ points
     if distance.numel() and float(distance.min()) < 1e-6:
         distance.clamp_(min=1e-6)  # points behind the camera project far outside
-    where = torch.empty(2, *distance.shape, device=heights.device)  # faster than (..., 2)
+    where = torch.empty(2, *distance.shape, device=heights.device)  # written and searched faster than (..., 2)
     for k, size in enumerate((width, height)):
         # To grid_sample's units before the division by the distance: (2 / (width - 1)) u - 1.
         unit = axes[..., k] * (2 / (size - 1)) - axes[..., 2]
         torch.div(unit @ points, distance, out=where[k])
-    return _sampled(heights, where.permute(1, 2, 0)).reshape(-1, 1, n_pixels, n_columns)
+    return _sampled(heights, where).reshape(-1, 1, n_pixels, n_columns)
 
 
 def _sampled(heights: Tensor, where: Tensor) -> Tensor:
-    """Interpolate heights (a, b) of one image (h, w), or of a images (a, h, w), at (a, b, 2)."""
+    """Interpolate heights (a, b) of one image (h, w), or of a images (a, h, w), at (2, a, b)."""
     one = heights.ndim == 2
     images = heights[None, None] if one else heights[:, None]
-    grid = where[None] if one else where[:, None]
+    points = where.permute(1, 2, 0)
+    grid = points[None] if one else points[:, None]
     valid = ~torch.isnan(images)
     if bool(valid.all()):
         value = torch.nn.functional.grid_sample(
             images.float(), grid, mode="bilinear", padding_mode="border", align_corners=True
         )
-        value = value.reshape(where.shape[:-1])
+        value = value.reshape(where.shape[1:])
         if not where.numel() or max(map(abs, map(float, where.aminmax()))) <= 1.0:
             return value  # all within the image
         # The share of the four pixels around a point that lies within the image, as below.
         share = torch.ones_like(value)
         for k, size in enumerate((heights.shape[-1], heights.shape[-2])):
-            beyond = where[..., k].abs().sub_(1).clamp_(min=0)
+            beyond = where[k].abs().sub_(1).clamp_(min=0)
             share *= (1 - beyond.mul_((size - 1) / 2)).clamp_(min=0)
         return value.masked_fill_(share < 0.5, 0.0)
     source = torch.cat([torch.where(valid, images, 0.0), valid.to(images.dtype)], dim=1).float()
     sampled = torch.nn.functional.grid_sample(
         source, grid, mode="bilinear", padding_mode="zeros", align_corners=True
     )
-    value, weight = (sampled[:, k].reshape(where.shape[:-1]) for k in (0, 1))
+    value, weight = (sampled[:, k].reshape(where.shape[1:]) for k in (0, 1))
     return torch.where(weight >= 0.5, value / weight.clamp(min=0.5), 0.0)
 
 

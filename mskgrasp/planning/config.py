@@ -29,7 +29,7 @@ class PlannerConfig(Config):
     recentre: bool = True
     """Among the best grasps by variance, try those as well in which the part would hardly move: the same ones
     at the place where it would come to lie between the pads."""
-    chunk_size: int = Field(default=800, ge=1, le=65_536)
+    chunk_size: int = Field(default=400, ge=1, le=65_536)
     """Greatest number of grasps in a batch: many more do not fit a CPU's cache, few have too much overhead.
     (The paper's network, with patches seven times larger, is fastest with 32.)"""
 
