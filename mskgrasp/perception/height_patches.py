@@ -81,7 +81,9 @@ def crop_patches(
     distance = axes[..., 2] @ points
     if distance.numel() and float(distance.min()) < 1e-6:
         distance.clamp_(min=1e-6)  # points behind the camera project far outside
-    where = torch.empty(2, *distance.shape, device=heights.device)  # written and searched faster than (..., 2)
+    where = torch.empty(
+        2, *distance.shape, device=heights.device
+    )  # written and searched faster than (..., 2)
     for k, size in enumerate((width, height)):
         # To grid_sample's units before the division by the distance: (2 / (width - 1)) u - 1.
         unit = axes[..., k] * (2 / (size - 1)) - axes[..., 2]

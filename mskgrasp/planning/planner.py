@@ -28,15 +28,14 @@ from mskgrasp.planning.refine import fingers_free, where_held
 from mskgrasp.planning.refusal import refusal_reason
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 
-PROMISING = 16
-"""Number of candidates, best by the score of one view, whose displacement is predicted from all four views.
-
-In 56 of 60 scenes of validation parts the best by every view was among them; in the others the root of the
-score was at most 1 % greater.
-"""
+PROMISING = 12
+"""Number of candidates, best by the score of one view, whose displacement is predicted from every view."""
 
 RECENTRED = 48
-"""Number of candidates of the shortlist, best by the score of one view, that are tried recentred, too."""
+"""Number of candidates of the shortlist, best by the score of one view, that are tried recentred, too.
+
+What the search loses by both, and by smaller numbers: `tests.benchmarks.search_breadth`.
+"""
 SURE = 0.95
 """Recentred grasps need this quality, or that of the shortlist's last, if it is lower."""
 Predict = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
