@@ -279,10 +279,10 @@ def _collect(stored: StoredReport) -> list[ReadmeRow]:
 
 def _plan(stored: StoredReport) -> list[ReadmeRow]:
     times, ratios = _report(stored)["tables"]
-    ours, paper = (dict(zip(times["header"], row, strict=True)) for row in times["rows"])
+    ours, paper = (dict(zip(times["header"], row, strict=True)) for row in times["rows"][:2])
     text = (
         f"{ours['median, ms']} ms with the shipped model; the paper's network {paper['median, ms']} ms, "
-        f"{ratios['rows'][0][0]} times as long"
+        f"{ratios['rows'][0][1]} times as long"
     )
     return [ReadmeRow(name="planning", text=text, interval=f"{ours['interval of the median']} ms")]
 
