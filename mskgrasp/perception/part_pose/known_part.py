@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import trimesh
 
@@ -73,6 +74,7 @@ class Look:
     Attributes:
         poses: The most probable first; its frame and points are those of the look.
         few: (m, 3) some of its points.
+        outline: (k, 2) corners of the convex hull of x, y of one in five of these.
         from_above: Heights of it as seen from straight above.
         top: Height of the highest point, metres.
         radius: Greatest distance of a point from the vertical through the part's origin, metres.
@@ -80,6 +82,7 @@ class Look:
 
     poses: tuple[Lying, ...]
     few: np.ndarray
+    outline: np.ndarray
     from_above: HeightMap
     top: float
     radius: float
@@ -268,9 +271,11 @@ def _look(group: list[tuple[_Seen, float]]) -> Look:
             )
         )
     points = poses[0].points
+    few = np.ascontiguousarray(points[:: max(1, len(points) // FEW_POINTS)].T).T
     return Look(
         poses=tuple(poses),
-        few=np.ascontiguousarray(points[:: max(1, len(points) // FEW_POINTS)].T).T,
+        few=few,
+        outline=cv2.convexHull(np.ascontiguousarray(few[::5, :2]))[:, 0],
         from_above=first.from_above,
         top=float(points[:, 2].max()),
         radius=float(np.linalg.norm(points[:, :2], axis=1).max()),

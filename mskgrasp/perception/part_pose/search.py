@@ -99,7 +99,7 @@ def _coarse(seen: Seen, known: KnownPart) -> list[Fit]:
     for look in known.looks:
         turns = np.arange(0, look.poses[0].period or 1.0, _turn_step(look) if look.poses[0].order else 1.0)
         cos, sin = np.cos(turns)[:, None], np.sin(turns)[:, None]
-        x, y, _ = look.few[::5].T
+        x, y = look.outline.T
         along, across = cos * x - sin * y, sin * x + cos * y
         low = np.stack([along.min(axis=1), across.min(axis=1)], axis=-1)
         high = np.stack([along.max(axis=1), across.max(axis=1)], axis=-1)

@@ -57,6 +57,14 @@ def test_the_pose_at_a_place_and_turn_is_the_resting_pose_moved_there(turn):
             assert np.allclose(found.as_matrix(), true.as_matrix(), atol=1e-9)
 
 
+def test_the_outline_reaches_as_far_as_the_points_at_any_turn():
+    for look in known("spur_gear_m3_z17").looks:
+        for turn in np.linspace(0, 2 * np.pi, 50):
+            across = np.array([np.cos(turn), np.sin(turn)])
+            reach = (look.few[::5, :2] @ across).max()
+            assert (look.outline @ across).max() == pytest.approx(reach, abs=1e-7)
+
+
 def test_points_are_on_and_above_the_table():
     for name in ("spur_gear_m3_z17", "l_bracket_60x40"):
         for look in known(name).looks:
