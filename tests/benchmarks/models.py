@@ -77,7 +77,7 @@ class Groups:
             config: Says how parts are split.
             novel: Side of the novel parts, validation or test.
             n_known: Number of known parts.
-            share: Share of the training attempts that is used.
+            share: Share of the attempts to train on and to select epochs by that is used.
 
         Raises:
             UsageError: There is no success to measure.
@@ -94,7 +94,8 @@ class Groups:
         most = int(torch.bincount(samples.part[known]).max())
         pooled = torch.cat([known, *(rows[samples.part[rows] == number][:most] for number in some)])
         none = training[:0]
-        used = Sides(training=training, validation=sides.validation, test=none, new_sizes=none)
+        validation = some_rows(sides.validation, share)
+        used = Sides(training=training, validation=validation, test=none, new_sizes=none)
         return cls(sides=used, known=known, novel=rows, pooled=pooled)
 
 
@@ -266,7 +267,9 @@ def _options() -> argparse.Namespace:
     )  # fmt: skip
     parser.add_argument("--only", nargs="+", metavar="NAME", help=f"networks, besides {PAPER}")
     parser.add_argument("--patience", type=int, default=10, help="epochs without improvement (default 10)")
-    parser.add_argument("--share", type=float, default=1.0, help="of the attempts to train on (default 1)")
+    parser.add_argument(
+        "--share", type=float, default=1.0, help="of the attempts to train on and to stop by (default 1)"
+    )
     parser.add_argument(
         "--mixed-precision", action="store_true",
         help="the paper's networks train in bfloat16: faster on a CPU that computes with it",
