@@ -33,6 +33,7 @@ class Choice:
             ship; None: both networks are trained as `mskgrasp.train` does.
         samples: What this choice sees of the samples.
         sides: The attempts that it trains on.
+        most_seeds: Greatest number of its trainings; None: as many as of the others.
     """
 
     name: str
@@ -41,11 +42,16 @@ class Choice:
     build: Callable[[ModelMeta], Models] | None = None
     samples: Callable[[Samples], Samples] = field(default=lambda samples: samples)
     sides: Callable[[Samples, Sides], Sides] = field(default=lambda samples, sides: sides)
+    most_seeds: int | None = None
 
     @property
     def has_quality(self) -> bool:
         """Whether it trains a quality network."""
         return self.build is None and not self.quality_of
+
+    def seeds(self, n: int) -> range:
+        """Seeds of its trainings where the others have n."""
+        return range(n if self.most_seeds is None else min(n, self.most_seeds))
 
     def stages(self) -> tuple[str, ...]:
         """Names of the networks that it trains."""

@@ -61,7 +61,7 @@ def make_trainings(
     Raises:
         UsageError: A folder holds a training of other settings or data, or another process is still at one.
     """
-    jobs = [(choice, seed) for seed in range(seeds) for choice in choices]
+    jobs = [(choice, seed) for seed in range(seeds) for choice in choices if seed in choice.seeds(seeds)]
     missing = [job for job in jobs if not all(_path(out, *job, name).exists() for name in groups)]
     costs = {}
     for choice, _ in missing:
@@ -85,7 +85,7 @@ def make_trainings(
     return {
         choice.name: [
             {name: Predictions.read(_path(out, choice, seed, name)) for name in groups}
-            for seed in range(seeds)
+            for seed in choice.seeds(seeds)
         ]
         for choice in choices
     }
