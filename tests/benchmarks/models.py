@@ -30,7 +30,7 @@ from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import progress
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.known_parts import evenly, held_out_rows, lowess_predictions
-from tests.benchmarks.paper_choices import OURS, PAPER, PAPER_AS_OURS, paper_choices, quick, some_rows
+from tests.benchmarks.paper_choices import OURS, PAPER_AS_OURS, paper_choices, quick, some_rows
 from tests.benchmarks.report import show
 from tests.benchmarks.scores import (
     change_table,
@@ -114,7 +114,8 @@ def main() -> int:
             f"--only {', '.join(sorted(unknown))}; legal: {', '.join(one.name for one in choices)}"
         )
     if options.only:
-        wanted = {PAPER, *options.only}  # its quality network is the others', its errors the reference
+        chosen = [one for one in choices if one.name in options.only]
+        wanted = {*options.only, *(one.quality_of for one in chosen)}
         choices = [one for one in choices if one.name in wanted]
     seeds = 1 if options.quick else options.seeds
     choices = [quick(one) for one in choices] if options.quick else choices
@@ -248,7 +249,7 @@ def compare(
         n_parts = of_group[NOTHING].parts
         caption = f"{title}: {len(rows[group])} grasps of {n_parts} parts"
         tables += [score_table(of_group, bold=OURS, caption=caption), coverage_table(of_group)]
-    for reference in (choices[0].name, PAPER_AS_OURS):
+    for reference in dict.fromkeys((choices[0].name, PAPER_AS_OURS)):
         rivals = [choice.name for choice in choices if choice.name != reference]
         if reference in trained and rivals:
             theirs = errors_of(samples, groups.novel, each["novel"][reference])
@@ -278,7 +279,7 @@ def _options() -> argparse.Namespace:
         "--split", choices=("validation", "test"), default="validation",
         help="novel parts; test for final tables only, which is logged (default validation)",
     )  # fmt: skip
-    parser.add_argument("--only", nargs="+", metavar="NAME", help=f"networks, besides {PAPER}")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="networks, beside those that they need")
     parser.add_argument("--patience", type=int, default=10, help="epochs without improvement (default 10)")
     parser.add_argument(
         "--share", type=float, default=1.0, help="of the attempts to train on and to stop by (default 1)"

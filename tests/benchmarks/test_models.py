@@ -147,12 +147,16 @@ def test_the_papers_recipe_may_have_fewer_seeds_than_ours(boxes, groups, tmp_pat
 
 def test_the_command_runs_from_a_dataset_to_a_report(boxes, tmp_path):
     done = run_here(
-        models.main, "--data", str(boxes.data), "--out", str(tmp_path), "--quick", "--only", OURS,
-        "--known-parts", "2",
+        models.main, "--data", str(boxes.data), "--out", str(tmp_path), "--quick", "--only", PAPER_AS_OURS,
+        OURS, "--known-parts", "2",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     report = json.loads((tmp_path / "report.json").read_text())
-    assert report["quick"] and report["seeds"] == {PAPER: 1, OURS: 1} and "test_parts_logged" not in report
+    assert (
+        report["quick"]
+        and report["seeds"] == {PAPER_AS_OURS: 1, OURS: 1}
+        and "test_parts_logged" not in report
+    )
     assert set(report["scores"]) == {"known", "novel", "pooled"}
     assert (tmp_path / "report.md").read_text().count("| **ours** |") == 3
     assert len((tmp_path / "known_parts.txt").read_text().split()) == 2
