@@ -204,7 +204,7 @@ def compare(
         novel: Name of the novel parts' side.
         seeds: Trainings of each network.
         out: Folder of the trainings.
-        lowess_data: Dataset that LOWESS is fitted to; None: that of the networks.
+        lowess_data: Dataset that LOWESS is fitted to; None: it is left out.
         measure_s: Seconds for which a network's steps are measured to predict the time left.
 
     Returns:
@@ -228,7 +228,9 @@ def compare(
         "pooled": torch.cat([groups.known, groups.novel[kept]]),
     }
     each: dict[str, dict[str, list[Predictions]]] = {name: {} for name in rows}
-    each["known"][LOWESS] = [lowess_predictions(samples, groups.known, groups.sides.training, lowess_data)]
+    if lowess_data is not None:
+        lowess = lowess_predictions(samples, groups.known, groups.sides.training, lowess_data)
+        each["known"][LOWESS] = [lowess]
     for name, found in trained.items():
         each["known"][name] = [one["known"] for one in found]
         each["novel"][name] = [one[novel] for one in found]
@@ -291,7 +293,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--known-parts", type=int, default=50, help="known parts to measure (default 50)")
     parser.add_argument(
         "--lowess-data", type=Path,
-        help="dataset of 1000 attempts at each of the parts in known_parts.txt; default: those of --data",
+        help="dataset of 1000 attempts at each of the parts in known_parts.txt; without it no LOWESS",
     )  # fmt: skip
     add_cost_options(parser)
     return parser.parse_args()

@@ -97,7 +97,8 @@ def choices() -> list[Choice]:
 def compared(boxes: Boxes, groups: Groups, choices: list[Choice], out, seeds: int):
     looks = Looks(boxes.data, (0.0, 1.0))
     return compare(
-        choices, looks=looks, groups=groups, novel="test", seeds=seeds, out=out, lowess_data=None,
+        choices, looks=looks, groups=groups, novel="test", seeds=seeds, out=out,
+        lowess_data=boxes.data,
         measure_s=0.02,
     )  # fmt: skip
 
