@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import datetime
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -150,7 +151,7 @@ def main() -> int:
         samples, groups.sides
     )
     if options.split == "test":
-        log_test_parts(len(torch.unique(samples.part[groups.novel])), scores["novel"])
+        log_test_parts(len(torch.unique(samples.part[groups.novel])), scores["novel"], options.out)
         values["test_parts_logged"] = True
     show(tables, options.out, values)
     return 0
@@ -168,8 +169,9 @@ def facts(samples: Samples, sides: Sides) -> dict[str, str]:
     }
 
 
-def log_test_parts(n_parts: int, scores: dict[str, dict[str, Any]]) -> None:
+def log_test_parts(n_parts: int, scores: dict[str, dict[str, Any]], out: Path) -> None:
     """Add a line to the log of the uses of test parts, with the errors of each model."""
+    arguments = [one for one in sys.argv[1:] if one not in ("--out", str(out))]
     errors = (
         f"{name} {1e3 * one['translation']['mean']:.1f} mm, {np.degrees(one['rotation']['mean']):.1f} degrees"
         for name, one in scores.items()
@@ -177,7 +179,7 @@ def log_test_parts(n_parts: int, scores: dict[str, dict[str, Any]]) -> None:
     log_use(
         datetime.date.today().isoformat(),
         commit(),
-        " ".join(["python -m tests.benchmarks.models", *sys.argv[1:]]),
+        f"python -m tests.benchmarks.models {shlex.join(arguments)}",
         f"test: {n_parts} held-out parts of the catalogue",
         "; ".join(errors),
     )

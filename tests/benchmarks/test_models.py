@@ -174,12 +174,12 @@ def test_what_cannot_be_is_refused_in_one_line(boxes, tmp_path):
 def test_a_use_of_the_test_parts_is_logged_with_its_figures(tmp_path, monkeypatch):
     log = tmp_path / "test_parts.csv"
     monkeypatch.setattr("tests.docs.uses_of_test_parts.TEST_PARTS", log)
-    monkeypatch.setattr("sys.argv", ["models", "--data", "data/training", "--split", "test"])
+    monkeypatch.setattr("sys.argv", ["models", "--only", PAPER_AS_OURS, "--out", str(tmp_path)])
     error = {"translation": {"mean": 0.0042}, "rotation": {"mean": np.pi / 36}}
-    models.log_test_parts(170, {OURS: error, PAPER: error})
+    models.log_test_parts(170, {OURS: error, PAPER: error}, tmp_path)
     (row,) = csv.reader(log.read_text().splitlines())
     assert row[2:] == [
-        "python -m tests.benchmarks.models --data data/training --split test",
+        "python -m tests.benchmarks.models --only 'GCIP-M+V, our recipe'",
         "test: 170 held-out parts of the catalogue",
         "ours 4.2 mm, 5.0 degrees; GCIP-M+V 4.2 mm, 5.0 degrees",
     ]

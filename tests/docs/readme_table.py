@@ -15,6 +15,7 @@ from mskgrasp.benchmark.report import TOLERANCE
 from mskgrasp.benchmark.summary import stored_row
 from mskgrasp.evaluate.comparison import POLICY_NAMES
 from mskgrasp.validate.config import SHIFTED
+from tests.benchmarks.paper_choices import OURS, PAPER_AS_OURS
 from tests.docs.pages import ROOT
 from tests.docs.stored_reports import REPORTS, StoredReport, page_of, read_stored
 from tests.sim_in_the_loop.regression import Row, StoredFigure, figures_of
@@ -230,6 +231,25 @@ def _shipped_model(stored: StoredReport) -> list[ReadmeRow]:
     ]
 
 
+def _equal_recipes(stored: StoredReport) -> list[ReadmeRow]:
+    found = _report(stored)["scores"]["novel"]
+    ours, paper = found[OURS], found[PAPER_AS_OURS]
+
+    def errors(one: dict[str, Any]) -> str:
+        accuracy = f"{one['balanced_accuracy']['mean']:.1%} accurate"
+        return f"{accuracy}, {_mm(one['translation']['mean'])}, {_degrees(one['rotation']['mean'])}"
+
+    text = f"trained alike on the same few grasps, ours {errors(ours)}; the paper's network {errors(paper)}"
+    interval = "; ".join(
+        f"{_between(one['balanced_accuracy']['interval'], 100, '%')}, "
+        f"{_between(one['translation']['interval'], 1e3, 'mm')}, "
+        f"{_between(one['rotation']['interval'], math.degrees(1), 'degrees')}"
+        for one in (ours, paper)
+    )
+    n = f"{ours['n']} grasps of {ours['parts']} parts, {ours['successes']} successes; three trainings each"
+    return [ReadmeRow(name="random grasps", text=text, interval=interval, n=n)]
+
+
 def _validation(stored: StoredReport) -> list[ReadmeRow]:
     report = _report(stored)
     (found,) = (
@@ -325,6 +345,7 @@ ROWS: tuple[tuple[str, Callable[[StoredReport], list[ReadmeRow]]], ...] = (
     ("palletize", _palletize),
     ("regression", _regression),
     ("shipped_model", _shipped_model),
+    ("equal_recipes", _equal_recipes),
     ("validation", _validation),
     ("engines", _engines),
     ("collect", _collect),

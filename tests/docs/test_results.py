@@ -52,7 +52,7 @@ def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
     index.write_text("# Results\n\n| page | measured |\n|---|---|\n| [Speed](speed.md) | speed |\n\nMore.\n")
     runs = {name: run["page"] for name, run in read_yaml(RUNS).items() if "page" in run}
     runs = {name: page for name, page in runs.items() if page["file"] == "models.md"}
-    assert list(runs) == ["model_baselines", "equal_recipes", "same_data", "oracles"]
+    assert list(runs) == ["model_baselines", "equal_recipes", "displacement_same_data", "oracles"]
     for name in (*runs, "oracles"):
         add_to_page(name, runs[name], tmp_path)
     text = (tmp_path / "models.md").read_text()
@@ -61,7 +61,7 @@ def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
         "end",
         "run: equal_recipes",
         "end",
-        "run: same_data",
+        "run: displacement_same_data",
         "end",
         "run: oracles",
         "end",
