@@ -239,7 +239,8 @@ def _equal_recipes(stored: StoredReport) -> list[ReadmeRow]:
         accuracy = f"{one['balanced_accuracy']['mean']:.1%} accurate"
         return f"{accuracy}, {_mm(one['translation']['mean'])}, {_degrees(one['rotation']['mean'])}"
 
-    text = f"trained alike on the same few grasps, ours {errors(ours)}; the paper's network {errors(paper)}"
+    trained = _report(stored)["n"].partition(",")[0]  # "trained on ... attempts at ... parts"
+    text = f"{trained}, both alike: ours {errors(ours)}; the paper's network {errors(paper)}"
     interval = "; ".join(
         f"{_between(one['balanced_accuracy']['interval'], 100, '%')}, "
         f"{_between(one['translation']['interval'], 1e3, 'mm')}, "
@@ -247,7 +248,8 @@ def _equal_recipes(stored: StoredReport) -> list[ReadmeRow]:
         for one in (ours, paper)
     )
     n = f"{ours['n']} grasps of {ours['parts']} parts, {ours['successes']} successes; three trainings each"
-    return [ReadmeRow(name="random grasps", text=text, interval=interval, n=n)]
+    split = stored.facts["split"].partition(";")[0]
+    return [ReadmeRow(name="random grasps", text=text, interval=interval, split=split, n=n)]
 
 
 def _validation(stored: StoredReport) -> list[ReadmeRow]:
