@@ -15,6 +15,9 @@ class StageConfig(Config):
 
     optimiser: Literal["adam", "rmsprop"] = "adam"
     learning_rate: float = Field(default=1e-3, gt=0.0)
+    weight_decay: float = Field(default=0.0, ge=0.0)
+    """With adam: each step takes learning_rate * weight_decay of a layer's weights away, not of its biases
+    (AdamW: Loshchilov and Hutter 2019, arXiv 1711.05101)."""
     decay: float = Field(default=0.0, ge=0.0)
     """Keras's decay: step k uses learning_rate / (1 + decay * k)."""
     schedule: Literal["constant", "cosine"] = "cosine"
@@ -23,6 +26,19 @@ class StageConfig(Config):
     patience: int | None = Field(default=None, ge=1)
     """Training ends after this many epochs without a lower validation loss; null: after all epochs."""
     batch_size: int = Field(default=32, ge=1)
+    batch_norm: bool = False
+    """The image branch trains with batch normalisation, which is folded into its weights at the end: the
+    model has the same layers, and takes the same time (paper: no)."""
+
+    @model_validator(mode="after")
+    def _settings_fit_together(self) -> StageConfig:
+        if self.weight_decay > 0 and self.optimiser != "adam":
+            raise ValueError(f"weight_decay: {self.weight_decay:g} needs optimiser: adam")
+        if self.batch_norm and self.batch_size < 4:
+            raise ValueError(
+                "batch_norm: true needs batch_size: 4 or more, so that no batch is of one sample"
+            )
+        return self
 
 
 class LearningConfig(Config):

@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from mskgrasp.core import metrics
 from mskgrasp.core.errors import BadDataset, MskgraspError, UsageError
 from mskgrasp.learning import held_out
+from mskgrasp.learning.batch_norm import add_batch_norms, fold_batch_norms
 from mskgrasp.learning.checkpoint import (
     Checkpoint,
     optimiser_tensors,
@@ -25,7 +26,12 @@ from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.network_config import Normalisation
-from mskgrasp.learning.networks import GraspQualityNetwork, displacement_loss, with_noise
+from mskgrasp.learning.networks import (
+    GraspDisplacementNetwork,
+    GraspQualityNetwork,
+    displacement_loss,
+    with_noise,
+)
 from mskgrasp.learning.samples import SAMPLES_VERSION, Samples, part_sides
 from mskgrasp.learning.symmetry import mirror_and_turn
 from mskgrasp.parts.catalogue import SPLITS
@@ -147,17 +153,27 @@ class Stage:
         self.training_rows, self.rows = sides.training, sides.validation
         network = models.gqn if name == "gqn" else models.gdn
         network.features.mixed_precision = config.mixed_precision
-        self.network: nn.Module = network
+        self.network: GraspQualityNetwork | GraspDisplacementNetwork = network
         self.settings = config.gqn if name == "gqn" else config.gdn
         n_success = int(samples.success[self.training_rows].sum())
         n_failure = len(self.training_rows) - n_success
         self.n_each = min(n_success, n_failure)
         self.n_samples = 2 * self.n_each if name == "gqn" else n_success
         self.batches = math.ceil(self.n_samples / self.settings.batch_size)
-        parameters, rate = self.network.parameters(), self.settings.learning_rate
+        if self.settings.batch_norm:
+            if self.n_samples < 2:
+                raise BadDataset("batch_norm: true needs two successes at the training parts; collect more")
+            add_batch_norms(network.features)
+        parameters, rate = list(self.network.parameters()), self.settings.learning_rate
         self.optimiser: torch.optim.Optimizer
         if self.settings.optimiser == "adam":
-            self.optimiser = torch.optim.Adam(parameters, lr=rate)
+            layers = [one for one in parameters if one.ndim > 1]
+            others = [one for one in parameters if one.ndim == 1]
+            groups = [
+                {"params": layers, "weight_decay": self.settings.weight_decay},
+                {"params": others, "weight_decay": 0.0},
+            ]
+            self.optimiser = torch.optim.AdamW(groups, lr=rate)
         else:
             # Keras's constants: the paper's learning rate was chosen for them.
             self.optimiser = torch.optim.RMSprop(parameters, lr=rate, alpha=0.9, eps=1e-7)
@@ -184,7 +200,7 @@ class Stage:
         with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
             torch.manual_seed(seed)  # dropout takes no generator
             self.network.train()
-            for index, rows in enumerate(self.order(order).split(self.settings.batch_size)):
+            for index, rows in enumerate(self.order(order).tensor_split(self.batches)):
                 for group in self.optimiser.param_groups:
                     group["lr"] = self.learning_rate(number * self.batches + index)
                 losses.append(self.learn(rows, noise))
@@ -248,6 +264,11 @@ class Stage:
         loss.backward()
         self.optimiser.step()
         return float(loss.detach())
+
+    def finish(self, weights: dict[str, Tensor]) -> None:
+        """Give the network the weights of an epoch and its final layers; nothing can be learned after it."""
+        self.network.load_state_dict(weights)
+        fold_batch_norms(self.network.features)
 
     def _validate(self) -> dict[str, float]:
         if self.name == "gqn":
@@ -334,14 +355,14 @@ def train(
         if quality is not None and name == "gqn":
             network.load_state_dict(quality.state_dict())
             continue
+        if name == "gdn":
+            models.gdn.start_from(models.gqn)
         stage = Stage(name, models, samples, sides, config)
         best: dict[str, Tensor] = {}
         done = 0
         if saved is not None and saved.stage == name:
             restore_checkpoint(saved, networks, stage.optimiser)
             best, done = saved.best, saved.epoch
-        elif name == "gdn":
-            models.gdn.start_from(models.gqn)
         reporter.stage(name, epochs=stage.settings.epochs, batches=stage.batches, done=done * stage.batches)
         for number in range(done, stage.settings.epochs):
             earlier = [one.validation_loss for one in history if one.stage == name]
@@ -367,7 +388,7 @@ def train(
                 ),
             )
             reporter.epoch(history)
-        network.load_state_dict(best)
+        stage.finish(best)
 
     if config.calibrate:
         found = held_out.calibrate(models, samples, sides.validation)

@@ -75,6 +75,9 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         "no floor of the deviations": with_(network={"least_std": (0.0, 0.0)}),
         "no dropout": with_(network={"dropout": 0.0}),
         "dropout 0.2": with_(network={"dropout": 0.2}),
+        "no batch normalisation": with_(gdn=ours.gdn.model_copy(update={"batch_norm": False})),
+        "no weight decay": with_(gdn=ours.gdn.model_copy(update={"weight_decay": 0.0})),
+        "neither": with_(gdn=ours.gdn.model_copy(update={"batch_norm": False, "weight_decay": 0.0})),
         "not calibrated": with_(calibrate=False),
         "mixed precision": with_(mixed_precision=True),
     }

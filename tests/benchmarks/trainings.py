@@ -173,7 +173,7 @@ def displacement_trained(
         if found.validation_loss <= least:
             least = found.validation_loss
             best = {key: value.detach().clone() for key, value in models.gdn.state_dict().items()}
-    models.gdn.load_state_dict(best)
+    stage.finish(best)
     return models
 
 

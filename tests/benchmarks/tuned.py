@@ -79,7 +79,8 @@ def main() -> int:
     options = _options()
     torch.set_num_threads(options.threads)
     config = read_config(LearningConfig, CONFIGS / "pretrained.yaml")
-    config = with_stages(config, epochs=options.epochs, learning_rate=options.learning_rate)
+    # The shipped network's batch normalisation is part of its weights.
+    config = with_stages(config, epochs=options.epochs, learning_rate=options.learning_rate, batch_norm=False)
     config = config.model_copy(update={"sides": "name"})  # no catalogue is needed
     with progress(title="read shards", unit="shard") as bar:
         samples = read_samples(options.data, config.network, advance=partial(advance_to, bar))

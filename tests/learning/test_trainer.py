@@ -34,6 +34,17 @@ def test_data_of_one_outcome_are_reported(samples, success, words):
         split(alike, PATCH)
 
 
+def test_one_success_is_no_batch_to_normalise(samples, tmp_path):
+    training = split(samples, PATCH).training
+    held = training[samples.success[training]]
+    success = samples.success.clone()
+    success[held[1:]] = False
+    alike = dataclasses.replace(samples, success=success)
+    config = SHORT.model_copy(update={"gdn": SHORT.gdn.model_copy(update={"batch_norm": True})})
+    with pytest.raises(BadDataset, match="batch_norm: true needs two successes"):
+        learn(alike, config, checkpoint_path=tmp_path / "c")
+
+
 class StopAfter(Reporter):
     """Ctrl-C in the middle of the epoch that follows the n-th."""
 
@@ -48,13 +59,17 @@ class StopAfter(Reporter):
             raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("after", [1, 2, 4])
-def test_a_stopped_run_goes_on_to_the_same_weights(samples, tmp_path, after):
+@pytest.mark.parametrize(("after", "batch_norm"), [(1, False), (2, False), (4, False), (1, True), (4, True)])
+def test_a_stopped_run_goes_on_to_the_same_weights(samples, tmp_path, after, batch_norm):
     path = tmp_path / "checkpoint.safetensors"
-    whole, history = learn(samples, SHORT, checkpoint_path=tmp_path / "whole.safetensors")
+    stages = {
+        name: getattr(SHORT, name).model_copy(update={"batch_norm": batch_norm}) for name in ("gqn", "gdn")
+    }
+    config = SHORT.model_copy(update=stages)
+    whole, history = learn(samples, config, checkpoint_path=tmp_path / "whole.safetensors")
     with pytest.raises(KeyboardInterrupt):
-        learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(after))
-    resumed, again = learn(samples, SHORT, checkpoint_path=path)
+        learn(samples, config, checkpoint_path=path, reporter=StopAfter(after))
+    resumed, again = learn(samples, config, checkpoint_path=path)
     for one, other in ((whole.gqn, resumed.gqn), (whole.gdn, resumed.gdn)):
         assert all(
             torch.equal(a, b)
@@ -136,6 +151,30 @@ def test_what_learned_in_mixed_precision_is_as_good_and_predicts_in_float32(data
     mixed.gdn.features.mixed_precision = False
     for one, other in zip(first, predict_grasp_displacement(mixed, samples, rows), strict=True):
         assert np.array_equal(one, other)
+
+
+def test_decay_shrinks_weights_of_layers_by_its_share_of_the_rate_and_no_biases(samples, tmp_path):
+    rows = torch.arange(8)
+    after = {}
+    for decay in (0.0, 0.5):
+        stage = StageConfig(
+            learning_rate=0.01, schedule="constant", epochs=1, batch_size=8, weight_decay=decay
+        )
+        config = SHORT.model_copy(update={"gqn": stage})
+        sides = split(samples, config)
+        torch.manual_seed(0)
+        models = build_models(describe_networks(samples, sides.training, config))
+        before = {name: value.clone() for name, value in models.gqn.named_parameters()}
+        Stage("gqn", models, samples, sides, config).learn(rows, torch.Generator().manual_seed(0))
+        after[decay] = models.gqn.state_dict()
+    for name, value in before.items():
+        shrunk = 0.005 * value if value.ndim > 1 else torch.zeros_like(value)
+        assert torch.allclose(after[0.0][name] - after[0.5][name], shrunk, atol=1e-7)
+
+
+def test_the_papers_optimiser_decays_no_weights():
+    with pytest.raises(ValueError, match="weight_decay: 0.1 needs optimiser: adam"):
+        StageConfig(optimiser="rmsprop", weight_decay=0.1)
 
 
 def test_a_loss_that_is_no_number_stops_the_run_in_one_line(samples, tmp_path):
