@@ -58,7 +58,7 @@ from tests.benchmarks.report import markdown_rows
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT
 from tests.docs.readme_table import README, ROWS, rendered_readme
-from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored
+from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored, shipped_weights
 from tests.docs.uses_of_test_parts import commit, log_use
 from tests.sim_in_the_loop.regression import Row, stored_figures
 
@@ -169,6 +169,8 @@ def record(name: str) -> None:
         ),
         report=facts.get("stored", report),
     )
+    if "shipped" in facts.get("model", ""):
+        values["record"]["weights"] = shipped_weights()
     if "training" in report:
         counts = report["training"]
         values["record"]["model"] = (

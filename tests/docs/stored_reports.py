@@ -7,11 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from mskgrasp.core.config import read_yaml
+from mskgrasp.learning.grasp_models import PRETRAINED, WEIGHTS
+from mskgrasp.runtime.run_folder import file_digest
 from tests.docs.pages import ROOT
 
 RESULTS = ROOT / "docs" / "results"
 RUNS = RESULTS / "runs.yaml"
 REPORTS = RESULTS / "reports"
+_SHIPPED = "shipped ([card](../../mskgrasp/learning/pretrained/card.md))"
+"""In the fact ``model``, the model that ships."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +24,8 @@ class StoredReport:
 
     Attributes:
         name: Of its file and of its block on a page.
-        facts: Command, split, n, intervals, model, simulation, commit, machine, as Markdown; perhaps notes.
+        facts: Command, split, n, intervals, model, simulation, commit, machine, as Markdown; perhaps notes,
+            and ``weights``, by which a model that has shipped is known.
         report: What the command wrote; the path of a table in the repository where that holds it.
     """
 
@@ -37,7 +42,15 @@ def read_stored(name: str) -> StoredReport:
     report = values["report"]
     if isinstance(report, str) and report.endswith(".json"):
         report = json.loads((ROOT / report).read_text(encoding="utf-8"))
-    return StoredReport(name=name, facts=known | values["record"], report=report)
+    facts = known | values["record"]
+    if facts.get("weights", shipped_weights()) != shipped_weights():
+        facts["model"] = facts["model"].replace(_SHIPPED, f"shipped before (weights `{facts['weights']}`)")
+    return StoredReport(name=name, facts=facts, report=report)
+
+
+def shipped_weights() -> str:
+    """Digest of the weights that ship."""
+    return file_digest(PRETRAINED / WEIGHTS)[:16]
 
 
 def page_of(name: str) -> str:

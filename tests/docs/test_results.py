@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -9,11 +10,12 @@ import pytest
 
 from mskgrasp.core.config import read_config, read_yaml
 from mskgrasp.evaluate.config import EvaluateConfig
+from tests.docs import stored_reports
 from tests.docs.make_results import FACTS, rendered
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT, without_code
 from tests.docs.readme_table import HEADER, README, ROWS, rendered_readme, shown_rows, table
-from tests.docs.stored_reports import REPORTS, RUNS, StoredReport, read_stored
+from tests.docs.stored_reports import REPORTS, RUNS, StoredReport, read_stored, shipped_weights
 
 RESULTS = sorted(set((ROOT / "docs/results").glob("*.md")) - {ROOT / "docs/results/README.md"})
 NUMBER = r"(?<![\w.])\d+(?: \d{3})*(?:\.\d+)?(?![\w.])"
@@ -38,6 +40,21 @@ def test_every_figure_of_a_page_comes_from_a_report(page: Path):
     words = re.sub(r"<!-- run: .*?<!-- end -->", "", page.read_text(encoding="utf-8"), flags=re.S)
     words = re.sub(r"^#.*$|\]\(.*?\)", "", without_code(words), flags=re.M)
     assert not re.findall(NUMBER, words)
+
+
+@pytest.mark.parametrize(
+    ("weights", "words"),
+    [
+        (shipped_weights(), "shipped ([card](../../mskgrasp/learning/pretrained/card.md))"),
+        ("0123456789abcdef", "shipped before (weights `0123456789abcdef`)"),
+    ],
+)
+def test_a_table_says_whether_the_model_that_ships_made_it(tmp_path: Path, monkeypatch, weights, words):
+    stored = json.loads((REPORTS / "success.json").read_text())
+    stored["record"]["weights"] = weights
+    (tmp_path / "success.json").write_text(json.dumps(stored))
+    monkeypatch.setattr(stored_reports, "REPORTS", tmp_path)
+    assert read_stored("success").facts["model"] == words
 
 
 def test_every_stored_report_is_on_a_page_and_every_run_has_one():
