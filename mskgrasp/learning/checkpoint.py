@@ -107,6 +107,9 @@ def restore_checkpoint(
             index, name = key.split("/", 1)
             values["state"].setdefault(int(index), {})[name] = value
         optimiser.load_state_dict(values)
+        for parameter, state in optimiser.state.items():  # which it does not compare
+            if any(one.ndim and one.shape != parameter.shape for one in state.values()):
+                raise ValueError("the optimiser's state is that of other layers")
     except (RuntimeError, ValueError) as error:
         problem = str(error).splitlines()[0]
         raise BadModel(f"the checkpoint does not fit ({problem}); delete it to start again") from error

@@ -10,7 +10,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 from mskgrasp.core import metrics
-from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.core.errors import BadDataset, BadModel, UsageError
 from mskgrasp.learning.config import StageConfig
 from mskgrasp.learning.grasp_models import ModelCalibration, Models, build_models, load_models, save_model
 from mskgrasp.learning.held_out import calibrate, predict_grasp_displacement
@@ -106,6 +106,20 @@ def test_a_checkpoint_of_samples_made_otherwise_is_refused(samples, tmp_path):
     del progress["samples_version"]  # as files were before samples had a version
     save_file(tensors, path, metadata={"progress": json.dumps(progress)})
     with pytest.raises(UsageError, match="made with version 1 of the samples, this is version 3"):
+        learn(samples, SHORT, checkpoint_path=path)
+
+
+def test_a_checkpoint_whose_optimiser_learned_other_layers_is_refused(samples, tmp_path):
+    path = tmp_path / "checkpoint.safetensors"
+    with pytest.raises(KeyboardInterrupt):
+        learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(1))
+    with safe_open(path, framework="pt") as file:
+        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - not a dict
+        metadata = file.metadata()
+    first, second = "optimiser/0/exp_avg", "optimiser/1/exp_avg"
+    tensors[first], tensors[second] = tensors[second], tensors[first]
+    save_file(tensors, path, metadata=metadata)
+    with pytest.raises(BadModel, match="the optimiser's state is that of other layers"):
         learn(samples, SHORT, checkpoint_path=path)
 
 
