@@ -47,6 +47,10 @@ class ReadmeRow:
     n: str = ""
 
 
+FORMER = " (with the weights that shipped before)"
+"""Mark of a row."""
+
+
 def rendered_readme(text: str) -> str:
     """The README with the table that the stored reports give."""
     return _BLOCK.sub(lambda found: found[1] + table() + found[2], text)
@@ -81,6 +85,8 @@ def shown_rows() -> list[tuple[str, Callable[[StoredReport], list[ReadmeRow]]]]:
 def _line(row: ReadmeRow, stored: StoredReport) -> str:
     facts = stored.facts
     first = f"[{row.name}]({page_of(stored.name)}): {row.text}"
+    if stored.of_former_model:
+        first += FORMER
     cells = (first, row.split or facts["split"], row.n or facts["n"], row.interval, facts["command"])
     return "| " + " | ".join(cells) + " |"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from mskgrasp.core.config import read_yaml
@@ -33,6 +33,11 @@ class StoredReport:
     facts: dict[str, Any]
     report: dict[str, Any] | str
 
+    @property
+    def of_former_model(self) -> bool:
+        """Whether it was made with weights that shipped before those that ship now."""
+        return self.facts.get("weights", shipped_weights()) != shipped_weights()
+
 
 def read_stored(name: str) -> StoredReport:
     """Reads a stored report, following a reference to another JSON file of the repository."""
@@ -42,10 +47,12 @@ def read_stored(name: str) -> StoredReport:
     report = values["report"]
     if isinstance(report, str) and report.endswith(".json"):
         report = json.loads((ROOT / report).read_text(encoding="utf-8"))
-    facts = known | values["record"]
-    if facts.get("weights", shipped_weights()) != shipped_weights():
-        facts["model"] = facts["model"].replace(_SHIPPED, f"shipped before (weights `{facts['weights']}`)")
-    return StoredReport(name=name, facts=facts, report=report)
+    stored = StoredReport(name=name, facts=known | values["record"], report=report)
+    if not stored.of_former_model:
+        return stored
+    former = f"shipped before (weights `{stored.facts['weights']}`)"
+    model = stored.facts["model"].replace(_SHIPPED, former)
+    return replace(stored, facts=stored.facts | {"model": model})
 
 
 def shipped_weights() -> str:

@@ -14,7 +14,7 @@ from tests.docs import stored_reports
 from tests.docs.make_results import FACTS, rendered
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT, without_code
-from tests.docs.readme_table import HEADER, README, ROWS, rendered_readme, shown_rows, table
+from tests.docs.readme_table import FORMER, HEADER, README, ROWS, rendered_readme, shown_rows, table
 from tests.docs.stored_reports import REPORTS, RUNS, StoredReport, read_stored, shipped_weights
 
 RESULTS = sorted(set((ROOT / "docs/results").glob("*.md")) - {ROOT / "docs/results/README.md"})
@@ -54,7 +54,14 @@ def test_a_table_says_whether_the_model_that_ships_made_it(tmp_path: Path, monke
     stored["record"]["weights"] = weights
     (tmp_path / "success.json").write_text(json.dumps(stored))
     monkeypatch.setattr(stored_reports, "REPORTS", tmp_path)
-    assert read_stored("success").facts["model"] == words
+    stored = read_stored("success")
+    assert stored.facts["model"] == words and stored.of_former_model == words.startswith("shipped before")
+
+
+def test_the_readme_marks_the_rows_of_weights_that_ship_no_more():
+    marked = {name for name, _ in shown_rows() if read_stored(name).of_former_model}
+    rows = sum(len(rows(read_stored(name))) for name, rows in shown_rows() if name in marked)
+    assert table().count(FORMER) == rows
 
 
 def test_every_stored_report_is_on_a_page_and_every_run_has_one():
