@@ -58,9 +58,9 @@ from tests.benchmarks.report import markdown_rows
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT
 from tests.docs.readme_table import README, ROWS, rendered_readme
-from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored, shipped_weights
+from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored
 from tests.docs.uses_of_test_parts import commit, log_use
-from tests.sim_in_the_loop.regression import Row, stored_figures
+from tests.sim_in_the_loop.regression import Row, shipped_weights, stored_figures
 
 FACTS = ("command", "split", "n", "intervals", "model", "simulation", "recorded", "machine")
 """Rows of the table above the figures of a run."""

@@ -24,6 +24,8 @@ README = ROOT / "README.md"
 PAPER = dict(balanced_accuracy=0.853, translation=2.4e-3, rotation=math.radians(7.0))
 """Zhao, Liang and Kroemer (arXiv 1909.02129): accuracy on balanced data; displacement RMSE in simulation at
 high quality and low variance, known and novel objects pooled, m and rad."""
+FORMER = " (with the weights that shipped before)"
+"""Mark of a row."""
 HEADER = ("result", "split", "n", "interval", "command")
 _BLOCK = re.compile(r"(<!-- results -->\n).*?(<!-- end -->)", re.S)
 
@@ -45,10 +47,6 @@ class ReadmeRow:
     interval: str
     split: str = ""
     n: str = ""
-
-
-FORMER = " (with the weights that shipped before)"
-"""Mark of a row."""
 
 
 def rendered_readme(text: str) -> str:

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from mskgrasp.core.config import read_yaml
-from mskgrasp.learning.grasp_models import PRETRAINED, WEIGHTS
-from mskgrasp.runtime.run_folder import file_digest
 from tests.docs.pages import ROOT
+from tests.sim_in_the_loop.regression import shipped_weights
 
 RESULTS = ROOT / "docs" / "results"
 RUNS = RESULTS / "runs.yaml"
@@ -53,11 +52,6 @@ def read_stored(name: str) -> StoredReport:
     former = f"shipped before (weights `{stored.facts['weights']}`)"
     model = stored.facts["model"].replace(_SHIPPED, former)
     return replace(stored, facts=stored.facts | {"model": model})
-
-
-def shipped_weights() -> str:
-    """Digest of the weights that ship."""
-    return file_digest(PRETRAINED / WEIGHTS)[:16]
 
 
 def page_of(name: str) -> str:

@@ -87,22 +87,31 @@ def test_the_seed_decides_the_weights_and_the_global_generator_is_left_alone(sam
     assert not torch.equal(first.gqn.head[0].weight, other.gqn.head[0].weight)
 
 
-def test_a_checkpoint_of_other_data_is_refused(samples, tmp_path):
-    path = tmp_path / "checkpoint.safetensors"
+def stopped(samples, folder):
+    """The checkpoint of a training that was stopped after its first epoch."""
+    path = folder / "checkpoint.safetensors"
     with pytest.raises(KeyboardInterrupt):
         learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(1))
+    return path
+
+
+def contents(path):
+    """Tensors and metadata of a file."""
+    with safe_open(path, framework="pt") as file:
+        return {key: file.get_tensor(key) for key in file.keys()}, file.metadata()  # noqa: SIM118 - not a dict
+
+
+def test_a_checkpoint_of_other_data_is_refused(samples, tmp_path):
+    path = stopped(samples, tmp_path)
     other = dataclasses.replace(samples, fingerprint="0")
     with pytest.raises(UsageError, match="other data"):
         learn(other, SHORT, checkpoint_path=path)
 
 
 def test_a_checkpoint_of_samples_made_otherwise_is_refused(samples, tmp_path):
-    path = tmp_path / "checkpoint.safetensors"
-    with pytest.raises(KeyboardInterrupt):
-        learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(1))
-    with safe_open(path, framework="pt") as file:
-        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - not a dict
-        progress = json.loads(file.metadata()["progress"])
+    path = stopped(samples, tmp_path)
+    tensors, metadata = contents(path)
+    progress = json.loads(metadata["progress"])
     del progress["samples_version"]  # as files were before samples had a version
     save_file(tensors, path, metadata={"progress": json.dumps(progress)})
     with pytest.raises(UsageError, match="made with version 1 of the samples, this is version 3"):
@@ -110,12 +119,8 @@ def test_a_checkpoint_of_samples_made_otherwise_is_refused(samples, tmp_path):
 
 
 def test_a_checkpoint_whose_optimiser_learned_other_layers_is_refused(samples, tmp_path):
-    path = tmp_path / "checkpoint.safetensors"
-    with pytest.raises(KeyboardInterrupt):
-        learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(1))
-    with safe_open(path, framework="pt") as file:
-        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - not a dict
-        metadata = file.metadata()
+    path = stopped(samples, tmp_path)
+    tensors, metadata = contents(path)
     first, second = "optimiser/0/exp_avg", "optimiser/1/exp_avg"
     tensors[first], tensors[second] = tensors[second], tensors[first]
     save_file(tensors, path, metadata=metadata)

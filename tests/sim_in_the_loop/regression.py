@@ -20,7 +20,7 @@ from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.metrics import bootstrap_interval, clustered_wilson_interval
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.learning.grasp_models import PRETRAINED, WEIGHTS
 from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.placement_records import Placement
 from mskgrasp.palletize.run import palletize
@@ -142,7 +142,7 @@ def main() -> int:
         RegressionConfig, prog="python -m tests.sim_in_the_loop.regression", description=DESCRIPTION
     )
     rows = run_set(config)
-    weights = file_digest(PRETRAINED / "model.safetensors")[:16]
+    weights = shipped_weights()
     worse = False
     if STORED.exists():
         stored = read_stored()
@@ -161,6 +161,11 @@ def main() -> int:
         print(f"stored {len(rows)} trials in {STORED.name}")
         return 0
     return int(worse)
+
+
+def shipped_weights() -> str:
+    """Digest of the weights that ship."""
+    return file_digest(PRETRAINED / WEIGHTS)[:16]
 
 
 def run_set(config: RegressionConfig) -> list[Row]:
