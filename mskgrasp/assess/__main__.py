@@ -22,9 +22,11 @@ def main() -> int:
     """Parse, assess, report."""
     with ctrl_c_deferred():
         from mskgrasp.assess.config import AssessConfig
-        from mskgrasp.assess.run import assess
         from mskgrasp.runtime.options import parse
-    assess(parse(AssessConfig, prog="python -m mskgrasp.assess", description=DESCRIPTION))
+    config = parse(AssessConfig, prog="python -m mskgrasp.assess", description=DESCRIPTION)
+    with ctrl_c_deferred():  # not for a mistyped option
+        from mskgrasp.assess.run import assess
+    assess(config)
     return 0
 
 

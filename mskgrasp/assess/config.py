@@ -11,8 +11,8 @@ import tyro
 from pydantic import Field, field_validator
 
 from mskgrasp.core.config import Config
-from mskgrasp.learning.grasp_models import PRETRAINED
-from mskgrasp.parts.importing.mesh_files import Unit
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.core.units import Unit
 
 _TOLERANCE = re.compile(r"\s*([0-9.]+)\s*(mm|m)\s*,\s*([0-9.]+)\s*(deg|rad)\s*")
 SIMULATIONS, QUICK_SIMULATIONS = 1200, 400

@@ -24,10 +24,11 @@ def main() -> int:
     """Parse, run, report."""
     with ctrl_c_deferred():
         from mskgrasp.benchmark.config import BenchmarkConfig
-        from mskgrasp.benchmark.run import benchmark
-        from mskgrasp.benchmark.score_grasps import score_file
         from mskgrasp.runtime.options import parse
     config = parse(BenchmarkConfig, prog="python -m mskgrasp.benchmark", description=DESCRIPTION)
+    with ctrl_c_deferred():  # not for a mistyped option
+        from mskgrasp.benchmark.run import benchmark
+        from mskgrasp.benchmark.score_grasps import score_file
     if config.grasps is not None:
         score_file(config, config.grasps)
     else:

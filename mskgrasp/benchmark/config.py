@@ -9,8 +9,7 @@ from pydantic import Field, field_validator
 
 from hal.sensor_noise import NoiseModel
 from mskgrasp.core.config import Config
-from mskgrasp.core.shipped import config_file
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED, config_file
 
 TRIALS, QUICK_TRIALS = 7, 2
 """Trials of each part by each planner."""

@@ -24,14 +24,12 @@ from mskgrasp.collect.workers import make_shards
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.core.files import LOCK, exclusive_lock
-from mskgrasp.core.shipped import config_file
 from mskgrasp.dataset import ShardInfo, read_shard, read_success, shard_path
 from mskgrasp.dataset.labels import ShardLabels, read_labels
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.catalogue import read_index, representative_entries
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
-from mskgrasp.runtime.options import parse
 from mskgrasp.runtime.progress import note, progress
 from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult
 from mskgrasp.simulation.shard_task import ShardTask
@@ -39,31 +37,6 @@ from mskgrasp.simulation.versions import SIMULATION_VERSION, other_versions
 
 MOST_SHARDS = 200_000
 """Files of a dataset."""
-
-DESCRIPTION = """Simulates random grasps of parts and records what happened.
-
-For each part and attempt: the part lies in a resting pose at a random position and yaw, the overhead
-camera takes a depth image, a grasp is drawn uniformly from the part's box in that image, the arm tries
-it, and one row is written: success, reason of failure, how the part moved in the hand. A run that was
-stopped resumes when it is started again with the same settings.
-
-A few grasps of two parts: python -m mskgrasp.collect --parts hex_nut_m30 washer_m36 --attempts-per-part 20
-
-Parts of your own, imported before: python -m mskgrasp.collect --parts my_bracket --out data/bracket
-
-The demo dataset: python -m mskgrasp.collect --config configs/collect/demo.yaml"""
-
-
-def main() -> int:
-    """Parse, collect, report."""
-    config = parse(
-        CollectConfig,
-        prog="python -m mskgrasp.collect",
-        description=DESCRIPTION,
-        default_config=config_file("collect/demo.yaml"),
-    )
-    collect(config)
-    return 0
 
 
 def collect(config: CollectConfig) -> None:

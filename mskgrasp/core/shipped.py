@@ -1,4 +1,4 @@
-"""Paths of the files that ship with the package: configurations and example parts."""
+"""Paths of the files that ship with the package: configurations, example parts, trained networks."""
 
 from __future__ import annotations
 
@@ -8,10 +8,17 @@ from pathlib import Path
 _CONFIGS = (Path(__file__).parents[1] / "configs").resolve()
 _EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
+PRETRAINED = Path(__file__).parents[1] / "learning" / "pretrained"
+"""Folder of the networks that plan by default."""
+
 
 def config_file(name: str) -> Path:
     """The path of a shipped configuration, for example ``cells/sapien.yaml``."""
     return _CONFIGS / name
+
+
+SIMULATED_CELL = config_file("cells/sapien.yaml")
+"""The cell by default."""
 
 
 def example_file(name: str) -> Path | None:

@@ -17,9 +17,10 @@ def main() -> int:
     """Parse, grasp, report."""
     with ctrl_c_deferred():
         from mskgrasp.demo.config import DemoConfig
-        from mskgrasp.demo.run import demo_text, demonstrate
         from mskgrasp.runtime.options import parse
     config = parse(DemoConfig, prog="python -m mskgrasp.demo", description=DESCRIPTION)
+    with ctrl_c_deferred():  # not for a mistyped option
+        from mskgrasp.demo.run import demo_text, demonstrate
     demo = demonstrate(config)
     print(demo_text(demo))
     print(f"wrote {config.out}/plan.png and {config.out}/grasp.gif: open them")

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.shipped import example_file
-from mskgrasp.parts.importing.mesh_files import Unit
+from mskgrasp.core.units import Unit
 
 
 class DemoConfig(Config):

@@ -8,12 +8,12 @@ import numpy as np
 
 from hal import capture_at_home, execute_grasp, open_cell
 from hal.sim import Film, SapienWorld
+from mskgrasp.core.shipped import PRETRAINED, SIMULATED_CELL
 from mskgrasp.demo.animation import write_animation
 from mskgrasp.demo.config import DemoConfig
-from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.parts import find_part
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL, make_planner, part_name, present
+from mskgrasp.planning.for_cell import make_planner, part_name, present
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.runtime.cli import make_folder

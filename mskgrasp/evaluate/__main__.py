@@ -26,10 +26,11 @@ def main() -> int:
     """Parse, evaluate, report."""
     with ctrl_c_deferred():
         from mskgrasp.evaluate.config import EvaluateConfig
-        from mskgrasp.evaluate.report import print_report
-        from mskgrasp.evaluate.run import estimate, evaluate, replay
         from mskgrasp.runtime.options import parse
     config = parse(EvaluateConfig, prog="python -m mskgrasp.evaluate", description=DESCRIPTION)
+    with ctrl_c_deferred():  # not for a mistyped option
+        from mskgrasp.evaluate.report import print_report
+        from mskgrasp.evaluate.run import estimate, evaluate, replay
     if config.replay is not None:
         return replay(*config.replay)
     if config.estimate:

@@ -9,9 +9,8 @@ from pydantic import Field, field_validator
 
 from hal.sensor_noise import NoiseModel
 from mskgrasp.core.config import Config
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED, SIMULATED_CELL
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL
 
 Experiment = Literal["success", "displacement"]
 

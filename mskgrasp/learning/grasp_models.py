@@ -23,14 +23,12 @@ from mskgrasp.core.files import read_bounded
 from mskgrasp.core.grasp import HAND_GEOMETRY
 from mskgrasp.core.json_text import parse_json
 from mskgrasp.core.metrics import INTERVAL_LEVELS, half_width_of, normal_half_width
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.learning.hand_features import HandFeatures
 from mskgrasp.learning.label_source import LabelSource
 from mskgrasp.learning.network_config import NetworkConfig, Normalisation
 from mskgrasp.learning.networks import GraspDisplacementNetwork, GraspQualityNetwork
 from mskgrasp.learning.symmetry import N_VIEWS, views
-
-PRETRAINED = Path(__file__).parent / "pretrained"
-"""Folder of the model that ships."""
 
 SCHEMA_VERSION = 1
 SAME_HAND = 2e-4

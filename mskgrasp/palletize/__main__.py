@@ -23,10 +23,11 @@ def main() -> int:
     """Parse, palletize, report."""
     with ctrl_c_deferred():
         from mskgrasp.palletize.config import PalletizeConfig
-        from mskgrasp.palletize.report import print_report
-        from mskgrasp.palletize.run import palletize
         from mskgrasp.runtime.options import parse
     config = parse(PalletizeConfig, prog="python -m mskgrasp.palletize", description=DESCRIPTION)
+    with ctrl_c_deferred():  # not for a mistyped option
+        from mskgrasp.palletize.report import print_report
+        from mskgrasp.palletize.run import palletize
     print_report(palletize(config))
     print(f"wrote {config.out}/report.html, report.json, trials.jsonl and a picture of every placement")
     return 0

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from pydantic import Field, field_validator
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Tape
-from mskgrasp.learning.grasp_models import PRETRAINED
-from mskgrasp.palletize.pallet_slots import Slot, parse_target, read_slots
+from mskgrasp.core.shipped import PRETRAINED, SIMULATED_CELL
 from mskgrasp.palletize.placement_records import Correction
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL
 
 
 class PalletizeConfig(Config):
@@ -65,6 +64,17 @@ class PalletizeConfig(Config):
         """The tape that measures; None: the tracker."""
         return None if self.tape is None else Tape(large=self.tape[0], small=self.tape[1])
 
-    def all_slots(self) -> list[Slot]:
-        """The slots of the file, or the single target."""
-        return [parse_target(self.target)] if self.slots is None else read_slots(self.slots)
+
+def parse_target(text: str) -> tuple[float, float, float]:
+    """Parse ``x,y,theta`` in metres and degrees.
+
+    Raises:
+        ValueError: The text is not three finite numbers.
+    """
+    try:
+        x, y, theta_deg = (float(word) for word in text.split(","))
+    except ValueError:
+        raise ValueError("target must be x,y,theta in metres and degrees") from None
+    if not all(map(math.isfinite, (x, y, theta_deg))):
+        raise ValueError("target must be finite")
+    return x, y, theta_deg

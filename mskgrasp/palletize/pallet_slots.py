@@ -17,6 +17,7 @@ from mskgrasp.core.config import Config, read_config
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.grasp import Grasp
+from mskgrasp.palletize.config import PalletizeConfig, parse_target
 from mskgrasp.parts import Part
 from mskgrasp.perception.footprint import Footprint, usual_footprint
 from mskgrasp.planning.place_pose import Target, check_place
@@ -125,19 +126,17 @@ class SlotsFile(Config):
         return [entry.slot() for entry in [*found, *self.slots]]
 
 
-def parse_target(text: str) -> Slot:
-    """Parse ``x,y,theta`` in metres and degrees.
+def chosen_slots(config: PalletizeConfig) -> list[Slot]:
+    """The slots of a run: those of its file, or its single target.
 
     Raises:
-        ValueError: The text is not three finite numbers.
+        BadConfig: The file cannot be read, or a value is not valid.
+        UsageError: The file holds no slot.
     """
-    try:
-        x, y, theta = (float(word) for word in text.split(","))
-    except ValueError:
-        raise ValueError("target must be x,y,theta in metres and degrees") from None
-    if not all(math.isfinite(value) for value in (x, y, theta)):
-        raise ValueError("target must be finite")
-    return Slot(x=x, y=y, theta=math.radians(theta))
+    if config.slots is not None:
+        return read_slots(config.slots)
+    x, y, theta_deg = parse_target(config.target)
+    return [Slot(x=x, y=y, theta=math.radians(theta_deg))]
 
 
 def read_slots(path: Path) -> list[Slot]:

@@ -17,7 +17,7 @@ from mskgrasp.core.files import write_whole
 from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
-from mskgrasp.palletize.pallet_slots import Slot, check_room, check_slots_in_reach
+from mskgrasp.palletize.pallet_slots import Slot, check_room, check_slots_in_reach, chosen_slots
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
 from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
 from mskgrasp.palletize.report import write_report
@@ -74,7 +74,7 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
     """
     config = config.model_copy(update={"planner": config.planner.for_motion()})
     models = load_models(config.models)
-    slots = config.all_slots()
+    slots = chosen_slots(config)
     corrections, asks = _check(config, slots)
     # Parts come last: those that are missing are built, which takes a while.
     names = part_names(config.parts, models.meta.training, config.n_parts)
@@ -186,7 +186,7 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
     with connected_engine(
         config.cell, yes=config.yes, picture=config.out / "next.png", tape=config.squares()
     ) as engine:
-        check_slots_in_reach(engine.cell, config.all_slots())
+        check_slots_in_reach(engine.cell, chosen_slots(config))
         planner = make_planner(config.models, config.planner, engine.cell)
         worker = PickAndPlace(engine, planner, config.out / "placements")
 
@@ -199,7 +199,7 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
                 yield worker.run(task, f"{where}, correction {task.correction}")
             if pallet.name:
                 engine.home()
-                image = worker.picture(config.all_slots())
+                image = worker.picture(chosen_slots(config))
                 _, png = cv2.imencode(".png", image[..., ::-1])
                 write_whole(config.out / "placements" / f"{pallet.name}.png", png.tobytes())
             else:

@@ -9,7 +9,7 @@ from mskgrasp.parts.builtin import find_part
 from mskgrasp.parts.part import Part
 
 if TYPE_CHECKING:
-    from mskgrasp.parts.importing.mesh_files import Unit
+    from mskgrasp.core.units import Unit
 
 
 def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:

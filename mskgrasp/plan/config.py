@@ -7,10 +7,9 @@ from pathlib import Path
 from pydantic import Field
 
 from mskgrasp.core.config import Config
-from mskgrasp.learning.grasp_models import PRETRAINED
-from mskgrasp.parts.importing.mesh_files import Unit
+from mskgrasp.core.shipped import PRETRAINED, SIMULATED_CELL
+from mskgrasp.core.units import Unit
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL
 
 
 class PlanConfig(Config):

@@ -8,16 +8,14 @@ import torch
 
 from hal.cell import Cell
 from hal.errors import HalError
-from mskgrasp.core.shipped import config_file, example_file
+from mskgrasp.core.shipped import example_file
+from mskgrasp.core.units import Unit
 from mskgrasp.learning.grasp_models import Models, load_models, require_hand
 from mskgrasp.learning.label_source import other_conditions, source_text
 from mskgrasp.parts.catalogue import require_name
-from mskgrasp.parts.importing.mesh_files import Unit
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
 from mskgrasp.runtime.progress import note
-
-SIMULATED_CELL = config_file("cells/sapien.yaml")
 
 
 def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:

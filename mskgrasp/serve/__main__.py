@@ -22,8 +22,10 @@ def main() -> int:
     with ctrl_c_deferred():
         from mskgrasp.runtime.options import parse
         from mskgrasp.serve.config import ServeConfig
+    config = parse(ServeConfig, prog="python -m mskgrasp.serve", description=DESCRIPTION)
+    with ctrl_c_deferred():  # not for a mistyped option
         from mskgrasp.serve.run import serve
-    serve(parse(ServeConfig, prog="python -m mskgrasp.serve", description=DESCRIPTION))
+    serve(config)
     return 0
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import Field, field_validator
 
 from mskgrasp.core.config import Config
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.planning.config import PlannerConfig
 
 

@@ -24,19 +24,9 @@ from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.trainer import Reporter, split, train
 from mskgrasp.runtime import cli
-from mskgrasp.runtime.options import parse
 from mskgrasp.runtime.progress import Bar, advance_to, note, progress
-from mskgrasp.train.config import DEFAULT_CONFIG, TrainConfig
+from mskgrasp.train.config import TrainConfig
 from mskgrasp.train.figures import draw_curves, draw_uncertainty
-
-HELP = """Trains the grasp quality and displacement networks on a dataset.
-
-Writes the model, its metrics on held-out parts, its card and figures. A run that was stopped resumes when it
-is started again in the same way.
-
-python -m mskgrasp.train --data data/demo --out models/demo
-
-A first look within minutes: python -m mskgrasp.train --data data/demo --out models/quick --epochs 2"""
 
 CHECKPOINT = "checkpoint.safetensors"
 FEW_ATTEMPTS, FEW_PARTS = 1000, 10
@@ -219,15 +209,3 @@ def _summarise(report: dict[str, Any], out: Path) -> None:
             f"{math.degrees(values['rotation_rmse']):.2f} deg"
         )
     print(f"wrote {out}: model.safetensors, model.json, card.md, metrics.json, curves.png")
-
-
-def main() -> int:
-    """Read the command line and run."""
-    return run_training(
-        parse(
-            TrainConfig,
-            prog="python -m mskgrasp.train",
-            description=HELP,
-            default_config=DEFAULT_CONFIG,
-        )
-    )

@@ -27,7 +27,7 @@ def main() -> int:
         description=DESCRIPTION,
         default_config=config_file("validate/default.yaml"),
     )
-    with ctrl_c_deferred():  # loads the simulator: not for a mistyped option
+    with ctrl_c_deferred():  # not for a mistyped option
         from mskgrasp.validate.run import validate
     return validate(config)
 

@@ -21,12 +21,8 @@ from mskgrasp.parts.solids.shape import bores_filled_to
 from mskgrasp.parts.solids.solid import Solid
 from mskgrasp.parts.solids.stable_poses import stable_poses
 from mskgrasp.parts.write_solid import write_solid
+from mskgrasp.validate.config import FILLED_MM, JOINED_MM
 
-JOINED_MM = {"0.1 mm": 0.1, "0.3 mm": 0.3, "0.7 mm": 0.7}
-"""Pieces joined while 95 % of the surface stays within this distance, mm."""
-FILLED_MM = {"bores open": 0.0, "bores filled": 1e3}
-"""Exact pieces, in which bores of plates up to this radius are filled, mm."""
-HULLS = ("exact", *JOINED_MM, *FILLED_MM)
 MAX_LEAN = 0.1
 """Greatest swing between a start and the resting pose that replaces it, rad."""
 
@@ -38,8 +34,8 @@ def altered_part(part: Part, folder: Path, *, density: float = 1.0, hulls: str =
         part: The original.
         folder: Folder for the copy.
         density: Density of the copy divided by that of the original.
-        hulls: One of `HULLS`; empty: those of the original. A part without a recipe has its own hulls as
-            exact pieces.
+        hulls: One of `mskgrasp.validate.config.HULLS`; empty: those of the original. A part without a
+            recipe has its own hulls as exact pieces.
 
     Raises:
         BadPart: The hulls are too far from the mesh, or more than PhysX should handle.

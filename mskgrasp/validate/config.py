@@ -14,7 +14,6 @@ from pydantic import Field, model_validator
 from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Physics
 from mskgrasp.core.settings.physics import LEAST_RATE_HZ
-from mskgrasp.validate.altered_part import HULLS
 
 Engine = Literal["sapien", "mujoco"]
 
@@ -35,6 +34,11 @@ NOMINAL, MOVED, NOTHING_SKIPPED = (
 DRAWN = "all drawn together"
 
 Value = float | bool | str
+JOINED_MM = {"0.1 mm": 0.1, "0.3 mm": 0.3, "0.7 mm": 0.7}
+"""Hulls joined while 95 % of the surface stays within this distance, mm."""
+FILLED_MM = {"bores open": 0.0, "bores filled": 1e3}
+"""Exact hulls, in which bores of plates up to this radius are filled, mm."""
+HULLS = ("exact", *JOINED_MM, *FILLED_MM)
 RESTS = ("hulls", "mesh")
 
 
@@ -48,7 +52,7 @@ class Setting:
         n: Number of grasps of each part that are tried.
         shift: Shift of the parts' starts on the table, m; 0 except for the floors.
         density: Density of the parts divided by their own.
-        hulls: Hulls of the parts, one of `mskgrasp.validate.altered_part.HULLS`; empty: their own.
+        hulls: Hulls of the parts, one of `HULLS`; empty: their own.
         rest: The parts start in the resting poses of their "hulls" or of their "mesh".
         ranges: Physics settings drawn for each grasp, uniformly between two bounds.
         engine: Simulator of the attempts.

@@ -19,8 +19,10 @@ def main() -> int:
     with ctrl_c_deferred():
         from mskgrasp.runtime.options import parse
         from mskgrasp.view.config import ViewConfig
+    config = parse(ViewConfig, prog="python -m mskgrasp.view", description=DESCRIPTION)
+    with ctrl_c_deferred():  # not for a mistyped option
         from mskgrasp.view.run import view
-    view(parse(ViewConfig, prog="python -m mskgrasp.view", description=DESCRIPTION))
+    view(config)
     return 0
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from pydantic import Field
 
 from mskgrasp.core.config import Config
-from mskgrasp.learning.grasp_models import PRETRAINED
-from mskgrasp.parts.importing.mesh_files import Unit
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.core.units import Unit
 from mskgrasp.planning.config import PlannerConfig
 
 

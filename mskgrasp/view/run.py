@@ -6,9 +6,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.shipped import SIMULATED_CELL
 from mskgrasp.dataset import Dataset, open_dataset
 from mskgrasp.parts import Part, find_part
-from mskgrasp.planning.for_cell import SIMULATED_CELL, part_name
+from mskgrasp.planning.for_cell import part_name
 from mskgrasp.runtime.address import is_local
 from mskgrasp.runtime.progress import note
 from mskgrasp.view.config import ViewConfig

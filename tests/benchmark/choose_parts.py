@@ -19,7 +19,8 @@ from collections import Counter
 from collections.abc import Iterable
 
 from mskgrasp.benchmark.part_list import LIST, BenchmarkPart
-from mskgrasp.learning.grasp_models import DESCRIPTION, PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import DESCRIPTION
 from mskgrasp.parts.catalogue import THIN, Entry, read_index
 
 STANDARD_TEST = {

@@ -6,7 +6,8 @@ import json
 from collections import Counter
 
 from mskgrasp.benchmark.part_list import benchmark_parts
-from mskgrasp.learning.grasp_models import DESCRIPTION, PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import DESCRIPTION
 from mskgrasp.parts.builtin import builtin_names
 from mskgrasp.parts.catalogue import split_of
 

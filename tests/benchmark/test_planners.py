@@ -12,8 +12,7 @@ from hal import cell_from_yaml
 from mskgrasp.benchmark.config import BenchmarkConfig
 from mskgrasp.benchmark.planners import Planners, PlannerSettings, check_planners, package_digests
 from mskgrasp.core.errors import BadConfig, BadPart, UsageError
-from mskgrasp.core.shipped import config_file
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED, config_file
 from mskgrasp.parts import find_part
 from mskgrasp.planning.planner import Planner
 from tests import synthetic

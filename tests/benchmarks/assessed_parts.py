@@ -23,8 +23,9 @@ from mskgrasp.assess.trials import CONDITIONS, EXACT, MEANS, AssessSetup, SceneT
 from mskgrasp.core.errors import BadPart
 from mskgrasp.core.grasp import MAX_OPENING, TILT_LIMIT
 from mskgrasp.core.metrics import clustered_wilson_interval, rms_interval
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.evaluate.summary import displacement_errors
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import Part, find_part
 from mskgrasp.parts.hulls import hull_corners
 from mskgrasp.parts.importing.mesh_files import LOADERS

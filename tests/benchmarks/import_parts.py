@@ -20,9 +20,9 @@ from typing import cast, get_args
 import numpy as np
 
 from mskgrasp.core.errors import BadPart
+from mskgrasp.core.units import Unit
 from mskgrasp.parts import Part, store
 from mskgrasp.parts.commands.import_files import ImportOptions, import_files
-from mskgrasp.parts.importing.mesh_files import Unit
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import note, progress
 from tests.benchmarks.report import show

@@ -28,7 +28,8 @@ from hal.open_cell import open_cell
 from hal.sensor_noise import NoiseModel, SensorNoise, add_noise
 from mskgrasp.core.errors import NoPartFound, PartNotRecognised
 from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing, wrap_angle
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose

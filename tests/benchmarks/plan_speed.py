@@ -24,8 +24,9 @@ from hal import RgbdFrame, open_cell
 from mskgrasp.core.config import read_config
 from mskgrasp.core.metrics import bootstrap_interval
 from mskgrasp.core.settings import REGION, TABLE_Z
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.learning.config import LearningConfig
-from mskgrasp.learning.grasp_models import PRETRAINED, ModelMeta, Models, build_models, load_models
+from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models, load_models
 from mskgrasp.learning.network_config import Normalisation
 from mskgrasp.parts import starter_names
 from mskgrasp.planning.config import PlannerConfig

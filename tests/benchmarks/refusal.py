@@ -19,12 +19,13 @@ import trimesh
 
 from hal.errors import MotionAborted
 from mskgrasp.core.grasp import MAX_OPENING
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.core.shipped import PRETRAINED, SIMULATED_CELL
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.parts.solids.solid import Solid
 from mskgrasp.parts.write_solid import write_solid
 from mskgrasp.planning.config import MIN_QUALITY, PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL, make_planner
+from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.planner import Planner
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import progress

@@ -16,7 +16,8 @@ import numpy as np
 import torch
 
 from hal.open_cell import open_cell
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning import planner as search
 from mskgrasp.planning.config import PlannerConfig

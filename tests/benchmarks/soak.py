@@ -21,8 +21,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from mskgrasp.core.seeds import trial_seeds
-from mskgrasp.core.shipped import config_file
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED, config_file
 from mskgrasp.parts import find_part, starter_names
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner

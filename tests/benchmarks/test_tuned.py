@@ -4,7 +4,8 @@ from pathlib import Path
 
 import torch
 
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.learning.held_out import predict_grasp_displacement, prediction_errors
 from mskgrasp.learning.samples import read_samples
 from tests.benchmarks import tuned

@@ -21,7 +21,7 @@ import numpy as np
 
 from mskgrasp.core.metrics import bootstrap_interval
 from mskgrasp.core.seeds import trial_seeds
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.parts import starter_names
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner

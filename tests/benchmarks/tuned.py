@@ -16,8 +16,9 @@ from torch import Tensor
 
 from mskgrasp.core.config import read_config
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.learning.config import LearningConfig
-from mskgrasp.learning.grasp_models import PRETRAINED, ModelMeta, Models, load_models, save_model
+from mskgrasp.learning.grasp_models import ModelMeta, Models, load_models, save_model
 from mskgrasp.learning.held_out import calibrate
 from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.trainer import Sides, describe_networks

@@ -16,8 +16,9 @@ import pytest
 import trimesh
 import yaml
 
+from mskgrasp.collect.__main__ import main
 from mskgrasp.collect.config import CollectConfig, PartFilter
-from mskgrasp.collect.run import check_out, chosen_parts, is_done, main
+from mskgrasp.collect.run import check_out, chosen_parts, is_done
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock
 from mskgrasp.dataset import list_shards, read_shard, read_success, shard_path

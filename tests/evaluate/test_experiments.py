@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.evaluate.experiments import (
     load_compared,
     model_folders,
@@ -15,7 +16,7 @@ from mskgrasp.evaluate.experiments import (
     scenes,
     with_predictions,
 )
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.trials.predictors import LOWESS, NetworkPredictor
 from mskgrasp.trials.trial_files import trial_file, write_trial

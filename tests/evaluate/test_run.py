@@ -16,12 +16,11 @@ import pytest
 from hal.operator import StoppedByOperator
 from hal.sim import SapienArm
 from mskgrasp.core.errors import MskgraspError, UsageError
+from mskgrasp.core.shipped import PRETRAINED, SIMULATED_CELL
 from mskgrasp.evaluate.__main__ import main
 from mskgrasp.evaluate.config import EvaluateConfig
 from mskgrasp.evaluate.run import estimate, evaluate
-from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.simulation import certify_parts
 from mskgrasp.simulation.certify import CertifyConfig

@@ -17,7 +17,8 @@ from hal import Cell, cell_from_yaml, execute_grasp, go_home
 from hal.arm import POSITION_TOLERANCE, ROTATION_TOLERANCE, Arm
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import MAX_OPENING, pose_base_tcp
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
 from tests.hal.franka.robots import franky_sim, write_cell

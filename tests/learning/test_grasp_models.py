@@ -5,7 +5,8 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from mskgrasp.core.errors import BadModel, MissingModel
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models, save_model
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import load_models, save_model
 from mskgrasp.learning.network_config import HandNetworkConfig
 from tests.learning.small import SMALL, small_models
 

@@ -10,8 +10,9 @@ import pytest
 from mskgrasp.core.errors import BadModel
 from mskgrasp.core.grasp import HAND_GEOMETRY
 from mskgrasp.core.settings import Physics
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.dataset import list_shards, read_shard
-from mskgrasp.learning.grasp_models import DESCRIPTION, PRETRAINED, load_models
+from mskgrasp.learning.grasp_models import DESCRIPTION, load_models
 from mskgrasp.learning.label_source import LabelSource, distinct, other_conditions, source_of, source_text
 from mskgrasp.learning.model_card import model_card
 

@@ -1,6 +1,7 @@
 import re
 
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.learning.model_card import model_card
 
 

@@ -10,7 +10,8 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from mskgrasp.core.grasp import centre_in_grasp_frame
-from mskgrasp.learning.grasp_models import PRETRAINED, ModelMeta, Models, build_models, load_models
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models, load_models
 from mskgrasp.learning.network_config import Normalisation
 from mskgrasp.learning.symmetry import mirror_and_turn
 from tests import synthetic

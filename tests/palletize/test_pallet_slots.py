@@ -10,7 +10,8 @@ import pytest
 from hal import cell_from_yaml
 from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.core.geometry import wrap_half_turn
-from mskgrasp.palletize.pallet_slots import Slot, check_room, check_slots_in_reach, parse_target, read_slots
+from mskgrasp.palletize.config import PalletizeConfig
+from mskgrasp.palletize.pallet_slots import Slot, check_room, check_slots_in_reach, chosen_slots, read_slots
 from mskgrasp.parts import find_part
 from mskgrasp.perception.footprint import Footprint, usual_footprint
 
@@ -35,6 +36,14 @@ def test_a_turned_slot_needs_another_size():
     assert Slot(x=0, y=0, theta=np.pi / 4).fits(footprint)
 
 
+def test_a_single_target_is_the_only_slot_and_a_file_takes_its_place(tmp_path):
+    (slot,) = chosen_slots(PalletizeConfig(target="0.55,-0.1,30"))
+    assert (slot.x, slot.y, slot.size) == (0.55, -0.1, None) and slot.theta == pytest.approx(np.pi / 6)
+    path = tmp_path / "slots.yaml"
+    path.write_text("slots: [{x: 0.5, y: 0.2}, {x: 0.4, y: 0.2}]")
+    assert [slot.x for slot in chosen_slots(PalletizeConfig(slots=path))] == [0.5, 0.4]
+
+
 def test_the_shipped_grid_is_within_reach_of_its_cell():
     slots = read_slots(GRID)
     assert len(slots) == 6 and len({(slot.x, slot.y) for slot in slots}) == 6
@@ -44,7 +53,7 @@ def test_the_shipped_grid_is_within_reach_of_its_cell():
 def test_a_slot_out_of_reach_is_named():
     cell = cell_from_yaml(REPOSITORY / "configs" / "cells" / "sapien.yaml")
     with pytest.raises(UsageError, match=r"slot 2 at \(0.9, 0\) m .*outside the workspace"):
-        check_slots_in_reach(cell, [parse_target("0.5,0,0"), parse_target("0.9,0,0")])
+        check_slots_in_reach(cell, [Slot(x=0.5, y=0.0, theta=0.0), Slot(x=0.9, y=0.0, theta=0.0)])
 
 
 def test_a_slot_smaller_than_a_part_is_named_with_both_sizes():
@@ -77,9 +86,3 @@ def test_an_invalid_file_is_an_error_of_one_line(tmp_path, text, error, message)
     with pytest.raises(error, match=message) as caught:
         read_slots(path)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("text", ["0.5,0.1", "a,b,c", "0.5,nan,0", "0.5 0.1 0"])
-def test_an_invalid_target_is_refused(text):
-    with pytest.raises(ValueError, match="target must be"):
-        parse_target(text)

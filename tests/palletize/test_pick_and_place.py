@@ -11,7 +11,7 @@ import pytest
 from hal.operator import Operator, StoppedByOperator
 from hal.sim import SapienCellConfig, sapien_cell
 from mskgrasp.core.settings import Tape
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.palletize.figures import pallet_image
 from mskgrasp.palletize.pallet_slots import Slot
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask

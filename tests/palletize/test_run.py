@@ -16,7 +16,7 @@ from hal import Cell, GraspResult, execute_grasp
 from hal.errors import CommunicationLost
 from mskgrasp.core.errors import BadModel, UsageError
 from mskgrasp.core.grasp import Grasp
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.palletize.__main__ import main
 from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.run import SCENE_VERSION, palletize

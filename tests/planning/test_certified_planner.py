@@ -10,8 +10,7 @@ import pytest
 from hal import open_cell
 from mskgrasp.core.errors import PartNotRecognised
 from mskgrasp.core.geometry import wrap_half_turn
-from mskgrasp.core.shipped import config_file
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED, config_file
 from mskgrasp.parts import Part, find_part
 from mskgrasp.planning.certified import rest_frame, to_base
 from mskgrasp.planning.certified_planner import (

@@ -10,11 +10,12 @@ from hal import cell_from_yaml
 from hal.errors import HalError
 from mskgrasp.core.errors import BadPart
 from mskgrasp.core.settings import Physics
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.core.shipped import PRETRAINED, SIMULATED_CELL
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.learning.label_source import LabelSource
 from mskgrasp.parts import find_part
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL, make_planner, part_name, present, tell_model
+from mskgrasp.planning.for_cell import make_planner, part_name, present, tell_model
 
 
 def test_a_planner_samples_over_the_cells_own_table():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -31,3 +34,21 @@ def test_every_program_of_the_packages_is_listed():
 
 def test_another_program_has_no_page():
     assert guide("program") == ""
+
+
+def test_options_load_neither_networks_nor_meshes_nor_a_simulator():
+    modules = [one.options.partition(":")[0] for one in PROGRAMS.values()]
+    program = (
+        "import importlib, json, sys; [importlib.import_module(one) for one in sys.argv[1:]]; "
+        "print(json.dumps(sorted(sys.modules)))"
+    )
+    configs = [one for one in modules if one.endswith(".config")]
+    done = subprocess.run(
+        [sys.executable, "-c", program, "mskgrasp.runtime.options", *configs],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    loaded = set(json.loads(done.stdout))
+    assert len(configs) > 10 and loaded >= set(configs)
+    assert not loaded & {"matplotlib", "mani_skill", "mujoco", "sapien", "torch", "trimesh"}

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.serve.config import ServeConfig
 from mskgrasp.serve.dispatcher import Dispatcher
 from mskgrasp.serve.planner_process import PlannerProcess

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from mskgrasp.core.errors import MskgraspError
-from mskgrasp.learning.grasp_models import PRETRAINED, WEIGHTS
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import WEIGHTS
 from mskgrasp.serve.config import ServeConfig
 from mskgrasp.serve.planner_process import PlannerProcess, ProcessEnded
 from mskgrasp.serve.run import planner_settings

@@ -9,7 +9,8 @@ import torch
 
 from hal import open_cell
 from hal.operator import Operator
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
 from mskgrasp.trials.engine import TrialEngine

@@ -20,7 +20,8 @@ from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.metrics import bootstrap_interval, clustered_wilson_interval
-from mskgrasp.learning.grasp_models import PRETRAINED, WEIGHTS
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import WEIGHTS
 from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.placement_records import Placement
 from mskgrasp.palletize.run import palletize

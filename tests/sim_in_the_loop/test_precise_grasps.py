@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from mskgrasp.core.metrics import rotation_rmse, translation_rmse
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import load_models
 from tests.sim_in_the_loop.record import PARTS, RECORDED, run_scenario
 
 

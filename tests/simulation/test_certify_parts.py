@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mskgrasp.core.settings import Physics
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.planning.certified import FILE, certified_folder, read_certified
 from mskgrasp.simulation import certify_parts
 from mskgrasp.simulation.certify import CertifyConfig

@@ -11,6 +11,7 @@ from mskgrasp.dataset import shard_path, write_shard
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.train import run as train
+from mskgrasp.train.__main__ import main
 from mskgrasp.train.config import TrainConfig
 from tests import synthetic
 from tests.learning.small import PATCH, SHORT
@@ -114,7 +115,7 @@ def test_mistakes_on_the_command_line_are_one_line_each(tmp_path, dataset):
     if not torch.cuda.is_available():
         cases.append((("--data", dataset, "--out", out, "--device", "cuda"), 2, "no CUDA device"))
     for arguments, code, words in cases:
-        done = run_here(train.main, *map(str, arguments))
+        done = run_here(main, *map(str, arguments))
         assert done.returncode == code and words in done.stderr, (arguments, done)
         assert done.stderr.count("\n") == 1
     assert not out.exists()

@@ -24,9 +24,8 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.seeds import trial_seeds
-from mskgrasp.core.shipped import config_file
+from mskgrasp.core.shipped import SIMULATED_CELL, config_file
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.trials.engine import ExecutedGrasp, PlannedGrasp, TrialEngine, connected_engine
 from tests.hal.real_cell import measured_cell
 from tests.hal.replay.toy import toy_cell

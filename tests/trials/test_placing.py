@@ -12,8 +12,7 @@ from hal import Cell
 from hal.errors import OutOfWorkspace
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, twist_and_swing
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, object_displacement
-from mskgrasp.core.shipped import config_file
-from mskgrasp.learning.grasp_models import PRETRAINED
+from mskgrasp.core.shipped import PRETRAINED, config_file
 from mskgrasp.parts import find_part
 from mskgrasp.parts.alike_poses import alike_poses
 from mskgrasp.perception.part_pose import PartPose

@@ -11,8 +11,9 @@ import pytest
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.evaluate.replay_trial import draw_trial, find_trial
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.planner import Planner

@@ -18,10 +18,9 @@ import pytest
 from hal import cell_from_yaml
 from hal.operator import Operator
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.shipped import PRETRAINED, SIMULATED_CELL
 from mskgrasp.evaluate.experiments import scenes
-from mskgrasp.learning.grasp_models import PRETRAINED
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.predictors import fit_lowess
 from mskgrasp.trials.trial_files import read_trial, trial_file

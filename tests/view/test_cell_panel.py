@@ -12,9 +12,9 @@ import pytest
 from hal.errors import CommunicationLost
 from hal.simulated import SimulatedArm
 from mskgrasp.core.config import Config
+from mskgrasp.core.shipped import SIMULATED_CELL
 from mskgrasp.parts import find_part
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.trials.engine import TrialEngine, connected_engine
 from mskgrasp.view.cell_panel import CellPanel, in_markdown
 from mskgrasp.view.config import ViewConfig

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.shipped import SIMULATED_CELL
 from mskgrasp.dataset import open_dataset
 from mskgrasp.parts import find_part
-from mskgrasp.planning.for_cell import SIMULATED_CELL
 from mskgrasp.runtime.run_folder import TRIALS, append_trial
 from mskgrasp.trials.trial_files import trial_file, write_trial
 from mskgrasp.view.__main__ import main

@@ -167,7 +167,8 @@ def _without(message: str, path: Path) -> str:
 
 
 def _warnings(part: Part, unit: str) -> list[str]:
-    from mskgrasp.parts.importing.mesh_files import MILLIMETRES, USUAL_SIZE_MM, size_hint
+    from mskgrasp.core.units import MILLIMETRES
+    from mskgrasp.parts.importing.mesh_files import USUAL_SIZE_MM, size_hint
 
     found = []
     longest = 1e3 * part.longest_axis

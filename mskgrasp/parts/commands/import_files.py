@@ -15,9 +15,9 @@ from mskgrasp.parts import store
 from mskgrasp.runtime.worker_pool import Work, results
 
 if TYPE_CHECKING:
+    from mskgrasp.core.units import Unit
     from mskgrasp.parts.importing.bodies import Bodies
     from mskgrasp.parts.importing.import_file import Imported
-    from mskgrasp.parts.importing.mesh_files import Unit
 
 _NUMBERED = re.compile(r"(-\d+)+$")
 _LOST = "ended the process that imported it, twice: free memory and import it alone, or simplify the mesh"

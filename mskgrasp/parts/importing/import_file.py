@@ -15,11 +15,12 @@ import trimesh
 from scipy.spatial import QhullError
 
 from mskgrasp.core.errors import BadPart, printable
+from mskgrasp.core.units import Unit
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import LEGAL_NAME, builtin_names
 from mskgrasp.parts.catalogue import SETS
 from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
-from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, MeshFile, Unit, read_content, read_mesh
+from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, MeshFile, read_content, read_mesh
 from mskgrasp.parts.part import Part
 from mskgrasp.parts.solids.mesh_pieces import mesh_pieces
 from mskgrasp.parts.solids.simplify import for_collision

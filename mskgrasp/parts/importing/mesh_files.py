@@ -5,11 +5,11 @@ from __future__ import annotations
 import stat
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from mskgrasp.core.errors import BadPart
+from mskgrasp.core.units import MILLIMETRES, Unit
 from mskgrasp.parts.importing.formats import MOST_TRIANGLES, Loaded, Unreadable
 from mskgrasp.parts.importing.formats.glb import load_glb
 from mskgrasp.parts.importing.formats.obj import load_obj
@@ -18,9 +18,6 @@ from mskgrasp.parts.importing.formats.step import load_step
 from mskgrasp.parts.importing.formats.stl import load_stl
 from mskgrasp.parts.importing.formats.three_mf import load_3mf
 from mskgrasp.parts.solids.surface import Surface
-
-Unit = Literal["mm", "m", "in"]
-MILLIMETRES: dict[str, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
 
 LOADERS = {
     ".stl": load_stl,

@@ -16,7 +16,8 @@ from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.geometry import quat_rotate, wrap_half_turn
 from mskgrasp.core.grasp import Grasp, object_displacement
 from mskgrasp.core.panda_kinematics import top_down
-from mskgrasp.learning.grasp_models import PRETRAINED, load_models
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
 from mskgrasp.perception.markers import planar_displacement
 from mskgrasp.planning.config import PlannerConfig
