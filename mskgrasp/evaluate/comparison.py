@@ -85,6 +85,18 @@ class ModelStatistics:
         found = each.get(policy)
         return found and {"all": found.all, "known": found.known, "novel": found.novel}[group]
 
+    def rows(self, policy: Policy, group: Group) -> list[tuple[str, TrialStatistics]]:
+        """The row of a table for a group, with its name; none where it has no trial or repeats another.
+
+        Where all parts are known, or all novel, one row says so.
+        """
+        each = {one: self.of(policy, one) for one in SIDES}
+        sides = [name for name, one in each.items() if one is not None and one.trials]
+        found = self.of(policy, group)
+        if found is None or not sides or (group != "all" and len(sides) == 1):
+            return []
+        return [(f"all, {sides[0]}" if len(sides) == 1 else group, found)] if found.trials else []
+
 
 @dataclass(frozen=True, kw_only=True)
 class DisplacementSummary:

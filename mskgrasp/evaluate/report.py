@@ -212,11 +212,11 @@ def _displacement(summary: DisplacementSummary, folder: Path) -> list[Section]:
         for name, one in summary.policies.items()
     ]  # fmt: skip
     groups = [
-        ((label, POLICY_NAMES[policy], group), found)
+        ((label, POLICY_NAMES[policy], name), found)
         for group in GROUPS
         for label, model in summary.models.items()
         for policy in POLICIES
-        if (found := model.of(policy, group)) is not None and found.trials
+        for name, found in model.rows(policy, group)
     ]
     certified = summary.policies.get(POLICY_NAMES["certified"])
     if certified is not None and certified.trials:
