@@ -32,7 +32,7 @@ from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
-from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
+from mskgrasp.perception.part_pose import KnownPart, PartPose, PossiblePose, find_part_pose
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import progress
@@ -74,28 +74,39 @@ class Result:
 
     Attributes:
         refused: Whether it was taken for no pose of the part.
+        unseen: Whether it was, because nothing was seen at all.
         look: Whether the resting pose is right, or one that looks alike.
         offset: (2,) error of the place.
         turn: Error of the turn, up to symmetry.
         squared: Squared error over the covariance.
         seconds: Time of the call, and of all processors for it.
         unknowns: 3; 2 where any turn looks the same.
+        named: Errors of place and turn of every pose that was named, the alternatives among them, whose look
+            is right.
     """
 
     part: str
     seconds: tuple[float, float]
     refused: bool = False
+    unseen: bool = False
     look: bool = False
     offset: np.ndarray | None = None
     turn: float = 0.0
     squared: float = 0.0
     unknowns: int = 3
+    named: tuple[tuple[float, float], ...] = ()
 
     def within(self, bounds: tuple[float, float]) -> bool:
         """Whether it is right within bounds of place and turn."""
-        if self.offset is None or not self.look:
-            return False
-        return bool(np.linalg.norm(self.offset) < bounds[0] and abs(self.turn) < bounds[1])
+        return self.look and _within(self.named[0], bounds)
+
+    def named_within(self, bounds: tuple[float, float]) -> bool:
+        """Whether one of the poses that were named is."""
+        return any(_within(one, bounds) for one in self.named)
+
+
+def _within(error: tuple[float, float], bounds: tuple[float, float]) -> bool:
+    return error[0] < bounds[0] and abs(error[1]) < bounds[1]
 
 
 def shown_parts(cell: Cell, names: Sequence[str], poses: int) -> Iterator[Shown]:
@@ -117,49 +128,59 @@ def with_noise(shown: Shown, model: NoiseModel) -> tuple[RgbdFrame, float]:
     return replace(shown.frame, depth=depth), noise.least_height
 
 
-def find(
-    cell: Cell, shown: Shown, model: NoiseModel, known: KnownPart
-) -> tuple[PartPose | None, tuple[float, float]]:
-    """The pose found, None if the part was refused, and the time by the clock and of the processors."""
+Found = PartPose | PartNotRecognised | NoPartFound
+
+
+def find(cell: Cell, shown: Shown, model: NoiseModel, known: KnownPart) -> tuple[Found, tuple[float, float]]:
+    """The pose found, or why the part was refused, and the time by the clock and of the processors."""
     frame, min_height = with_noise(shown, model)
     start = time.perf_counter(), time.process_time()
     try:
         found = find_part_pose(
             frame, known, table_z=cell.workspace.table_z, region=cell.workspace.region, min_height=min_height
         )
-    except (PartNotRecognised, NoPartFound):
-        found = None
+    except (PartNotRecognised, NoPartFound) as refusal:
+        found = refusal
     return found, (time.perf_counter() - start[0], time.process_time() - start[1])
 
 
-def result(shown: Shown, found: PartPose | None, seconds: tuple[float, float], known: KnownPart) -> Result:
+def result(shown: Shown, found: Found, seconds: tuple[float, float], known: KnownPart) -> Result:
     """Compare what was found with the simulator's pose."""
-    if found is None:
-        return Result(part=shown.part, seconds=seconds, refused=True)
-    true_resting, true_turn = resting_of(shown.T_base_obj, known)
-    offset = np.asarray(found.T_base_obj.position - shown.T_base_obj.position)[:2]
-    lying = {one.resting: (one, look) for look in known.looks for one in look.poses}
-    one, look = lying[found.resting]
-    if true_resting not in lying or lying[true_resting][1] is not look:
-        return Result(part=shown.part, seconds=seconds, offset=offset)
-    true = lying[true_resting][0]
-    turn = 0.0
-    if found.symmetry:
-        _, found_turn = resting_of(found.T_base_obj, known)
-        period = 2 * np.pi / found.symmetry
-        turn = (found_turn + one.turn - true_turn - true.turn + period / 2) % period - period / 2
+    if not isinstance(found, PartPose):
+        return Result(part=shown.part, seconds=seconds, refused=True, unseen=isinstance(found, NoPartFound))
+    errors = [error_of(one, shown, known) for one in (found, *found.alternatives)]
+    named = tuple((float(np.linalg.norm(one[:2])), float(one[2])) for one in errors if one is not None)
+    if errors[0] is None:
+        return Result(part=shown.part, seconds=seconds, named=named)
     unknowns = 3 if found.symmetry else 2
-    error = np.array([*offset, turn])[:unknowns]
+    error = errors[0][:unknowns]
     squared = float(error @ np.linalg.solve(found.covariance[:unknowns, :unknowns], error))
     return Result(
         part=shown.part,
         seconds=seconds,
         look=True,
-        offset=offset,
-        turn=float(turn),
+        offset=errors[0][:2],
+        turn=float(errors[0][2]),
         squared=squared,
         unknowns=unknowns,
+        named=named,
     )
+
+
+def error_of(named: PartPose | PossiblePose, shown: Shown, known: KnownPart) -> np.ndarray | None:
+    """Error (3,) of a pose: place and, up to symmetry, turn; None where another look is shown."""
+    lying = {one.resting: (one, look) for look in known.looks for one in look.poses}
+    true_resting, true_turn = resting_of(shown.T_base_obj, known)
+    one, look = lying[named.resting]
+    if true_resting not in lying or lying[true_resting][1] is not look:
+        return None
+    turn = 0.0
+    if one.order:
+        _, named_turn = resting_of(named.T_base_obj, known)
+        period = 2 * np.pi / one.order
+        off = named_turn + one.turn - true_turn - lying[true_resting][0].turn
+        turn = (off + period / 2) % period - period / 2
+    return np.array([*(named.T_base_obj.position - shown.T_base_obj.position)[:2], turn])
 
 
 def resting_of(T_base_obj: Pose, known: KnownPart) -> tuple[int, float]:  # noqa: N803 (a pose's name)
@@ -179,9 +200,10 @@ def accuracy_row(model: NoiseModel, results: Sequence[Result]) -> list[str]:
         return f"{np.mean(values):.1%}"
 
     return [
-        model, str(len(results)), str(len(results) - len(accepted)),
+        model, str(len(results)), str(len(results) - len(accepted)), str(sum(one.unseen for one in results)),
         share([one.look for one in accepted]),
         share([one.within(bounds) for one in results]), share([one.within(bounds) for one in accepted]),
+        share([one.named_within(bounds) for one in accepted]),
         share([one.squared < CHI_SQUARED_95[one.unknowns] for one in accepted if one.look]),
     ]  # fmt: skip
 
@@ -293,9 +315,9 @@ def main() -> int:
                 for kind, pairs in kinds.items():
                     if shown.part in pairs:
                         other, _ = find(cell, shown, model, known[pairs[shown.part]])
-                        refused.setdefault((kind, model), []).append(other is None)
+                        refused.setdefault((kind, model), []).append(isinstance(other, Exception))
                 other, _ = find(cell, touching(shown, cell.workspace.table_z), model, known[shown.part])
-                refused.setdefault(("two that touch", model), []).append(other is None)
+                refused.setdefault(("two that touch", model), []).append(isinstance(other, Exception))
     with open_cell(options.mujoco) as cell:
         for shown in progress(
             shown_parts(cell, names, 1), unit="image", total=len(names), title="leaning parts"
@@ -304,13 +326,15 @@ def main() -> int:
                 tilted = leaning(cell, shown, degrees, known[shown.part])
                 for model in options.noise:
                     other, _ = find(cell, tilted, model, known[shown.part])
-                    refused.setdefault((f"leans by {degrees:g} degrees", model), []).append(other is None)
+                    refused.setdefault((f"leans by {degrees:g} degrees", model), []).append(
+                        isinstance(other, Exception)
+                    )
     wrong = [(kind, model, str(len(one)), f"{np.mean(one):.1%}") for (kind, model), one in refused.items()]
     show(
         [
             Table(
-                header=("noise", "images", "refused", "look right", "within bounds", "of those accepted",
-                        "inside 95 % ellipse"),
+                header=("noise", "images", "refused", "of them unseen", "look right", "within bounds",
+                        "of those accepted", "or an alternative is", "inside 95 % ellipse"),
                 rows=[accuracy_row(model, found) for model, found in results.items()],
                 caption="Parts by themselves",
             ),
