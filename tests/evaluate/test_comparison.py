@@ -34,9 +34,10 @@ def test_models_are_compared_on_shared_grasps_and_on_their_own():
         s for s in report_sections(report_of(summary), Path("out")) if s.title == "Displacement in the hand"
     )
     rows = [row[:3] for row in section.tables[0].rows]
-    assert rows[:2] == [("one", "high quality", "all"), ("one", "high quality and low variance", "all, known")]
+    low = "high quality and low variance"
+    assert rows[:2] == [("one", "high quality", "all"), ("one", low, "all, known")]
     assert ("one", "high quality", "novel") in rows
-    assert ("one", "high quality and low variance", "known") not in rows  # it would repeat the row of all
+    assert ("one", low, "known") not in rows  # it would repeat the row of all
     assert one.of("quality", "all") is one.quality.all
 
 

@@ -2,7 +2,7 @@ import pytest
 
 from mskgrasp.core.errors import UnknownPart
 from mskgrasp.core.shipped import example_file
-from mskgrasp.parts import load_part, read_part
+from mskgrasp.parts import find_part, load_part, read_part
 
 
 def test_a_cad_file_a_name_and_a_folder_give_the_same_part():
@@ -11,6 +11,15 @@ def test_a_cad_file_a_name_and_a_folder_give_the_same_part():
     for source in ("bracket", from_file.folder):
         assert load_part(source).content_hash == from_file.content_hash
     assert read_part(from_file.folder).mass == from_file.mass
+
+
+def test_a_file_that_is_not_there_is_named_as_a_file(tmp_path):
+    with pytest.raises(UnknownPart, match=r"there is no file .*bracket\.STL; check the path"):
+        load_part(tmp_path / "bracket.STL")
+    file = example_file("bracket.stl")
+    assert file is not None
+    with pytest.raises(UnknownPart, match=r"bracket\.stl is a CAD file: import it"):
+        find_part(file)
 
 
 def test_an_unknown_name_lists_similar_ones():
