@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from mskgrasp.learning.held_out import measure_models
     from mskgrasp.learning.model_metrics import EpochMetrics, ModelMetrics
     from mskgrasp.learning.samples import Samples, read_samples
-    from mskgrasp.learning.trainer import Reporter, Sides, split, train
+    from mskgrasp.learning.sides import Sides, split
+    from mskgrasp.learning.trainer import Reporter, train
 
 __all__ = [
     "EpochMetrics", "LearningConfig", "ModelMetrics", "Models", "Reporter", "Samples", "Sides", "StageConfig",
@@ -28,6 +29,7 @@ _HOMES = {
     "mskgrasp.learning.held_out": ("measure_models",),
     "mskgrasp.learning.model_metrics": ("EpochMetrics", "ModelMetrics"),
     "mskgrasp.learning.samples": ("Samples", "read_samples"),
-    "mskgrasp.learning.trainer": ("Reporter", "Sides", "split", "train"),
+    "mskgrasp.learning.sides": ("Sides", "split"),
+    "mskgrasp.learning.trainer": ("Reporter", "train"),
 }
 __getattr__, __dir__ = lazy_names(__name__, _HOMES)

@@ -22,7 +22,8 @@ from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, read_meta, save
 from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples, read_samples
-from mskgrasp.learning.trainer import Reporter, split, train
+from mskgrasp.learning.sides import split
+from mskgrasp.learning.trainer import Reporter, train
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import Bar, advance_to, note, progress
 from mskgrasp.train.config import TrainConfig

@@ -19,7 +19,7 @@ from mskgrasp.core.config import read_config
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.samples import Samples
-from mskgrasp.learning.trainer import Sides, split
+from mskgrasp.learning.sides import Sides, split
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import progress
 from tests.benchmarks.choice import Choice, Looks

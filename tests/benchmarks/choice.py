@@ -17,7 +17,7 @@ from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models
 from mskgrasp.learning.network_config import NetworkConfig
 from mskgrasp.learning.samples import Samples, read_samples
-from mskgrasp.learning.trainer import Sides
+from mskgrasp.learning.sides import Sides
 from mskgrasp.runtime.progress import advance_to, progress
 
 

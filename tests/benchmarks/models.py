@@ -25,7 +25,7 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.label_source import source_text
 from mskgrasp.learning.samples import Samples
-from mskgrasp.learning.trainer import Sides, split
+from mskgrasp.learning.sides import Sides, split
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import progress

@@ -23,7 +23,7 @@ from mskgrasp.dataset import open_dataset, read_columns
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.network_config import HandNetworkConfig, NetworkConfig
 from mskgrasp.learning.samples import Samples
-from mskgrasp.learning.trainer import Sides, split
+from mskgrasp.learning.sides import Sides, split
 from mskgrasp.parts import load_part
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import progress

@@ -12,7 +12,7 @@ from mskgrasp.core.config import read_config
 from mskgrasp.learning.config import LearningConfig, StageConfig
 from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.samples import Samples
-from mskgrasp.learning.trainer import Sides
+from mskgrasp.learning.sides import Sides
 from tests.benchmarks.choice import Choice
 
 CONFIGS = Path(__file__).parents[2] / "configs" / "train"

@@ -7,7 +7,7 @@ import torch
 from mskgrasp.core import metrics
 from mskgrasp.learning.held_out import centroid_displacement
 from mskgrasp.learning.samples import Samples, read_samples
-from mskgrasp.learning.trainer import split
+from mskgrasp.learning.sides import split
 from tests.benchmarks.conftest import Boxes
 from tests.benchmarks.known_parts import HELD_OUT_EVERY, held_out_rows, lowess_predictions, recorded_grasps
 from tests.benchmarks.paper_choices import paper_choices

@@ -12,7 +12,7 @@ import torch
 from mskgrasp.core.config import read_config
 from mskgrasp.dataset import list_shards, read_shard, write_shard
 from mskgrasp.learning.config import LearningConfig
-from mskgrasp.learning.trainer import Sides, split
+from mskgrasp.learning.sides import Sides, split
 from tests.benchmarks import oracles
 from tests.benchmarks.oracle_networks import OracleSamples
 from tests.benchmarks.oracles import BASELINE, SuccessLooks, drawn_values, oracle_choices

@@ -21,7 +21,8 @@ from mskgrasp.core.config import read_config
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import build_models
 from mskgrasp.learning.samples import Samples
-from mskgrasp.learning.trainer import Stage, describe_networks, split
+from mskgrasp.learning.sides import split
+from mskgrasp.learning.trainer import Stage, describe_networks
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import progress
 

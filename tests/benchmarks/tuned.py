@@ -21,7 +21,8 @@ from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models, load_models, save_model
 from mskgrasp.learning.held_out import calibrate
 from mskgrasp.learning.samples import Samples, read_samples
-from mskgrasp.learning.trainer import Sides, describe_networks
+from mskgrasp.learning.sides import Sides
+from mskgrasp.learning.trainer import describe_networks
 from mskgrasp.parts.catalogue import SPLITS
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import advance_to, progress

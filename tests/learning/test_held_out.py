@@ -10,7 +10,8 @@ import torch
 from mskgrasp.core import metrics
 from mskgrasp.learning import held_out
 from mskgrasp.learning.grasp_models import ModelCalibration, Models, build_models
-from mskgrasp.learning.trainer import describe_networks, split
+from mskgrasp.learning.sides import split
+from mskgrasp.learning.trainer import describe_networks
 from tests.learning.small import PATCH
 
 CLOSING = ("x", "y", "theta")

@@ -15,23 +15,11 @@ from mskgrasp.learning.config import StageConfig
 from mskgrasp.learning.grasp_models import ModelCalibration, Models, build_models, load_models, save_model
 from mskgrasp.learning.held_out import calibrate, predict_grasp_displacement
 from mskgrasp.learning.samples import read_samples
-from mskgrasp.learning.trainer import Reporter, Stage, TrainingDiverged, describe_networks, split
+from mskgrasp.learning.sides import split
+from mskgrasp.learning.trainer import Reporter, Stage, TrainingDiverged, describe_networks
 from mskgrasp.learning.trainer import train as learn
 from tests import synthetic
 from tests.learning.small import HAND, PATCH, SHORT
-
-
-def test_validation_never_sees_a_part_of_training(samples):
-    sides = split(samples, PATCH)
-    assert not set(samples.part[sides.training].tolist()) & set(samples.part[sides.validation].tolist())
-    assert len(sides.training) + len(sides.validation) == len(samples) and not len(sides.test)
-
-
-@pytest.mark.parametrize(("success", "words"), [(True, "no failure"), (False, "no success")])
-def test_data_of_one_outcome_are_reported(samples, success, words):
-    alike = dataclasses.replace(samples, success=torch.full((len(samples),), success))
-    with pytest.raises(BadDataset, match=words):
-        split(alike, PATCH)
 
 
 def test_one_success_is_no_batch_to_normalise(samples, tmp_path):

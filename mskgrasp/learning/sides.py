@@ -1,0 +1,52 @@
+"""Parts to train on, to select by, and to measure on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.learning.config import LearningConfig
+from mskgrasp.learning.samples import Samples, part_sides
+from mskgrasp.parts.catalogue import SPLITS
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sides:
+    """Rows of the samples by side; no part is on two sides.
+
+    Attributes:
+        training: Rows to train on.
+        validation: Rows that select the epoch and calibrate.
+        test: Rows of families that training never sees, for the final metrics only.
+        new_sizes: Rows of other sizes of families that it sees, for the final metrics only. Like ``test``
+            empty if parts are split by name.
+    """
+
+    training: Tensor
+    validation: Tensor
+    test: Tensor
+    new_sizes: Tensor
+
+
+def split(samples: Samples, config: LearningConfig) -> Sides:
+    """Split the samples by their parts.
+
+    Raises:
+        BadDataset: Training or validation lacks successes or failures.
+    """
+    sides = part_sides(samples.parts, config.validation_fraction, config.sides)
+    rows = [
+        torch.nonzero(torch.isin(samples.part, torch.tensor(numbers, dtype=torch.int64)))[:, 0]
+        for numbers in (
+            [number for number, name in enumerate(samples.parts) if sides[name] == side] for side in SPLITS
+        )
+    ]
+    for name, side in zip(("training", "validation"), rows, strict=False):
+        n, n_success = len(side), int(samples.success[side].sum())
+        if n_success in (0, n):
+            kind = "success" if n_success == 0 else "failure"
+            raise BadDataset(f"no {kind} among the {n} attempts at the {name} parts; collect more attempts")
+    return Sides(training=rows[0], validation=rows[1], test=rows[2], new_sizes=rows[3])

@@ -1,0 +1,25 @@
+"""Parts to train on, to select by, and to measure on."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+import torch
+
+from mskgrasp.core.errors import BadDataset
+from mskgrasp.learning.sides import split
+from tests.learning.small import PATCH
+
+
+def test_validation_never_sees_a_part_of_training(samples):
+    sides = split(samples, PATCH)
+    assert not set(samples.part[sides.training].tolist()) & set(samples.part[sides.validation].tolist())
+    assert len(sides.training) + len(sides.validation) == len(samples) and not len(sides.test)
+
+
+@pytest.mark.parametrize(("success", "words"), [(True, "no failure"), (False, "no success")])
+def test_data_of_one_outcome_are_reported(samples, success, words):
+    alike = dataclasses.replace(samples, success=torch.full((len(samples),), success))
+    with pytest.raises(BadDataset, match=words):
+        split(alike, PATCH)
