@@ -11,6 +11,7 @@ from mskgrasp.core.errors import BadDataset
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.samples import Samples, part_sides
 from mskgrasp.parts.catalogue import SPLITS
+from mskgrasp.runtime.progress import note
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,9 +21,9 @@ class Sides:
     Attributes:
         training: Rows to train on.
         validation: Rows that select the epoch and calibrate.
-        test: Rows of families that training never sees, for the final metrics only.
-        new_sizes: Rows of other sizes of families that it sees, for the final metrics only. Like ``test``
-            empty if parts are split by name.
+        test: Rows of families that training never sees, for the final metrics only. Empty if parts are split
+            by name, or if all attempts at them end alike: nothing can be measured on those.
+        new_sizes: The same for other sizes of families that training sees.
     """
 
     training: Tensor
@@ -44,9 +45,16 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
             [number for number, name in enumerate(samples.parts) if sides[name] == side] for side in SPLITS
         )
     ]
-    for name, side in zip(("training", "validation"), rows, strict=False):
-        n, n_success = len(side), int(samples.success[side].sum())
-        if n_success in (0, n):
-            kind = "success" if n_success == 0 else "failure"
+    for k, name in enumerate(("training", "validation", "test", "new_sizes")):
+        n, n_success = len(rows[k]), int(samples.success[rows[k]].sum())
+        if 0 < n_success < n:
+            continue
+        kind = "failure" if n_success else "success"
+        if k < 2:
             raise BadDataset(f"no {kind} among the {n} attempts at the {name} parts; collect more attempts")
+        if n:
+            note(
+                f"warning: no {kind} among the {n} attempts at the {name} parts: nothing is measured on them"
+            )
+        rows[k] = rows[k][:0]
     return Sides(training=rows[0], validation=rows[1], test=rows[2], new_sizes=rows[3])

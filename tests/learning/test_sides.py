@@ -23,3 +23,16 @@ def test_data_of_one_outcome_are_reported(samples, success, words):
     alike = dataclasses.replace(samples, success=torch.full((len(samples),), success))
     with pytest.raises(BadDataset, match=words):
         split(alike, PATCH)
+
+
+@pytest.mark.parametrize(("success", "words"), [(True, "no failure"), (False, "no success")])
+def test_nothing_is_measured_on_parts_whose_attempts_all_end_alike(
+    samples, monkeypatch, capsys, success, words
+):
+    names = {name: ("train", "validation", "test")[min(k, 2)] for k, name in enumerate(samples.parts)}
+    monkeypatch.setattr("mskgrasp.learning.sides.part_sides", lambda *_: names)
+    test = samples.part >= 2
+    assert len(samples.parts) > 2 and len(split(samples, PATCH).test) == int(test.sum())
+    alike = dataclasses.replace(samples, success=torch.where(test, success, samples.success))
+    assert not len(split(alike, PATCH).test)
+    assert f"{words} among the {int(test.sum())} attempts at the test parts" in capsys.readouterr().err
