@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import queue
 import shlex
+import signal
 import subprocess
 import tempfile
 import threading
@@ -93,11 +95,11 @@ class ProgramPlanner:
             assert self._process.stdin is not None and self._process.stdout is not None
             with contextlib.suppress(OSError):
                 self._process.stdin.close()
-            try:
+            with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(2.0)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
+                self._reader.join(2.0)
+            if self._process.poll() is None or self._reader.is_alive():
+                _kill(self._process)
             self._reader.join()
             self._process.stdout.close()
             self._process = None
@@ -112,7 +114,7 @@ class ProgramPlanner:
             process.stdin.flush()
             line = self._lines.get(timeout=self._timeout_s)
         except queue.Empty:
-            process.kill()
+            _kill(process)
             raise BadPlanner(
                 f"the program {self._command!r} did not answer within {self._timeout_s:g} s; does it flush "
                 "its output?"
@@ -132,7 +134,8 @@ class ProgramPlanner:
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=self._log,
-                    text=True,
+                    encoding="utf-8",
+                    errors="backslashreplace",
                     # Ctrl-C is for this program, which then ends the other.
                     start_new_session=True,
                 )
@@ -153,6 +156,13 @@ class ProgramPlanner:
         lines = [line.strip() for line in self._log.read().decode(errors="replace").splitlines()]
         last = next((line for line in reversed(lines) if line), "")
         return f" ({last})" if last else ""
+
+
+def _kill(process: subprocess.Popen[str]) -> None:
+    """End a program and what it started, such as the program that a shell waits for."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
 
 
 def _proposed(values: dict[str, Any]) -> ProposedGrasp:

@@ -89,6 +89,10 @@ def test_a_program_may_refuse_a_part(program):
         (answer("[1, 2]"), "must answer a line such as"),
         ("raise RuntimeError('no licence')", r"ended with exit code 1 \(RuntimeError: no licence\)"),
         ("sys.exit(3)", "ended with exit code 3"),
+        (
+            r"sys.stdout.buffer.write(b'\xe9\n'); sys.stdout.flush()",
+            r"must answer .*'\\\\xe9'",
+        ),
     ],
 )
 def test_a_program_that_fails_is_one_line(lines, message, program):
@@ -100,6 +104,17 @@ def test_a_program_that_fails_is_one_line(lines, message, program):
 def test_a_program_that_does_not_answer_is_ended(program):
     with pytest.raises(BadPlanner, match="did not answer within 1 s; does it flush"):
         ask(program("time.sleep(60)", timeout_s=1.0))
+
+
+@pytest.mark.parametrize("ends", ["wait", "exit 1"])
+def test_what_a_program_started_ends_with_it(ends, tmp_path):
+    command = f"sh -c 'sleep 600 & echo $! > {tmp_path}/child; {ends}'"
+    planner = ProgramPlanner(command, WORKSPACE, timeout_s=1.0)
+    with pytest.raises(BadPlanner, match="did not answer"):
+        ask(planner)
+    planner.close()
+    child = Path("/proc", (tmp_path / "child").read_text().strip(), "stat")
+    assert not child.exists() or child.read_text().rsplit(")", 1)[1].split()[0] == "Z"
 
 
 def test_a_program_that_is_missing_is_named():
