@@ -184,12 +184,26 @@ def _success_text(summary: SuccessSummary) -> list[str]:
         f"{paper['simulated']:.1%} simulated, {paper['real']:.1%} real)"
     ]
     lines.append(refused_text(overall.reasons, overall.trials, overall.successes))
+    lines += _certified_text(overall)
     if overall.unmeasured:
         n = sum(overall.unmeasured.values())
         lines.append(f"{n} of {overall.successes} lifted not measured: {counted(overall.unmeasured)}")
     if overall.median_planning_s is not None:
         lines.append(f"median planning time {overall.median_planning_s:.2f} s")
     return lines
+
+
+def _policy_text(one: TrialStatistics) -> list[str]:
+    refused = [refused_text(one.reasons, one.trials, one.successes)] if one.reasons.get(REFUSED) else []
+    return refused + _certified_text(one)
+
+
+def _certified_text(one: TrialStatistics) -> list[str]:
+    if one.certified is None:
+        return []
+    n, planned = one.certified
+    rest = "; the others are the networks'" if n < planned else ""
+    return [f"{n} of {planned} planned grasps are certified{rest}"]
 
 
 def refused_text(reasons: Mapping[str, int], n_trials: int, n_lifted: int) -> str:
@@ -231,11 +245,7 @@ def _displacement(summary: DisplacementSummary, folder: Path) -> list[Section]:
     return [
         Section(
             title="Lifted",
-            text=[
-                f"{name}: {refused_text(one.reasons, one.trials, one.successes)}"
-                for name, one in summary.policies.items()
-                if one.reasons.get(REFUSED)
-            ],
+            text=[f"{name}: {line}" for name, one in summary.policies.items() for line in _policy_text(one)],
             tables=[
                 Table(header=("policy", "lifted", "95 % interval", "failures", "not measured"), rows=lifted)
             ],

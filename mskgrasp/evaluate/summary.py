@@ -66,6 +66,8 @@ class TrialStatistics:
         flat_translation_interval: Its interval, as above.
         flat_rotation_rmse: The same of the turn.
         flat_rotation_interval: The same of the turn.
+        certified: Of the planned grasps of policy ``certified`` those that are certified, the networks' being
+            the others; None for other policies, and where it was not recorded.
     """
 
     trials: int
@@ -92,6 +94,7 @@ class TrialStatistics:
     flat_translation_interval: Interval | None = None
     flat_rotation_rmse: float | None = None
     flat_rotation_interval: Interval | None = None
+    certified: tuple[int, int] | None = None
 
     @classmethod
     def of(
@@ -138,6 +141,7 @@ class TrialStatistics:
             flat_translation_interval=_interval(errors[0][flat], parts[flat]),
             flat_rotation_rmse=_rms(errors[1][flat]),
             flat_rotation_interval=_interval(errors[1][flat], parts[flat]),
+            certified=_certified([trial for trial in trials if trial.policy == "certified" and trial.grasp]),
         )
 
 
@@ -193,6 +197,11 @@ def _grouped(trials: Sequence[Trial], name: Callable[[Trial], str]) -> dict[str,
     for trial in trials:
         groups.setdefault(name(trial), []).append(trial)
     return {group: TrialStatistics.of(groups[group]) for group in sorted(groups)}
+
+
+def _certified(planned: Sequence[Trial]) -> tuple[int, int] | None:
+    known = [trial.certified for trial in planned if trial.certified is not None]
+    return (sum(known), len(known)) if known and len(known) == len(planned) else None
 
 
 def own_prediction(trial: Trial) -> Prediction | None:

@@ -59,6 +59,8 @@ class Trial:
         pose_base_obj: (7,) x y z qw qx qy qz of the part before the grasp; None without a tracker.
         predictions: Predictions of the compared models for this grasp, by label.
         refusal: Why all grasps were refused, in a line; empty where one was tried.
+        certified: Whether the grasp was a certified one; None where none was found, and in runs that did not
+            record it.
     """
 
     part: str
@@ -82,6 +84,7 @@ class Trial:
     pose_base_obj: list[float] | None = None
     predictions: dict[str, Prediction] = field(default_factory=dict)
     refusal: str = ""
+    certified: bool | None = None
 
     @property
     def key(self) -> str:

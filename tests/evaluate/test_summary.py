@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,22 @@ def test_shares_within_an_error_are_of_all_attempts_and_parts_that_hang_tilted_a
     assert found.flat_translation_rmse == pytest.approx(1e-3 * np.sqrt(14 / 4))
     assert found.translation_rmse == pytest.approx(1e-3 * np.sqrt(114 / 5))
     assert "50.0% [" in printed(summarise_trials([*precise, tilted, lost]))
+
+
+def test_grasps_of_the_networks_are_told_from_certified_ones():
+    own = [trial(number=k, policy="certified", certified=k > 0) for k in range(3)]
+    refused = trial(number=3, policy="certified", **NOTHING)
+    found = summarise_trials([*own, refused])
+    assert found.overall.certified == (2, 3)
+    assert "2 of 3 planned grasps are certified; the others are the networks'" in printed(found)
+    assert "3 of 3 planned grasps are certified\n" in printed(
+        summarise_trials([replace(one, certified=True) for one in own])
+    )
+    assert summarise_trials([trial(certified=False)]).overall.certified is None  # another policy
+    old = replace(own[0], certified=None)
+    assert summarise_trials([old, *own[1:]]).overall.certified is None
+    compared = compare_models([replace(one, chosen_by="certified") for one in own], {})
+    assert "certified grasps: 2 of 3 planned grasps are certified" in printed(compared)
 
 
 def test_without_a_success_errors_are_absent_not_zero(tmp_path: Path):
