@@ -54,7 +54,7 @@ def assess(config: AssessConfig) -> None:
     tolerance = parse_tolerance(config.tolerance)
     if len(sources) == 1:
         out = config.out
-        found = _assess_one(sources[0], config, out, tolerance)
+        found = _assess_one(find_part(part_name(sources[0], config.unit)), config, out, tolerance)
         print(f"\n{found.headline}")
         print(f"wrote {out}/report.html, report.json, grasps.json, grasps.isaac.yaml")
         return
@@ -64,7 +64,7 @@ def assess(config: AssessConfig) -> None:
         note(f"{source} ({number} of {len(sources)})")
         try:
             part = find_part(part_name(source, config.unit))
-            found = _assess_one(source, config, config.out / part.name, tolerance)
+            found = _assess_one(part, config, config.out / part.name, tolerance)
         except MskgraspError as error:
             if isinstance(error, UsageError) and not isinstance(error, BadPart):
                 raise
@@ -82,7 +82,7 @@ def _sources(config: AssessConfig) -> list[str]:
     """The parts named by the user; a folder without a part stands for its CAD files.
 
     Raises:
-        UsageError: There is none.
+        UsageError: There is none, or two would share a name, and with it a part and a folder of results.
     """
     sources: list[str] = []
     for text in config.parts:
@@ -99,11 +99,24 @@ def _sources(config: AssessConfig) -> list[str]:
             "name a part, a part folder, a CAD file or a folder of them: "
             "python -m mskgrasp.assess bracket.stl"
         )
-    return list(dict.fromkeys(sources))
+    from mskgrasp.parts.importing.import_file import legal_name  # loads CoACD, which takes a while
+
+    sources = list(dict.fromkeys(sources))
+    named: dict[str, str] = {}
+    for text in sources:
+        path = Path(text)
+        try:
+            name = legal_name(path.stem if path.suffix.lower() in LOADERS else path.name)
+        except BadPart:
+            continue  # the import says so
+        if named.setdefault(name, text) != text:
+            raise UsageError(
+                f"{named[name]} and {text} are both called {name!r}; rename one, or leave it away"
+            )
+    return sources
 
 
-def _assess_one(source: str, config: AssessConfig, out: Path, tolerance: Tolerance) -> Assessed:
-    part = find_part(part_name(source, config.unit))
+def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Tolerance) -> Assessed:
     # A part outside the cache is known by its folder alone.
     place = str(part.folder)
     workers = config.workers or os.cpu_count() or 1

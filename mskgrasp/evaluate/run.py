@@ -107,7 +107,7 @@ def prepare(config: EvaluateConfig) -> Prepared:
     """
     _check(config)
     models = load_models(config.models)
-    if config.planner.policy == "low_variance" and not models.meta.network.variance:
+    if config.planner.policy != "quality" and not models.meta.network.variance:
         raise BadModel(
             f"{config.models} predicts no variance; use --planner.policy quality, or another model"
         )

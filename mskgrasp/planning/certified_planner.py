@@ -19,7 +19,6 @@ from mskgrasp.core.geometry import twist_and_swing
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, to_grasp_displacement
 from mskgrasp.parts import Part
 from mskgrasp.parts.alike_poses import PartSurface
-from mskgrasp.perception.part_detection import view_part
 from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
 from mskgrasp.planning.certified import (
     CertifiedGrasp,
@@ -83,6 +82,7 @@ class CertifiedPlanner:
         Raises:
             NoPartFound: No part is detected.
             PartNotRecognised: What lies there is not this part, or does not lie flat.
+            TableTooHigh: The table is seen too high, as by `Planner.view`.
             GraspRefused: The part has no certified grasp here, and no candidate has the required quality.
         """
         started = time.perf_counter()
@@ -145,10 +145,7 @@ class CertifiedPlanner:
         grasps, turn = self._certified.of(found.resting)
         if not grasps:
             return None
-        view = view_part(
-            frame.depth, frame.intrinsics, frame.T_base_camera,
-            table_z=planner.table_z, region=planner.region, min_height=planner.min_height, alone=True,
-        )  # fmt: skip
+        view = planner.view(frame)
         T_base_rest = turned(rest_frame(found.T_base_obj, part.resting.quat_wxyz[found.resting]), turn)
         vectors = planner.cleared(
             to_base(T_base_rest, np.stack([one.grasp for one in grasps]), planner.table_z + view.table_offset)

@@ -63,7 +63,7 @@ class Planner:
         Raises:
             BadModel: The policy needs variances and the model predicts none.
         """
-        if config.policy == "low_variance" and not models.meta.network.variance:
+        if config.policy != "quality" and not models.meta.network.variance:
             raise BadModel(
                 "this model predicts no variance; use policy: quality, or train with variance: true"
             )

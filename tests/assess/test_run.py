@@ -92,15 +92,19 @@ def test_trials_planned_by_other_certified_grasps_are_made_again(tmp_path, capsy
         ((), UsageError, "name a part"),
         (("no_such_part",), BadPart, "no part or part folder is called"),
         (("EMPTY",), UsageError, "holds no CAD file"),
+        (("TWO",), UsageError, r"plate\.ply and .*plate\.stl are both called 'plate'; rename one"),
         (("CAD/broken.stl",), BadPart, "broken.stl"),
         (("hex_nut_m20", "--models", "nowhere"), MissingModel, "nowhere"),
         (("hex_nut_m20", "--out", "CAD"), UsageError, "holds other files"),
     ],
 )
 def test_what_cannot_be_assessed_is_refused_in_a_line(arguments, error, message, cad, tmp_path, monkeypatch):
-    (tmp_path / "empty").mkdir()
+    for folder, names in (("empty", ()), ("two", ("plate.stl", "plate.ply", "zeta.stl"))):
+        (tmp_path / folder).mkdir()
+        for name in names:
+            (tmp_path / folder / name).touch()
     (cad / "broken.stl").write_bytes(b"solid nothing\n")
-    words = {"EMPTY": str(tmp_path / "empty"), "CAD": str(cad)}
+    words = {"EMPTY": str(tmp_path / "empty"), "TWO": str(tmp_path / "two"), "CAD": str(cad)}
     filled = [words.get(one, one.replace("CAD/", f"{cad}/")) for one in arguments]
     with pytest.raises(error, match=message) as caught:
         run(monkeypatch, *filled, "--simulations", 24, "--trials", 1, "--workers", 1)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 
 import numpy as np
 import pytest
 
 from hal import open_cell
-from mskgrasp.core.errors import PartNotRecognised
+from mskgrasp.core.errors import PartNotRecognised, TableTooHigh
 from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.shipped import PRETRAINED, config_file
 from mskgrasp.parts import Part, find_part
@@ -92,6 +93,17 @@ def test_the_surest_grasp_is_planned_where_the_part_lies(cell, planner, seed):
     assert least[0, 0] < covariance[0, 0] <= least[0, 0] + 2 * along
     assert np.isclose(covariance[1, 1], least[1, 1], rtol=1e-6)
     assert plan.quality == pytest.approx(24 / 26)
+
+
+def test_a_table_seen_too_high_is_refused_as_by_the_networks(cell, planner):
+    frame, true = present(cell, 0)
+    noise = np.random.default_rng(0).normal(0, 2e-3, frame.depth.shape)
+    high = dataclasses.replace(frame, depth=(frame.depth + noise - 2.5e-3).astype(np.float32))
+    patient = copy.copy(planner)
+    patient.min_height = 0.006
+    own = CertifiedPlanner(patient, PART, grasps(resting_of(true)), reachable_by(cell))
+    with pytest.raises(TableTooHigh, match=r"run hal\.touch"):
+        own.plan(high, np.random.default_rng(0))
 
 
 def test_grasps_out_of_reach_are_left_out(cell, planner):
