@@ -11,7 +11,7 @@ import numpy as np
 from hal.camera import RgbdFrame
 from mskgrasp.benchmark.config import BenchmarkConfig
 from mskgrasp.core.displacement_covariance import displacement_jacobian
-from mskgrasp.core.errors import UsageError
+from mskgrasp.core.errors import NoPartFound, UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
@@ -100,7 +100,7 @@ def score(part: Part, models: Models, grasps: Mapping[str, TopDownGrasp]) -> dic
         By name: ``confidence``, the predicted probability of success; ``displacement`` (4,) of the part's
         origin in the hand, metres and radians along the axes of the grasp, those of the hand in the file with
         y and z reversed; ``displacement_cov`` (4, 4), left out where the networks predict no variance;
-        ``resting``, the index of the resting pose.
+        ``resting``, the index of the resting pose. Poses in which the camera does not see the part are left out, and named.
     """
     from mskgrasp.simulation.shard import Simulator  # loads the simulator
 
@@ -118,7 +118,10 @@ def score(part: Part, models: Models, grasps: Mapping[str, TopDownGrasp]) -> dic
                 colour=np.zeros((*depth.shape, 3), np.uint8), depth=depth, intrinsics=env.intrinsics,
                 T_base_camera=env.T_base_camera, timestamp_s=0.0, serial="simulated",
             )  # fmt: skip
-            scores |= _scored(part, models, frame, lying, some)
+            try:
+                scores |= _scored(part, models, frame, lying, some)
+            except NoPartFound:  # too flat or thin
+                note(f"left out: {', '.join(some)}: in pose {resting} the camera does not see the part")
     finally:
         simulator.close()
     return scores

@@ -107,7 +107,7 @@ def read_isaac_grasp(path: Path) -> IsaacGrasps:
     if values.get("format") != "isaac_grasp":
         raise BadConfig(f"{path}: format is {values.get('format')!r}, legal: 'isaac_grasp'")
     link = values.get("gripper_frame_link")
-    if link not in _TCP_IN_LINK:
+    if not isinstance(link, str) or link not in _TCP_IN_LINK:
         raise BadConfig(
             f"{path}: gripper_frame_link is {link!r}, legal: {', '.join(_TCP_IN_LINK)}, the only known hand"
         )
@@ -124,7 +124,8 @@ def read_isaac_grasp(path: Path) -> IsaacGrasps:
             quat = np.array([one["orientation"]["w"], *one["orientation"]["xyz"]], dtype=np.float64).reshape(
                 4
             )
-            if not np.isfinite(position).all() or abs(np.linalg.norm(quat) - 1) > 0.01:
+            # Not "> 0.01", which NaN is not either.
+            if not np.isfinite(position).all() or not abs(np.linalg.norm(quat) - 1) <= 0.01:
                 raise ValueError("position or orientation is not finite, or no rotation")
         except (LookupError, TypeError, ValueError) as error:
             raise BadConfig(f"{path}: grasp {name!r} has no pose: {' '.join(str(error).split())}") from error
@@ -176,7 +177,9 @@ def write_scored(path: Path, read: IsaacGrasps, scores: Mapping[str, Mapping[str
         OSError: The disk is full or not writable.
     """
     grasps = {
-        name: dict(one, **scores[name]) for name, one in read.values["grasps"].items() if name in scores
+        name: dict(one, **scores[str(name)])
+        for name, one in read.values["grasps"].items()
+        if str(name) in scores
     }
     values = read.values | {"grasps": grasps}
     write_whole(path, yaml.safe_dump(values, sort_keys=False).encode())

@@ -7,11 +7,14 @@ import pytest
 import yaml
 
 from mskgrasp.benchmark.__main__ import main
+from mskgrasp.benchmark.score_grasps import score
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.panda_kinematics import TCP_OFFSET
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts.store import read_record
-from mskgrasp.planning.isaac_grasp import write_isaac_grasp
+from mskgrasp.planning.isaac_grasp import TopDownGrasp, write_isaac_grasp
+from tests.boxes import make_box
 from tests.planning.test_certified import PART, certified, certified_grasp
 from tests.programs import run_here
 
@@ -57,6 +60,20 @@ def test_top_down_grasps_get_confidence_displacement_and_covariance(tmp_path):
     assert same == pytest.approx(np.array(found["good"]["displacement"]), abs=1e-9)
     assert found["turned"]["confidence"] == found["good"]["confidence"]
     assert found["good"]["resting"] == found["turned"]["resting"]
+
+
+def test_grasps_of_a_pose_that_the_camera_does_not_see_are_left_out(tmp_path, capsys):
+    part = make_box(tmp_path, "sheet", (0.06, 0.03, 0.0015), 0.02)
+    poses = np.argsort(part.resting.position[:, 2])
+    grasp = np.array([0.0, 0.0, 0.0105, 0.0])
+    grasps = {
+        name: TopDownGrasp(resting=int(pose), grasp=grasp, sign=1.0, tilt=0.0)
+        for name, pose in (("flat", poses[0]), ("upright", poses[-1]))
+    }
+    assert score(part, load_models(), grasps) == {}
+    said = capsys.readouterr().err
+    for name, one in grasps.items():
+        assert f"left out: {name}: in pose {one.resting} the camera does not see the part" in said
 
 
 def test_grasps_need_their_part(tmp_path, monkeypatch):

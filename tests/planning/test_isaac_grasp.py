@@ -93,15 +93,30 @@ def test_scored_grasps_keep_all_else_and_the_others_are_left_out(tmp_path):
     assert after == before | {"grasps": {"grasp_1_pose_2": expected}}
 
 
+def test_grasps_that_are_numbered_are_scored_too(tmp_path):
+    path, scored = tmp_path / "grasps.yaml", tmp_path / "scored.yaml"
+    write_isaac_grasp(path, PART, certified(certified_grasp(), certified_grasp(resting=2)))
+    values = yaml.safe_load(path.read_text())
+    values["grasps"] = dict(enumerate(values["grasps"].values()))
+    path.write_text(yaml.safe_dump(values))
+    write_scored(scored, read_isaac_grasp(path), {"1": dict(confidence=0.25)})
+    assert yaml.safe_load(scored.read_text())["grasps"] == {1: values["grasps"][1] | {"confidence": 0.25}}
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         (dict(format="grasps"), "format is 'grasps', legal: 'isaac_grasp'"),
         (dict(gripper_frame_link="robotiq_base"), "gripper_frame_link is 'robotiq_base', legal: panda_hand"),
+        (dict(gripper_frame_link=["panda_hand"]), r"gripper_frame_link is \['panda_hand'\], legal"),
         (dict(grasps={}), "holds no grasps"),
         (dict(grasps={"one": dict(position=[0, 0])}), "grasp 'one' has no pose"),
         (
             dict(grasps={"one": dict(position=[0, 0, 0], orientation=dict(w=2.0, xyz=[0, 0, 0]))}),
+            "grasp 'one' has no pose",
+        ),
+        (
+            dict(grasps={"one": dict(position=[0, 0, 0], orientation=dict(w=float("nan"), xyz=[0, 0, 0]))}),
             "grasp 'one' has no pose",
         ),
     ],
