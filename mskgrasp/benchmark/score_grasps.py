@@ -100,7 +100,8 @@ def score(part: Part, models: Models, grasps: Mapping[str, TopDownGrasp]) -> dic
         By name: ``confidence``, the predicted probability of success; ``displacement`` (4,) of the part's
         origin in the hand, metres and radians along the axes of the grasp, those of the hand in the file with
         y and z reversed; ``displacement_cov`` (4, 4), left out where the networks predict no variance;
-        ``resting``, the index of the resting pose. Poses in which the camera does not see the part are left out, and named.
+        ``resting``, the index of the resting pose. Poses in which the camera does not see the part are left
+        out, and named.
     """
     from mskgrasp.simulation.shard import Simulator  # loads the simulator
 

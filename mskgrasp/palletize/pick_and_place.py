@@ -15,9 +15,9 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.settings import Region
 from mskgrasp.palletize.figures import draw_placement, pallet_image
-from mskgrasp.palletize.height_maps import take_height_maps, write_height_maps
+from mskgrasp.palletize.height_maps import read_height_maps, take_height_maps, write_height_maps
 from mskgrasp.palletize.pallet_slots import SEEN_TOLERANCE, Slot, first_reachable
-from mskgrasp.palletize.placement_records import Correction, Placement
+from mskgrasp.palletize.placement_records import Correction, Placement, placement_name
 from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.footprint import seen_footprint
 from mskgrasp.perception.markers import planar_displacement
@@ -116,6 +116,19 @@ class PickAndPlace:
         write_height_maps(maps, self._pictures / f"{done.name}.npz")
         draw_placement(maps, done, self._pictures / f"{done.name}.png")
         return done
+
+    def skip(self, task: PlacementTask) -> None:
+        """Take note of a placement that an earlier run made, whose part still lies in its slot.
+
+        Raises:
+            BadDataset: Its height maps are damaged.
+        """
+        if not task.keep:
+            self._tops = {}
+        path = self._pictures / f"{placement_name(task.key)}.npz"
+        # Without a grasp there are no maps, without a placed part none of it.
+        if path.exists() and (maps := read_height_maps(path)).after.size:
+            self._tops[task.index] = maps.top
 
     def _planner_of(self, part: str) -> RepeatedPlanner:
         if part not in self._planners:

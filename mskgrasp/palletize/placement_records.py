@@ -9,6 +9,12 @@ Correction = Literal["none", "predicted", "truth"]
 CORRECTIONS: tuple[Correction, Correction, Correction] = ("none", "predicted", "truth")
 
 
+def placement_name(key: tuple[str, int, int, Correction]) -> str:
+    """Name of a placement's files, by `Placement.key`."""
+    part, number, slot, correction = key
+    return f"{part}-{number:03d}-{slot:02d}-{correction}"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Placement:
     """Outcome of placing one part once; metres and radians.
@@ -54,7 +60,7 @@ class Placement:
     @property
     def name(self) -> str:
         """Name of the placement's files."""
-        return f"{self.part}-{self.number:03d}-{self.slot:02d}-{self.correction}"
+        return placement_name(self.key)
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""

@@ -28,7 +28,14 @@ from mskgrasp.planning.for_cell import make_planner, tell_model
 from mskgrasp.planning.run_inputs import BY_CONTENT, certified_digests, inputs_of
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append_trial, file_digest, opened_run, resume_trials
+from mskgrasp.runtime.run_folder import (
+    TRIALS,
+    append_trial,
+    file_digest,
+    opened_run,
+    record_inputs,
+    resume_trials,
+)
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import check_loads
@@ -92,10 +99,10 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
     # The parts determine which of them fills which slot.
     may_change += ["parts", "n_parts"] if config.slots is None else []
     tell_model(models, cell_from_yaml(config.cell))
-    if config.planner.policy == "certified":
-        certify_missing(names, config.models, config.workers)
-        inputs |= certified_digests(names)
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
+        if config.planner.policy == "certified":
+            certify_missing(names, config.models, config.workers)
+            record_inputs(config.out, certified_digests(names))
         make_folder(config.out / "placements")
         for leftover in (config.out / "placements").glob("*.tmp"):
             leftover.unlink()
@@ -193,7 +200,10 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
         def fill(pallet: TaskGroup) -> Iterator[Placement]:
             for number, task in enumerate(pallet.tasks, 1):
                 # A real pallet keeps its parts; a simulated one is filled anew from its first slot.
-                if task.key in pallet.done and (engine.cell.feeder is None or not pallet.name):
+                if task.key in pallet.done and not pallet.name:
+                    continue
+                if task.key in pallet.done and engine.cell.feeder is None:
+                    worker.skip(task)
                     continue
                 where = f"slot {number} of {len(pallet.tasks)}" if pallet.name else f"trial {task.number + 1}"
                 yield worker.run(task, f"{where}, correction {task.correction}")

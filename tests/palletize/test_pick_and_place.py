@@ -86,6 +86,11 @@ def test_the_picture_of_a_pallet_whose_first_part_failed_uses_no_heights_of_the_
         assert worker.run(placed).placed
         flat = pallet_image(cell.camera.capture(), slots, cell.workspace.table_z, {})
         assert not np.array_equal(worker.picture(slots), flat)
+        resumed = PickAndPlace(engine, planner, tmp_path / "placements")
+        resumed.skip(placed)
+        np.testing.assert_array_equal(resumed.picture(slots), worker.picture(slots))
         assert worker.run(too_small).reason == "slot too small"
+        resumed.skip(too_small)
         flat = pallet_image(cell.camera.capture(), slots, cell.workspace.table_z, {})
         np.testing.assert_array_equal(worker.picture(slots), flat)
+        np.testing.assert_array_equal(resumed.picture(slots), flat)
