@@ -103,6 +103,15 @@ class ModelMeta(Config):
                 raise ValueError(f"{name} has {size} numbers, the network predicts {n}")
         return self
 
+    @field_validator("training")
+    @classmethod
+    def _parts_are_names(cls, values: dict[str, Any]) -> dict[str, Any]:
+        for name, parts in values.items():
+            listed = isinstance(parts, list | tuple) and all(isinstance(one, str) for one in parts)
+            if name.endswith("_parts") and not listed:
+                raise ValueError(f"training.{name} must be a list of names")
+        return values
+
     @field_validator("network", mode="before")
     @classmethod
     def _without_former_fields(cls, values: Any) -> Any:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from pydantic import field_validator
+
 from mskgrasp.core.config import Config
 from mskgrasp.dataset import ShardInfo
 
@@ -29,6 +31,16 @@ class LabelSource(Config):
     """Height of the camera above the table."""
     seed: int
     """Seed of the collection."""
+
+    @field_validator("physics", "noise")
+    @classmethod
+    def _numbers(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """A model's description may come from anywhere; its numbers are compared with a cell's."""
+        for name, value in values.items():
+            bounds = value if isinstance(value, list | tuple) else [value, value]
+            if len(bounds) != 2 or not all(isinstance(one, int | float) for one in bounds):
+                raise ValueError(f"{name} must be a number, or the bounds of a range, got {value!r}")
+        return values
 
 
 def source_of(info: ShardInfo) -> LabelSource:

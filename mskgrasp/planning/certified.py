@@ -215,6 +215,10 @@ def read_certified(part: Part, folder: Path | None = None) -> CertifiedGrasps:
             stands=tuple(map(bool, values["stands"])),
             conditions=dict(values["conditions"]),
         )
+        n_resting = len(part.resting_probability)
+        numbers = {*found.without, *found.like, *(other for other, _ in found.like.values())}
+        if len(found.stands) != n_resting or not numbers <= set(range(n_resting)):
+            raise ValueError(f"the part has {n_resting} resting poses")
         hand = values["hand"]
     except FileNotFoundError as error:
         raise BadPart(f"no certified grasps of '{part.name}'; {remedy}") from error

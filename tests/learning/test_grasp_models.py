@@ -84,6 +84,12 @@ def test_a_description_of_another_patch_or_network_is_reported(folder):
     assert "colour" in complaint(folder)
 
 
+@pytest.mark.parametrize("parts", [5, "hex_nut_m30", [1, 2]])
+def test_a_description_whose_parts_are_no_names_is_reported(folder, parts):
+    change_description(folder, lambda values: values.update(training={"training_parts": parts}))
+    assert "training.training_parts must be a list of names" in complaint(folder)
+
+
 def test_other_schema_versions_and_missing_weights_are_reported(folder):
     change_weights(folder, lambda weights: weights.pop("gqn.head.0.weight"))
     assert "lacks weight gqn.head.0.weight" in complaint(folder)

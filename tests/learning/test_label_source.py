@@ -54,6 +54,19 @@ def test_a_model_of_another_hand_is_refused(tmp_path: Path, collected: Path):
         load_models(folder)
 
 
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (dict(noise={"friction_pad_part": [0.3]}), "friction_pad_part must be a number, or the bounds"),
+        (dict(physics={"friction_pad_part": "high"}), "friction_pad_part must be a number, or the bounds"),
+    ],
+)
+def test_a_description_whose_settings_are_no_numbers_is_refused(changes, words):
+    values = dict(simulation="4", fidelity="cpu", physics={}, noise={}, hand={}, camera_height=0.8, seed=0)
+    with pytest.raises(ValueError, match=words):
+        LabelSource.model_validate(values | changes)
+
+
 def test_conditions_other_than_those_of_the_labels_are_named():
     source = LabelSource(
         simulation="4", fidelity="cpu", physics=Physics().model_dump(), hand={}, camera_height=0.8, seed=0,

@@ -130,6 +130,8 @@ def test_the_file_gives_back_what_was_written(tmp_path):
         (dict(hand={}), "another hand"),
         (dict(grasps=[{}]), "is damaged"),
         (dict(grasps=7), "is damaged"),
+        (dict(stands=[True]), r"is damaged \(the part has \d+ resting poses\)"),
+        (dict(like={"1": [99, 0.0]}), r"is damaged \(the part has \d+ resting poses\)"),
     ],
 )
 def test_a_file_that_cannot_be_used_is_refused_in_a_line(tmp_path, change, message):

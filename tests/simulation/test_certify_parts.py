@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
+from mskgrasp.core.errors import BadPart
 from mskgrasp.core.settings import Physics
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.planning.certified import FILE, certified_folder, read_certified
-from mskgrasp.simulation import certify_parts
+from mskgrasp.simulation import certify_parts, resting
 from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.simulation.certify_parts import certify
 from mskgrasp.simulation.versions import versions
@@ -60,6 +63,15 @@ def test_a_part_all_of_whose_resting_poses_are_rare_has_a_file_that_says_so(box)
     assert not found.grasps and found.without
     assert all("it is rare" in reason for reason in found.without.values())
     assert read_certified(box).without == found.without
+
+
+def test_a_part_that_stands_in_no_resting_pose_is_refused_in_a_line(box):
+    cached = resting._cached(box, CONFIG.physics)
+    cached.parent.mkdir(parents=True)
+    cached.write_text(json.dumps(dict(part=box.name, stands=[False] * len(box.resting_probability))))
+    with pytest.raises(BadPart, match="'box' topples in the simulation in every resting pose"):
+        certify([str(box.folder)], CONFIG, PRETRAINED, 1, hidden=True)
+    assert not certified_folder(box).exists()
 
 
 @pytest.mark.parametrize(
