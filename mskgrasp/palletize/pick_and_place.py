@@ -196,11 +196,8 @@ class PickAndPlace:
         return replace(known, reason="OutOfWorkspace"), target, None
 
     def _pose(self, plan: GraspPlan, displacement: np.ndarray, target: Target, drop: float = 0.0) -> Grasp:
-        table_z, centre = self._cell.workspace.table_z, plan.view.centre_base
-        pose = place_pose(plan.grasp, displacement, centre, target, table_z, drop=drop)
-        x, y, z = pose.position
-        clear = float(self._cell.workspace.lowest_grasp_z(pose.position[:2]))
-        return replace(pose, position=np.array([x, y, max(z, clear)]))
+        lowest, centre = self._cell.workspace.lowest_grasp_z, plan.view.centre_base
+        return place_pose(plan.grasp, displacement, centre, target, lowest, drop=drop)
 
     def _measured(
         self,

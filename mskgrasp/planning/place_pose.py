@@ -19,7 +19,7 @@ from mskgrasp.core.geometry import (
     twist_and_swing,
     wrap_angle,
 )
-from mskgrasp.core.grasp import Grasp, PartView, lowest_grasp_z
+from mskgrasp.core.grasp import Grasp, PartView
 
 EARLY = 0.007
 """Height above the target pose from which contact with the table counts as placed, metres."""
@@ -66,7 +66,7 @@ def place_pose(
     displacement: np.ndarray,
     centre_base: np.ndarray,
     target: Target,
-    table_z: float,
+    lowest_grasp_z: Callable[[np.ndarray], np.ndarray],
     *,
     drop: float = 0.0,
 ) -> Grasp:
@@ -81,7 +81,7 @@ def place_pose(
         displacement: (4,) of the centre, in the grasp frame; zeros place without correction.
         centre_base: (3,) the part's centre before the grasp, base frame, metres.
         target: Target of the part's centre.
-        table_z: Height of the table, metres.
+        lowest_grasp_z: Gives the least z of grasps at points (..., 2), as `hal.Workspace.lowest_grasp_z`.
         drop: As `drop_of` computes it: the hand releases the part so much higher, metres.
 
     Returns:
@@ -95,7 +95,8 @@ def place_pose(
     x = target.x - (cos * held[0] - sin * held[1])
     y = target.y - (sin * held[0] + cos * held[1])
     # A part that has sunk in the hand is released higher, one that has risen lower.
-    z = max(grasp.position[2] - displacement[2] + drop + PUT_DOWN, lowest_grasp_z(table_z))
+    z = grasp.position[2] - displacement[2] + drop + PUT_DOWN
+    z = max(z, float(lowest_grasp_z(np.array([x, y]))))
     return Grasp(position=np.array([x, y, z]), theta=theta)
 
 

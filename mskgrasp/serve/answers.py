@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import traceback
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -128,7 +129,7 @@ def _plain(values: np.ndarray) -> list[Any]:
     return plain.tolist()
 
 
-def place_answer(request: PlaceRequest, table_z: float) -> dict[str, Any]:
+def place_answer(request: PlaceRequest, lowest_grasp_z: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
     """The hand's pose at which the held part is at the target: as a grasp, and as ``T_base_tcp``."""
     grasp, target = request.parts()
     hand = place_pose(
@@ -136,7 +137,7 @@ def place_answer(request: PlaceRequest, table_z: float) -> dict[str, Any]:
         np.array(request.displacement),
         np.array(request.centre_base),
         target,
-        table_z,
+        lowest_grasp_z,
         drop=request.drop,
     )
     return {"hand": hand.as_vector().tolist(), "T_base_tcp": hand.T_base_tcp.as_vector().tolist()}

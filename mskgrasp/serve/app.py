@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from typing import Any
 
+import numpy as np
 from fastapi import FastAPI, Request, Response
 from fastapi.telemetry import TelemetryConfig
 from starlette.exceptions import HTTPException
@@ -36,14 +37,19 @@ PATHS = "POST /plan, /score, /place, GET /health, /models, /openapi.json"
 
 
 def make_app(
-    dispatcher: Dispatcher, models: Mapping[str, Any], *, table_z: float, max_body: int, timeout_s: float
+    dispatcher: Dispatcher,
+    models: Mapping[str, Any],
+    *,
+    lowest_grasp_z: Callable[[np.ndarray], np.ndarray],
+    max_body: int,
+    timeout_s: float,
 ) -> FastAPI:
     """Make the application.
 
     Args:
         dispatcher: Answers requests that hold a frame; opened and closed by the application.
         models: Answer to /models.
-        table_z: Height of the table, base frame, metres.
+        lowest_grasp_z: Gives the least z of grasps at points (..., 2), as `hal.Workspace.lowest_grasp_z`.
         max_body: Largest request, bytes.
         timeout_s: Longest time to receive a request, seconds.
     """
@@ -89,7 +95,7 @@ def make_app(
         """Pose of the hand at which the held part is at the target."""
         _content_type(request, (JSON,))
         body = await read_body(request, MAX_PLACE_BYTES, timeout_s)
-        return _json(place_answer(parse_json(PlaceRequest, body), table_z))
+        return _json(place_answer(parse_json(PlaceRequest, body), lowest_grasp_z))
 
     @app.get("/health")
     async def health() -> Response:

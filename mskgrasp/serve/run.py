@@ -67,7 +67,7 @@ def serve(config: ServeConfig) -> None:
             app = make_app(
                 dispatcher,
                 about_models(config.models, settings),
-                table_z=settings.workspace.table_z,
+                lowest_grasp_z=settings.workspace.lowest_grasp_z,
                 max_body=int(1e6 * config.max_body_mb),
                 timeout_s=config.timeout_s,
             )

@@ -129,7 +129,7 @@ def _placed(
 
     for theta in (turn, 0.0):
         target = Target(x=float(x), y=float(y), theta=float(theta))
-        pose = place_pose(plan.grasp, expected, point, target, workspace.table_z, drop=drop)
+        pose = place_pose(plan.grasp, expected, point, target, workspace.lowest_grasp_z, drop=drop)
         try:
             place(engine.cell, pose, engine.recover, part_height=float(plan.view.size[2]), arrived=arrived)
             break

@@ -1,5 +1,7 @@
 """The hand is sent where the part in it, as it moved, lands on its target."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -19,8 +21,10 @@ from mskgrasp.planning.place_pose import (
     place_pose,
 )
 from tests.hal.replay.toy import DOWN, toy_cell
+from tests.planning.workspaces import WORKSPACE
 
 near = st.floats(-0.04, 0.04)
+lowest = WORKSPACE.lowest_grasp_z
 angle = st.floats(-3.0, 3.0)
 
 
@@ -39,7 +43,7 @@ def test_a_part_whose_displacement_is_known_lands_on_its_target(dx, dy, yaw, cx,
     grasp = np.array([0.5, 0.0, 0.03, 0.4])
     displacement = np.array([dx, dy, 0.001, dtheta])
     target = Target(x=0.55 + tx, y=ty, theta=turn)
-    pose = place_pose(Grasp.from_vector(grasp), displacement, part.position, target, 0.0)
+    pose = place_pose(Grasp.from_vector(grasp), displacement, part.position, target, lowest)
     placed = pose.T_base_grasp @ moved_in_hand(grasp, part, displacement)
     missed, off = place_error(part, placed, np.zeros(2), target)
     assert missed < 1e-9 and off < 1e-7
@@ -49,7 +53,7 @@ def test_without_correction_the_part_misses_by_its_displacement():
     part = Pose(position=np.array([0.5, 0.0, 0.02]), quat_wxyz=np.array([1.0, 0, 0, 0]))
     grasp, displacement = np.array([0.51, 0.0, 0.03, 0.0]), np.array([0.003, 0.004, 0.0, 0.1])
     target = Target(x=0.6, y=0.1, theta=np.pi / 2)
-    pose = place_pose(Grasp.from_vector(grasp), np.zeros(4), part.position, target, 0.0)
+    pose = place_pose(Grasp.from_vector(grasp), np.zeros(4), part.position, target, lowest)
     placed = pose.T_base_grasp @ moved_in_hand(grasp, part, displacement)
     missed, off = place_error(part, placed, np.zeros(2), target)
     assert missed == pytest.approx(0.005) and off == pytest.approx(0.1)
@@ -77,7 +81,7 @@ def test_the_seen_centre_counts_where_it_is_not_the_origin():
     of_centre = displacement_of_point(
         displacement, centre_in_grasp_frame(part.position, grasp), centre_in_grasp_frame(centre, grasp)
     )
-    pose = place_pose(Grasp.from_vector(grasp), of_centre, centre, target, 0.0)
+    pose = place_pose(Grasp.from_vector(grasp), of_centre, centre, target, lowest)
     placed = pose.T_base_grasp @ moved_in_hand(grasp, part, displacement)
     missed, off = place_error(part, placed, offset, target)
     assert missed < 1e-9 and off < 1e-9
@@ -86,13 +90,25 @@ def test_the_seen_centre_counts_where_it_is_not_the_origin():
 def test_the_hand_stays_above_the_table_and_follows_a_part_that_sank():
     grasp, centre = np.array([0.5, 0.0, 0.03, 0.0]), np.array([0.5, 0.0, 0.02])
     target = Target(x=0.5, y=0.0, theta=0.0)
-    sunk = place_pose(Grasp.from_vector(grasp), np.array([0, 0, -0.004, 0]), centre, target, 0.0)
+    sunk = place_pose(Grasp.from_vector(grasp), np.array([0, 0, -0.004, 0]), centre, target, lowest)
     assert sunk.position[2] == pytest.approx(0.03 + 0.004 + 0.002)
     risen = place_pose(
-        Grasp.from_vector(np.array([0.5, 0, 0.0106, 0])), np.array([0, 0, 0.005, 0]), centre, target, 0.0
+        Grasp.from_vector(np.array([0.5, 0, 0.0106, 0])), np.array([0, 0, 0.005, 0]), centre, target, lowest
     )
     assert risen.position[2] == lowest_grasp_z(0.0)
     assert wrap_angle(sunk.theta) == sunk.theta
+
+
+def test_on_a_slope_the_hand_stays_above_the_table_where_it_places():
+    slope = dataclasses.replace(WORKSPACE, table_slope=(0.02, 0.0))
+    grasp = Grasp.from_vector(np.array([0.5, 0.0, 0.0125, 0.0]))
+    low, high = (
+        place_pose(grasp, np.zeros(4), np.array([0.5, 0, 0.01]), target, slope.lowest_grasp_z)
+        for target in (Target(x=0.4, y=0.0, theta=0.0), Target(x=0.7, y=0.0, theta=0.0))
+    )
+    assert low.position[2] == pytest.approx(0.0125 + 0.002)
+    assert high.position[2] == pytest.approx(float(slope.lowest_grasp_z(np.array([0.7, 0.0]))))
+    assert high.position[2] > low.position[2] + 1e-3
 
 
 def seen_box(yaw: float, height: float) -> PartView:
@@ -112,7 +128,7 @@ def test_a_tilted_part_is_let_go_where_its_lowest_corner_nearly_touches(yaw, sx,
     displacement = np.array([0.001, 0.0, -0.002, turn])
     drop = drop_of(grasp, view, turn, np.array([sx, sy]))
     target = Target(x=0.5, y=0.0, theta=0.0)
-    pose = place_pose(grasp, displacement, view.centre_base, target, 0.0, drop=drop)
+    pose = place_pose(grasp, displacement, view.centre_base, target, lowest, drop=drop)
     corners = np.stack(np.meshgrid(*([-0.5, 0.5],) * 3), axis=-1).reshape(-1, 3)
     to_grasp = grasp.T_base_grasp.inverse()
     in_grasp = to_grasp.apply(view.T_base_box.apply(corners * view.size + [0, 0, height / 2]))

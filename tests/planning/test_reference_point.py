@@ -16,6 +16,7 @@ from mskgrasp.planning.place_pose import Target, place_error, place_pose
 from mskgrasp.trials.engine import ExecutedGrasp
 from tests import synthetic
 from tests.planning.hand_made import planner
+from tests.planning.workspaces import WORKSPACE
 
 SHIFT = np.array([0.008, -0.006, 0.0])
 TURNS = np.radians([10.0, -15.0, 20.0])
@@ -91,7 +92,7 @@ def test_a_displacement_is_known_of_the_centroid_and_of_the_seen_centre(moved: M
 
 def test_a_part_whose_motion_is_known_is_placed_without_error(moved: Moved):
     plan, target = moved.plan, Target(x=0.52, y=-0.06, theta=1.1)
-    pose = place_pose(plan.grasp, plan.displacement, plan.view.centre_base, target, synthetic.TABLE_Z)
+    pose = place_pose(plan.grasp, plan.displacement, plan.view.centre_base, target, WORKSPACE.lowest_grasp_z)
     held = plan.grasp.T_base_grasp.inverse() @ moved.after
     missed, turned = place_error(moved.before, pose.T_base_grasp @ held, moved.off, target)
     assert missed < 1e-9 and turned < 1e-7

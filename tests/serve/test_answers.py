@@ -12,6 +12,7 @@ from mskgrasp.planning.planner import Planner
 from mskgrasp.serve.answers import place_answer, respond
 from mskgrasp.serve.requests import PlaceRequest
 from tests import synthetic
+from tests.planning.workspaces import WORKSPACE
 from tests.serve.bodies import ALONG, FRAME, JSON, NPZ, npz, text
 
 
@@ -81,7 +82,7 @@ def test_a_part_held_at_its_centre_is_placed_with_its_centre_at_the_target():
         centre_base=(0.5, 0.1, 0.02),
         target={"x": 0.4, "y": -0.1, "theta": -0.2},  # pyright: ignore[reportArgumentType]
     )
-    x, y, z, theta = place_answer(request, 0.0)["hand"]
+    x, y, z, theta = place_answer(request, WORKSPACE.lowest_grasp_z)["hand"]
     # The hand is turned to 0: the part has moved by 4 mm along its y, hence the hand stands 4 mm before.
     np.testing.assert_allclose([x, y, theta], [0.4, -0.104, 0.0], atol=1e-12)
     assert 0.03 <= z < 0.04 and z > lowest_grasp_z(0.0)

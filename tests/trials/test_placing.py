@@ -23,6 +23,7 @@ from mskgrasp.trials import placing
 from mskgrasp.trials.engine import TrialEngine, connected_engine
 from mskgrasp.trials.placed_trial import CORRECTIONS, PlacedTrial
 from mskgrasp.trials.placing import _moved, _off, _pose_error, as_turned, grasp_and_place
+from tests.planning.workspaces import WORKSPACE
 
 NUT = find_part("hex_nut_m20")
 
@@ -123,7 +124,7 @@ def test_the_columns_that_follow_from_one_placement_are_what_placing_so_would_gi
     target = Target(x=0.5, y=0.06, theta=float(rng.uniform(-0.7, 0.7)))
 
     def placed(displacement: np.ndarray) -> np.ndarray:
-        hand = place_pose(grasp, displacement, point, target, 0.0)
+        hand = place_pose(grasp, displacement, point, target, WORKSPACE.lowest_grasp_z)
         return _off(hand, seen, point, hand.T_base_tcp @ in_hand, target)
 
     trial = PlacedTrial(
