@@ -16,11 +16,6 @@ def minimum_jerk(t: np.ndarray) -> np.ndarray:
     return t**3 * (10 - 15 * t + 6 * t**2)
 
 
-def minimum_jerk_rate(t: np.ndarray) -> np.ndarray:
-    """Derivative of `minimum_jerk`, at fractions ``t`` of the duration."""
-    return 30 * t**2 * (1 - t) ** 2
-
-
 def minimum_jerk_steps(n_steps: int) -> np.ndarray:
     """(n_steps,) fractions of a path at the ends of equal time steps, from just above 0 to 1."""
     return minimum_jerk(np.arange(1, n_steps + 1) / n_steps)

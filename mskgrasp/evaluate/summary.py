@@ -28,6 +28,9 @@ PAPER_SUCCESS = {"simulated": 0.949, "real": 0.863}
 WITHIN = (1e-3, 2e-3)
 """Errors of the predicted displacement up to which shares of all attempts are reported, metres."""
 
+MOST_WORST = 10
+"""Trials that are shown as the worst."""
+
 Interval = tuple[float, float]
 
 
@@ -295,13 +298,13 @@ def _tape_errors(trials: Sequence[Trial]) -> TapeErrors:
     )
 
 
-def worst_trials(trials: Sequence[Trial], n: int = 10) -> list[Trial]:
+def worst_trials(trials: Sequence[Trial]) -> list[Trial]:
     """Select failures by decreasing predicted quality, then trials by decreasing prediction error."""
     failed = sorted((t for t in trials if not t.success), key=lambda t: (-(t.quality or 0.0), t.key))
-    return [*failed, *largest_errors(trials, n)][:n]
+    return [*failed, *largest_errors(trials)][:MOST_WORST]
 
 
-def largest_errors(trials: Sequence[Trial], n: int = 10) -> list[Trial]:
+def largest_errors(trials: Sequence[Trial], n: int = MOST_WORST) -> list[Trial]:
     """Select the measured trials with the largest prediction errors, the largest first."""
     measured = (trial for trial in trials if _error(trial) is not None)
     return sorted(measured, key=lambda trial: (-(_error(trial) or 0.0), trial.key))[:n]

@@ -78,7 +78,7 @@ def write_report(
         _examples(out, placements),
         _parts(summary),
         _worst(out, placements),
-        _lost(out, placements),
+        _lost(placements),
         settings_section(config.model_dump(mode="json")),
     ]
     write_html(out / "report.html", title="Palletizing", conclusion=_conclusion(summary), sections=sections)
@@ -257,7 +257,7 @@ def _why_lost(one: Placement) -> str:
     return one.reason or f"not measured: {one.unmeasured}"
 
 
-def _lost(out: Path, placements: Sequence[Placement]) -> Section:
+def _lost(placements: Sequence[Placement]) -> Section:
     """The placements without an error, and why."""
     rows = [
         [one.part, one.number, one.slot, one.correction, _why_lost(one)]

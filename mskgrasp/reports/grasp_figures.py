@@ -25,6 +25,7 @@ from mskgrasp.reports.style import saved_figure
 
 _PAD_WIDTH, _PAD_THICKNESS = 0.020, 0.008  # drawn size of a finger pad seen from above, metres
 _FEW = 6  # grasps of the best scores drawn besides the chosen one
+_DEVIATIONS = 2.0  # standard deviations that ellipses show
 _MM = 1e3
 
 
@@ -63,13 +64,11 @@ def show_heights(
     return image
 
 
-def draw_jaw(
-    axes: Axes, origin: np.ndarray, theta: float, opening: float = MAX_OPENING, scale: float = 1.0
-) -> None:
+def draw_jaw(axes: Axes, origin: np.ndarray, theta: float, scale: float = 1.0) -> None:
     """Draw the open hand from above: two pads and the line along which they close, to scale (mm)."""
     closing = np.array([-np.sin(theta), np.cos(theta)])
     origin = np.asarray(origin[:2]) * _MM
-    reach = opening / 2 * _MM
+    reach = MAX_OPENING / 2 * _MM
     ends = np.stack([origin - reach * closing, origin + reach * closing])
     axes.plot(*ends.T, color=BLUE, lw=1.4 * scale, ls=(0, (4, 2)), zorder=6)
     axes.plot(*origin, "o", color=BLUE, ms=3.5 * scale, zorder=7)
@@ -108,9 +107,9 @@ def _arrow(axes: Axes, start: np.ndarray, shift: np.ndarray, width: float = 1.8,
     )
 
 
-def _ellipse(axes: Axes, centre: np.ndarray, covariance: np.ndarray, n_sigma: float = 2.0) -> None:
+def _ellipse(axes: Axes, centre: np.ndarray, covariance: np.ndarray) -> None:
     values, vectors = np.linalg.eigh(covariance)
-    diameters = 2 * n_sigma * np.sqrt(np.maximum(values, 0.0)) * _MM
+    diameters = 2 * _DEVIATIONS * np.sqrt(np.maximum(values, 0.0)) * _MM
     angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
     axes.add_patch(
         Ellipse(

@@ -38,13 +38,11 @@ class Markers:
             coordinates.
         points_base: (2, 3) their centres, base frame, metres.
         sides: (2, 2) the measured longer and shorter side of each, metres.
-        contrast: Grey levels between the tape and the brightest surface around it.
     """
 
     pixels: np.ndarray
     points_base: np.ndarray
     sides: np.ndarray
-    contrast: int
 
 
 def find_markers(
@@ -82,7 +80,7 @@ def find_markers(
             "(colour_scale)"
         )
     grey = np.where(_region_mask(view, region, table_z), view.colour.min(axis=2), 0).astype(np.uint8)
-    spots, contrast = _search(grey, view, tape, pitch)
+    spots = _search(grey, view, tape, pitch)
     depths = []
     for i, spot in enumerate(spots):
         if heights is not None:
@@ -99,7 +97,6 @@ def find_markers(
         pixels=np.array([view.depth_pixel(spot.centre) for spot in spots]),
         points_base=np.array([view.point_base(s.centre, d) for s, d in zip(spots, depths, strict=True)]),
         sides=np.array([s.sides * d / view.focal for s, d in zip(spots, depths, strict=True)]),
-        contrast=contrast,
     )
 
 
@@ -113,10 +110,8 @@ def _region_mask(view: RegisteredFrame, region: Region, table_z: float) -> np.nd
     return mask > 0
 
 
-def _search(
-    grey: np.ndarray, view: RegisteredFrame, tape: Tape, pitch: float
-) -> tuple[tuple[Spot, Spot], int]:
-    """Search the larger and the smaller square, and the number of levels at which only they are white.
+def _search(grey: np.ndarray, view: RegisteredFrame, tape: Tape, pitch: float) -> tuple[Spot, Spot]:
+    """Search the larger and the smaller square, in the middle of the levels at which only they are white.
 
     Raises:
         MarkersNotFound: There are no or too few such levels.
@@ -148,7 +143,7 @@ def _search(
             f"too little contrast: the tape alone is white over {contrast} grey levels, at least "
             f"{LEAST_CONTRAST} are needed; light the part evenly and without glare, or use whiter tape"
         )
-    return longest[len(longest) // 2], contrast
+    return longest[len(longest) // 2]
 
 
 def _kind(spot: Spot, view: RegisteredFrame, tape: Tape, pitch: float) -> int | None:
