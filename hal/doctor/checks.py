@@ -44,12 +44,13 @@ class Finding:
 
 
 _PACKAGES = {
-    "franky": ("franky-control", "mskgrasp[franka]"),
-    "panda_py": ("panda-python", "mskgrasp[franka]"),
-    "kinect2": ("pylibfreenect2", "mskgrasp[kinect2]"),
-    "sapien": ("sapien", "mskgrasp"),
-    "mujoco": ("mujoco", "mskgrasp[mujoco]"),
+    "franky": ("franky-control", "run: EXTRAS=dev,franka .ci/setup"),
+    "panda_py": ("panda-python", "run: EXTRAS=dev,franka .ci/setup"),
+    "kinect2": ("pylibfreenect2", "docs/kinect2.md says how to build it and libfreenect2"),
+    "sapien": ("sapien", "run: .ci/setup"),
+    "mujoco": ("mujoco", "run: EXTRAS=dev,mujoco .ci/setup"),
 }
+"""Packages of the drivers, and how to install them."""
 _SECTIONS: tuple[tuple[str, Group], ...] = (("arm", "arms"), ("camera", "cameras"))
 _LOW_DISK = 2e9
 _MAX_AGE_S = 0.5
@@ -89,12 +90,7 @@ def check_drivers(values: dict[str, Any]) -> Iterator[Finding]:
         try:
             version = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:
-            first = " (after building libfreenect2, see docs/kinect2.md)" if name == "kinect2" else ""
-            yield Finding(
-                level="fail",
-                subject=subject,
-                text=f"{package} is not installed: pip install '{install}'{first}",
-            )
+            yield Finding(level="fail", subject=subject, text=f"{package} is not installed; {install}")
             continue
         yield _driver_fits(name, package, version, settings)
 

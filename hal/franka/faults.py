@@ -9,7 +9,7 @@ from __future__ import annotations
 from hal import errors
 from hal.franka.driver import DriverName
 
-EXTRA = "pip install 'mskgrasp[franka]'"
+EXTRA = "EXTRAS=dev,franka .ci/setup"
 _WHEELS: dict[DriverName, str] = {"franky": "franky-control", "panda_py": "panda-python"}
 _NO_ROBOT = ("connection to fci refused", "host not found", "connection error", "network is unreachable")
 _LOST = ("timeout", "connection", "socket", "network", "broken pipe", "reset by peer")

@@ -226,8 +226,7 @@ def import_vendor() -> Any:
     """
     if importlib.util.find_spec("pylibfreenect2") is None:
         raise DriverMissing(
-            "pylibfreenect2 is not installed; build libfreenect2 first (docs/kinect2.md), then "
-            "pip install 'mskgrasp[kinect2]'"
+            "pylibfreenect2 is not installed; docs/kinect2.md says how to build it and libfreenect2"
         )
     # Once the stand-in is there, `find_spec` refuses it: it has no spec.
     if "pkg_resources" not in sys.modules and importlib.util.find_spec("pkg_resources") is None:

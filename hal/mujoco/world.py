@@ -90,7 +90,5 @@ def _simulation() -> type[Simulation]:
     except ModuleNotFoundError as error:
         if error.name != "mujoco":
             raise
-        raise DriverMissing(
-            "this cell needs the package mujoco; run: pip install 'mskgrasp[mujoco]'"
-        ) from error
+        raise DriverMissing("this cell needs the package mujoco; run: EXTRAS=dev,mujoco .ci/setup") from error
     return Simulation

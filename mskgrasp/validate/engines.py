@@ -40,7 +40,7 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
         DriverMissing: MuJoCo is not installed.
     """
     if importlib.util.find_spec("mujoco") is None:
-        raise DriverMissing("--engine mujoco needs the package mujoco; run: pip install 'mskgrasp[mujoco]'")
+        raise DriverMissing("--engine mujoco needs the package mujoco; run: EXTRAS=dev,mujoco .ci/setup")
     workers = config.workers or os.cpu_count() or 1
     n = len(parts) * config.grasps_per_part
     folders = [part.folder for part in parts]

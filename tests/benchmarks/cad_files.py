@@ -215,7 +215,7 @@ def _read(path: Path) -> trimesh.Trimesh:
 
 
 def _from_bd_warehouse() -> Iterator[CadFile]:
-    if _package("bd_warehouse", None, "pip install 'mskgrasp[cad]'") is None:
+    if _package("bd_warehouse", None, "EXTRAS=dev,cad .ci/setup") is None:
         return
     from bd_warehouse import fastener, flange, gear, open_builds, sprocket, thread
 

@@ -81,7 +81,7 @@ def test_what_does_not_exist_is_one_line_and_exit_code_2(
 def test_a_missing_extra_is_one_line_with_the_remedy(monkeypatch, package: str):
     monkeypatch.setitem(sys.modules, package, None)
     ended = run_here(main)
-    assert ended.returncode == 2 and "pip install 'mskgrasp[serve]'" in ended.stderr
+    assert ended.returncode == 2 and "EXTRAS=dev,serve .ci/setup" in ended.stderr
     assert ended.stderr.count("\n") == 1
 
 

@@ -94,7 +94,7 @@ def test_what_cannot_be_shown_is_one_line_and_exit_code_2(
 def test_a_missing_extra_is_one_line_with_the_remedy(monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     ended = run_here(main)
-    assert ended.returncode == 2 and "pip install 'mskgrasp[view]'" in ended.stderr
+    assert ended.returncode == 2 and "EXTRAS=dev,view .ci/setup" in ended.stderr
     assert ended.stderr.count("\n") == 1
 
 

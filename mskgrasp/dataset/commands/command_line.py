@@ -71,7 +71,7 @@ class ExportCommand:
     """Folder of the dataset."""
     format: Literal["npz", "maniskill", "parquet", "labels"]
     """npz: all arrays in one file, for numpy. maniskill: a trajectory an attempt, for ManiSkill's loaders.
-    parquet: one file with images and a card beside it, to publish (pip install 'mskgrasp[parquet]').
+    parquet: one file with images and a card beside it, to publish (needs EXTRAS=dev,parquet .ci/setup).
     labels: no images; `mskgrasp.collect --labels` renders them and makes the dataset again."""
     out: Path
     """The file to write, ending in .npz, .h5, .parquet or .labels; with .h5 comes a .json file of the same

@@ -38,7 +38,7 @@ def test_a_missing_package_is_reported_with_its_extra(driver: DriverName, tmp_pa
     name = {"franky": "franky", "panda_py": "panda_py"}[driver]
     (tmp_path / f"{name}.py").write_text(f"raise ModuleNotFoundError('No module named {name}')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    with pytest.raises(DriverMissing, match=r"pip install 'mskgrasp\[franka\]'"):
+    with pytest.raises(DriverMissing, match=r"EXTRAS=dev,franka"):
         arm_at(tmp_path, driver, "127.0.0.250").connect()
 
 

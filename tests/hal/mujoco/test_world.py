@@ -57,7 +57,7 @@ def test_without_mujoco_the_cell_names_the_extra_and_nothing_else_needs_it():
         "except DriverMissing as error: print(error)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert "mskgrasp[mujoco]" in done.stdout, done.stderr
+    assert "EXTRAS=dev,mujoco" in done.stdout, done.stderr
 
 
 def world_of(part: Part) -> MujocoWorld:

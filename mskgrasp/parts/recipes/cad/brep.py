@@ -52,8 +52,7 @@ def needs_cad(make: Callable[..., Any]) -> Callable[..., Any]:
                 return make(size)
             except ImportError as error:
                 raise BadPart(
-                    f"this part is drawn with build123d and bd_warehouse ({error}): "
-                    "pip install 'mskgrasp[cad]'"
+                    f"this part is drawn with build123d and bd_warehouse ({error}): EXTRAS=dev,cad .ci/setup"
                 ) from error
             except (ValueError, RuntimeError, KeyError) as error:
                 # OpenCASCADE fails on some fillets, depending on its version.

@@ -49,7 +49,7 @@ def test_a_damaged_step_is_refused(tmp_path):
 
 def test_without_cascadio_a_step_is_refused_with_the_extra_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "cascadio", None)  # how Python marks what cannot be imported
-    assert "pip install 'mskgrasp[cad]'" in refusal("box.step", b"ISO-10303-21;")
+    assert "EXTRAS=dev,cad .ci/setup" in refusal("box.step", b"ISO-10303-21;")
 
 
 # All of them

@@ -12,7 +12,7 @@ from tests.parts.recipes.cad.made_parts import made, needs_cad
 def test_without_the_libraries_the_error_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "build123d", None)
     recipe = next(iter(drawn.recipes()))
-    with pytest.raises(BadPart, match=r"pip install 'mskgrasp\[cad\]'"):
+    with pytest.raises(BadPart, match=r"EXTRAS=dev,cad"):
         recipe.make(recipe.dimensions)
 
 
