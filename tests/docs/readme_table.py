@@ -100,13 +100,15 @@ def _success(stored: StoredReport) -> list[ReadmeRow]:
         ),
         ReadmeRow(
             name="best quality",
-            text=f"displacement RMSE {_mm(found['translation_rmse'])}, {_degrees(found['rotation_rmse'])} "
-            f"(predicting zero: {_mm(found['translation_rmse_of_zero'])}, "
-            f"{_degrees(found['rotation_rmse_of_zero'])})",
+            text=f"displacement RMSE {_rmse(found)} (predicting zero: {_rmse(found, '_of_zero')})",
             interval=_rmse_intervals(found),
             n=f"{found['measured']} trials of {found['measured_parts']} parts that were lifted",
         ),
     ]
+
+
+def _rmse(statistics: dict[str, Any], of: str = "") -> str:
+    return f"{_mm(statistics[f'translation_rmse{of}'])}, {_degrees(statistics[f'rotation_rmse{of}'])}"
 
 
 def _displacement(stored: StoredReport) -> list[ReadmeRow]:
@@ -116,11 +118,9 @@ def _displacement(stored: StoredReport) -> list[ReadmeRow]:
     return [
         ReadmeRow(
             name="high quality, low variance, recentred",
-            text=f"displacement RMSE {_mm(found['translation_rmse'])}, {_degrees(found['rotation_rmse'])} "
-            f"(novel parts alone: {_mm(novel['translation_rmse'])}, {_degrees(novel['rotation_rmse'])}; not "
-            f"recentred, as in the paper: {_mm(as_paper['translation_rmse'])}, "
-            f"{_degrees(as_paper['rotation_rmse'])}; "
-            f"paper: {_mm(PAPER['translation'])}, {_degrees(PAPER['rotation'])})",
+            text=f"displacement RMSE {_rmse(found)} (predicting zero: {_rmse(found, '_of_zero')}; novel parts "
+            f"alone: {_rmse(novel)}; not recentred, as in the paper: {_rmse(as_paper)}; paper: "
+            f"{_mm(PAPER['translation'])}, {_degrees(PAPER['rotation'])})",
             interval=_rmse_intervals(found),
             n=f"{found['measured']} trials of {found['measured_parts']} parts",
         )
@@ -149,7 +149,7 @@ def _assessed(stored: StoredReport) -> list[ReadmeRow]:
         ReadmeRow(
             name="assessed parts in fresh scenes",
             text=f"{share} of all attempts placed within 1 mm, corrected by the prediction of certified "
-            f"grasps; {agrees} reports state a share that holds",
+            f"grasps; for {agrees} parts this lies within the interval that the part's report stated",
             interval=between.replace("%, ", " - ").replace("%", " %"),
             n=f"{fresh['trials']} attempts",
         )
