@@ -118,8 +118,8 @@ def _displacement(stored: StoredReport) -> list[ReadmeRow]:
     return [
         ReadmeRow(
             name="high quality, low variance, recentred",
-            text=f"displacement RMSE {_rmse(found)} (predicting zero: {_rmse(found, '_of_zero')}; novel parts "
-            f"alone: {_rmse(novel)}; not recentred, as in the paper: {_rmse(as_paper)}; paper: "
+            text=f"displacement RMSE {_rmse(found)} (predicting zero: {_rmse(found, '_of_zero')}; novel "
+            f"parts alone: {_rmse(novel)}; not recentred, as in the paper: {_rmse(as_paper)}; paper: "
             f"{_mm(PAPER['translation'])}, {_degrees(PAPER['rotation'])})",
             interval=_rmse_intervals(found),
             n=f"{found['measured']} trials of {found['measured_parts']} parts",
