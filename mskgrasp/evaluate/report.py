@@ -129,7 +129,7 @@ def print_report(report: Report, folder: Path, console: Console | None = None) -
 def _success(summary: SuccessSummary, folder: Path) -> list[Section]:
     by_family = Section(title="Families", tables=[_success_table("family", summary.families)])
     return [
-        *([by_family] if len(summary.families) < len(summary.parts) else []),
+        *([by_family] if 1 < len(summary.families) < len(summary.parts) else []),
         Section(
             title="Parts",
             text=[*_success_text(summary), _ERRORS_EXPLAINED],

@@ -46,13 +46,14 @@ def test_the_conclusion_of_a_comparison_names_model_parts_and_policy():
     assert conclusion(compare_models([], {"one": Model()})) == "No displacement was measured."
 
 
-def test_families_are_listed_where_they_are_fewer_than_the_parts():
+def test_families_are_listed_where_they_are_several_and_fewer_than_the_parts():
+    some = [trial(part="a"), trial(part="b"), trial(part="c", family="bolt")]
+    (table,) = by_title(report_of(summarise_trials(some)))["Families"].tables
+    assert [row[0] for row in table.rows] == ["bolt", "nut"]
     of_one = [trial(part=name) for name in "abc"]
-    assert [row[0] for row in by_title(report_of(summarise_trials(of_one)))["Families"].tables[0].rows] == [
-        "nut"
-    ]
     apart = [trial(part=name, family=name) for name in "abc"]
-    assert "Families" not in by_title(report_of(summarise_trials(apart)))
+    for trials in (of_one, apart):
+        assert "Families" not in by_title(report_of(summarise_trials(trials)))
 
 
 def test_every_part_has_a_row_and_all_together_the_last():
