@@ -103,7 +103,7 @@ def test_tape_measures_what_is_predicted_of_the_seen_centre(moved: Moved):
     on_top = np.array([[0.012, 0.003, z], [-0.008, 0.006, z]]) + [*plan.view.centre_base[:2], 0.0]
     sides = np.array([[0.012, 0.012], [0.008, 0.008]])
     first, second = (
-        Markers(pixels=np.zeros((2, 2)), points_base=points, sides=sides, contrast=100)
+        Markers(pixels=np.zeros((2, 2)), points_base=points, sides=sides)
         for points in (on_top, (moved.after @ moved.before.inverse()).apply(on_top))
     )
     measured = planar_displacement(first, second, plan.grasp, plan.view.centre_base)

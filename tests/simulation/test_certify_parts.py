@@ -93,8 +93,9 @@ def test_grasps_of_another_simulation_or_conditions_are_made_again(box, monkeypa
         versions=versions(),
     )
     stored = certified(
-        certified_grasp(), part=box.name, part_hash=box.content_hash, conditions=conditions | changes
-    )
+        certified_grasp(), part=box.name, part_hash=box.content_hash, conditions=conditions | changes,
+        like={}, without={}, stands=(True,) * len(box.resting_probability),
+    )  # fmt: skip
     certified_folder(box).mkdir(parents=True)
     stored.write(certified_folder(box))
     wanted = []
