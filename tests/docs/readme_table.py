@@ -180,15 +180,16 @@ def _benchmark(stored: StoredReport) -> list[ReadmeRow]:
 
 def _palletize(stored: StoredReport) -> list[ReadmeRow]:
     report = _report(stored)
-    corrected, plain = (report["corrections"][name] for name in ("predicted", "none"))
+    each = [report["corrections"][name] for name in ("predicted", "none", "truth")]
+    corrected, plain, true = (
+        f"{1e3 * one['median_translation']:.2f} mm, {_degrees(one['median_rotation'])}" for one in each
+    )
     return [
         ReadmeRow(
             name="placing",
-            text=f"median error {_mm(corrected['median_translation'])} corrected by the prediction, "
-            f"{_mm(plain['median_translation'])} without",
-            interval="; ".join(
-                _between(one["median_translation_interval"], 1e3, "mm") for one in (corrected, plain)
-            ),
+            text=f"median error {corrected} corrected by the prediction; {plain} without; {true} corrected "
+            "by the true displacement",
+            interval="; ".join(_between(one["median_translation_interval"], 1e3, "mm") for one in each),
             n=f"{report['compared']} placements of {report['parts_compared']} parts for each correction",
         )
     ]
