@@ -101,9 +101,11 @@ def _sources(config: AssessConfig) -> list[str]:
         )
     from mskgrasp.parts.importing.import_file import legal_name  # loads CoACD, which takes a while
 
-    sources = list(dict.fromkeys(sources))
-    named: dict[str, str] = {}
+    unique: dict[Path | str, str] = {}
     for text in sources:
+        unique.setdefault(Path(text).resolve() if Path(text).exists() else text, text)
+    named: dict[str, str] = {}
+    for text in unique.values():
         path = Path(text)
         try:
             name = legal_name(path.stem if path.suffix.lower() in LOADERS else path.name)
@@ -111,9 +113,9 @@ def _sources(config: AssessConfig) -> list[str]:
             continue  # the import says so
         if named.setdefault(name, text) != text:
             raise UsageError(
-                f"{named[name]} and {text} are both called {name!r}; rename one, or leave it away"
+                f"{named[name]} and {text} are both called {name!r}; rename one, or leave one out"
             )
-    return sources
+    return list(unique.values())
 
 
 def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Tolerance) -> Assessed:

@@ -42,7 +42,7 @@ def check_cluster(address: str) -> None:
             f"--cluster {address}: give auto, or host:port of the head, for example 10.0.0.1:6379"
         )
     if importlib.util.find_spec("ray") is None:
-        raise UsageError("--cluster needs Ray, which is an extra: EXTRAS=dev,cluster .ci/setup")
+        raise UsageError("--cluster needs Ray, which is an extra: run EXTRAS=dev,cluster .ci/setup")
 
 
 @contextlib.contextmanager

@@ -64,7 +64,7 @@ def export_parquet(folder: Path, out: Path, watch: Watch = iter, *, licence: str
     try:
         import pyarrow.parquet as pq
     except ImportError as error:
-        raise UsageError("--format parquet needs pyarrow: EXTRAS=dev,parquet .ci/setup") from error
+        raise UsageError("--format parquet needs pyarrow: run EXTRAS=dev,parquet .ci/setup") from error
     card = out.parent / CARD
     if card.exists():
         raise UsageError(f"--out: {card} exists, and is not overwritten; choose another folder or delete it")

@@ -88,7 +88,7 @@ class ModelStatistics:
     def rows(self, policy: Policy, group: Group) -> list[tuple[str, TrialStatistics]]:
         """The row of a table for a group, with its name; none where it has no trial or repeats another.
 
-        Where all parts are known, or all novel, one row says so.
+        At most one. Where all parts are known, or all novel, one row says so; LOWESS predicts known parts.
         """
         each = {one: self.of(policy, one) for one in SIDES}
         sides = [name for name, one in each.items() if one is not None and one.trials]

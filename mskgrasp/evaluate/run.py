@@ -189,7 +189,8 @@ def estimate(config: EvaluateConfig) -> float:
             measured = seconds[chosen] or seconds[not chosen]  # lowess knows no part of the starter set
             each = float(np.mean(measured))
             total += n * each / n_workers
-            print(f"{n} trials {what}, {each:.1f} s each (of {len(measured)} measured)")
+            like = "" if seconds[chosen] else " as long as the others,"
+            print(f"{n} trials {what},{like} {each:.1f} s each (of {len(measured)} measured)")
     if config.planner.policy == "certified":
         print("before them the certified grasps that are missing are made, some minutes a part")
     print(

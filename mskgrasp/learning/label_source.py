@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import field_validator
 
 from mskgrasp.core.config import Config
+from mskgrasp.core.errors import BadDataset
 from mskgrasp.dataset import ShardInfo
 
 SAME_HEIGHT = 0.05
@@ -44,8 +45,12 @@ class LabelSource(Config):
 
 
 def source_of(info: ShardInfo) -> LabelSource:
-    """The source of a shard's labels."""
-    return LabelSource(
+    """The source of a shard's labels.
+
+    Raises:
+        BadDataset: A setting in the shard is no number.
+    """
+    values = dict(
         simulation=info.versions.get("simulation", "unknown"),
         fidelity=info.fidelity,
         physics=info.physics,
@@ -54,6 +59,10 @@ def source_of(info: ShardInfo) -> LabelSource:
         camera_height=float(info.T_base_camera.position[2]) - info.table_z,
         seed=info.seed,
     )
+    try:
+        return LabelSource.model_validate(values)
+    except ValueError as error:
+        raise BadDataset(f"a shard of part '{info.part}': {' '.join(str(error).split())}") from error
 
 
 def distinct(sources: Iterable[LabelSource]) -> tuple[LabelSource, ...]:

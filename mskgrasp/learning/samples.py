@@ -219,6 +219,7 @@ def _reader(
         try:
             attempts, info = read_shard(path)
             require_own_name(path, info)
+            source = source_of(info)
         except BadDataset as error:
             yield index, error
             return
@@ -231,7 +232,7 @@ def _reader(
                 raw=b"".join(np.ascontiguousarray(array).tobytes() for array in outcomes),
                 arrays=arrays,
                 skipped=dict(skipped),
-                source=source_of(info),
+                source=source,
             ),
         )
 

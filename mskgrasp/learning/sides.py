@@ -22,7 +22,7 @@ class Sides:
         training: Rows to train on.
         validation: Rows that select the epoch and calibrate.
         test: Rows of families that training never sees, for the final metrics only. Empty if parts are split
-            by name, or if all attempts at them end alike: nothing can be measured on those.
+            by name, or if none of them is ever lifted: no displacement can be measured on those.
         new_sizes: The same for other sizes of families that training sees.
     """
 
@@ -45,16 +45,13 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
             [number for number, name in enumerate(samples.parts) if sides[name] == side] for side in SPLITS
         )
     ]
-    for k, name in enumerate(("training", "validation", "test", "new_sizes")):
-        n, n_success = len(rows[k]), int(samples.success[rows[k]].sum())
-        if 0 < n_success < n:
-            continue
-        kind = "failure" if n_success else "success"
-        if k < 2:
+    for name, side in zip(("training", "validation"), rows, strict=False):
+        n, n_success = len(side), int(samples.success[side].sum())
+        if n_success in (0, n):
+            kind = "success" if n_success == 0 else "failure"
             raise BadDataset(f"no {kind} among the {n} attempts at the {name} parts; collect more attempts")
-        if n:
-            note(
-                f"warning: no {kind} among the {n} attempts at the {name} parts: nothing is measured on them"
-            )
-        rows[k] = rows[k][:0]
+    for k, name in ((2, "test"), (3, "new_sizes")):
+        if len(rows[k]) and not samples.success[rows[k]].any():
+            note(f"warning: no success among the {len(rows[k])} attempts at the {name} parts; left out")
+            rows[k] = rows[k][:0]
     return Sides(training=rows[0], validation=rows[1], test=rows[2], new_sizes=rows[3])

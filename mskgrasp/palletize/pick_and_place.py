@@ -90,6 +90,8 @@ class PickAndPlace:
         """
         if not task.keep:
             self._tops = {}
+        # Of a placement that was interrupted before it was stored.
+        (self._pictures / f"{placement_name(task.key)}.npz").unlink(missing_ok=True)
         slot = task.slot
         failed = Placement(
             part=find_part(task.part).name, number=task.number, slot=task.index, correction=task.correction,
@@ -126,7 +128,7 @@ class PickAndPlace:
         if not task.keep:
             self._tops = {}
         path = self._pictures / f"{placement_name(task.key)}.npz"
-        # Without a grasp there are no maps, without a placed part none of it.
+        # Without a grasp there are no maps; where no part was placed, `after` is empty.
         if path.exists() and (maps := read_height_maps(path)).after.size:
             self._tops[task.index] = maps.top
 

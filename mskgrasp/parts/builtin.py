@@ -6,6 +6,7 @@ import difflib
 import hashlib
 import json
 import re
+import shlex
 from functools import lru_cache
 from pathlib import Path
 
@@ -112,13 +113,16 @@ def imported_names() -> tuple[str, ...]:
 
 
 def unknown_part(name: str, *, builtin_only: bool = False) -> UnknownPart:
-    """The error for a name that no part has."""
+    """The error for a name that no part has, or for a CAD file in place of one."""
     from mskgrasp.parts.importing.mesh_files import LOADERS  # needs the names of this package
 
     if Path(name).suffix.lower() in LOADERS:
         if Path(name).is_file():
-            return UnknownPart(f"{name} is a CAD file: import it, python -m mskgrasp.parts import {name}")
-        return UnknownPart(f"there is no file {name}; check the path")
+            return UnknownPart(
+                f"{name} is a CAD file: import it, python -m mskgrasp.parts import {shlex.quote(name)}"
+            )
+        known = f", or name the part {Path(name).stem}" if Path(name).stem in _recipes() else ""
+        return UnknownPart(f"there is no file {name}; check the path{known}")
     known = builtin_names() if builtin_only else (*builtin_names(), *imported_names())
     close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(close)}?" if close else "`python -m mskgrasp.parts list` shows the parts"

@@ -30,6 +30,8 @@ from mskgrasp.planning.proposal import ProposedGrasp
 
 TIMEOUT_S = 60.0
 """Time in which a program must answer, the start of its process included."""
+_GRACE_S = 2.0
+"""Time in which a program may end by itself."""
 _FIELDS = ("quality", "displacement", "displacement_cov", "point_base")
 
 
@@ -96,12 +98,11 @@ class ProgramPlanner:
             with contextlib.suppress(OSError):
                 self._process.stdin.close()
             with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(2.0)
-                self._reader.join(2.0)
-            if self._process.poll() is None or self._reader.is_alive():
-                _kill(self._process)
-            self._reader.join()
-            self._process.stdout.close()
+                self._process.wait(_GRACE_S)
+            _kill(self._process)
+            self._reader.join(_GRACE_S)
+            if not self._reader.is_alive():  # else what has left the program's session still has its output
+                self._process.stdout.close()
             self._process = None
         self._log.close()
         self._folder.cleanup()
@@ -122,7 +123,11 @@ class ProgramPlanner:
         except OSError:
             line = None
         if line is None:
-            code = process.wait()
+            try:
+                code = process.wait(_GRACE_S)
+            except subprocess.TimeoutExpired:
+                _kill(process)
+                raise BadPlanner(f"the program {self._command!r} closed its output") from None
             raise BadPlanner(f"the program {self._command!r} ended with exit code {code}{self._last_line()}")
         return line
 

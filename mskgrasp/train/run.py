@@ -106,7 +106,7 @@ def run_training(config: TrainConfig) -> int:
     write_config(config, out / "config.yaml")
     with closing(_ProgressBar(out / "log.csv")) as bar:
         models, history = train(
-            samples, config, checkpoint_path=out / CHECKPOINT, device=device, reporter=bar
+            samples, config, checkpoint_path=out / CHECKPOINT, device=device, reporter=bar, sides=sides
         )
     draw_curves(history, models.meta.metrics, out / "curves.png")
     if config.network.variance:

@@ -25,7 +25,7 @@ def view(config: ViewConfig) -> None:
     try:
         import viser  # noqa: F401
     except ImportError as error:
-        raise UsageError("mskgrasp.view needs viser: EXTRAS=dev,view .ci/setup") from error
+        raise UsageError("mskgrasp.view needs viser: run EXTRAS=dev,view .ci/setup") from error
     from mskgrasp.trials.engine import connected_engine
     from mskgrasp.view.cell_panel import CellPanel
     from mskgrasp.view.dataset_panel import DatasetPanel

@@ -9,7 +9,8 @@ import pytest
 import trimesh
 
 from mskgrasp.assess.__main__ import main
-from mskgrasp.assess.run import begin_trials
+from mskgrasp.assess.config import AssessConfig
+from mskgrasp.assess.run import _sources, begin_trials
 from mskgrasp.assess.trials import CONDITIONS, EXACT, MEANS
 from mskgrasp.core.errors import BadPart, MissingModel, UsageError
 from mskgrasp.planning.certified import FILE
@@ -84,6 +85,12 @@ def test_trials_planned_by_other_certified_grasps_are_made_again(tmp_path, capsy
     ]  # fmt: skip
     assert "2 trials are made again: 'hex_nut_m20' has other certified grasps" in capsys.readouterr().err
     assert (tmp_path / FILE).read_bytes() == more.contents()
+
+
+def test_a_file_that_is_named_twice_is_one_part(cad, monkeypatch):
+    monkeypatch.chdir(cad)
+    (cad / "plate.stl").touch()
+    assert _sources(AssessConfig(parts=("plate.stl", "./plate.stl", str(cad / "plate.stl")))) == ["plate.stl"]
 
 
 @pytest.mark.parametrize(

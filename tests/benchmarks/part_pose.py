@@ -74,7 +74,7 @@ class Result:
 
     Attributes:
         refused: Whether it was taken for no pose of the part.
-        unseen: Whether it was, because nothing was seen at all.
+        unseen: Whether it was, because no part was detected.
         look: Whether the resting pose is right, or one that looks alike.
         offset: (2,) error of the place.
         turn: Error of the turn, up to symmetry.
@@ -147,7 +147,8 @@ def find(cell: Cell, shown: Shown, model: NoiseModel, known: KnownPart) -> tuple
 def result(shown: Shown, found: Found, seconds: tuple[float, float], known: KnownPart) -> Result:
     """Compare what was found with the simulator's pose."""
     if not isinstance(found, PartPose):
-        return Result(part=shown.part, seconds=seconds, refused=True, unseen=isinstance(found, NoPartFound))
+        unseen = not isinstance(found, PartNotRecognised)  # which is a NoPartFound, too
+        return Result(part=shown.part, seconds=seconds, refused=True, unseen=unseen)
     errors = [error_of(one, shown, known) for one in (found, *found.alternatives)]
     named = tuple((float(np.linalg.norm(one[:2])), float(one[2])) for one in errors if one is not None)
     if errors[0] is None:

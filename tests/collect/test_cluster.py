@@ -249,7 +249,7 @@ def test_without_the_extra_the_command_says_what_to_install(tmp_path):
     )  # fmt: skip
     assert done.returncode == 2
     assert done.stderr.strip() == (
-        "mskgrasp.collect: --cluster needs Ray, which is an extra: EXTRAS=dev,cluster .ci/setup"
+        "mskgrasp.collect: --cluster needs Ray, which is an extra: run EXTRAS=dev,cluster .ci/setup"
     )
     assert not (tmp_path / "data").exists()
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
 import pytest
 
-from mskgrasp.core.errors import BadModel
+from mskgrasp.core.errors import BadDataset, BadModel
 from mskgrasp.core.grasp import HAND_GEOMETRY
 from mskgrasp.core.settings import Physics
 from mskgrasp.core.shipped import PRETRAINED
@@ -23,6 +24,13 @@ def test_the_source_of_collected_labels_is_what_their_shards_say(collected: Path
     assert source.physics == infos[0].physics and source.hand == HAND_GEOMETRY and source.seed == 5
     assert source.simulation == infos[0].versions["simulation"] and source.noise == {}
     assert source.camera_height == pytest.approx(infos[0].T_base_camera.position[2])
+
+
+def test_a_shard_whose_settings_are_no_numbers_is_refused(collected: Path):
+    _, info = read_shard(list_shards(collected)[0])
+    with pytest.raises(BadDataset, match="rate_hz must be a number") as caught:
+        source_of(dataclasses.replace(info, physics=info.physics | {"rate_hz": "fast"}))
+    assert "\n" not in str(caught.value)
 
 
 def described(tmp_path: Path, collected: Path, **hand: float) -> Path:

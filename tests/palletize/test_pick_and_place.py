@@ -13,8 +13,10 @@ from hal.sim import SapienCellConfig, sapien_cell
 from mskgrasp.core.settings import Tape
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.palletize.figures import pallet_image
+from mskgrasp.palletize.height_maps import read_height_maps, write_height_maps
 from mskgrasp.palletize.pallet_slots import Slot
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
+from mskgrasp.palletize.placement_records import placement_name
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.trials.engine import TrialEngine
@@ -88,6 +90,11 @@ def test_the_picture_of_a_pallet_whose_first_part_failed_uses_no_heights_of_the_
         assert not np.array_equal(worker.picture(slots), flat)
         resumed = PickAndPlace(engine, planner, tmp_path / "placements")
         resumed.skip(placed)
+        np.testing.assert_array_equal(resumed.picture(slots), worker.picture(slots))
+        maps = tmp_path / "placements" / f"{placement_name(placed.key)}.npz"
+        emptied = dataclasses.replace(read_height_maps(maps), after=np.zeros((0, 0)))
+        write_height_maps(emptied, maps.with_name(f"{placement_name(too_small.key)}.npz"))
+        resumed.skip(dataclasses.replace(too_small, keep=True))  # grasped, and not placed
         np.testing.assert_array_equal(resumed.picture(slots), worker.picture(slots))
         assert worker.run(too_small).reason == "slot too small"
         resumed.skip(too_small)

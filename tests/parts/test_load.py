@@ -16,6 +16,8 @@ def test_a_cad_file_a_name_and_a_folder_give_the_same_part():
 def test_a_file_that_is_not_there_is_named_as_a_file(tmp_path):
     with pytest.raises(UnknownPart, match=r"there is no file .*bracket\.STL; check the path"):
         load_part(tmp_path / "bracket.STL")
+    with pytest.raises(UnknownPart, match="check the path, or name the part hex_nut_m30"):
+        find_part("hex_nut_m30.stl")
     file = example_file("bracket.stl")
     assert file is not None
     with pytest.raises(UnknownPart, match=r"bracket\.stl is a CAD file: import it"):

@@ -106,15 +106,23 @@ def test_a_program_that_does_not_answer_is_ended(program):
         ask(program("time.sleep(60)", timeout_s=1.0))
 
 
-@pytest.mark.parametrize("ends", ["wait", "exit 1"])
-def test_what_a_program_started_ends_with_it(ends, tmp_path):
-    command = f"sh -c 'sleep 600 & echo $! > {tmp_path}/child; {ends}'"
+@pytest.mark.parametrize("child", ["sleep 600", "sleep 600 >/dev/null 2>&1"])
+@pytest.mark.parametrize(("ends", "message"), [("wait", "did not answer"), ("exit 1", "exit code 1|did not")])
+def test_what_a_program_started_ends_with_it(child, ends, message, tmp_path):
+    command = f"sh -c '{child} & echo $! > {tmp_path}/child; {ends}'"
     planner = ProgramPlanner(command, WORKSPACE, timeout_s=1.0)
-    with pytest.raises(BadPlanner, match="did not answer|ended with exit code 1"):
+    with pytest.raises(BadPlanner, match=message):  # a child may keep the output of a program that has ended
         ask(planner)
     planner.close()
-    child = Path("/proc", (tmp_path / "child").read_text().strip(), "stat")
-    assert not child.exists() or child.read_text().rsplit(")", 1)[1].split()[0] == "Z"
+    stat = Path("/proc", (tmp_path / "child").read_text().strip(), "stat")
+    assert not stat.exists() or stat.read_text().rsplit(")", 1)[1].split()[0] == "Z"
+
+
+def test_a_program_that_closes_its_output_and_runs_on_is_ended():
+    planner = ProgramPlanner("sh -c 'exec 1>&-; exec sleep 600'", WORKSPACE, timeout_s=30.0)
+    with pytest.raises(BadPlanner, match="closed its output"):
+        ask(planner)
+    planner.close()
 
 
 def test_a_program_that_is_missing_is_named():

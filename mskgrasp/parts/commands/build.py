@@ -100,4 +100,4 @@ def _print_summary(index: Index) -> None:
         print(f"left out {name}: {left_out.reason.removeprefix(f'{name}: ')}")
     print(f"the catalogue has {len(index.parts)} parts of {len(index.families())} families")
     if not cad.available():
-        print("more parts come with the extra [cad]: EXTRAS=dev,cad .ci/setup, then build again")
+        print("more parts come with the extra [cad]: run EXTRAS=dev,cad .ci/setup, then build again")

@@ -41,7 +41,7 @@ def load_step(content: bytes) -> Loaded:
         Unreadable: It is damaged, has no solids, or cascadio is not installed.
     """
     if importlib.util.find_spec("cascadio") is None:
-        raise Unreadable("is STEP, which needs an extra: EXTRAS=dev,cad .ci/setup")
+        raise Unreadable("is STEP, which needs an extra: run EXTRAS=dev,cad .ci/setup")
     if b"ISO-10303-21" not in content[:4096]:
         raise Unreadable("is not a STEP file (ISO-10303-21 is missing at its head): export it again as STEP")
     if b"END-ISO-10303-21" not in content[-4096:]:

@@ -52,7 +52,8 @@ def needs_cad(make: Callable[..., Any]) -> Callable[..., Any]:
                 return make(size)
             except ImportError as error:
                 raise BadPart(
-                    f"this part is drawn with build123d and bd_warehouse ({error}): EXTRAS=dev,cad .ci/setup"
+                    f"this part is drawn with build123d and bd_warehouse ({error}): "
+                    "run EXTRAS=dev,cad .ci/setup"
                 ) from error
             except (ValueError, RuntimeError, KeyError) as error:
                 # OpenCASCADE fails on some fillets, depending on its version.
