@@ -123,13 +123,13 @@ def test_a_line_out_of_reach_is_refused():
 
 
 def test_a_motion_is_checked_in_well_under_20_ms():
-    """Best of five: other programs share the machine."""
+    """Of processor time, the best of five: other programs share the machine."""
     limits = replace(panda_limits(), keep_out=(CAMERA, post(0.2, 0.5), post(0.2, -0.5)))
     start, goal = forward_pose(READY), pose_base_tcp(np.array([0.6, -0.1, 0.1, 1.2]))
     took = []
     for _ in range(5):
-        begun = time.perf_counter()
+        begun = time.thread_time()
         check_path(PANDA_LINKS, limits, line_joints(PANDA_LINKS, READY, start, goal), "the line")
-        took.append(time.perf_counter() - begun)
+        took.append(time.thread_time() - begun)
     assert min(took) < 0.02
     assert MARGIN == 0.02
