@@ -90,8 +90,8 @@ class PickAndPlace:
         """
         if not task.keep:
             self._tops = {}
-        # Of a placement that was interrupted before it was stored.
-        (self._pictures / f"{placement_name(task.key)}.npz").unlink(missing_ok=True)
+        if self._cell.feeder is None:  # `skip` must not read maps of a placement that was never stored
+            (self._pictures / f"{placement_name(task.key)}.npz").unlink(missing_ok=True)
         slot = task.slot
         failed = Placement(
             part=find_part(task.part).name, number=task.number, slot=task.index, correction=task.correction,

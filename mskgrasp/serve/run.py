@@ -48,7 +48,9 @@ def serve(config: ServeConfig) -> None:
         import fastapi  # noqa: F401
         import uvicorn
     except ImportError as error:
-        raise UsageError("mskgrasp.serve needs FastAPI, uvicorn: run EXTRAS=dev,serve .ci/setup") from error
+        raise UsageError(
+            "mskgrasp.serve needs FastAPI and uvicorn: run EXTRAS=dev,serve .ci/setup"
+        ) from error
     from mskgrasp.serve.app import make_app
     from mskgrasp.serve.connections import closing_after
 
