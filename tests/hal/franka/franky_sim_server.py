@@ -36,6 +36,8 @@ from tests.hal.franka.wire import Table, ask_for_priority
 
 _LATE_S = 0.005
 _TURN_S = 3e-4
+_AT_REST_TICKS, _RESTING = 200, 4
+"""A robot that was told nothing for so many ticks simulates one of so many: two thirds of them are such."""
 _CARTESIAN_REFLEX = 7
 ANSWERS = {
     "ok": GripperCommandStatus.kSuccess,
@@ -51,6 +53,7 @@ class FaultyServer(FrankaRobotServer):
     fault: RobotMode | None = None
     table: Table | None = None
     ticks = 0
+    busy_until = 0
     record: list[UDPCommand] | None = None
     answered = False
 
@@ -85,6 +88,14 @@ class FaultyServer(FrankaRobotServer):
         self._FrankaRobotServer__current_control_command = UDPCommand(
             q_c=tuple(desired.q_d), O_T_EE_c=tuple(desired.O_T_EE_d)
         )
+
+    def pass_time(self) -> int:
+        """Ticks until the next step: one, or several where neither arm nor hand moves."""
+        if self.current_motion_id or self.gripper_server._motion_state.name != "IDLE":
+            self.busy_until = self.ticks + _AT_REST_TICKS
+        passed = 1 if self.ticks < self.busy_until else _RESTING
+        self.ticks += passed
+        return passed
 
     def wait_for_command(self) -> None:
         """A record has no gaps: a busy client's command comes late, and a robot waits for nobody."""
@@ -147,14 +158,16 @@ def serve(server, simulator: MujocoSimulator, robot: FaultyServer, answers: Answ
         robot.process_commands()
         simulator.step()
         robot.send_state()
-        robot.ticks += 1
+        passed = robot.pass_time()
         robot.wait_for_command()
         if select.select([sys.stdin], [], [], 0)[0]:
             line = sys.stdin.readline()
             if not line:
                 return
             print(obey(line.split(), simulator, robot, answers), flush=True)
-        due = max(due + 1e-3, time.monotonic() - _LATE_S)
+            if line.strip() != "clock":
+                robot.busy_until = robot.ticks + _AT_REST_TICKS
+        due = max(due + passed * 1e-3, time.monotonic() - _LATE_S)
         # Late or not, its client must get a turn: a server that never sleeps starves it on a busy machine.
         time.sleep(max(due - time.monotonic(), _TURN_S))
 
