@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +10,7 @@ from mskgrasp.assess.config import AssessConfig, Tolerance, parse_tolerance
 from mskgrasp.assess.index import IndexEntry, write_index
 from mskgrasp.assess.report import poses_section, trials_section, write_report
 from mskgrasp.assess.summary import Row
-from mskgrasp.assess.trials import AssessSetup, SceneTask, run_scenes, scene_tasks, write_cells
+from mskgrasp.assess.trials import AssessSetup, scene_tasks, trial_bench, write_cells
 from mskgrasp.core.errors import BadPart, MskgraspError, UsageError
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import Part, find_part
@@ -22,10 +20,11 @@ from mskgrasp.planning.for_cell import part_name
 from mskgrasp.planning.run_inputs import BY_CONTENT, model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.cli import make_folder
-from mskgrasp.runtime.progress import note, progress
-from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, resume_trials, rewrite_trials
+from mskgrasp.runtime.progress import note
+from mskgrasp.runtime.run_folder import TRIALS, opened_run, resume_trials, rewrite_trials
 from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.simulation.certify_parts import certify
+from mskgrasp.trials.placed_scenes import placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 
 SCENE_VERSION = 2
@@ -167,25 +166,4 @@ def _trials(
         out=out,
         seed=config.seed,
     )
-    return make_trials(setup, scene_tasks(config.n_trials), workers)
-
-
-def make_trials(setup: AssessSetup, tasks: Sequence[SceneTask], workers: int) -> list[PlacedTrial]:
-    """All trials of scenes; those that the folder holds already are not made again.
-
-    Raises:
-        WorkerFailed: As in `run_scenes`.
-    """
-    path = setup.out / TRIALS
-    found = {trial.key: trial for trial in resume_trials(path, PlacedTrial.from_json)}
-    missing = [left for task in tasks if (left := task.without(found)) is not None]
-    keys = [key for task in tasks for key in task.keys()]
-    bar = progress(
-        total=len(keys), done=sum(key in found for key in keys), unit="trial", keep=True, title="trials"
-    )
-    with closing(run_scenes(setup, missing, workers)) as made, bar:
-        for trial in made:
-            append_trial(path, trial.to_json())
-            found[trial.key] = trial
-            bar.update()
-    return [found[key] for key in keys]
+    return placed_trials(trial_bench, setup, scene_tasks(part, config.n_trials), out, workers)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Generator, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,17 +10,16 @@ from typing import Any, Literal
 
 import yaml
 
-from hal.errors import HalError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.seeds import trial_seeds
-from mskgrasp.parts import find_part
+from mskgrasp.parts import Part, find_part
 from mskgrasp.planning.certified import CertifiedGrasps
 from mskgrasp.planning.certified_planner import CertifiedPlanner, reachable_by
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.planner import Planner
-from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.trials.engine import TrialEngine, connected_engine
+from mskgrasp.trials.placed_scenes import SceneTask
 from mskgrasp.trials.placed_trial import PlacedTrial
 from mskgrasp.trials.placing import grasp_and_place
 
@@ -57,24 +56,6 @@ class AssessSetup:
     seed: int
 
 
-@dataclass(frozen=True)
-class SceneTask:
-    """Trials in one scene, by each of some means."""
-
-    condition: str
-    number: int
-    means: tuple[Means, ...]
-
-    def keys(self) -> list[tuple[str, int, str]]:
-        """Keys of its trials: `PlacedTrial.key`."""
-        return [(self.condition, self.number, one) for one in self.means]
-
-    def without(self, found: Container[tuple[str, int, str]]) -> SceneTask | None:
-        """The task less the trials that are found; None where nothing is left."""
-        means = tuple(one for one, key in zip(self.means, self.keys(), strict=True) if key not in found)
-        return replace(self, means=means) if means else None
-
-
 def write_cells(out: Path) -> dict[str, Path]:
     """Write the files of the simulated cells of all conditions."""
     found = {}
@@ -85,41 +66,26 @@ def write_cells(out: Path) -> dict[str, Path]:
     return found
 
 
-def scene_tasks(n_trials: int) -> list[SceneTask]:
+def scene_tasks(part: Part, n_trials: int) -> list[SceneTask]:
     """Scenes of a part, the most important condition first."""
+    # A part outside the cache is known by its folder alone.
+    source = str(part.folder)
     return [
-        SceneTask(condition, number, MEANS)
+        SceneTask(source=source, part=part.name, condition=condition, number=number, means=MEANS)
         for condition, (share, _) in CONDITIONS.items()
         for number in range(max(1, round(share * n_trials)))
     ]
 
 
-def run_scenes(
-    setup: AssessSetup, tasks: list[SceneTask], workers: int
-) -> Generator[PlacedTrial, None, None]:
-    """Run trials, yielding each; the outcome does not depend on the processes.
-
-    Raises:
-        WorkerFailed: A trial failed for a reason that repeating it cannot remove.
-    """
-    work = Work(
-        _bench,
-        setup,
-        name=lambda task: f"trial {task.number} with {task.condition}",
-        rest=lambda task, n: replace(task, means=task.means[n:]) if n < len(task.means) else None,
-        lost_by=(HalError,),
-    )
-    return results(work, tasks, workers)
-
-
 @contextmanager
-def _bench(setup: AssessSetup) -> Iterator[Callable[[SceneTask], Iterator[PlacedTrial]]]:
+def trial_bench(setup: AssessSetup) -> Iterator[Callable[[SceneTask], Iterator[PlacedTrial]]]:
+    """Make the trials of a scene by certified grasps and by the networks alone."""
     part = find_part(setup.source)
     nothing = replace(setup.certified, grasps=())
     with ExitStack() as stack:
-        found: dict[str, tuple[TrialEngine, dict[Means, CertifiedPlanner]]] = {}
+        found: dict[str, tuple[TrialEngine, dict[str, CertifiedPlanner]]] = {}
 
-        def bench(condition: str) -> tuple[TrialEngine, dict[Means, CertifiedPlanner]]:
+        def bench(condition: str) -> tuple[TrialEngine, dict[str, CertifiedPlanner]]:
             if condition not in found:
                 stack.close()
                 found.clear()

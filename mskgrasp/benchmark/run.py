@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
 
 from mskgrasp.benchmark.config import QUICK_PARTS, BenchmarkConfig
 from mskgrasp.benchmark.part_list import BenchmarkPart, benchmark_parts
 from mskgrasp.benchmark.planners import PlannerSettings, check_planners, package_digests
 from mskgrasp.benchmark.report import RunFacts, write_report
-from mskgrasp.benchmark.trials import BenchmarkSetup, SceneTask, key_of, run_scenes, scene_tasks
+from mskgrasp.benchmark.trials import BenchmarkSetup, scene_tasks, trial_bench
 from mskgrasp.core.errors import UsageError
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
@@ -20,9 +19,10 @@ from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.run_inputs import BY_CONTENT, certified_digests, model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import TRIALS, append_trial, opened_run, record_inputs, resume_trials
+from mskgrasp.runtime.run_folder import opened_run, record_inputs
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import CellFile, read_cell
+from mskgrasp.trials.placed_scenes import placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 
 SCENE_VERSION = 2
@@ -73,7 +73,7 @@ def benchmark(config: BenchmarkConfig) -> None:
         if "certified" in config.rows:
             certify_missing(sources, config.models, workers)
             record_inputs(config.out, certified_digests(sources))
-        trials = _trials(config, cell, scene_tasks(sources, config.n_trials, config.rows), workers)
+        trials = _trials(config, cell, sources, workers)
         facts = RunFacts(
             cell=config.cell,
             noise=cell.noise,
@@ -144,29 +144,18 @@ def _counted(rows: Sequence[str], count: Callable[[str], int]) -> dict[str, int]
 
 
 def _trials(
-    config: BenchmarkConfig, cell: CellFile, tasks: Sequence[SceneTask], workers: int
+    config: BenchmarkConfig, cell: CellFile, sources: Sequence[str], workers: int
 ) -> list[PlacedTrial]:
     """All trials; those that are stored are not made again."""
     setup = BenchmarkSetup(
         cell=cell.write(config.out),
-        condition=config.cell,
         planners=PlannerSettings(
             models=config.models, paper_models=config.paper_models, program=config.program
         ),
         out=config.out,
         seed=config.seed,
     )
-    path = config.out / TRIALS
-    found = {key_of(trial): trial for trial in resume_trials(path, PlacedTrial.from_json)}
-    missing = [left for task in tasks if (left := task.without(found)) is not None]
+    tasks = scene_tasks(sources, cell.values["type"], config.n_trials, config.rows)
+    made = placed_trials(trial_bench, setup, tasks, config.out, workers)
     # Planner by planner, as the report lists them.
-    keys = [(task.part, task.number, name) for name in config.rows for task in tasks]
-    bar = progress(
-        total=len(keys), done=sum(key in found for key in keys), unit="trial", keep=True, title="trials"
-    )
-    with closing(run_scenes(setup, missing, workers)) as made, bar:
-        for trial in made:
-            append_trial(path, trial.to_json())
-            found[key_of(trial)] = trial
-            bar.update()
-    return [found[key] for key in keys]
+    return sorted(made, key=lambda trial: config.rows.index(trial.means))

@@ -9,6 +9,8 @@ import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
 
+Key = tuple[str, str, int, str]
+"""Part, condition, number and means of a trial."""
 Correction = Literal["none", "predicted", "seen"]
 CORRECTIONS: tuple[Correction, ...] = ("none", "predicted", "seen")
 
@@ -64,9 +66,9 @@ class PlacedTrial:
     placed: list[float] | None = None
 
     @property
-    def key(self) -> tuple[str, int, str]:
-        """Identifier of the trial among those of its part."""
-        return self.condition, self.number, self.means
+    def key(self) -> Key:
+        """Identifier of the trial in its run."""
+        return self.part, self.condition, self.number, self.means
 
     def off(self, correction: Correction) -> np.ndarray | None:
         """x, y and turn (3,) by which the part misses its target; None where it cannot be told.

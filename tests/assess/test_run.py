@@ -81,7 +81,7 @@ def test_trials_planned_by_other_certified_grasps_are_made_again(tmp_path, capsy
     assert len(read_trials(tmp_path / TRIALS, PlacedTrial.from_json)) == 4
     begin_trials(tmp_path, more)
     assert [one.key for one in read_trials(tmp_path / TRIALS, PlacedTrial.from_json)] == [
-        (EXACT, 0, "networks"), (EXACT, 1, "networks"),
+        ("bracket", EXACT, 0, "networks"), ("bracket", EXACT, 1, "networks"),
     ]  # fmt: skip
     assert "2 trials are made again: 'hex_nut_m20' has other certified grasps" in capsys.readouterr().err
     assert (tmp_path / FILE).read_bytes() == more.contents()

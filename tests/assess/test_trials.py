@@ -1,25 +1,20 @@
-"""Scenes of an assessment: which there are, and which are still to be made."""
+"""Scenes of an assessment, and their cells."""
 
 from __future__ import annotations
 
 from hal.open_cell import cell_from_yaml
-from mskgrasp.assess.trials import CONDITIONS, EXACT, MEANS, NOISY, SceneTask, scene_tasks, write_cells
+from mskgrasp.assess.trials import CONDITIONS, EXACT, MEANS, NOISY, scene_tasks, write_cells
+from mskgrasp.parts import find_part
 
 
 def test_the_exact_camera_has_most_scenes_and_every_condition_some():
+    part = find_part("hex_nut_m20")
     for n in (1, 8, 24):
-        counts = [sum(task.condition == name for task in scene_tasks(n)) for name in CONDITIONS]
+        counts = [sum(task.condition == name for task in scene_tasks(part, n)) for name in CONDITIONS]
         assert counts[0] == n and min(counts) >= 1 and counts == sorted(counts, reverse=True)
-    assert scene_tasks(24)[0] == SceneTask(EXACT, 0, MEANS)
-    assert [task for task in scene_tasks(24) if task in scene_tasks(8)] == scene_tasks(8)
-
-
-def test_trials_that_are_stored_are_left_out():
-    task = SceneTask(EXACT, 2, MEANS)
-    first, second = task.keys()
-    assert task.without({}) == task
-    assert task.without({first}) == SceneTask(EXACT, 2, (MEANS[1],))
-    assert task.without({first, second}) is None
+    first, *_ = many = scene_tasks(part, 24)
+    assert first.keys() == [("hex_nut_m20", EXACT, 0, means) for means in MEANS]
+    assert [task for task in many if task in scene_tasks(part, 8)] == scene_tasks(part, 8)
 
 
 def test_cells_differ_in_what_their_names_say(tmp_path):

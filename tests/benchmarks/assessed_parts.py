@@ -17,9 +17,9 @@ import numpy as np
 
 from hal.hand import HAND_MASS, PAYLOAD
 from mskgrasp.assess.config import AssessConfig, parse_tolerance
-from mskgrasp.assess.run import assess, begin_trials, make_trials
+from mskgrasp.assess.run import assess, begin_trials
 from mskgrasp.assess.summary import DISTANCES, Row, summarise
-from mskgrasp.assess.trials import CONDITIONS, EXACT, MEANS, AssessSetup, SceneTask, write_cells
+from mskgrasp.assess.trials import CONDITIONS, EXACT, MEANS, AssessSetup, trial_bench, write_cells
 from mskgrasp.core.errors import BadPart
 from mskgrasp.core.grasp import MAX_OPENING, TILT_LIMIT
 from mskgrasp.core.metrics import clustered_wilson_interval, rms_interval
@@ -39,6 +39,7 @@ from mskgrasp.runtime.progress import note
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.simulation.certify_parts import certify
+from mskgrasp.trials.placed_scenes import SceneTask, placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 from tests.benchmarks.report import show
 
@@ -146,7 +147,11 @@ def fresh_trials(part: Part, out: Path, n: int, workers: int) -> list[PlacedTria
         source=str(part.folder), certified=certified, models=PRETRAINED, cells=write_cells(out), out=out,
         seed=FRESH_SEED,
     )  # fmt: skip
-    return make_trials(setup, [SceneTask(EXACT, number, ("certified",)) for number in range(n)], workers)
+    tasks = [
+        SceneTask(source=setup.source, part=part.name, condition=EXACT, number=number, means=("certified",))
+        for number in range(n)
+    ]
+    return placed_trials(trial_bench, setup, tasks, out, workers)
 
 
 def pooled(reported: Trials, fresh: Trials) -> Table:
