@@ -46,6 +46,7 @@ from mskgrasp.simulation.shard_task import ShardTask
 from mskgrasp.simulation.versions import versions
 from tasks import GraspDisplacementEnv
 from tasks.scene.renderer import render_backend
+from tasks.scene.table_friction import TableFriction
 from tests.benchmarks.raw_sapien import RawSapien
 from tests.benchmarks.report import show
 
@@ -62,13 +63,14 @@ MANISKILL = dict(
 
 @dataclass
 class Row:
-    """One program: its processor time, the share of it inside PhysX' steps and the renderer."""
+    """One program: its processor time, of it that in PhysX and the renderer, and in friction on the table."""
 
     program: str
     grasps: int = 0
     lifted: int = 0
     seconds: float = 0.0
     inside: float = 0.0
+    friction: float = 0.0
 
 
 def main() -> None:
@@ -235,27 +237,30 @@ class Clock:
 
 
 class Ours:
-    """The collector's own loop, and a clock around PhysX and the renderer that measures the others, too."""
+    """The collector's own loop, and clocks around what every program computes with, which measure all."""
 
     def __init__(self) -> None:
         self.simulator = Simulator(Physics(), Overhead(), ExecutionNoise())
-        self.clock = Clock()
-        for owner, name in (
-            (PhysxCpuSystem, "step"),
-            (sapien.Scene, "update_render"),
-            (sapien.render.RenderCameraComponent, "take_picture"),
-            (sapien.render.RenderCameraComponent, "get_picture"),
+        self.engine, self.friction = Clock(), Clock()
+        for clock, owner, name in (
+            (self.engine, PhysxCpuSystem, "step"),
+            (self.engine, sapien.Scene, "update_render"),
+            (self.engine, sapien.render.RenderCameraComponent, "take_picture"),
+            (self.engine, sapien.render.RenderCameraComponent, "get_picture"),
+            (self.friction, TableFriction, "apply"),
         ):
-            setattr(owner, name, self.clock.around(getattr(owner, name)))
+            setattr(owner, name, clock.around(getattr(owner, name)))
 
     @contextmanager
     def measured(self, row: Row) -> Iterator[None]:
         """Adds the processor time of the context to a row."""
-        self.clock.reset()
+        self.engine.reset()
+        self.friction.reset()
         began = time.process_time()
         yield
-        row.seconds += time.process_time() - began - self.clock.cost
-        row.inside += self.clock.inside
+        row.seconds += time.process_time() - began - self.engine.cost - self.friction.cost
+        row.inside += self.engine.inside
+        row.friction += self.friction.inside
 
     def draw(self, part: Part, n: int) -> list[Draw]:
         """The first attempts at a part, as the collector draws them."""
@@ -359,11 +364,15 @@ def report(
     ours = rows[-1]
     rate = {row.program: row.grasps / row.seconds for row in rows}
     table = Table(
-        header=("one core", "grasps/s", "ours by it", "lifted", "in PhysX and renderer"),
+        header=(
+            "one core", "grasps/s", "ours by it", "lifted", "in PhysX and renderer",
+            "in friction on the table",
+        ),
         rows=[
             (
                 row.program, f"{rate[row.program]:.2f}", f"{rate[ours.program] / rate[row.program]:.2f}",
                 f"{row.lifted / row.grasps:.1%}", f"{row.inside / row.seconds:.1%}",
+                f"{row.friction / row.seconds:.1%}",
             )
             for row in rows
         ],
@@ -375,6 +384,7 @@ def report(
         "ours_over_maniskill_same_physics": same,
         "ours_over_raw": raw,
         "engine_share": round(ours.inside / ours.seconds, 3),
+        "friction_share": round(ours.friction / ours.seconds, 3),
         "grasps_per_s_core": round(rate[ours.program], 2),
     }
     if rates:
