@@ -7,6 +7,7 @@ says whether the surface reaches the finger tips and the palm. A coarse image an
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -72,21 +73,22 @@ class HandFeatures(nn.Module):
         super().__init__()
         layers: list[nn.Module] = []
         before = self.n_channels = 4
+        rows, columns = shape
         for number, (width, n_blocks) in enumerate(zip(widths, blocks or [0] * len(widths), strict=True)):
             kernel = 5 if number == 0 else 3
             layers += [nn.Conv2d(before, width, kernel, stride=2, padding=kernel // 2), nn.ReLU(inplace=True)]
             layers += [ResidualBlock(width) for _ in range(n_blocks)]
-            before = width
+            before, rows, columns = width, (rows + 1) // 2, (columns + 1) // 2
         self.convolutions = nn.Sequential(*layers, nn.Flatten())
-        with torch.no_grad():
-            n_flat = self.convolutions(torch.zeros(1, self.n_channels, *shape)).shape[1]
+        n_flat = before * rows * columns
         self.image = nn.Sequential(nn.Linear(n_flat, config.trunk_width), nn.ReLU(inplace=True))
         self.action = nn.Sequential(nn.Linear(4, config.action_width), nn.ReLU(inplace=True))
         self.n_features = config.trunk_width + config.action_width
         self.mixed_precision = False
-        scale = 1 / torch.tensor([_EDGE, _NEAR, _EDGE, _HIGH])
+        # By numpy: torch needs a second to load what it computes with where tensors are shapes alone.
+        scale = np.float32(1) / np.array([_EDGE, _NEAR, _EDGE, _HIGH], dtype=np.float32)
         self.channel_scale: Tensor
-        self.register_buffer("channel_scale", scale[:, None, None], persistent=False)
+        self.register_buffer("channel_scale", torch.tensor(scale.tolist())[:, None, None], persistent=False)
         self.action_scale: Tensor
         self.register_buffer("action_scale", torch.tensor(normalisation.action_scale), persistent=False)
 

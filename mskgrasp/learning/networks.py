@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -100,9 +102,9 @@ class GraspQualityNetwork(nn.Module):
         super().__init__()
         self.features = make_features(config, normalisation, quality=True)
         self.head = _head(self.features.n_features, config, 2)
-        odds = normalisation.base_rate / (1 - normalisation.base_rate)
+        log_odds = math.log(normalisation.base_rate / (1 - normalisation.base_rate))
         self.log_prior_odds: Tensor
-        self.register_buffer("log_prior_odds", torch.tensor(odds).log(), persistent=False)
+        self.register_buffer("log_prior_odds", torch.tensor(log_odds), persistent=False)
 
     def forward(self, patches: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:
         """Logits (n, 2) of failure and success among balanced data.
@@ -155,9 +157,9 @@ class GraspDisplacementNetwork(nn.Module):
         self.target_std: Tensor
         self.register_buffer("target_mean", torch.tensor(normalisation.target_mean), persistent=False)
         self.register_buffer("target_std", torch.tensor(normalisation.target_std), persistent=False)
-        metres, radians = config.least_std
+        metres, radians = (float(np.float32(std) ** 2) for std in config.least_std)
         self.least_variance: Tensor
-        floor = torch.tensor([metres, metres, metres, radians, radians, radians])[:n_outputs].square()
+        floor = torch.tensor([metres, metres, metres, radians, radians, radians])[:n_outputs]
         self.register_buffer("least_variance", floor, persistent=False)
 
     def forward(

@@ -1,4 +1,6 @@
 import json
+import subprocess
+import sys
 
 import pytest
 import torch
@@ -119,3 +121,13 @@ def test_descriptions_that_list_both_architectures_are_read(folder):
     assert load_models(folder).meta.network == SMALL
     change_description(folder, lambda values: values["network"].pop("architecture"))
     assert load_models(folder).meta.network == SMALL
+
+
+def test_reading_a_model_does_not_load_what_torch_computes_shapes_with():
+    """It takes a second: any arithmetic on tensors without numbers loads it."""
+    program = (
+        "import sys; from mskgrasp.learning.grasp_models import load_models; load_models(); "
+        "print('sympy' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
