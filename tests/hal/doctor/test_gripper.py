@@ -16,6 +16,7 @@ from hal.doctor.gripper import Grip, NotMeasured, closing_speed
 from hal.replay import recorded_cell
 from mskgrasp.core.geometry import Pose
 from tests.hal.franka.robots import FakeRobot, robot_for, write_cell
+from tests.hal.real_cell import REAL, REPLAYED
 from tests.hal.replay.toy import toy_cell
 from tests.programs import run_here
 
@@ -77,20 +78,6 @@ def test_a_file_stays_as_it_is_where_nothing_is_held_or_the_operator_stops(
             done = run_here(doctor.main, "--cell", str(path), "--gripper")
             assert done.returncode == code and words in done.stderr, done.stderr
         assert path.read_bytes() == before
-
-
-REAL = """type: devices
-arm: {driver: franky, host: 127.0.0.1, robot: fr3}
-camera: {driver: kinect2, calibration: a}
-"""
-
-
-REPLAYED = """\
-type: devices
-arm: {driver: replay, recording: a.h5}
-camera: {driver: replay, recording: a.h5}
-workspace: {table_z: 0.0}
-"""
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from hal.replay import recorded_cell
 from hal.touch import run as touch
 from hal.touch import touches
 from tests.hal.franka.robots import robot_for, write_cell
+from tests.hal.real_cell import REAL, REPLAYED
 from tests.hal.replay.toy import toy_cell
 from tests.hal.touch.tables import CELLS, feeling_cell, simulated_file, tilted
 from tests.programs import run_here
@@ -122,20 +123,6 @@ def test_a_table_that_is_not_found_writes_nothing(tmp_path: Path, monkeypatch: p
     done = run_here(touch.main, "--cell", str(CELLS / "mujoco.yaml"), "--out", str(tmp_path / "out"), *QUICK)
     assert done.returncode == 1 and "met no table" in done.stderr and done.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
-
-
-REAL = """type: devices
-arm: {driver: franky, host: 127.0.0.1, robot: fr3}
-camera: {driver: kinect2, calibration: a}
-"""
-
-
-REPLAYED = """\
-type: devices
-arm: {driver: replay, recording: a.h5}
-camera: {driver: replay, recording: a.h5}
-workspace: {table_z: 0.0}
-"""
 
 
 @pytest.mark.parametrize(
