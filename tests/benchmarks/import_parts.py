@@ -59,11 +59,12 @@ def main() -> None:
         parser.error(
             f"no file of {options.folder} becomes a part: {'; '.join(no_bodies[:3]) or 'none found'}"
         )
-    tables = [_files(outcomes), _summary(outcomes, no_bodies)]
+    tables = [_summary(outcomes, no_bodies), _files(outcomes)]
     if options.speed_up:
         files = [outcome.path for outcome in outcomes]
-        tables.append(_speed_up(files, cast("Unit | None", options.unit), options.speed_up))
-    show(tables, options.out)
+        tables.insert(1, _speed_up(files, cast("Unit | None", options.unit), options.speed_up))
+    n = f"{len(outcomes)} watertight files; {len(no_bodies)} others were not counted"
+    show(tables, options.out, {"n": n})
 
 
 def measure(folder: Path, unit: Unit | None, every: int = 1) -> tuple[list[Outcome], list[str]]:
@@ -110,7 +111,7 @@ def _no_body(path: Path, unit: Unit | None) -> str:
 
 def _files(outcomes: Sequence[Outcome]) -> Table:
     header = ("file", "grade", "hulls", "error p95 mm", "volume", "processor s")
-    return Table(header=header, rows=[_row(one) for one in outcomes])
+    return Table(header=header, rows=[_row(one) for one in outcomes], caption="Files")
 
 
 def _row(one: Outcome) -> tuple[object, ...]:
@@ -139,7 +140,8 @@ def _summary(outcomes: Sequence[Outcome], others: Sequence[str]) -> Table:
         ("processor s a file, 90 %", f"{np.quantile(seconds, 0.9):.1f}"),
         ("processor s, all", f"{seconds.sum():.0f}"),
     ]
-    return Table(header=("of all files", ""), rows=[*rows, *(("not counted", line) for line in others)])
+    rows += [("not counted", line) for line in others]
+    return Table(header=("of all files", ""), rows=rows, caption="All files")
 
 
 def _speed_up(files: Sequence[Path], unit: Unit | None, workers: int) -> Table:
@@ -158,7 +160,7 @@ def _speed_up(files: Sequence[Path], unit: Unit | None, workers: int) -> Table:
     same = "yes" if contents[0] == contents[1] else "no"
     rows = [(f"{n} processes, s", f"{s:.0f}") for n, s in zip((1, workers), seconds, strict=True)]
     rows += [("speed-up", f"{seconds[0] / seconds[1]:.2f}"), ("the same bytes", same)]
-    return Table(header=("wall time", ""), rows=rows)
+    return Table(header=("wall time", ""), rows=rows, caption="One process and several")
 
 
 def _options(unit: Unit | None) -> ImportOptions:
