@@ -146,7 +146,6 @@ class ArmContract:
     def test_a_hand_that_meets_nothing_arrives(self, cell: Cell):
         target = touched(cell) @ BACK
         cell.arm.move_gripper(0.0)
-        cell.arm.move_to_pose(target @ BACK @ BACK, speed=0.5)
         assert cell.arm.move_until_contact(target @ BACK, speed=0.05) is None
         assert cell.arm.move_until_contact(target, speed=0.05) is None
         assert pose_distance(cell.arm.state().T_base_tcp, target)[0] < POSITION_TOLERANCE

@@ -37,7 +37,7 @@ from tests.hal.franka.wire import Table, ask_for_priority
 _LATE_S = 0.005
 _TURN_S = 3e-4
 _AT_REST_TICKS, _RESTING = 200, 4
-"""A robot that was told nothing for so many ticks simulates one of so many: two thirds of them are such."""
+"""A robot that was told nothing for so many ticks simulates one of so many, and sends its state as often."""
 _CARTESIAN_REFLEX = 7
 ANSWERS = {
     "ok": GripperCommandStatus.kSuccess,
