@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from itertools import pairwise
 
 import numpy as np
@@ -26,11 +26,15 @@ SETTLE_S = 0.15
 AIR_HZ = 125
 """Simulation steps a second while an empty hand is in free air."""
 AIR_GAP = 0.02
-"""Least distance of the empty hand from all else in free air, m: at 0.4 m/s it takes 50 ms to cross it."""
+"""Least distance of the empty hand from all below it in free air, m: at 0.4 m/s it crosses that in 50 ms."""
 PAD_GAP = 0.004
-"""Distance of the pads from a part at which closing fingers leave free air, m: more than their run-up."""
+"""Distance of the pads from a part between them in free air, m: more than the run-up of closing fingers."""
+TABLE_GAP = 0.006
+"""Least height of pads that pass a part in free air over the table and what lies beside, m."""
 STOP_CHECK_S = 0.02
 """Time between two checks whether a wait was stopped, s."""
+_SAME_PLACE, _SAME_TURN = 1e-4, 1e-3
+"""Differences of poses of the hand on a vertical line, m and rad: those of the kinematics' solutions."""
 
 
 class _Met(Exception):
@@ -96,27 +100,33 @@ class SapienArm(SimulatedArm[SapienWorld]):
         """
         motion = self._world.env.motion
         path = _interpolate(waypoints, torch.from_numpy(minimum_jerk_steps(motion.n_steps(seconds))))
-        # In free air long steps do: what the arm does there nothing feels.
-        in_air = self._in_air(path)
-        ends = [*(np.flatnonzero(np.diff(in_air)) + 1).tolist(), len(path)]
+        rates = self._rates(path)
+        ends = [*(np.flatnonzero(np.diff(rates)) + 1).tolist(), len(path)]
         pressed = self._pressed()
         for begin, end in pairwise([0, *ends]):
-            if in_air[begin]:
-                with self._coarsely():
-                    every = self._world.physics.rate_hz // motion.rate_hz
-                    picked = [*range(begin + every - 1, end - 1, every), end - 1]
-                    pressed = self._follow_piece(path[picked], pressed, limit)
-            else:
-                pressed = self._follow_piece(path[begin:end], pressed, limit)
-        self._pause(SETTLE_S, bool(in_air[-1]))
+            every = motion.rate_hz // int(rates[begin])
+            picked = [*range(begin + every - 1, end - 1, every), end - 1]
+            with self._at(int(rates[begin])):
+                pressed = self._follow_piece(path[picked], pressed, limit)
+        self._pause(SETTLE_S, int(rates[-1]))
 
-    def _in_air(self, path: Tensor) -> np.ndarray:
-        """(n,) whether the hand is empty and far from all else at joints (n, 7).
+    def _rates(self, path: Tensor) -> np.ndarray:
+        """(n,) simulation steps a second at joints (n, 7) of a motion: few where nothing can touch the hand.
 
-        A part in the hand feels the steps: pads that press a thin sheet may oscillate in long ones.
+        A part in the hand feels the steps: the longer they are, the farther it swings where friction barely
+        holds it. One that has been released may still fall or rock.
         """
-        heights = forward(path)[0][:, 2, 3].numpy()
-        return (heights - PAD_REACH > self._world.top() + AIR_GAP) & (self._force == 0)
+        world = self._world
+        hands = forward(path)[0].numpy()
+        lowest = hands[:, 2, 3] - PAD_REACH
+        if self._force > 0 or not world.at_rest():
+            return np.full(len(hands), world.physics.rate_hz)
+        air = lowest > world.top() + AIR_GAP
+        if not air.all() and _is_vertical(hands):
+            reach = world.reach(Pose.from_matrix(hands[lowest.argmin()]))
+            if reach is not None and reach + PAD_GAP <= float(world.env.motion.fingers().min()):
+                air |= lowest > world.floor() + TABLE_GAP
+        return np.where(air, min(AIR_HZ, world.physics.rate_hz), world.physics.rate_hz)
 
     def _pressed(self) -> float:
         """Force on hand and part, N, before a motion with a held part."""
@@ -140,16 +150,19 @@ class SapienArm(SimulatedArm[SapienWorld]):
             raise contact_fault(reflex_force) if touch is None or self._stop.is_set() else _Met
         return pressed
 
-    def _pause(self, seconds: float, in_air: bool) -> None:
-        """Let time pass; coarsely in free air."""
+    def _pause(self, seconds: float, rate_hz: int) -> None:
+        """Let time pass at a rate."""
         motion = self._world.env.motion
-        with self._coarsely() if in_air else nullcontext():
+        with self._at(rate_hz):
             motion.step(motion.n_steps(seconds))
 
     @contextmanager
-    def _coarsely(self) -> Iterator[None]:
-        """Long steps, in free air."""
-        with self._world.env.motion.coarsely(AIR_HZ), self._world.parts_kept_still():
+    def _at(self, rate_hz: int) -> Iterator[None]:
+        """Simulate at a rate; what lies at rest stays where it is in long steps."""
+        if rate_hz == self._world.physics.rate_hz:
+            yield
+            return
+        with self._world.env.motion.coarsely(rate_hz), self._world.parts_kept_still():
             yield
 
     def _target(self) -> Tensor:
@@ -160,12 +173,29 @@ class SapienArm(SimulatedArm[SapienWorld]):
         )
 
     def _move_gripper(self, width: float) -> None:
-        motion = self._world.env.motion
-        free = bool(self._in_air(self._target()[None])[0])
+        motion, lag = self._world.env.motion, self._force / self._world.physics.finger_stiffness
         self._force = 0.0
         motion.hold(False)
-        with self._coarsely() if free else nullcontext():
+        # Pads that press have their targets far inside the part: they press as much with targets less far in.
+        motion.set_fingers(motion.finger_target.clip(motion.fingers().min() - lag))
+        with self._at(self._leave_part(width / 2)):
             motion.move_fingers(width / 2, check=self._stop.is_set)
+
+    def _leave_part(self, goal: float) -> int:
+        """Open the fingers as far as a part between them requires; return the rate of the rest of their way.
+
+        Args:
+            goal: Where they are to go, metres from the middle.
+        """
+        world, motion = self._world, self._world.env.motion
+        hand, fine = self._state().T_base_tcp, world.physics.rate_hz
+        if hand.position[2] - PAD_REACH <= world.top() + AIR_GAP:
+            reach = world.reach(hand)
+            if reach is None or reach + PAD_GAP > goal:
+                return fine
+            if float(motion.fingers().min()) < reach + PAD_GAP:
+                motion.move_fingers(reach + PAD_GAP, check=self._stop.is_set)
+        return min(AIR_HZ, fine) if world.at_rest() else fine
 
     def _grasp(self, force: float) -> GraspOutcome:
         env = self._world.env
@@ -174,7 +204,7 @@ class SapienArm(SimulatedArm[SapienWorld]):
         reach = self._world.reach(state.T_base_tcp)
         # Fingers that are as near already, as those of a hand that holds the part, must not open.
         if reach is not None and reach + PAD_GAP < state.gripper_width / 2:
-            with env.motion.coarsely(AIR_HZ):
+            with self._at(min(AIR_HZ, self._world.physics.rate_hz)):
                 env.motion.move_fingers(reach + PAD_GAP, check=self._stop.is_set)
         self._force = force
         env.motion.move_fingers(-MAX_OPENING / 2, force=force, check=self._stop.is_set)
@@ -183,11 +213,11 @@ class SapienArm(SimulatedArm[SapienWorld]):
         return GraspOutcome(width=state.gripper_width, holding=self.holds(state))
 
     def _wait(self, seconds: float) -> None:
-        in_air = bool(self._in_air(self._target()[None])[0])
+        rate_hz = int(self._rates(self._target()[None])[0])
         for _ in range(max(1, round(seconds / STOP_CHECK_S))):
             if self._stop.is_set():
                 return
-            self._pause(STOP_CHECK_S, in_air)
+            self._pause(STOP_CHECK_S, rate_hz)
 
     def _recover(self) -> None:
         """Nothing to reset in a simulator; the drives restart from the current joints."""
@@ -202,3 +232,10 @@ def _interpolate(waypoints: Tensor, share: Tensor) -> Tensor:
     index = where.floor().long().clamp(max=len(waypoints) - 2)
     rest = (where - index)[:, None]
     return waypoints[index] * (1 - rest) + waypoints[index + 1] * rest
+
+
+def _is_vertical(hands: np.ndarray) -> bool:
+    """Whether poses (n, 4, 4) of the hand lie straight above one another."""
+    turned = np.abs(hands[:, :3, :3] - hands[:1, :3, :3]).max()
+    aside = np.abs(hands[:, :2, 3] - hands[:1, :2, 3]).max()
+    return bool(turned < _SAME_TURN and aside < _SAME_PLACE)

@@ -170,10 +170,21 @@ class SapienWorld(SimulatedWorld):
                 body.set_linear_velocity([0.0, 0.0, 0.0])
                 body.set_angular_velocity([0.0, 0.0, 0.0])
 
+    def at_rest(self) -> bool:
+        """Whether the part that was presented last is at rest."""
+        return _is_still(_rigid(self.env.part))
+
+    def floor(self) -> float:
+        """Height of the highest point of the table in the region, and of the parts beside it, m."""
+        x_min, x_max, y_min, y_max = self.region
+        table = np.array([[x, y, TABLE_Z] for x in (x_min, x_max) for y in (y_min, y_max)])
+        if self.table_motion is not None:
+            table = self.table_motion.apply(table)
+        return max(float(corners[:, 2].max()) for corners in [table, *map(self._corners, self._beside)])
+
     def top(self) -> float:
-        """Height of the highest point of the parts on the table, m."""
-        bodies = [*self._beside, self._present]
-        return max([TABLE_Z, *(float(self._corners(one)[:, 2].max()) for one in bodies)])
+        """Height of the highest point of the table and of all parts, m."""
+        return max(self.floor(), float(self._corners(self._present)[:, 2].max()))
 
     def reach(self, T_base_tcp: Pose) -> float | None:
         """Greatest distance of the parts between the open pads from the middle between the pads, m.
