@@ -15,19 +15,20 @@ if TYPE_CHECKING:
 def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:
     """Load a part; a built-in one is built and a CAD file imported the first time, which takes seconds.
 
-    A CAD file becomes a part of its name with the density of steel, and replaces an import of that name made
-    of another file or with other options; name the part itself to use it as imported.
+    A CAD file that was imported before is the part that it became then, with the density given then. Another
+    one becomes a part of its name with the density of steel, in place of one imported from another file.
 
     Args:
         source: Name of a part, a part folder, or an STL, OBJ, PLY, GLB, 3MF or STEP file.
-        unit: Unit of a CAD file's coordinates; None: that of the format, or mm where it states none.
+        unit: Unit of a CAD file's coordinates; None: that of the import, or of the format, or mm where it
+            states none.
 
     Raises:
         UnknownPart: There is no such part; the message lists similar names.
         BadPart: The file or folder cannot be used as a part.
     """
     if Path(source).is_file():
-        from mskgrasp.parts.importing.import_file import import_part  # loads CoACD, which takes a while
+        from mskgrasp.parts.importing.import_file import part_of_file  # loads CoACD, which takes a while
 
-        return import_part(Path(source), unit=unit)
+        return part_of_file(Path(source), unit=unit)
     return find_part(source)

@@ -63,7 +63,9 @@ def present(cell: Cell, part: str, seed: int) -> None:
 
 
 def part_name(text: str, unit: Unit | None = None) -> str:
-    """Resolve a user's name, folder or CAD file to a part's name or folder; a CAD file is imported first.
+    """Resolve a user's name, folder or CAD file to a part's name or folder.
+
+    A CAD file is the part that was imported from it; one that was not is imported, as steel.
 
     The name of a shipped example refers to that file where the current folder has no such file.
 
@@ -77,6 +79,6 @@ def part_name(text: str, unit: Unit | None = None) -> str:
         path = example
     if not path.is_file():
         return text
-    from mskgrasp.parts.importing.import_file import import_part  # most parts need no decomposition
+    from mskgrasp.parts.importing.import_file import part_of_file  # most parts need no decomposition
 
-    return import_part(path, unit=unit).name
+    return part_of_file(path, unit=unit).name

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import re
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import trimesh
@@ -84,10 +86,8 @@ def import_file(
     check_density(density)
     name = legal_name(path.stem if name is None else name)
     content = read_content(path)
-    versions = stamp("part", PART_VERSION), stamp("import", IMPORT_VERSION)
-    recipe = [family, unit, float(density), licence, bodies, path.name, *versions]
-    digest = hashlib.sha256(json.dumps(recipe).encode() + hashlib.sha256(content).digest()).hexdigest()
-
+    sha256 = hashlib.sha256(content).digest()
+    digest = _recipe_hash(path, sha256, family, unit, density, licence, bodies)
     if bodies != "split":
         _check_available(name, check_name)
         known = _known(name, digest)
@@ -125,6 +125,37 @@ def import_file(
 def import_part(path: Path, **options: object) -> Part:
     """The part of a file that holds one; the options are those of import_file."""
     return import_file(path, **options).parts[0]  # pyright: ignore[reportArgumentType]
+
+
+def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
+    """The part of a CAD file that a program is given: as it was imported from it, else imported as steel.
+
+    Args:
+        path: As in `import_file`.
+        unit: As in `import_file`; a part imported with another one counts only where this is None.
+
+    Raises:
+        BadPart: As in `import_file`.
+    """
+    folder = store.parts_folder() / legal_name(path.stem)
+    stored = store.stored_recipe_hash(folder)
+    if stored is not None:
+        known, sha256 = store.read_part(folder), hashlib.sha256(read_content(path)).digest()
+        units = (None, *get_args(Unit)) if unit is None else (unit,)
+        for its_unit, bodies in itertools.product(units, get_args(Bodies)):
+            options = known.family, its_unit, known.density, known.licence, bodies
+            if _recipe_hash(path, sha256, *options) == stored:
+                return known
+    return import_part(path, unit=unit)
+
+
+def _recipe_hash(
+    path: Path, sha256: bytes, family: str, unit: Unit | None, density: float, licence: str, bodies: Bodies
+) -> str:
+    """Identifier of a file's content, ``sha256``, with the options of its import."""
+    versions = stamp("part", PART_VERSION), stamp("import", IMPORT_VERSION)
+    recipe = [family, unit, float(density), licence, bodies, path.name, *versions]
+    return hashlib.sha256(json.dumps(recipe).encode() + sha256).hexdigest()
 
 
 def check_density(density: float) -> None:

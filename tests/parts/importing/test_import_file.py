@@ -9,7 +9,7 @@ from build123d import Box, Cylinder, export_step
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import find_part
-from mskgrasp.parts.importing.import_file import import_file, import_part, legal_name
+from mskgrasp.parts.importing.import_file import import_file, import_part, legal_name, part_of_file
 
 
 def bracket() -> trimesh.Trimesh:
@@ -72,6 +72,19 @@ def test_the_same_file_is_not_imported_twice_and_a_changed_one_replaces_the_part
     assert (import_part(file).folder / "part.json").stat().st_mtime_ns == made
     trimesh.creation.box((40, 30, 25)).export(file)
     assert import_part(file).mass > first.mass
+
+
+def test_a_file_that_a_program_is_given_is_the_part_that_was_imported_from_it(tmp_path):
+    file = tmp_path / "box.stl"
+    trimesh.creation.box((4, 3, 2)).export(file)
+    assert part_of_file(file).density == 7850.0
+    light = import_part(file, unit="mm", density=1050.0, licence="MIT", bodies="union")
+    assert part_of_file(file).content_hash == part_of_file(file, unit="mm").content_hash == light.content_hash
+    assert part_of_file(file, unit="in").longest_axis == pytest.approx(0.004 * 25.4)
+    assert part_of_file(file).longest_axis == pytest.approx(0.004 * 25.4)  # as it was imported last
+    trimesh.creation.box((4, 3, 2.5)).export(file)
+    assert part_of_file(file).extents == pytest.approx([0.004, 0.003, 0.0025])  # another file
+    assert part_of_file(file).density == 7850.0
 
 
 def write_open(file: Path) -> None:
