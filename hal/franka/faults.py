@@ -49,7 +49,7 @@ def explain(error: BaseException, driver: DriverName, host: str) -> errors.HalEr
     if name.startswith("IncompatibleVersion"):
         return errors.IncompatibleDriver(
             f"{host}: {text.rstrip('.')}; the installed {_WHEELS[driver]} is for another robot or system "
-            "version: docs/real_cell.md says which wheel fits"
+            "version: docs/real_cell.md says which driver package fits"
         )
     if any(part in low for part in _NO_ROBOT):
         return errors.NotConnected(

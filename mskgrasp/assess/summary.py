@@ -85,7 +85,7 @@ class Row:
         if self.means == "networks":
             return "the networks"
         if n == 0:
-            return "the networks, for want of a certified grasp"
+            return "the networks (no certified grasp)"
         return (
             "certified grasps" if n == of else f"certified grasps in {n} of {of} attempts, else the networks"
         )

@@ -24,7 +24,7 @@ def test_a_robot_of_another_version_is_reported_with_the_remedy(
     driver: DriverName, version: int, tmp_path: Path
 ):
     with fci5(version=version) as robot:
-        with pytest.raises(IncompatibleDriver, match="which wheel fits") as caught:
+        with pytest.raises(IncompatibleDriver, match="which driver package fits") as caught:
             arm_at(tmp_path, driver, robot.host).connect()
         assert "\n" not in str(caught.value)
 
