@@ -54,7 +54,7 @@ def test_long_steps_leave_a_part_in_the_hand_and_on_the_table_as_short_ones_do(
                     for (_, last), (rate, height) in pairwise(way)
                     if rate == hal.sim.arm.AIR_HZ and height < top and abs(height - last) > 1e-4
                 ]
-                assert len(heights) > 5 and min(heights) > hal.sim.arm.TABLE_GAP - 2e-4
+                assert len(heights) > 5 and min(heights) > 0.0058
         go_home(cell)
     assert steps[0] < 0.65 * steps[1]
     for coarse, fine in (hands, placed):
