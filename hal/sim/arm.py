@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import pairwise
 
 import numpy as np
 import torch
@@ -24,15 +23,19 @@ from tasks.robot.reflex import Reflex
 SETTLE_S = 0.15
 """Settling time of the drives at the end of a motion, s."""
 AIR_HZ = 125
-"""Simulation steps a second while an empty hand is in free air."""
+"""Simulation steps a second while nothing can touch the empty hand."""
 AIR_GAP = 0.02
 """Least distance of the empty hand from all below it in free air, m: at 0.4 m/s it crosses that in 50 ms."""
 PAD_GAP = 0.004
 """Distance of the pads from a part between them in free air, m: more than the run-up of closing fingers."""
 TABLE_GAP = 0.006
 """Least height of pads that pass a part in free air over the table and what lies beside, m."""
+LOOK_S = 0.1
+"""Time after which it is looked again whether parts that moved are at rest, s."""
 STOP_CHECK_S = 0.02
 """Time between two checks whether a wait was stopped, s."""
+_ARRIVED = 0.001
+"""Greatest distance of fingers that have moved from where they were to go, m."""
 _SAME_PLACE, _SAME_TURN = 1e-4, 1e-3
 """Differences of poses of the hand on a vertical line, m and rad: those of the kinematics' solutions."""
 
@@ -100,33 +103,36 @@ class SapienArm(SimulatedArm[SapienWorld]):
         """
         motion = self._world.env.motion
         path = _interpolate(waypoints, torch.from_numpy(minimum_jerk_steps(motion.n_steps(seconds))))
-        rates = self._rates(path)
-        ends = [*(np.flatnonzero(np.diff(rates)) + 1).tolist(), len(path)]
-        pressed = self._pressed()
-        for begin, end in pairwise([0, *ends]):
-            every = motion.rate_hz // int(rates[begin])
-            picked = [*range(begin + every - 1, end - 1, every), end - 1]
-            with self._at(int(rates[begin])):
+        clear = self._clear(path)
+        pressed, begin = self._pressed(), 0
+        while begin < len(path):
+            coarse = bool(clear[begin]) and self._world.at_rest()
+            end = begin + int(np.argmin(np.append(clear[begin:] == clear[begin], False)))
+            if clear[begin] and not coarse:
+                end = min(end, begin + motion.n_steps(LOOK_S))
+            with self._coarsely(coarse):
+                every = self._world.physics.rate_hz // motion.rate_hz
+                picked = [*range(begin + every - 1, end - 1, every), end - 1]
                 pressed = self._follow_piece(path[picked], pressed, limit)
-        self._pause(SETTLE_S, int(rates[-1]))
+            begin = end
+        self._pause(SETTLE_S, bool(clear[-1]))
 
-    def _rates(self, path: Tensor) -> np.ndarray:
-        """(n,) simulation steps a second at joints (n, 7) of a motion: few where nothing can touch the hand.
+    def _clear(self, path: Tensor) -> np.ndarray:
+        """(n,) whether the hand is empty, and nothing can touch it, at joints (n, 7) of a motion.
 
         A part in the hand feels the steps: the longer they are, the farther it swings where friction barely
-        holds it. One that has been released may still fall or rock.
+        holds it.
         """
-        world = self._world
-        hands = forward(path)[0].numpy()
+        if self._force > 0:
+            return np.zeros(len(path), dtype=bool)
+        world, hands = self._world, forward(path)[0].numpy()
         lowest = hands[:, 2, 3] - PAD_REACH
-        if self._force > 0 or not world.at_rest():
-            return np.full(len(hands), world.physics.rate_hz)
-        air = lowest > world.top() + AIR_GAP
-        if not air.all() and _is_vertical(hands):
+        clear = lowest > world.top() + AIR_GAP
+        if not clear.all() and is_vertical(hands):
             reach = world.reach(Pose.from_matrix(hands[lowest.argmin()]))
             if reach is not None and reach + PAD_GAP <= float(world.env.motion.fingers().min()):
-                air |= lowest > world.floor() + TABLE_GAP
-        return np.where(air, min(AIR_HZ, world.physics.rate_hz), world.physics.rate_hz)
+                clear |= lowest > world.top_beside() + TABLE_GAP
+        return clear
 
     def _pressed(self) -> float:
         """Force on hand and part, N, before a motion with a held part."""
@@ -150,19 +156,19 @@ class SapienArm(SimulatedArm[SapienWorld]):
             raise contact_fault(reflex_force) if touch is None or self._stop.is_set() else _Met
         return pressed
 
-    def _pause(self, seconds: float, rate_hz: int) -> None:
-        """Let time pass at a rate."""
+    def _pause(self, seconds: float, clear: bool) -> None:
+        """Let time pass; coarsely if nothing can touch the hand and no part moves."""
         motion = self._world.env.motion
-        with self._at(rate_hz):
+        with self._coarsely(clear and self._world.at_rest()):
             motion.step(motion.n_steps(seconds))
 
     @contextmanager
-    def _at(self, rate_hz: int) -> Iterator[None]:
-        """Simulate at a rate; what lies at rest stays where it is in long steps."""
-        if rate_hz == self._world.physics.rate_hz:
+    def _coarsely(self, coarse: bool) -> Iterator[None]:
+        """If asked for, take long steps, in which parts at rest stay where they are."""
+        if not coarse:
             yield
             return
-        with self._world.env.motion.coarsely(rate_hz), self._world.parts_kept_still():
+        with self._world.env.motion.coarsely(AIR_HZ), self._world.parts_kept_still():
             yield
 
     def _target(self) -> Tensor:
@@ -173,29 +179,25 @@ class SapienArm(SimulatedArm[SapienWorld]):
         )
 
     def _move_gripper(self, width: float) -> None:
-        motion, lag = self._world.env.motion, self._force / self._world.physics.finger_stiffness
-        self._force = 0.0
-        motion.hold(False)
-        # Pads that press have their targets far inside the part: they press as much with targets less far in.
-        motion.set_fingers(motion.finger_target.clip(motion.fingers().min() - lag))
-        with self._at(self._leave_part(width / 2)):
-            motion.move_fingers(width / 2, check=self._stop.is_set)
-
-    def _leave_part(self, goal: float) -> int:
-        """Open the fingers as far as a part between them requires; return the rate of the rest of their way.
-
-        Args:
-            goal: Where they are to go, metres from the middle.
-        """
         world, motion = self._world, self._world.env.motion
-        hand, fine = self._state().T_base_tcp, world.physics.rate_hz
-        if hand.position[2] - PAD_REACH <= world.top() + AIR_GAP:
-            reach = world.reach(hand)
-            if reach is None or reach + PAD_GAP > goal:
-                return fine
+        lag, self._force = self._force / world.physics.finger_stiffness, 0.0
+        motion.hold(False)
+        # Pads that press have their targets far inside the part. With these they press as much, and leave it
+        # at once instead of after the ramp to its surface.
+        motion.set_fingers(motion.finger_target.clip(motion.fingers().min() - lag))
+        goal, hand = width / 2, self._state().T_base_tcp
+        clear = bool(hand.position[2] - PAD_REACH > world.top() + AIR_GAP)
+        reach = world.reach(hand)
+        if not clear and reach is not None and reach + PAD_GAP <= goal:
             if float(motion.fingers().min()) < reach + PAD_GAP:
                 motion.move_fingers(reach + PAD_GAP, check=self._stop.is_set)
-        return min(AIR_HZ, fine) if world.at_rest() else fine
+                self._pause(LOOK_S, False)
+                reach = world.reach(hand)
+            # The part may have followed them.
+            clear = reach is not None and reach + PAD_GAP - _ARRIVED <= float(motion.fingers().min())
+        if not self._stop.is_set():
+            with self._coarsely(clear and world.at_rest()):
+                motion.move_fingers(goal, check=self._stop.is_set)
 
     def _grasp(self, force: float) -> GraspOutcome:
         env = self._world.env
@@ -203,8 +205,8 @@ class SapienArm(SimulatedArm[SapienWorld]):
         state = self._state()
         reach = self._world.reach(state.T_base_tcp)
         # Fingers that are as near already, as those of a hand that holds the part, must not open.
-        if reach is not None and reach + PAD_GAP < state.gripper_width / 2:
-            with self._at(min(AIR_HZ, self._world.physics.rate_hz)):
+        if reach is not None and reach + PAD_GAP < state.gripper_width / 2 and self._world.at_rest():
+            with self._coarsely(True):
                 env.motion.move_fingers(reach + PAD_GAP, check=self._stop.is_set)
         self._force = force
         env.motion.move_fingers(-MAX_OPENING / 2, force=force, check=self._stop.is_set)
@@ -213,11 +215,11 @@ class SapienArm(SimulatedArm[SapienWorld]):
         return GraspOutcome(width=state.gripper_width, holding=self.holds(state))
 
     def _wait(self, seconds: float) -> None:
-        rate_hz = int(self._rates(self._target()[None])[0])
+        clear = bool(self._clear(self._target()[None])[0])
         for _ in range(max(1, round(seconds / STOP_CHECK_S))):
             if self._stop.is_set():
                 return
-            self._pause(STOP_CHECK_S, rate_hz)
+            self._pause(STOP_CHECK_S, clear)
 
     def _recover(self) -> None:
         """Nothing to reset in a simulator; the drives restart from the current joints."""
@@ -234,8 +236,9 @@ def _interpolate(waypoints: Tensor, share: Tensor) -> Tensor:
     return waypoints[index] * (1 - rest) + waypoints[index + 1] * rest
 
 
-def _is_vertical(hands: np.ndarray) -> bool:
-    """Whether poses (n, 4, 4) of the hand lie straight above one another."""
+def is_vertical(hands: np.ndarray) -> bool:
+    """Whether poses (n, 4, 4) of a hand that points down lie straight above one another."""
     turned = np.abs(hands[:, :3, :3] - hands[:1, :3, :3]).max()
     aside = np.abs(hands[:, :2, 3] - hands[:1, :2, 3]).max()
-    return bool(turned < _SAME_TURN and aside < _SAME_PLACE)
+    tilted = np.abs(hands[:, :2, 2]).max()
+    return bool(max(turned, tilted) < _SAME_TURN and aside < _SAME_PLACE)

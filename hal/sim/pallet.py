@@ -13,7 +13,7 @@ from mskgrasp.parts import Part
 from tasks.scene.frames import base_pose
 from tasks.scene.part_actor import add_part
 
-_FALLEN = 0.05
+FALLEN = 0.05
 """A part this far below the table has fallen off it, m."""
 
 
@@ -31,7 +31,7 @@ def outside(region: Region, bodies: list[Lying]) -> list[tuple[Lying, sapien.Pos
     found = []
     for lying in bodies:
         x, y, z = base_pose(lying.body).position[0].tolist()
-        if z > TABLE_Z - _FALLEN and not (x_min <= x <= x_max and y_min <= y <= y_max):
+        if z > TABLE_Z - FALLEN and not (x_min <= x <= x_max and y_min <= y <= y_max):
             found.append((lying, lying.body.pose.sp))
     return found
 

@@ -13,14 +13,14 @@ import numpy as np
 import sapien
 import torch
 from mani_skill.utils.structs.actor import Actor
-from sapien.physx import PhysxRigidDynamicComponent
 
 from hal.errors import NotConnected
 from hal.sim.board import show_board
 from hal.sim.colour import FineColour
-from hal.sim.pallet import Lying, outside, restore
+from hal.sim.pallet import FALLEN, Lying, outside, restore
+from hal.sim.rest import RestWatch, rigid_component
 from hal.sim.tape import stick_tape
-from hal.simulated import SimulatedWorld
+from hal.simulated import SimulatedWorld, panda_limits
 from mskgrasp.core.errors import TapeDoesNotFit
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.settings import TABLE_Z, Physics, Tape
@@ -30,9 +30,6 @@ from tasks import GraspDisplacementEnv
 from tasks.attempt.clearance import hand_clearance
 from tasks.scene.frames import base_pose, to_world
 from tasks.scene.renderer import render_backend
-
-STILL_SPEED, STILL_TURN = 0.002, 0.05
-"""A part slower than this, m/s and rad/s, is at rest."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -52,6 +49,7 @@ class SapienWorld(SimulatedWorld):
     _beside: list[Lying] = field(default_factory=list, init=False)
     _hull_corners: dict[str, list[np.ndarray]] = field(default_factory=dict, init=False)
     _gym: gymnasium.Env | None = field(default=None, init=False)
+    _rest: RestWatch = field(default_factory=RestWatch, init=False)
 
     @property
     def env(self) -> GraspDisplacementEnv:
@@ -105,6 +103,8 @@ class SapienWorld(SimulatedWorld):
             restore(self.env.scene, lying, pose, number, 2 * self.physics.friction_table_part)
             for number, (lying, pose) in enumerate(staying)
         ]
+        self._rest = RestWatch()
+        self._rest.look(self.env.motion.seconds, self._bodies, touched=False)
         self.env.motion.place(torch.as_tensor(self.home, dtype=torch.float64)[None])
         self.env.motion.step(self.env.motion.n_steps(self.physics.settle_s))
         if self.tape is not None:
@@ -112,13 +112,16 @@ class SapienWorld(SimulatedWorld):
             stick_tape(entity, self.env.parts[0], self.part_pose().quat_wxyz, self.tape)
 
     def _watch_motions(self) -> None:
-        """Have the scene's motions, which are built with it, call `watch`, too."""
+        """Have the scene's motions, which are built with it, look at the parts and call `watch`, too."""
         motion = self.env.motion
         judged = motion.watch
 
         def passed(seconds: float) -> None:
             if judged is not None:
                 judged(seconds)
+            contacts = self.env.contacts
+            touched = contacts.near() and bool(np.any(contacts.load()))
+            self._rest.look(seconds, self._bodies, touched=touched)
             self.call_watch()
 
         motion.watch = passed
@@ -158,8 +161,7 @@ class SapienWorld(SimulatedWorld):
 
         A part that stands on an edge or on teeth creeps in long steps: a pinion shaft by 5 mm/s at 125 Hz.
         """
-        bodies = [_rigid(lying.body) for lying in [*self._beside, self._present]]
-        still = [body for body in bodies if _is_still(body)]
+        still = [rigid_component(body) for body in self._bodies if self._rest.at_rest(body)]
         for body in still:
             body.set_locked_motion_axes([True] * 6)
         try:
@@ -171,20 +173,22 @@ class SapienWorld(SimulatedWorld):
                 body.set_angular_velocity([0.0, 0.0, 0.0])
 
     def at_rest(self) -> bool:
-        """Whether the part that was presented last is at rest."""
-        return _is_still(_rigid(self.env.part))
+        """Whether all parts are at rest; those that fell off the table do not count."""
+        bodies = [body for body in self._bodies if _pose_of(body).position[2] > TABLE_Z - FALLEN]
+        return all(map(self._rest.at_rest, bodies))
 
-    def floor(self) -> float:
-        """Height of the highest point of the table in the region, and of the parts beside it, m."""
-        x_min, x_max, y_min, y_max = self.region
-        table = np.array([[x, y, TABLE_Z] for x in (x_min, x_max) for y in (y_min, y_max)])
+    def top_beside(self) -> float:
+        """Height of the highest point of the table and of the parts beside the one presented last, m."""
+        limits = panda_limits()
+        low, high = limits.box_lower, limits.box_upper
+        table = np.array([[x, y, TABLE_Z] for x in (low[0], high[0]) for y in (low[1], high[1])])
         if self.table_motion is not None:
             table = self.table_motion.apply(table)
         return max(float(corners[:, 2].max()) for corners in [table, *map(self._corners, self._beside)])
 
     def top(self) -> float:
         """Height of the highest point of the table and of all parts, m."""
-        return max(self.floor(), float(self._corners(self._present)[:, 2].max()))
+        return max(self.top_beside(), float(self._corners(self._present)[:, 2].max()))
 
     def reach(self, T_base_tcp: Pose) -> float | None:
         """Greatest distance of the parts between the open pads from the middle between the pads, m.
@@ -203,6 +207,10 @@ class SapienWorld(SimulatedWorld):
         return found.reach if found.free and found.reach > 0 else None
 
     @property
+    def _bodies(self) -> list[Actor]:
+        return [lying.body for lying in [*self._beside, self._present]]
+
+    @property
     def _present(self) -> Lying:
         return Lying(self.env.parts[0], self.env.part)
 
@@ -219,17 +227,6 @@ class SapienWorld(SimulatedWorld):
     def part_pose(self) -> Pose:
         """``T_base_obj`` of the part, the simulator's ground truth."""
         return _pose(self._present)
-
-
-def _rigid(body: Actor) -> PhysxRigidDynamicComponent:
-    found = body._objs[0].find_component_by_type(PhysxRigidDynamicComponent)
-    assert isinstance(found, PhysxRigidDynamicComponent)
-    return found
-
-
-def _is_still(body: PhysxRigidDynamicComponent) -> bool:
-    slow = float(np.linalg.norm(body.linear_velocity)) < STILL_SPEED
-    return slow and float(np.linalg.norm(body.angular_velocity)) < STILL_TURN
 
 
 def _pose(lying: Lying) -> Pose:

@@ -24,8 +24,8 @@ class Physics(Config):
     coarse_rate_hz: int = Field(default=500, ge=100)
     """Steps a second, at most ``rate_hz``, during lift and hold, and while a part that is not held comes to
     rest. The first 6 mm of the lift, in which the part leaves the table, and the last 20 ms before the part's
-    pose in the hand is measured use ``rate_hz``, as does the simulated cell (`hal.sim`) while its hand holds
-    a part or is near one. At 250 Hz parts swing in the hand, by up to 13 degrees more than at 1000 Hz."""
+    pose in the hand is measured use ``rate_hz``, as does the simulated cell (`hal.sim`) unless nothing can
+    touch its hand. At 250 Hz parts swing in the hand, by up to 13 degrees more than at 1000 Hz."""
     position_iterations: int = Field(default=50, ge=4)
     """Solver iterations a step; `validate` compares them."""
     hold_iterations: int = Field(default=50, ge=4)

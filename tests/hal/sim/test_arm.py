@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import pytest
 import sapien
+from scipy.spatial.transform import Rotation
 
 import hal.sim.arm
 from hal import Cell, execute_grasp, go_home, put_down
 from hal.sim import SapienCellConfig, sapien_cell
+from hal.sim.arm import is_vertical
 from hal.sim.world import SapienWorld
 from mskgrasp.core.geometry import pose_distance
-from mskgrasp.core.grasp import Grasp
+from mskgrasp.core.grasp import PAD_REACH, Grasp
 from tests.hal.watching import check_watching
 
 
@@ -34,49 +37,101 @@ def test_long_steps_leave_a_part_in_the_hand_and_on_the_table_as_short_ones_do(
             for gap in ("AIR_GAP", "PAD_GAP", "TABLE_GAP"):
                 monkeypatch.setattr(hal.sim.arm, gap, np.inf)
         cell.feeder.present(part, 1)
-        made = _count_steps(cell.feeder, monkeypatch)
+        top, made = cell.feeder.top(), _recorded_steps(cell, monkeypatch)
         before = cell.tracker.part_pose().position
         grasp = Grasp.from_vector(np.array([before[0] + offset[0], before[1] + offset[1], 0.0115, 0.3]))
         result = execute_grasp(cell, grasp)
         assert result.holding
+        descent = len(made)
         hands.append(result.T_base_tcp.inverse() @ cell.tracker.part_pose())
         put_down(cell, grasp, opening=0.0)
         placed.append(cell.tracker.part_pose())
         steps.append(len(made))
+        if far:  # past the part, but not near the table; on the way down to the hinge a finger meets it
+            for way in (made[:descent], made[descent:])[part == "hinge_60x30" :]:
+                heights = [
+                    height
+                    for (_, last), (rate, height) in pairwise(way)
+                    if rate == hal.sim.arm.AIR_HZ and height < top and abs(height - last) > 1e-4
+                ]
+                assert len(heights) > 5 and min(heights) > hal.sim.arm.TABLE_GAP - 2e-4
         go_home(cell)
-    assert steps[0] < 0.7 * steps[1]
+    assert steps[0] < 0.65 * steps[1]
     for coarse, fine in (hands, placed):
         moved, turned = pose_distance(coarse, fine)
         assert moved < 0.2e-3 and np.degrees(turned) < 0.3
 
 
-def test_a_part_that_still_falls_is_simulated_finely(cell: Cell, monkeypatch):
+def _recorded_steps(cell: Cell, monkeypatch) -> list[tuple[int, float]]:
+    """A list that gets rate and height of the pads, m, at each further step of the present simulation."""
+    made: list[tuple[int, float]] = []
     assert isinstance(cell.feeder, SapienWorld)
-    cell.feeder.present("hex_nut_m30", 1)
-    made = _count_steps(cell.feeder, monkeypatch)
-    cell.arm.wait(0.1)
-    assert set(made) == {hal.sim.arm.AIR_HZ}
-    pose = cell.feeder.env.part.pose.sp
-    cell.feeder.env.part.set_pose(sapien.Pose(pose.p + [0.0, 0.0, 0.02], pose.q))
-    cell.feeder.env.motion.step()
-    assert not cell.feeder.at_rest()
-    made.clear()
-    cell.arm.wait(0.1)
-    assert set(made) == {cell.feeder.physics.rate_hz}
-    assert cell.feeder.at_rest()
+    motion = cell.feeder.env.motion
+    step = motion.step
 
-
-def _count_steps(world: SapienWorld, monkeypatch) -> list[int]:
-    """A list that gets the rate of each further step of the present simulation."""
-    made: list[int] = []
-    step = world.env.motion.step
-
-    def counted(n_steps: int = 1) -> None:
-        made.extend([world.env.motion.rate_hz] * n_steps)
+    def recorded(n_steps: int = 1) -> None:
+        height = float(cell.arm.state().T_base_tcp.position[2]) - PAD_REACH
+        made.extend([(motion.rate_hz, height)] * n_steps)
         step(n_steps)
 
-    monkeypatch.setattr(world.env.motion, "step", counted)
+    monkeypatch.setattr(motion, "step", recorded)
     return made
+
+
+def test_while_a_part_falls_or_one_beside_moves_all_steps_are_short(cell: Cell, monkeypatch):
+    assert isinstance(cell.feeder, SapienWorld)
+    world, fine = cell.feeder, {cell.feeder.physics.rate_hz}
+    world.present("hex_nut_m30", 1)
+    x, y = world.part_pose().position[:2]
+    world.env.part.set_pose(sapien.Pose(world.env.part.pose.sp.p - np.array([x - 0.45, y + 0.25, 0.0])))
+    world.present("hex_nut_m20", 2, keep=True)
+    made = _recorded_steps(cell, monkeypatch)
+    cell.arm.wait(0.1)
+    assert {rate for rate, _ in made} == {hal.sim.arm.AIR_HZ}
+    (beside,) = (body for name, body in world.env.scene.actors.items() if "beside" in name)
+    for body in (world.env.part, beside):
+        pose = body.pose.sp
+        body.set_pose(sapien.Pose(pose.p + [0.0, 0.0, 0.02], pose.q))
+        world.env.motion.step(3)
+        assert not world.at_rest()
+        made.clear()
+        cell.arm.wait(0.1)
+        assert {rate for rate, _ in made} == fine
+        cell.arm.wait(0.1)
+        assert world.at_rest()
+
+
+def test_pads_that_press_let_go_at_once_and_the_part_is_at_rest_when_it_is_free(cell: Cell):
+    assert isinstance(cell.feeder, SapienWorld)
+    world = cell.feeder
+    world.present("hex_nut_m30", 1)
+    x, y, _ = world.part_pose().position
+    first = execute_grasp(cell, Grasp.from_vector(np.array([x, y, 0.0115, 0.3])))
+    put_down_at = world.env.motion.seconds
+    assert first.holding and not world.at_rest()
+    cell.arm.move_gripper(first.width + 0.004)
+    # 2 mm a finger, the pads' own way back out of what they pressed, and the time to see that they stand.
+    assert world.env.motion.seconds - put_down_at < 0.04 + 0.1 + 0.1
+    cell.arm.move_gripper(0.08)
+    go_home(cell)
+
+
+def test_a_hand_moves_straight_down_only_if_it_points_down():
+    def poses(*changes: tuple[float, float, float]) -> np.ndarray:
+        made = np.tile(np.diag([1.0, -1.0, -1.0, 1.0]), (len(changes) + 1, 1, 1))
+        made[:, 2, 3] = np.linspace(0.2, 0.1, len(made))
+        for pose, (aside, turn, tilt) in zip(made[1:], changes, strict=True):
+            pose[0, 3] = aside
+            pose[:3, :3] = pose[:3, :3] @ Rotation.from_euler("zx", [turn, tilt]).as_matrix()
+        return made
+
+    straight = (0.0, 0.0, 0.0)
+    assert is_vertical(poses(straight, straight))
+    for other in ((0.001, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, 0.01)):
+        assert not is_vertical(poses(straight, other))
+    leaning = poses(straight)
+    leaning[:, :3, :3] = leaning[:, :3, :3] @ Rotation.from_euler("x", 0.1).as_matrix()
+    assert not is_vertical(leaning)
 
 
 def test_a_second_grasp_presses_harder_and_does_not_drop_the_part(cell: Cell):

@@ -103,7 +103,7 @@ def test_what_lies_beside_the_region_counts_for_height_and_room(world: SapienWor
     put(world, 0.45, 0.25)
     world.present(str(block.folder), 0, keep=True)
     world.env.part.set_pose(sapien.Pose(p=to_world(np.array([0.5, 0.0, -1.0]))))
-    assert world.top() == world.floor() == pytest.approx(0.03, abs=1e-4)
+    assert world.top() == world.top_beside() == pytest.approx(0.03, abs=1e-4)
     assert world.reach(pose_base_tcp(np.array([0.45, 0.25, 0.02, 0.0]))) == pytest.approx(0.010, abs=1e-4)
     world.present(str(block.folder), 0)
     assert world.reach(pose_base_tcp(np.array([0.45, 0.25, 0.02, 0.0]))) is None
@@ -118,8 +118,8 @@ def test_a_part_lies_on_a_table_with_an_error(block: Part):
         with cell.arm:
             assert isinstance(cell.tracker, SapienWorld)
             poses.append(cell.tracker.part_pose())
-            floors.append(cell.tracker.floor())
-    assert np.diff(floors)[0] == pytest.approx(0.003 + 0.01 * (config.region[1] - 0.5), abs=1e-5)
+            floors.append(cell.tracker.top_beside())
+    assert np.diff(floors)[0] == pytest.approx(0.003 + 0.01 * (0.75 - 0.5), abs=1e-5)
     level, moved = poses
     rise = 0.003 + 0.01 * (moved.position[0] - 0.5)
     assert moved.position[2] - level.position[2] == pytest.approx(rise, abs=2e-4)
