@@ -1,4 +1,4 @@
-"""Whether parts on the table are at rest, from their motion over some tenths of a second."""
+"""Watch that tells parts at rest on the table from moving ones, by their motion between looks 20 ms apart."""
 
 from __future__ import annotations
 

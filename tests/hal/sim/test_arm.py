@@ -107,11 +107,11 @@ def test_pads_that_press_let_go_at_once_and_the_part_is_at_rest_when_it_is_free(
     world.present("hex_nut_m30", 1)
     x, y, _ = world.part_pose().position
     first = execute_grasp(cell, Grasp.from_vector(np.array([x, y, 0.0115, 0.3])))
-    put_down_at = world.env.motion.seconds
+    held_until = world.env.motion.seconds
     assert first.holding and not world.at_rest()
     cell.arm.move_gripper(first.width + 0.004)
     # 2 mm a finger, the pads' own way back out of what they pressed, and the time to see that they stand.
-    assert world.env.motion.seconds - put_down_at < 0.04 + 0.1 + 0.1
+    assert world.env.motion.seconds - held_until < 0.04 + 0.1 + 0.1
     cell.arm.move_gripper(0.08)
     go_home(cell)
 

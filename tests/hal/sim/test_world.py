@@ -111,15 +111,15 @@ def test_what_lies_beside_the_region_counts_for_height_and_room(world: SapienWor
 
 def test_a_part_lies_on_a_table_with_an_error(block: Part):
     """3 mm higher, and by the slope more or less where the part lies."""
-    poses, floors = [], []
+    poses, tops = [], []
     for error in (TableError(), TableError(height=0.003, slope=(0.01, 0.0))):
         config = SapienCellConfig(type="sapien", part=str(block.folder), table_error=error)
         cell = sapien_cell(config)
         with cell.arm:
             assert isinstance(cell.tracker, SapienWorld)
             poses.append(cell.tracker.part_pose())
-            floors.append(cell.tracker.top_beside())
-    assert np.diff(floors)[0] == pytest.approx(0.003 + 0.01 * (0.75 - 0.5), abs=1e-5)
+            tops.append(cell.tracker.top_beside())
+    assert np.diff(tops)[0] == pytest.approx(0.003 + 0.01 * (0.75 - 0.5), abs=1e-5)
     level, moved = poses
     rise = 0.003 + 0.01 * (moved.position[0] - 0.5)
     assert moved.position[2] - level.position[2] == pytest.approx(rise, abs=2e-4)
