@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import torch
-
 from hal.cell import Cell
 from hal.errors import HalError
 from mskgrasp.core.shipped import example_file
 from mskgrasp.core.units import Unit
+from mskgrasp.learning.compute_device import compute_device
 from mskgrasp.learning.grasp_models import Models, load_models, require_hand
 from mskgrasp.learning.label_source import other_conditions, source_text
 from mskgrasp.parts.catalogue import require_name
@@ -24,9 +23,8 @@ def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
     Raises:
         BadModel: The model cannot be used, or was made for another hand than the arm's.
     """
-    device = "cuda" if torch.cuda.is_available() else "cpu"
     workspace = cell.workspace
-    loaded = load_models(models, device)
+    loaded = load_models(models, compute_device())
     require_hand(loaded.meta, cell.arm.limits.gripper.geometry, models)
     return Planner(
         loaded,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tyro
 from pydantic import Field
 
 from mskgrasp.core.config import check_config, read_config
 from mskgrasp.core.shipped import config_file
+from mskgrasp.learning.compute_device import DeviceName
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.network_config import NetworkConfig, PatchNetworkConfig
 
@@ -27,7 +28,7 @@ class TrainConfig(LearningConfig):
     """The model's folder. A run that was interrupted resumes when it is started again in the same way."""
     epochs: int | None = Field(default=None, ge=1)
     """Epochs of each network, in place of gqn.epochs and gdn.epochs."""
-    device: Literal["auto", "cpu", "cuda"] = "auto"
+    device: DeviceName = "auto"
     """auto: a CUDA device where there is one."""
 
 

@@ -12,12 +12,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import is_leftover, write_whole
 from mskgrasp.dataset.fingerprint import dataset_fingerprint
+from mskgrasp.learning.compute_device import compute_device
 from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, read_meta, save_model
 from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.model_metrics import EpochMetrics
@@ -90,7 +89,7 @@ def run_training(config: TrainConfig) -> int:
         (out / CHECKPOINT).unlink(missing_ok=True)
         print(f"{out} is trained already; choose another --out to train again")
         return 0
-    device = _device(config.device)
+    device = compute_device(config.device)
     samples = _read(config, config.data)
     sides = split(samples, config)
     print(
@@ -158,16 +157,6 @@ def _warn_of_few(n_attempts: int, n_parts: int) -> None:
             f"warning: {n_attempts} attempts at {n_parts} parts are few to learn from, and the figures will "
             f"say little; collect {FEW_ATTEMPTS} at {FEW_PARTS} parts or more"
         )
-
-
-def _device(name: str) -> torch.device:
-    available = torch.cuda.is_available()
-    if name == "cuda" and not available:
-        raise UsageError("--device cuda: no CUDA device is available; legal here: auto, cpu")
-    if name == "cpu" or not available:
-        return torch.device("cpu")
-    torch.backends.cudnn.deterministic = True  # the same seed gives the same weights
-    return torch.device("cuda", 0)
 
 
 def _read(config: TrainConfig, data: Path) -> Samples:
