@@ -19,10 +19,11 @@ class Normalised(nn.Module):
     def __init__(self, layer: nn.Conv2d | nn.Linear):
         super().__init__()
         self.layer = layer
+        device = layer.weight.device
         self.norm = (
-            nn.BatchNorm2d(layer.out_channels)
+            nn.BatchNorm2d(layer.out_channels, device=device)
             if isinstance(layer, nn.Conv2d)
-            else nn.BatchNorm1d(layer.out_features)
+            else nn.BatchNorm1d(layer.out_features, device=device)
         )
 
     def forward(self, values: Tensor) -> Tensor:
