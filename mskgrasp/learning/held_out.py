@@ -22,7 +22,8 @@ from mskgrasp.learning.model_metrics import (
 )
 from mskgrasp.learning.samples import Samples
 
-_CHUNK = 64
+_CHUNK = {"cpu": 64, "cuda": 4096}
+"""Samples in a batch, by the device: a CPU's cache is small, a GPU's kernels take long to start."""
 AXES = ("x", "y", "z", "theta", "swing_x", "swing_y")
 """Predicted components; the last two by networks that predict the swing alone."""
 _REPEATS = 200
@@ -41,7 +42,7 @@ def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.
             samples.centre_grasp[r].to(models.device),
             samples.height[r].to(models.device),
         )
-        for r in rows.split(_CHUNK)
+        for r in rows.split(_CHUNK[models.device.type])
     ]
     return torch.cat(pieces).cpu().double().numpy()
 
@@ -51,7 +52,7 @@ def predict_grasp_displacement(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Predict mean and variance (n, k) of `Samples.targets`; without a variance it is NaN."""
     means, variances = [], []
-    for r in rows.split(_CHUNK):
+    for r in rows.split(_CHUNK[models.device.type]):
         mean, variance = models.grasp_displacement(
             samples.displacement_patches_of(r, models.device),
             samples.centre_grasp[r].to(models.device),

@@ -89,6 +89,11 @@ class Samples:
     def __len__(self) -> int:
         return len(self.success)
 
+    def on(self, device: torch.device | str) -> Samples:
+        """The same samples with every array on a device."""
+        moved = {name: values.to(device) for name, values in vars(self).items() if isinstance(values, Tensor)}
+        return replace(self, **moved)
+
     def patches_of(self, rows: Tensor, device: torch.device | str) -> Tensor:
         """Get patches (n, 1, r, c) of some rows in metres on a device."""
         return self.patches[rows].to(device).float() * HEIGHT_STEP

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 import zlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from mskgrasp.learning.checkpoint import (
     write_checkpoint,
 )
 from mskgrasp.learning.config import LearningConfig
+from mskgrasp.learning.cuda_graphs import GraphedStep
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.network_config import Normalisation
@@ -113,6 +115,8 @@ class Stage:
         self.name = name
         self.models, self.samples, self.config = models, samples, config
         self.training_rows, self.rows = sides.training, sides.validation
+        self.seen = samples.on(models.device)
+        self.noise = torch.Generator(models.device)
         network = models.gqn if name == "gqn" else models.gdn
         network.features.mixed_precision = config.mixed_precision
         self.network: GraspQualityNetwork | GraspDisplacementNetwork = network
@@ -126,7 +130,10 @@ class Stage:
             if self.n_samples < 2:
                 raise BadDataset("batch_norm: true needs two successes at the training parts; collect more")
             add_batch_norms(network.features)
+        on_a_gpu = models.device.type == "cuda"
         parameters, rate = list(self.network.parameters()), self.settings.learning_rate
+        if on_a_gpu:  # what a graph reads has to lie there
+            rate = torch.tensor(rate, device=models.device)
         self.optimiser: torch.optim.Optimizer
         if self.settings.optimiser == "adam":
             layers = [one for one in parameters if one.ndim > 1]
@@ -135,10 +142,15 @@ class Stage:
                 {"params": layers, "weight_decay": self.settings.weight_decay},
                 {"params": others, "weight_decay": 0.0},
             ]
-            self.optimiser = torch.optim.AdamW(groups, lr=rate)
+            self.optimiser = torch.optim.AdamW(groups, lr=rate, capturable=on_a_gpu)
         else:
             # Keras's constants: the paper's learning rate was chosen for them.
-            self.optimiser = torch.optim.RMSprop(parameters, lr=rate, alpha=0.9, eps=1e-7)
+            self.optimiser = torch.optim.RMSprop(
+                parameters, lr=rate, alpha=0.9, eps=1e-7, capturable=on_a_gpu
+            )
+        self._take_step: Callable[[Tensor], Tensor] = self._step
+        if on_a_gpu:
+            self._take_step = GraphedStep(self._step, network, self.optimiser, self.noise)
 
     def learning_rate(self, step: int) -> float:
         """Compute the learning rate of a step, counted from the start of training."""
@@ -157,15 +169,14 @@ class Stage:
         # Every epoch seeds its own generators, so that a checkpoint needs to store only its number.
         seed = zlib.crc32(f"{self.config.seed} {self.name} {number}".encode())
         order = torch.Generator().manual_seed(seed)
-        noise = torch.Generator(device).manual_seed(seed)
+        self.noise.manual_seed(seed)
         losses = []
         with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
             torch.manual_seed(seed)  # dropout takes no generator
             self.network.train()
-            for index, rows in enumerate(self.order(order).tensor_split(self.batches)):
-                for group in self.optimiser.param_groups:
-                    group["lr"] = self.learning_rate(number * self.batches + index)
-                losses.append(self.learn(rows, noise))
+            for index, rows in enumerate(self.order(order).to(device).tensor_split(self.batches)):
+                self._set_rate(self.learning_rate(number * self.batches + index))
+                losses.append(self.learn(rows))
                 if not math.isfinite(losses[-1]):
                     raise TrainingDiverged(
                         f"the {self.name}'s loss became {losses[-1]} in epoch {number + 1}; train into "
@@ -194,30 +205,30 @@ class Stage:
             rows = kinds[0]
         return rows[torch.randperm(len(rows), generator=generator)]
 
-    def batch(self, rows: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    def batch(self, rows: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Get patches, object centres, displacements and successes of some rows.
 
         Augmented by rotation, mirroring and noise, on the networks' device.
         """
-        s, device = self.samples, self.models.device
+        s, device = self.seen, self.models.device
         if self.name == "gqn":
             patches = s.quality_patches_of(rows, device, self.config.network)
         else:
             patches = s.displacement_patches_of(rows, device)
-        centre = s.centre_grasp[rows].to(device)
-        target = s.targets(rows, self.config.network).to(device)
+        centre, target = s.centre_grasp[rows], s.targets(rows, self.config.network)
         if self.config.symmetric:
-            patches, centre, target = mirror_and_turn(patches, centre, target, generator)
+            patches, centre, target = mirror_and_turn(patches, centre, target, self.noise)
         if self.config.noise_std > 0:
-            patches = with_noise(patches, self.config.noise_std, generator)
-        return patches, centre, target, s.success[rows].to(device)
+            patches = with_noise(patches, self.config.noise_std, self.noise)
+        return patches, centre, target, s.success[rows]
 
-    def learn(self, rows: Tensor, generator: torch.Generator) -> float:
+    def learn(self, rows: Tensor) -> float:
         """Take one step of the optimiser; return the loss before it."""
-        patches, centre, target, success = self.batch(rows, generator)
-        height, theta = (
-            values[rows].to(patches.device) for values in (self.samples.height, self.samples.theta)
-        )
+        return float(self._take_step(rows))
+
+    def _step(self, rows: Tensor) -> Tensor:
+        patches, centre, target, success = self.batch(rows)
+        height, theta = self.seen.height[rows], self.seen.theta[rows]
         if self.name == "gqn":
             loss = nn.functional.cross_entropy(self.models.gqn(patches, centre, height), success.long())
         else:
@@ -225,7 +236,14 @@ class Stage:
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         self.optimiser.step()
-        return float(loss.detach())
+        return loss.detach()
+
+    def _set_rate(self, rate: float) -> None:
+        for group in self.optimiser.param_groups:
+            if isinstance(group["lr"], Tensor):
+                group["lr"].fill_(rate)
+            else:
+                group["lr"] = rate
 
     def finish(self, weights: dict[str, Tensor]) -> None:
         """Give the network the weights of an epoch and its final layers; nothing can be learned after it."""

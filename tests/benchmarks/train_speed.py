@@ -69,16 +69,16 @@ def measure(samples: Samples, config: LearningConfig, device: str, seconds: floa
     return rates | {"share": 1 - rates["gqn"] / preparing}
 
 
-def rate(stage: Stage, work: Callable[[torch.Tensor, torch.Generator], object], seconds: float) -> float:
+def rate(stage: Stage, work: Callable[[torch.Tensor], object], seconds: float) -> float:
     """Samples/s of some work on a stage's batches, the first few not counted."""
-    order, noise = torch.Generator().manual_seed(0), torch.Generator(stage.models.device).manual_seed(0)
+    order = torch.Generator().manual_seed(0)
     done, began = -3, 0.0
     batch = stage.settings.batch_size
     while done < 1 or time.perf_counter() - began < seconds:
-        for rows in stage.order(order).split(batch):
+        for rows in stage.order(order).to(stage.models.device).split(batch):
             if done == 0:
                 began = time.perf_counter()
-            work(rows, noise)
+            work(rows)
             done += 1
             if done > 0 and time.perf_counter() - began > seconds:
                 break

@@ -172,7 +172,7 @@ def test_decay_shrinks_weights_of_layers_by_its_share_of_the_rate_and_no_biases(
         torch.manual_seed(0)
         models = build_models(describe_networks(samples, sides.training, config))
         before = {name: value.clone() for name, value in models.gqn.named_parameters()}
-        Stage("gqn", models, samples, sides, config).learn(rows, torch.Generator().manual_seed(0))
+        Stage("gqn", models, samples, sides, config).learn(rows)
         after[decay] = models.gqn.state_dict()
     for name, value in before.items():
         shrunk = 0.005 * value if value.ndim > 1 else torch.zeros_like(value)
@@ -200,7 +200,7 @@ def test_a_picture_of_the_whole_part_is_that_of_the_samples(dataset):
     sides = split(samples, config)
     models = build_models(describe_networks(samples, sides.training, config))
     stage = Stage("gdn", models, samples, sides, config)
-    inputs = stage.batch(rows, torch.Generator().manual_seed(0))[0]
+    inputs = stage.batch(rows)[0]
     assert inputs.shape == (8, 1, 40, 40)
 
 
