@@ -71,7 +71,8 @@ def crop_patches(
     """
     height, width = heights.shape[-2:]
     n_columns = n_columns or n_pixels
-    axes = _patch_axes(grasps.to(heights.device), intrinsics, T_base_camera)
+    # Where the grasps are: dozens of numbers are computed on a CPU before a GPU has started.
+    axes = _patch_axes(grasps, intrinsics, T_base_camera).to(heights.device)
     along, across = (
         (torch.arange(n, device=heights.device, dtype=torch.float32) - (n - 1) / 2) * (side / n_pixels)
         for n in (n_pixels, n_columns)

@@ -30,7 +30,7 @@ class PlannerConfig(Config):
     """Among the best grasps by variance, try those as well in which the part would hardly move: the same ones
     at the place where it would come to lie between the pads."""
     chunk_size: int = Field(default=400, ge=1, le=65_536)
-    """Greatest number of grasps in a batch: many more do not fit a CPU's cache, few have too much overhead.
+    """Greatest number of grasps in a CPU's batch: many more do not fit its cache, few have too much overhead.
     (The paper's network, with patches seven times larger, is fastest with 32.)"""
 
     @property

@@ -26,6 +26,8 @@ _BATCHES = 4
 """Batches that grasps are shared out among, whatever the number of cores: rounding depends on their sizes."""
 _FEWEST = 2
 """Batches of however few grasps: with a single one the other cores wait."""
+_ON_A_GPU = 8192
+"""Most grasps in a batch on a GPU: its kernels take longer to start than to run."""
 _SMALL = 48
 """Views of grasps in a batch; fewer cost more time for each."""
 
@@ -149,13 +151,19 @@ class _Batch(NamedTuple):
 def _batches(
     models: Models, scene: Scene, grasps: np.ndarray, size: int, small: int = _SMALL
 ) -> Iterator[_Batch]:
-    """Generate equal batches of at most ``size`` grasps: `_BATCHES`, or fewer where they would be small."""
+    """Generate equal batches of at most ``size`` grasps: `_BATCHES`, or fewer where they would be small.
+
+    On a GPU they are as large as possible.
+    """
     values = np.column_stack(
         [centre_in_grasp_frame(scene.view.centre_base, grasps), grasps[:, 2] - scene.table_z, grasps[:, 3]]
     )
     known = torch.as_tensor(values, dtype=torch.float32, device=models.device)
-    n_batches = max(_FEWEST, min(_BATCHES, len(grasps) // small), -(-len(grasps) // size))
-    size = max(1, -(-len(grasps) // n_batches))
+    if models.device.type == "cuda":
+        size = _ON_A_GPU
+    else:
+        n_batches = max(_FEWEST, min(_BATCHES, len(grasps) // small), -(-len(grasps) // size))
+        size = max(1, -(-len(grasps) // n_batches))
     for start in range(0, len(grasps), size):
         rows = slice(start, start + size)
         yield _Batch(rows, known[rows, :3], known[rows, 3], known[rows, 4])

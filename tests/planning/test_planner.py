@@ -65,6 +65,18 @@ def test_the_same_generator_gives_the_same_plan_whatever_the_number_of_threads()
         assert np.array_equal(other.shortlist_scores, plans[0].shortlist_scores)
 
 
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
+def test_a_gpu_finds_as_good_a_grasp_as_a_cpu():
+    plans = [
+        Planner(load_models(device=device), PlannerConfig(n_candidates=600), table_z=0.0, region=REGION).plan(
+            FRAME, np.random.default_rng(5)
+        )
+        for device in ("cpu", "cuda")
+    ]
+    assert np.allclose(plans[1].qualities, plans[0].qualities, atol=1e-5)
+    assert plans[1].score == pytest.approx(plans[0].score, rel=1e-3)
+
+
 def test_one_view_of_the_best_qualities_says_which_are_seen_in_all():
     def plan(**settings: Any) -> GraspPlan:
         config = PlannerConfig(n_candidates=1000, top_fraction=0.06, recentre=False, **settings)
