@@ -15,13 +15,14 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from mskgrasp.core.errors import UsageError
+from mskgrasp.learning.compute_device import DeviceName
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.label_source import source_text
 from mskgrasp.learning.samples import Samples
@@ -134,7 +135,8 @@ def main() -> int:
     names = [samples.parts[number] for number in torch.unique(samples.part[groups.known]).tolist()]
     (options.out / "known_parts.txt").write_text("\n".join(names) + "\n", encoding="utf-8")
     if options.estimate:
-        show([cost_table(choices, looks, groups.sides, seconds=options.measure)], None)
+        table = cost_table(choices, looks, groups.sides, seconds=options.measure, device=options.device)
+        show([table], None)
         return 0
     tables, scores = compare(
         choices,
@@ -145,6 +147,8 @@ def main() -> int:
         out=options.out,
         lowess_data=options.lowess_data,
         measure_s=0.1 if options.quick else 2.0,
+        device=options.device,
+        at_once=options.at_once,
     )
     trainings = {choice.name: len(choice.seeds(seeds)) for choice in choices}
     values = {"scores": scores, "seeds": trainings, "quick": options.quick, "share": options.share} | facts(
@@ -195,6 +199,8 @@ def compare(
     out: Path,
     lowess_data: Path | None,
     measure_s: float = 2.0,
+    device: DeviceName = "cpu",
+    at_once: int = 1,
 ) -> tuple[list[Table], dict[str, dict[str, dict[str, Any]]]]:
     """Train what is missing, and score everything.
 
@@ -208,6 +214,8 @@ def compare(
         out: Folder of the trainings.
         lowess_data: Dataset that LOWESS is fitted to; None: it is left out.
         measure_s: Seconds for which a network's steps are measured to predict the time left.
+        device: Device of the networks.
+        at_once: Trainings at a time.
 
     Returns:
         Tables, and `Scores` by group and model as plain values.
@@ -221,6 +229,8 @@ def compare(
         groups=measured,
         out=out,
         measure_s=measure_s,
+        device=device,
+        at_once=at_once,
     )
     samples = looks.of(choices[0].config.network)
     kept, success = torch.isin(groups.novel, groups.pooled), samples.success[groups.novel].numpy()
@@ -297,6 +307,11 @@ def _options() -> argparse.Namespace:
         "--lowess-data", type=Path,
         help="dataset of 1000 attempts at each of the parts in known_parts.txt; without it no LOWESS",
     )  # fmt: skip
+    parser.add_argument(
+        "--device", choices=get_args(DeviceName), default="cpu",
+        help="auto: a GPU where there is one (default cpu)",
+    )  # fmt: skip
+    parser.add_argument("--at-once", type=int, default=1, help="trainings at a time (default 1)")
     add_cost_options(parser)
     return parser.parse_args()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from mskgrasp.learning.trainer import Reporter
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.conftest import Boxes
 from tests.benchmarks.training_cost import cost_of, cost_table
-from tests.benchmarks.trainings import make_trainings
+from tests.benchmarks.trainings import TrainingFailed, make_trainings
 from tests.learning.small import SHORT
 
 CONFIG = SHORT.model_copy(update={"sides": "catalogue"})
@@ -38,11 +39,12 @@ def sides(looks: Looks) -> Sides:
     return split(looks.of(CONFIG.network), CONFIG)
 
 
-def made(looks: Looks, sides: Sides, out: Path, choices: list[Choice], seeds: int = 1):
+def made(looks: Looks, sides: Sides, out: Path, choices: list[Choice], seeds: int = 1, at_once: int = 1):
     groups = {"validation": sides.validation}
     return make_trainings(
-        choices, seeds=seeds, looks=looks, sides=sides, groups=groups, out=out, measure_s=0.01
-    )
+        choices, seeds=seeds, looks=looks, sides=sides, groups=groups, out=out, measure_s=0.01,
+        at_once=at_once,
+    )  # fmt: skip
 
 
 def test_a_choice_can_take_the_quality_network_of_another(looks, sides, tmp_path):
@@ -89,6 +91,25 @@ def test_a_stopped_training_goes_on_to_the_same_predictions(looks, sides, tmp_pa
     assert not (folder / "checkpoint.safetensors").exists()
 
 
+def test_trainings_in_processes_of_their_own_are_the_same(looks, sides, tmp_path):
+    in_turn = made(looks, sides, tmp_path / "in_turn", [OWN, OTHER], seeds=2)
+    at_once = made(looks, sides, tmp_path / "at_once", [OWN, OTHER], seeds=2, at_once=3)
+    for name, seeds in in_turn.items():
+        for one, other in zip(seeds, at_once[name], strict=True):
+            np.testing.assert_array_equal(other["validation"].mean, one["validation"].mean)
+            np.testing.assert_array_equal(other["validation"].quality, one["validation"].quality)
+
+
+def test_a_training_that_fails_in_a_process_of_its_own_ends_the_others(looks, sides, tmp_path, capfd):
+    made(looks, sides, tmp_path, [OWN])
+    (OWN.folder(tmp_path, 0) / "validation.npz").unlink()
+    other = replace(OWN, config=CONFIG.model_copy(update={"noise_std": 0.0}))
+    with pytest.raises(TrainingFailed, match="the training of Own with seed 0 failed: see above"):
+        made(looks, sides, tmp_path, [other], seeds=2, at_once=2)
+    assert "Own with seed 0: " in (told := capfd.readouterr().err) and "other settings" in told
+    assert not multiprocessing.active_children()
+
+
 def test_a_folder_of_other_settings_or_attempts_is_refused(looks, sides, tmp_path):
     made(looks, sides, tmp_path, [OWN])
     (OWN.folder(tmp_path, 0) / "validation.npz").unlink()
@@ -107,6 +128,11 @@ def test_a_training_of_another_process_is_left_to_it(looks, sides, tmp_path):
         pytest.raises(UsageError, match="another process trains Own with seed 0, Mean"),
     ):
         made(looks, sides, tmp_path, [OWN, OTHER])
+    with (
+        exclusive_lock(folder),
+        pytest.raises(UsageError, match="another process trains Own with seed 0, Mean"),
+    ):
+        made(looks, sides, tmp_path, [OWN, OTHER], at_once=2)
     assert not list(tmp_path.rglob("*.npz"))
     assert set(made(looks, sides, tmp_path, [OWN, OTHER])) == {"Own", "Mean only"}
 

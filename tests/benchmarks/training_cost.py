@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from mskgrasp.learning import held_out
+from mskgrasp.learning.compute_device import DeviceName, compute_device
 from mskgrasp.learning.grasp_models import Models, build_models
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples
@@ -40,9 +41,13 @@ class Cost:
     samples: dict[str, int]
 
 
-def cost_of(choice: Choice, samples: Samples, sides: Sides, seconds: float) -> Cost:
+def cost_of(
+    choice: Choice, samples: Samples, sides: Sides, seconds: float, device: DeviceName = "cpu"
+) -> Cost:
     """Measure some steps of each network of a choice, ``seconds`` each, on weights that are thrown away."""
     models = (choice.build or build_models)(describe_networks(samples, sides.training, choice.config))
+    models.gqn.to(compute_device(device))
+    models.gdn.to(compute_device(device))
     batch, validation, rates, counts, total = {}, {}, {}, {}, 0.0
     for name in choice.stages():
         stage = Stage(name, models, samples, sides, choice.config)
@@ -87,7 +92,14 @@ class TimeLeft(Reporter):
         self._bar.update(round(self._start + self._done) - self._bar.n)
 
 
-def cost_table(choices: Sequence[Choice], looks: Looks, sides: Sides, *, seconds: float) -> Table:
+def cost_table(
+    choices: Sequence[Choice],
+    looks: Looks,
+    sides: Sides,
+    *,
+    seconds: float,
+    device: DeviceName = "cpu",
+) -> Table:
     """The table of measured rates and predicted hours of a training, a row a choice.
 
     Args:
@@ -95,12 +107,13 @@ def cost_table(choices: Sequence[Choice], looks: Looks, sides: Sides, *, seconds
         looks: The samples.
         sides: Attempts to train on.
         seconds: Time for which each network's steps are measured.
+        device: Device of the networks.
     """
     header = ("one seed", "quality: samples/s", "an epoch", "displacement: samples/s", "an epoch", "hours")
     rows = []
     for choice in progress(choices, unit="network"):
         samples = choice.samples(looks.of(choice.config.network))
-        cost = cost_of(choice, samples, choice.sides(samples, sides), seconds)
+        cost = cost_of(choice, samples, choice.sides(samples, sides), seconds, device)
         cells: list[str | None] = [choice.name]
         for stage in ("gqn", "gdn"):
             known = stage in cost.samples

@@ -2,7 +2,8 @@
 
 A folder of a training holds its networks and its predictions for each group of attempts that was asked for.
 It is not made again; one that was stopped goes on at its last epoch, or from its start where networks that do
-not ship are built. Two processes started on the same folder share the trainings between them.
+not ship are built. Two programs started on the same folder share the trainings between them, and one program
+makes several at once, which keeps a GPU busy: its time goes into starting small steps.
 """
 
 from __future__ import annotations
@@ -10,6 +11,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import multiprocessing
+import multiprocessing.connection
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,9 +23,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mskgrasp.core.errors import UsageError
+from mskgrasp.core.errors import MskgraspError, UsageError, one_line
 from mskgrasp.core.files import exclusive_lock, write_whole
 from mskgrasp.learning import held_out
+from mskgrasp.learning.compute_device import DeviceName, compute_device
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import DESCRIPTION, ModelMeta, Models, load_models, save_model
 from mskgrasp.learning.samples import SAMPLES_VERSION, Samples
@@ -33,6 +38,14 @@ from tests.benchmarks.training_cost import TimeLeft, cost_of
 
 _CHECKPOINT = "checkpoint.safetensors"
 _MADE_OF = "made_of.json"
+_BUSY = 3
+"""Exit status of a training that another program is at."""
+_Job = tuple[Choice, int]
+_Make = Callable[[Choice, int, Reporter], bool]
+
+
+class TrainingFailed(MskgraspError):
+    """A training in a process of its own ended with an error."""
 
 
 def make_trainings(
@@ -44,6 +57,8 @@ def make_trainings(
     groups: dict[str, Tensor],
     out: Path,
     measure_s: float = 2.0,
+    device: DeviceName = "cpu",
+    at_once: int = 1,
 ) -> dict[str, list[dict[str, Predictions]]]:
     """Train every choice with every seed, unless it is stored, and predict for each group of attempts.
 
@@ -55,32 +70,29 @@ def make_trainings(
         groups: Rows of the samples by the name of the group.
         out: Folder of all trainings.
         measure_s: Seconds for which a network's steps are measured to predict the time left.
+        device: Device of the networks.
+        at_once: Trainings at a time, each in a process of its own.
 
     Returns:
         Predictions by the choice's name, seed and group.
 
     Raises:
         UsageError: A folder holds a training of other settings or data, or another process is still at one.
+        TrainingFailed: A training in a process of its own ended with an error, which it has printed.
     """
     jobs = [(choice, seed) for seed in range(seeds) for choice in choices if seed in choice.seeds(seeds)]
     missing = [job for job in jobs if not all(_path(out, *job, name).exists() for name in groups)]
-    costs = {}
-    for choice, _ in missing:
-        if choice.name not in costs:
-            samples = choice.samples(looks.of(choice.config.network))
-            costs[choice.name] = cost_of(choice, samples, choice.sides(samples, sides), measure_s)
-    total = sum(costs[choice.name].total_s for choice, _ in missing)
-    busy = []
-    with progress(unit="s", total=math.ceil(total), keep=bool(missing), hidden=not missing) as bar:
-        for choice, seed in missing:
-            bar.set_description(f"{choice.name}, seed {seed}")
-            folder = choice.folder(out, seed)
-            folder.mkdir(parents=True, exist_ok=True)
-            reporter = TimeLeft(bar, costs[choice.name])
-            with exclusive_lock(folder) as alone:
-                if not alone or not _make(choice, seed, looks, sides, groups, out, reporter):
-                    busy.append(f"{choice.name} with seed {seed}")
-            reporter.close()
+
+    def make(choice: Choice, seed: int, reporter: Reporter) -> bool:
+        folder = choice.folder(out, seed)
+        folder.mkdir(parents=True, exist_ok=True)
+        with exclusive_lock(folder) as alone:
+            return alone and _make(choice, seed, looks, sides, groups, out, reporter, device)
+
+    if at_once > 1:
+        busy = _made_at_once(missing, at_once, looks, sides, make)
+    else:
+        busy = _made_in_turn(missing, looks, sides, make, measure_s, device)
     if busy:
         raise UsageError(f"another process trains {', '.join(busy)}; when it is done, run this again")
     return {
@@ -90,6 +102,105 @@ def make_trainings(
         ]
         for choice in choices
     }
+
+
+def _made_in_turn(
+    missing: Sequence[_Job], looks: Looks, sides: Sides, make: _Make, measure_s: float, device: DeviceName
+) -> list[str]:
+    """Make trainings one after the other; names of those that another process is at."""
+    costs = {}
+    for choice, _ in missing:
+        if choice.name not in costs:
+            samples = choice.samples(looks.of(choice.config.network))
+            costs[choice.name] = cost_of(choice, samples, choice.sides(samples, sides), measure_s, device)
+    total = sum(costs[choice.name].total_s for choice, _ in missing)
+    busy = []
+    with progress(unit="s", total=math.ceil(total), keep=bool(missing), hidden=not missing) as bar:
+        for choice, seed in missing:
+            bar.set_description(f"{choice.name}, seed {seed}")
+            reporter = TimeLeft(bar, costs[choice.name])
+            if not make(choice, seed, reporter):
+                busy.append(_name(choice, seed))
+            reporter.close()
+    return busy
+
+
+def _made_at_once(
+    missing: Sequence[_Job], at_once: int, looks: Looks, sides: Sides, make: _Make
+) -> list[str]:
+    """Make trainings in several processes; names of those that another program is at.
+
+    A training starts when that of the quality network which it needs is done.
+    """
+    steps = []
+    for choice, _ in missing:  # every process finds the samples read
+        samples = choice.samples(looks.of(choice.config.network))
+        steps.append(_steps(choice, samples, choice.sides(samples, sides)))
+    # By fork the samples are shared instead of copied. CUDA allows it before its first use in this process.
+    context = multiprocessing.get_context("fork")
+    done = context.Array("q", len(missing))
+    waiting, running, busy = list(range(len(missing))), dict[int, Any](), list[str]()
+    try:
+        with progress(unit="step", total=sum(steps), keep=bool(missing), hidden=not missing) as bar:
+            while waiting or running:
+                unmade = {(missing[k][0].name, missing[k][1]) for k in (*waiting, *running)}
+                for k in list(waiting):
+                    choice, seed = missing[k]
+                    if len(running) < at_once and (choice.quality_of, seed) not in unmade:
+                        waiting.remove(k)
+                        running[k] = context.Process(
+                            target=_run, args=(make, choice, seed, _Counted(done, k)), daemon=True
+                        )
+                        running[k].start()
+                multiprocessing.connection.wait([one.sentinel for one in running.values()], timeout=1.0)
+                for k in [k for k, one in running.items() if not one.is_alive()]:
+                    code = running.pop(k).exitcode
+                    done[k] = steps[k]  # an early end, too, is all of it
+                    if code == _BUSY:
+                        busy.append(_name(*missing[k]))
+                    elif code:
+                        raise TrainingFailed(f"the training of {_name(*missing[k])} failed: see above")
+                bar.update(sum(done) - bar.n)
+    finally:
+        for process in running.values():
+            process.terminate()
+            process.join()
+    return busy
+
+
+def _run(make: _Make, choice: Choice, seed: int, reporter: Reporter) -> None:
+    try:
+        sys.exit(0 if make(choice, seed, reporter) else _BUSY)
+    except MskgraspError as error:
+        sys.exit(one_line(f"{_name(choice, seed)}: {error}"))
+
+
+class _Counted(Reporter):
+    """Counts steps in memory that is shared among processes."""
+
+    def __init__(self, done: Any, number: int):
+        self._done, self._number = done, number
+
+    def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:  # noqa: ARG002
+        self._done[self._number] += done
+
+    def batch(self, loss: float) -> None:  # noqa: ARG002
+        self._done[self._number] += 1
+
+
+def _steps(choice: Choice, samples: Samples, sides: Sides) -> int:
+    """Steps of all epochs of a training."""
+    n_success = int(samples.success[sides.training].sum())
+    n_samples = {"gqn": 2 * min(n_success, len(sides.training) - n_success), "gdn": n_success}
+    settings = {"gqn": choice.config.gqn, "gdn": choice.config.gdn}
+    return sum(
+        settings[name].epochs * math.ceil(n_samples[name] / settings[name].batch_size)
+        for name in choice.stages()
+    )
+
+
+def _name(choice: Choice, seed: int) -> str:
+    return f"{choice.name} with seed {seed}"
 
 
 def _path(out: Path, choice: Choice, seed: int, group: str) -> Path:
@@ -104,6 +215,7 @@ def _make(
     groups: dict[str, Tensor],
     out: Path,
     reporter: Reporter,
+    device: DeviceName,
 ) -> bool:
     """Make one training; False if the quality network that it needs is still being trained."""
     folder = choice.folder(out, seed)
@@ -115,7 +227,7 @@ def _make(
     samples = choice.samples(looks.of(config.network))
     sides = choice.sides(samples, sides)
     _check_origin(folder, _origin(config, samples, sides))
-    models = _trained(choice, config, samples, sides, out, reporter)
+    models = _trained(choice, config, samples, sides, out, reporter, compute_device(device))
     for name, rows in groups.items():
         if not (path := folder / f"{name}.npz").exists():
             predicted(models, samples, rows, quality=choice.has_quality).write(path)
@@ -135,19 +247,31 @@ def predicted(models: Models, samples: Samples, rows: Tensor, *, quality: bool) 
 
 
 def _trained(
-    choice: Choice, config: LearningConfig, samples: Samples, sides: Sides, out: Path, reporter: Reporter
+    choice: Choice,
+    config: LearningConfig,
+    samples: Samples,
+    sides: Sides,
+    out: Path,
+    reporter: Reporter,
+    device: torch.device,
 ) -> Models:
     """Stored networks, or those that are trained now, from a checkpoint if there is one."""
     folder = choice.folder(out, config.seed)
     if choice.build is not None:
-        return displacement_trained(choice.build, config, samples, sides, reporter)
+        return displacement_trained(choice.build, config, samples, sides, reporter, device)
     if (folder / DESCRIPTION).exists():
-        return load_models(folder)
+        return load_models(folder, device)
     quality = None
     if choice.quality_of:
         quality = load_models(_quality_folder(choice, out, config.seed)).gqn
     models, _ = train(
-        samples, config, checkpoint_path=folder / _CHECKPOINT, reporter=reporter, sides=sides, quality=quality
+        samples,
+        config,
+        checkpoint_path=folder / _CHECKPOINT,
+        device=device,
+        reporter=reporter,
+        sides=sides,
+        quality=quality,
     )
     save_model(folder, models)
     (folder / _CHECKPOINT).unlink(missing_ok=True)
@@ -160,11 +284,14 @@ def displacement_trained(
     samples: Samples,
     sides: Sides,
     reporter: Reporter,
+    device: torch.device | str = "cpu",
 ) -> Models:
     """A displacement network at the epoch of its lowest validation loss."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         models = build(describe_networks(samples, sides.training, config))
+    models.gqn.to(device)
+    models.gdn.to(device)
     stage = Stage("gdn", models, samples, sides, config)
     reporter.stage("gdn", epochs=config.gdn.epochs, batches=stage.batches, done=0)
     least, best = math.inf, {}
