@@ -195,7 +195,8 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
                 f"{share + part.resting_probability[alike].sum():.1%}",
                 len(grasps),
                 "-" if best is None else f"{best:.2f} mm",
-                certified.without.get(number, ""),
+                certified.without.get(number, "")
+                + ("; grasped so that it always tilts alike" if certified.tilting_of(number)[0] else ""),
             )
         )
     rows.sort(key=lambda row: -float(row[1].rstrip("%")))

@@ -202,7 +202,7 @@ def _certified_text(one: TrialStatistics) -> list[str]:
     if one.certified is None:
         return []
     n, planned = one.certified
-    rest = "; the others are the networks'" if n < planned else ""
+    rest = "; the others tilt the part or are the networks'" if n < planned else ""
     return [f"{n} of {planned} planned grasps are certified{rest}"]
 
 

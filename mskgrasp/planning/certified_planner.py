@@ -1,4 +1,4 @@
-"""Planner for a known part: its certified grasp of least expected error, or else the networks' grasp."""
+"""Planner for a known part: its simulated grasp of least expected error, or else the networks' grasp."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class CertifiedPlanner:
     more than the image, plan there.
 
     Args:
-        planner: Plans where the part has no certified grasp that the arm reaches, and knows the table.
+        planner: Plans where the part has no simulated grasp that the arm reaches, and knows the table.
         part: The part on the table.
         certified: Its certified grasps.
         reachable: Whether the arm can execute a grasp; None: all.
@@ -89,9 +89,10 @@ class CertifiedPlanner:
         planner = self._planner
         found = self._find(frame)
         located = time.perf_counter()
-        plan = None if self._ambiguous(found) else self._certified_plan(frame, found)
+        plan = None if self._ambiguous(found) else self._simulated_plan(frame, found)
+        if plan is None or not plan.certified:
+            self._tell(found, plan)
         if plan is None:
-            self._tell(found)
             return replace(planner.plan(frame, rng), pose=found)
         now = time.perf_counter()
         seconds = {"pose": located - started, "select": now - located, "total": now - started}
@@ -125,24 +126,26 @@ class CertifiedPlanner:
         )
         return squared > AMBIGUOUS_FROM**2
 
-    def _tell(self, found: PartPose) -> None:
-        """Say why the networks plan, unless that is what was asked for."""
-        if not self._certified.grasps:
+    def _tell(self, found: PartPose, plan: GraspPlan | None) -> None:
+        """Say why it is no certified grasp, unless the networks' is what was asked for."""
+        if plan is None and not self._certified.grasps:
             return
         resting = self._certified.like.get(found.resting, (found.resting, 0.0))[0]
         if self._ambiguous(found):
             reason = "the image fits two poses of it"
         else:
             reason = self._certified.without.get(resting, "the arm reaches none of its certified grasps")
-        note(
-            f"'{self._part.name}' in resting pose {found.resting} gets no certified grasp: {reason}; planned "
-            "by the networks"
-        )
+        by = "by the networks" if plan is None else "with one in which it always tilts alike"
+        which = f"'{self._part.name}' in resting pose {found.resting}"
+        note(f"{which} gets no certified grasp: {reason}; planned {by}")
 
-    def _certified_plan(self, frame: RgbdFrame, found: PartPose) -> GraspPlan | None:
-        """The plan of the best grasp within reach; None where there is none."""
+    def _simulated_plan(self, frame: RgbdFrame, found: PartPose) -> GraspPlan | None:
+        """The plan of the best grasp within reach, of those that tilt the part last; None: there is none."""
         planner, part = self._planner, self._part
         grasps, turn = self._certified.of(found.resting)
+        certified = bool(grasps)
+        if not grasps:
+            grasps, turn = self._certified.tilting_of(found.resting)
         if not grasps:
             return None
         view = planner.view(frame)
@@ -184,7 +187,8 @@ class CertifiedPlanner:
             shortlist_scores=scores[order],
             seconds={},
             pose=found,
-            certified=True,
+            simulated=True,
+            certified=certified,
         )
 
 

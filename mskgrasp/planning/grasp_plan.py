@@ -55,7 +55,8 @@ class GraspPlan:
         shortlist_scores: (k,) their variance scores, square metres.
         seconds: Time spent in each stage.
         pose: The part's pose as found with its CAD; None where it was planned from the image alone.
-        certified: The grasp and its outcome are those of repeated simulation, not predicted by networks.
+        simulated: The grasp and its outcome are those of repeated simulation, not predicted by networks.
+        certified: And the outcome is steady and flat.
     """
 
     grasp: Grasp
@@ -72,6 +73,7 @@ class GraspPlan:
     shortlist_scores: np.ndarray
     seconds: dict[str, float]
     pose: PartPose | None = None
+    simulated: bool = False
     certified: bool = False
 
     @classmethod
@@ -177,6 +179,7 @@ class GraspPlan:
                 "size": _plain(self.view.size),
                 "gyration_radius": float(self.view.gyration_radius),
             },
+            "simulated": self.simulated,
             "certified": self.certified,
             "n_candidates": len(self.candidates),
             "n_shortlist": len(self.shortlist),

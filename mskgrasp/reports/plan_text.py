@@ -24,7 +24,9 @@ def plan_text(plan: GraspPlan) -> str:
     stages = ", ".join(f"{name} {value:.2f} s" for name, value in plan.seconds.items() if name != "total")
     pose = [] if plan.pose is None else [_pose_text(plan.pose)]
     n = len(plan.candidates)
-    of = f"{n} certified grasps" if plan.certified else f"best of {n}: {plan.qualities.max():.3f}"
+    of = f"best of {n}: {plan.qualities.max():.3f}"
+    if plan.simulated:
+        of = f"{n} certified grasps" if plan.certified else f"{n} grasps that tilt the part"
     return "\n".join(
         [
             *pose,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
@@ -43,7 +43,7 @@ from tasks import GraspDisplacementEnv
 
 CERTIFY_VERSION = 2
 """Raised by every change after which a seed simulates other grasps."""
-SELECT_VERSION = 1
+SELECT_VERSION = 2
 """Raised by every change after which others of the simulated grasps are certified."""
 FIRST, SECOND = 2, 4
 """Simulations of each candidate in the first round and of each of the best in the second."""
@@ -354,39 +354,61 @@ def moment_share(part: Part, one: CertifiedGrasp, config: CertifyConfig) -> floa
     return float(weight * abs(beside) / most) if most > 0 else np.inf
 
 
+@dataclass(frozen=True, kw_only=True)
+class Selected:
+    """Grasps of a resting pose, least expected error first, their covariances as expected of chosen ones.
+
+    Attributes:
+        certified: The certified ones.
+        tilting: Where there is none, those that fail by the tilt alone.
+        reason: Why there is no certified one; empty: there is.
+    """
+
+    certified: tuple[CertifiedGrasp, ...] = ()
+    tilting: tuple[CertifiedGrasp, ...] = ()
+    reason: str = ""
+
+
 def select_certified(
     part: Part, resting: int, grasps: Sequence[CertifiedGrasp], config: CertifyConfig
-) -> tuple[list[CertifiedGrasp], str]:
-    """Select the certified grasps of a resting pose.
-
-    Returns:
-        The grasps, least expected error first, their covariances as those of chosen ones are expected, and
-        where there is none the reason.
-    """
+) -> Selected:
+    """Select the certified grasps of a resting pose."""
     errors = config.pose_errors
     pose_cov = np.diag(np.square([errors.position, errors.position, errors.turn]))
     radius = radius_about_vertical(part, resting)
     if not grasps:
-        return [], "the camera does not see it over the table"
+        return Selected(reason="the camera does not see it over the table")
     lifting = [one for one in grasps if one.lifted >= config.least_lifted * one.n and one.lifted >= 3]
     if not lifting:
         best = max((one.lifted / one.n for one in grasps), default=0.0)
-        return [], f"no grasp lifts it in {config.least_lifted:.0%} of the simulations (best {best:.0%})"
+        reason = f"no grasp lifts it in {config.least_lifted:.0%} of the simulations (best {best:.0%})"
+        return Selected(reason=reason)
     flat = [one for one in lifting if one.swing @ one.swing + np.trace(one.swing_cov) <= TILT_LIMIT**2]
+    # The pads are taken to hold it, whether flat or not.
+    firm = [one for one in flat or lifting if moment_share(part, one, config) <= 1]
+    unbiased = without_selection_bias(firm, radius)
+
+    def error(one: CertifiedGrasp) -> float:
+        """Expected distance, m, by which points miss their places: the flat ones, or those in the hand."""
+        return float(np.sqrt((one if flat else replace(one, swing=np.zeros(2))).score(pose_cov, radius)))
+
+    ranked = sorted(unbiased, key=error)
+    steady = tuple(_first_apart([one for one in ranked if error(one) <= config.most_error], config.kept))
     if not flat:
-        return (
-            [],
-            f"it tilts by more than {np.degrees(TILT_LIMIT):g} degrees in every grasp that lifts it",
-        )
-    firm = [one for one in flat if moment_share(part, one, config) <= 1]
+        tilt = np.degrees(TILT_LIMIT)
+        reason = f"it tilts by more than {tilt:g} degrees in every grasp that lifts it"
+        return Selected(tilting=steady, reason=reason)
     if not firm:
-        return [], "its weight could turn it between the pads in every grasp that lifts it"
-    firm = without_selection_bias(firm, radius)
-    ranked = sorted(firm, key=lambda one: one.score(pose_cov, radius))
-    steady = [one for one in ranked if one.score(pose_cov, radius) <= config.most_error**2]
+        return Selected(reason="its weight could turn it between the pads in every grasp that lifts it")
     if not steady:
-        least = 1e3 * np.sqrt(ranked[0].score(pose_cov, radius))
-        return [], f"every outcome spreads by more than {1e3 * config.most_error:g} mm (least {least:.1f} mm)"
-    chosen = _distinct(np.stack([one.grasp for one in steady]), config.kept)
-    keys = {grasp.tobytes() for grasp in chosen}
-    return [one for one in steady if one.grasp.tobytes() in keys][: config.kept], ""
+        most, least = 1e3 * config.most_error, 1e3 * error(ranked[0])
+        return Selected(reason=f"every outcome spreads by more than {most:g} mm (least {least:.1f} mm)")
+    return Selected(certified=steady)
+
+
+def _first_apart(ranked: Sequence[CertifiedGrasp], n: int) -> list[CertifiedGrasp]:
+    """At most n grasps that are apart from each other, or the first ones, in the order given."""
+    if not ranked:
+        return []
+    keys = {grasp.tobytes() for grasp in _distinct(np.stack([one.grasp for one in ranked]), n)}
+    return [one for one in ranked if one.grasp.tobytes() in keys][:n]

@@ -263,6 +263,7 @@ def _read_stream(part: Part, stream: Stream, digest: str) -> list[CertifiedGrasp
 
 def _merged(plan: _Plan, config: CertifyConfig, conditions: dict[str, Any], digest: str) -> CertifiedGrasps:
     grasps: list[CertifiedGrasp] = []
+    tilting: list[CertifiedGrasp] = []
     without = dict(plan.without)
     for resting in dict.fromkeys(stream.resting for stream in plan.streams):
         found = [
@@ -271,14 +272,16 @@ def _merged(plan: _Plan, config: CertifyConfig, conditions: dict[str, Any], dige
             if stream.resting == resting
             for grasp in _read_stream(plan.part, stream, digest) or ()
         ]
-        kept, reason = select_certified(plan.part, resting, found, config)
-        grasps += kept
-        if reason:
-            without[resting] = reason
+        selected = select_certified(plan.part, resting, found, config)
+        grasps += selected.certified
+        tilting += selected.tilting
+        if selected.reason:
+            without[resting] = selected.reason
     return CertifiedGrasps(
         part=plan.part.name,
         part_hash=plan.part.content_hash,
         grasps=tuple(grasps),
+        tilting=tuple(tilting),
         without=without,
         like=plan.like,
         stands=plan.stands,

@@ -41,7 +41,7 @@ def write_trial(path: Path, frame: RgbdFrame, plan: GraspPlan | None, after: Rgb
         arrays |= _frame_arrays("after", after, fine=True)
     if plan is not None:
         arrays |= {f"plan_{name}": getattr(plan, name) for name in (*_ARRAYS, *_NUMBERS)}
-        arrays["plan_certified"] = plan.certified
+        arrays["plan_simulated"], arrays["plan_certified"] = plan.simulated, plan.certified
         arrays["plan_grasp"] = plan.grasp.as_vector()
         arrays["plan_candidates"] = plan.candidates.as_vector().astype(np.float32)
         view = plan.view
@@ -124,6 +124,7 @@ def _plan(arrays: dict[str, np.ndarray]) -> GraspPlan:
         grasp=Grasp.from_vector(arrays["plan_grasp"].reshape(4)),
         candidates=Grasp.from_vector(arrays["plan_candidates"].astype(np.float64).reshape(-1, 4)),
         seconds={},
+        simulated=bool(arrays.get("plan_simulated", arrays.get("plan_certified", False))),
         certified=bool(arrays.get("plan_certified", False)),
         **rest,
     )

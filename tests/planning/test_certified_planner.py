@@ -23,6 +23,7 @@ from mskgrasp.planning.certified_planner import (
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.planner import Planner
+from mskgrasp.reports.plan_text import plan_text
 from tests.planning.test_certified import certified, certified_grasp
 
 PART = find_part("l_bracket_60x40")
@@ -126,6 +127,21 @@ def test_without_certified_grasps_the_networks_plan_and_say_why(cell, planner, c
     assert "gets no certified grasp: no grasp lifts it; planned by the networks" in capsys.readouterr().err
     network = planner.plan(frame, np.random.default_rng(0))
     assert np.array_equal(plan.grasp.as_vector(), network.grasp.as_vector())
+
+
+def test_where_the_part_always_tilts_it_is_planned_with_the_tilt(cell, planner, capsys):
+    frame, true = present(cell, 2)
+    resting = resting_of(true)
+    (poor, sure), reason = grasps(resting).grasps, "it tilts by more than 2 degrees"
+    tilts = dataclasses.replace(sure, swing=np.array([0.2, 0.0]))
+    known = dataclasses.replace(grasps(resting), grasps=(), tilting=(poor, tilts), without={resting: reason})
+    plan = CertifiedPlanner(planner, PART, known).plan(frame, np.random.default_rng(0))
+    assert plan.simulated and not plan.certified and np.linalg.norm(plan.swing) == pytest.approx(0.2)
+    assert f"{reason}; planned with one in which it always tilts alike" in capsys.readouterr().err
+    assert "2 grasps that tilt the part" in plan_text(plan)
+    # A certified grasp of the pose comes first.
+    both = dataclasses.replace(known, grasps=(sure,), without={})
+    assert CertifiedPlanner(planner, PART, both).plan(frame, np.random.default_rng(0)).certified
 
 
 def test_where_an_image_fits_two_poses_the_networks_plan(cell, planner, capsys):
