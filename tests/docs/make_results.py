@@ -165,7 +165,7 @@ def record(name: str) -> None:
                 f"{SIMULATION_VERSION}, parts of version {PART_VERSION}"
             ),
             recorded=recorded,
-            machine=_machine(),
+            machine=facts.get("machine") or _machine(),
         ),
         report=facts.get("stored", report),
     )
