@@ -106,6 +106,8 @@ def main() -> int:
     options = _options()
     if options.split == "test" and options.quick:
         raise UsageError("--quick trains too little for the test parts; leave out --split test")
+    if options.at_once < 1:
+        raise UsageError(f"--at-once {options.at_once}: 1 or more")
     torch.set_num_threads(options.threads)
     choices = paper_choices(
         options.patience, mixed_precision=options.mixed_precision, paper_seeds=options.paper_seeds
