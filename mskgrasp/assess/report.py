@@ -196,7 +196,11 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
                 len(grasps),
                 "-" if best is None else f"{best:.2f} mm",
                 certified.without.get(number, "")
-                + ("; grasped so that it always tilts alike" if certified.tilting_of(number)[0] else ""),
+                + (
+                    "; grasped so that it always tilts in the same way"
+                    if certified.tilting_of(number)[0]
+                    else ""
+                ),
             )
         )
     rows.sort(key=lambda row: -float(row[1].rstrip("%")))
@@ -223,7 +227,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
 
 def _grasps_section(part: Part, certified: CertifiedGrasps) -> Section:
     rows = []
-    for grasp in certified.grasps:
+    for grasp in (*certified.grasps, *certified.tilting):
         x, y, z, theta = grasp.grasp
         low, high = grasp.lifted_interval
         std = np.sqrt(np.diag(grasp.residual))
@@ -237,18 +241,20 @@ def _grasps_section(part: Part, certified: CertifiedGrasps) -> Section:
                 f"{np.degrees(grasp.mean[3]):+.2f}",
                 ", ".join(f"{1e3 * value:.2f}" for value in std[:3]),
                 f"{np.degrees(std[3]):.2f}",
+                f"{np.degrees(np.linalg.norm(grasp.swing)):.1f}",
             )
         )
     header = (
         "pose", "x, y, z, mm", "theta, deg", "lifted", "shift x, y, z, mm", "turn, deg",
-        "deviations, mm", "deg",
+        "deviations, mm", "deg", "tilt, deg",
     )  # fmt: skip
     return Section(
-        title="All certified grasps",
+        title="All grasps",
         text=[
             "In the part's rest frame: under its centroid, z up, axes of the mesh file turned into the "
             "resting pose. Shift and turn of the part in the hand, and their standard deviations apart from "
-            "errors of the seen pose, along the axes of the grasp."
+            "errors of the seen pose, along the axes of the grasp. Grasps with a tilt of more than "
+            f"{np.degrees(TILT_LIMIT):g} degrees are not certified, but the best of their pose."
         ],
         tables=[Table(header=header, rows=rows)],
         page_only=True,

@@ -58,6 +58,7 @@ class Row:
         condition: Name of the condition.
         means: What planned the grasps.
         certified: Share planned by a certified grasp.
+        tilting: Number planned by a grasp in which the part tilts in every simulation.
         lifted: Share lifted.
         within: By correction, the share of all attempts placed within the tolerance.
         within_distance: The same within each of `DISTANCES`, whatever the turn.
@@ -70,6 +71,7 @@ class Row:
     condition: str
     means: Means
     certified: Share
+    tilting: int
     lifted: Share
     within: dict[Correction, Share]
     within_distance: dict[Correction, tuple[Share, ...]]
@@ -80,15 +82,19 @@ class Row:
 
     @property
     def planned_by(self) -> str:
-        """What planned the grasps, in words: where a part has no certified grasp the networks did."""
+        """What planned the grasps, in words: where a part has no certified grasp others did."""
         n, of = self.certified.n, self.certified.of
+        others = of - n - self.tilting
         if self.means == "networks":
             return "the networks"
-        if n == 0:
+        if others == of:
             return "the networks (no certified grasp)"
-        return (
-            "certified grasps" if n == of else f"certified grasps in {n} of {of} attempts, else the networks"
-        )
+        counts = {"certified grasps": n, "grasps that tilt the part": self.tilting}
+        used = {name: count for name, count in counts.items() if count}
+        if of in used.values():
+            return next(iter(used)) + ("" if n else " (no certified grasp)")
+        planned = " and ".join(f"{name} in {count}" for name, count in used.items())
+        return f"{planned} of {of} attempts" + (", else the networks" if others else "")
 
     @property
     def advice(self) -> Correction | None:
@@ -101,6 +107,7 @@ class Row:
             condition=self.condition,
             means=self.means,
             certified=self.certified.to_json(),
+            tilting=self.tilting,
             lifted=self.lifted.to_json(),
             within={name: share.to_json() for name, share in self.within.items()},
             within_distance={
@@ -147,7 +154,8 @@ def _row(
     return Row(
         condition=condition,
         means=means,
-        certified=Share(n=sum(trial.certified for trial in trials), of=n),
+        certified=Share(n=sum(trial.planned_by == "certified" for trial in trials), of=n),
+        tilting=sum(trial.planned_by == "tilting" for trial in trials),
         lifted=Share(n=len(lifted), of=n),
         within={one: within(one, tolerance.distance, tolerance.angle) for one in CORRECTIONS},
         within_distance={

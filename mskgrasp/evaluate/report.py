@@ -202,8 +202,9 @@ def _certified_text(one: TrialStatistics) -> list[str]:
     if one.certified is None:
         return []
     n, planned = one.certified
-    rest = "; the others tilt the part or are the networks'" if n < planned else ""
-    return [f"{n} of {planned} planned grasps are certified{rest}"]
+    tilting = f"; in {one.tilting} the part tilts in every simulation" if one.tilting else ""
+    rest = "; the others are the networks'" if n + one.tilting < planned else ""
+    return [f"{n} of {planned} planned grasps are certified{tilting}{rest}"]
 
 
 def refused_text(reasons: Mapping[str, int], n_trials: int, n_lifted: int) -> str:

@@ -69,8 +69,9 @@ class TrialStatistics:
         flat_translation_interval: Its interval, as above.
         flat_rotation_rmse: The same of the turn.
         flat_rotation_interval: The same of the turn.
-        certified: Of the planned grasps of policy ``certified`` those that are certified, the networks' being
-            the others; None for other policies, and where it was not recorded.
+        certified: Of the planned grasps of policy ``certified`` those that are certified, and their number;
+            None for other policies, and where it was not recorded.
+        tilting: Of these, grasps in which the part tilts in every simulation; the others are the networks'.
     """
 
     trials: int
@@ -98,6 +99,7 @@ class TrialStatistics:
     flat_rotation_rmse: float | None = None
     flat_rotation_interval: Interval | None = None
     certified: tuple[int, int] | None = None
+    tilting: int = 0
 
     @classmethod
     def of(
@@ -116,6 +118,7 @@ class TrialStatistics:
         compared, measured, predicted, std = _measurements(trials, prediction or own_prediction)
         parts = np.array([trial.part for trial in compared])
         errors = displacement_errors(predicted, measured)
+        planned_by = [trial.planned_by for trial in trials if trial.policy == "certified" and trial.grasp]
         flat = np.array([(trial.tilt or 0.0) <= TILT_LIMIT for trial in compared], dtype=bool)
         errors_of_zero = displacement_errors(0 * predicted, measured)
         known = len(parts) > 0 and np.isfinite(std).all() and np.isfinite(measured).all()
@@ -144,7 +147,8 @@ class TrialStatistics:
             flat_translation_interval=_interval(errors[0][flat], parts[flat]),
             flat_rotation_rmse=_rms(errors[1][flat]),
             flat_rotation_interval=_interval(errors[1][flat], parts[flat]),
-            certified=_certified([trial for trial in trials if trial.policy == "certified" and trial.grasp]),
+            certified=(planned_by.count("certified"), len(planned_by)) if planned_by else None,
+            tilting=planned_by.count("tilting"),
         )
 
 
@@ -200,11 +204,6 @@ def _grouped(trials: Sequence[Trial], name: Callable[[Trial], str]) -> dict[str,
     for trial in trials:
         groups.setdefault(name(trial), []).append(trial)
     return {group: TrialStatistics.of(groups[group]) for group in sorted(groups)}
-
-
-def _certified(planned: Sequence[Trial]) -> tuple[int, int] | None:
-    known = [trial.certified for trial in planned if trial.certified is not None]
-    return (sum(known), len(known)) if known and len(known) == len(planned) else None
 
 
 def own_prediction(trial: Trial) -> Prediction | None:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import torch
 
 from mskgrasp.core.errors import UsageError
-
-DeviceName = Literal["auto", "cpu", "cuda"]
+from mskgrasp.learning.config import DeviceName
 
 
 def compute_device(name: DeviceName = "auto") -> torch.device:
-    """Choose the device of networks, where from then on the same seed gives the same weights.
+    """Choose the device of networks, and set cuDNN up for it, in the whole process.
 
-    A GPU computes convolutions in float32 then: in TF32, torch's default, predictions differ from a CPU's by
+    The same seed then gives the same weights on the same GPU. A GPU computes convolutions in float32 then: in TF32, torch's default, predictions differ from a CPU's by
     micrometres.
 
     Args:

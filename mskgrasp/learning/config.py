@@ -9,6 +9,9 @@ from pydantic import Field, model_validator
 from mskgrasp.core.config import Config
 from mskgrasp.learning.network_config import NetworkConfig, PatchNetworkConfig
 
+DeviceName = Literal["auto", "cpu", "cuda"]
+"""Device of networks; auto: a CUDA device where there is one."""
+
 
 class StageConfig(Config):
     """Optimisation of one network."""

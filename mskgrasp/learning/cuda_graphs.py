@@ -39,7 +39,7 @@ class GraphedStep:
         Args:
             step: Changes the weights by what it learns from some rows (n,), without waiting for the GPU, and
                 returns its loss.
-            network: Whose weights and buffers it changes, on the GPU.
+            network: Network that the step changes, on the GPU.
             optimiser: Made with ``capturable=True``.
             generator: On the GPU, from which the step draws, besides the default generator.
         """
@@ -47,7 +47,7 @@ class GraphedStep:
         self._recorded: dict[int, _Recorded] = {}
 
     def __call__(self, rows: Tensor) -> Tensor:
-        """Learn from some rows (n,); the loss is overwritten by the next step of as many."""
+        """Learn from some rows (n,); the next step on a batch of this size overwrites the loss."""
         known = self._recorded.get(len(rows))
         if known is None:
             known = self._recorded[len(rows)] = self._record(rows)

@@ -22,8 +22,8 @@ from mskgrasp.learning.model_metrics import (
 )
 from mskgrasp.learning.samples import Samples
 
-_CHUNK = {"cpu": 64, "cuda": 4096}
-"""Samples in a batch, by the device: a CPU's cache is small, a GPU's kernels take long to start."""
+_CHUNK, _CHUNK_ON_A_GPU = 64, 4096
+"""Samples in a batch: a CPU's cache is small, a GPU's kernels take long to start."""
 AXES = ("x", "y", "z", "theta", "swing_x", "swing_y")
 """Predicted components; the last two by networks that predict the swing alone."""
 _REPEATS = 200
@@ -34,6 +34,10 @@ _LEAST_TO_SCALE = 50
 """Fewest successes from which a 90 % quantile is estimated."""
 
 
+def _chunk(models: Models) -> int:
+    return _CHUNK_ON_A_GPU if models.device.type == "cuda" else _CHUNK
+
+
 def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.ndarray:
     """Predict probabilities of success (n,)."""
     pieces = [
@@ -42,7 +46,7 @@ def predict_quality(models: Models, samples: Samples, rows: torch.Tensor) -> np.
             samples.centre_grasp[r].to(models.device),
             samples.height[r].to(models.device),
         )
-        for r in rows.split(_CHUNK[models.device.type])
+        for r in rows.split(_chunk(models))
     ]
     return torch.cat(pieces).cpu().double().numpy()
 
@@ -52,7 +56,7 @@ def predict_grasp_displacement(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Predict mean and variance (n, k) of `Samples.targets`; without a variance it is NaN."""
     means, variances = [], []
-    for r in rows.split(_CHUNK[models.device.type]):
+    for r in rows.split(_chunk(models)):
         mean, variance = models.grasp_displacement(
             samples.displacement_patches_of(r, models.device),
             samples.centre_grasp[r].to(models.device),

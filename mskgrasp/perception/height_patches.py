@@ -71,7 +71,7 @@ def crop_patches(
     """
     height, width = heights.shape[-2:]
     n_columns = n_columns or n_pixels
-    # Where the grasps are: dozens of numbers are computed on a CPU before a GPU has started.
+    # Computed where the grasps are: starting a GPU's kernels takes longer than these few numbers.
     axes = _patch_axes(grasps, intrinsics, T_base_camera).to(heights.device)
     along, across = (
         (torch.arange(n, device=heights.device, dtype=torch.float32) - (n - 1) / 2) * (side / n_pixels)

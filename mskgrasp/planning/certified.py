@@ -143,7 +143,7 @@ class CertifiedGrasps:
         part: Name of the part.
         part_hash: Its content hash.
         grasps: The grasps, those of a resting pose in the order of their expected error.
-        tilting: Grasps of resting poses that have no certified one, in the same order: the part tilts in the
+        tilting: Grasps of resting poses that have no certified one, steadiest first: the part tilts in the
             hand, always in the same way. Where it comes to hang is known, but it cannot be placed flat.
         without: For resting poses without a certified grasp the reason, by index.
         like: For resting poses that look and behave as another one, its index and the turn (radians) by which

@@ -30,7 +30,7 @@ from mskgrasp.planning.certified import (
     to_base,
     turned,
 )
-from mskgrasp.planning.grasp_plan import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan, PlannedBy
 from mskgrasp.planning.planner import Planner
 from mskgrasp.runtime.progress import note
 
@@ -83,7 +83,7 @@ class CertifiedPlanner:
             NoPartFound: No part is detected.
             PartNotRecognised: What lies there is not this part, or does not lie flat.
             TableTooHigh: The table is seen too high, as by `Planner.view`.
-            GraspRefused: The part has no certified grasp here, and no candidate has the required quality.
+            GraspRefused: No simulated grasp is within reach, and no candidate has the required quality.
         """
         started = time.perf_counter()
         planner = self._planner
@@ -127,24 +127,26 @@ class CertifiedPlanner:
         return squared > AMBIGUOUS_FROM**2
 
     def _tell(self, found: PartPose, plan: GraspPlan | None) -> None:
-        """Say why it is no certified grasp, unless the networks' is what was asked for."""
-        if plan is None and not self._certified.grasps:
+        """Report why no certified grasp is planned, unless the networks' was asked for."""
+        if not (self._certified.grasps or self._certified.tilting):
             return
         resting = self._certified.like.get(found.resting, (found.resting, 0.0))[0]
+        reason = self._certified.without.get(resting, "the arm reaches none of its certified grasps")
         if self._ambiguous(found):
             reason = "the image fits two poses of it"
-        else:
-            reason = self._certified.without.get(resting, "the arm reaches none of its certified grasps")
-        by = "by the networks" if plan is None else "with one in which it always tilts alike"
+        elif plan is None and self._certified.tilting_of(found.resting)[0]:
+            reason += ", and the arm reaches none of these"
+        by = "by the networks" if plan is None else "with one in which it always tilts in the same way"
         which = f"'{self._part.name}' in resting pose {found.resting}"
         note(f"{which} gets no certified grasp: {reason}; planned {by}")
 
     def _simulated_plan(self, frame: RgbdFrame, found: PartPose) -> GraspPlan | None:
-        """The plan of the best grasp within reach, of those that tilt the part last; None: there is none."""
+        """The plan of the best simulated grasp within reach, certified ones first; None: none is."""
         planner, part = self._planner, self._part
+        planned_by: PlannedBy = "certified"
         grasps, turn = self._certified.of(found.resting)
-        certified = bool(grasps)
         if not grasps:
+            planned_by = "tilting"
             grasps, turn = self._certified.tilting_of(found.resting)
         if not grasps:
             return None
@@ -187,8 +189,7 @@ class CertifiedPlanner:
             shortlist_scores=scores[order],
             seconds={},
             pose=found,
-            simulated=True,
-            certified=certified,
+            planned_by=planned_by,
         )
 
 

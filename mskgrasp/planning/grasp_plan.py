@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from mskgrasp.core.displacement_covariance import displacement_jacobian
 from mskgrasp.core.grasp import Grasp, PartView, to_object_displacement
 from mskgrasp.parts import Part
 from mskgrasp.perception.part_pose import PartPose
+
+PlannedBy = Literal["networks", "tilting", "certified"]
+"""What a planned grasp and its outcome come from: the networks' predictions, or simulations made beforehand,
+of a grasp in which the part tilts or of a certified one (`mskgrasp.planning.certified`)."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +59,7 @@ class GraspPlan:
         shortlist_scores: (k,) their variance scores, square metres.
         seconds: Time spent in each stage.
         pose: The part's pose as found with its CAD; None where it was planned from the image alone.
-        simulated: The grasp and its outcome are those of repeated simulation, not predicted by networks.
-        certified: And the outcome is steady and flat.
+        planned_by: What the grasp and its outcome come from.
     """
 
     grasp: Grasp
@@ -73,8 +76,7 @@ class GraspPlan:
     shortlist_scores: np.ndarray
     seconds: dict[str, float]
     pose: PartPose | None = None
-    simulated: bool = False
-    certified: bool = False
+    planned_by: PlannedBy = "networks"
 
     @classmethod
     def of(
@@ -105,6 +107,11 @@ class GraspPlan:
             shortlist_scores=best.scores,
             seconds=seconds,
         )
+
+    @property
+    def certified(self) -> bool:
+        """Whether the grasp is a certified one."""
+        return self.planned_by == "certified"
 
     @property
     def summary(self) -> str:
@@ -179,8 +186,7 @@ class GraspPlan:
                 "size": _plain(self.view.size),
                 "gyration_radius": float(self.view.gyration_radius),
             },
-            "simulated": self.simulated,
-            "certified": self.certified,
+            "planned_by": self.planned_by,
             "n_candidates": len(self.candidates),
             "n_shortlist": len(self.shortlist),
             "seconds": {stage: round(value, 4) for stage, value in self.seconds.items()},

@@ -190,7 +190,7 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
         zorder=4,
     )
     bar = figure.colorbar(ScalarMappable(dots.norm, dots.cmap), ax=axes, shrink=0.8, pad=0.02)
-    bar.set_label("share lifted" if plan.simulated else "predicted quality of a candidate")
+    bar.set_label("predicted quality of a candidate" if plan.planned_by == "networks" else "share lifted")
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     # Without predicted variances all scores are NaN: the order by quality remains.
     few = plan.candidates[plan.shortlist[np.argsort(plan.shortlist_scores, kind="stable")[:_FEW]]]

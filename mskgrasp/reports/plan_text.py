@@ -24,9 +24,11 @@ def plan_text(plan: GraspPlan) -> str:
     stages = ", ".join(f"{name} {value:.2f} s" for name, value in plan.seconds.items() if name != "total")
     pose = [] if plan.pose is None else [_pose_text(plan.pose)]
     n = len(plan.candidates)
-    of = f"best of {n}: {plan.qualities.max():.3f}"
-    if plan.simulated:
-        of = f"{n} certified grasps" if plan.certified else f"{n} grasps that tilt the part"
+    of = {
+        "networks": f"best of {n}: {plan.qualities.max():.3f}",
+        "tilting": f"{n} grasps that tilt the part",
+        "certified": f"{n} certified grasps",
+    }[plan.planned_by]
     return "\n".join(
         [
             *pose,

@@ -11,6 +11,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -135,6 +136,9 @@ class _Candidate:
         return float(failed + spread[:3].sum() + radius**2 * (spread[3] + swung))
 
 
+_Ranked = TypeVar("_Ranked", _Candidate, CertifiedGrasp)
+
+
 def run_stream(
     env: GraspDisplacementEnv, planner: Planner, stream: Stream, config: CertifyConfig
 ) -> Generator[None, None, list[CertifiedGrasp]]:
@@ -242,8 +246,8 @@ def _distinct(grasps: np.ndarray, n: int) -> list[np.ndarray]:
     return [grasps[row] for row in (chosen + rest)[:n]]
 
 
-def _spread_out(ranked: Sequence[_Candidate], n: int) -> list[_Candidate]:
-    """The first n candidates that are apart from each other, in the order given."""
+def _spread_out(ranked: Sequence[_Ranked], n: int) -> list[_Ranked]:
+    """The first n grasps that are apart from each other, filled up with others, in the order given."""
     if not ranked:
         return []
     chosen = {grasp.tobytes() for grasp in _distinct(np.stack([one.grasp for one in ranked]), n)}
@@ -384,31 +388,35 @@ def select_certified(
         reason = f"no grasp lifts it in {config.least_lifted:.0%} of the simulations (best {best:.0%})"
         return Selected(reason=reason)
     flat = [one for one in lifting if one.swing @ one.swing + np.trace(one.swing_cov) <= TILT_LIMIT**2]
-    # The pads are taken to hold it, whether flat or not.
-    firm = [one for one in flat or lifting if moment_share(part, one, config) <= 1]
-    unbiased = without_selection_bias(firm, radius)
-
-    def error(one: CertifiedGrasp) -> float:
-        """Expected distance, m, by which points miss their places: the flat ones, or those in the hand."""
-        return float(np.sqrt((one if flat else replace(one, swing=np.zeros(2))).score(pose_cov, radius)))
-
-    ranked = sorted(unbiased, key=error)
-    steady = tuple(_first_apart([one for one in ranked if error(one) <= config.most_error], config.kept))
     if not flat:
+        firm = without_selection_bias(_firm(part, lifting, config), radius)
+        # A tilt that is always the same moves no point from where it is expected in the hand.
+        errors = [float(np.sqrt(replace(one, swing=np.zeros(2)).score(pose_cov, radius))) for one in firm]
         tilt = np.degrees(TILT_LIMIT)
-        reason = f"it tilts by more than {tilt:g} degrees in every grasp that lifts it"
-        return Selected(tilting=steady, reason=reason)
+        return Selected(
+            tilting=_steady(firm, errors, config),
+            reason=f"it tilts by more than {tilt:g} degrees in every grasp that lifts it",
+        )
+    firm = without_selection_bias(_firm(part, flat, config), radius)
     if not firm:
         return Selected(reason="its weight could turn it between the pads in every grasp that lifts it")
+    errors = [float(np.sqrt(one.score(pose_cov, radius))) for one in firm]
+    steady = _steady(firm, errors, config)
     if not steady:
-        most, least = 1e3 * config.most_error, 1e3 * error(ranked[0])
+        most, least = 1e3 * config.most_error, 1e3 * min(errors)
         return Selected(reason=f"every outcome spreads by more than {most:g} mm (least {least:.1f} mm)")
     return Selected(certified=steady)
 
 
-def _first_apart(ranked: Sequence[CertifiedGrasp], n: int) -> list[CertifiedGrasp]:
-    """At most n grasps that are apart from each other, or the first ones, in the order given."""
-    if not ranked:
-        return []
-    keys = {grasp.tobytes() for grasp in _distinct(np.stack([one.grasp for one in ranked]), n)}
-    return [one for one in ranked if one.grasp.tobytes() in keys][:n]
+def _firm(part: Part, grasps: Sequence[CertifiedGrasp], config: CertifyConfig) -> list[CertifiedGrasp]:
+    """The grasps whose pads hold the part's weight."""
+    return [one for one in grasps if moment_share(part, one, config) <= 1]
+
+
+def _steady(
+    grasps: Sequence[CertifiedGrasp], errors: Sequence[float], config: CertifyConfig
+) -> tuple[CertifiedGrasp, ...]:
+    """The grasps of little enough expected error (m), least first, apart from each other and not too many."""
+    order = np.argsort(errors, kind="stable")
+    ranked = [grasps[row] for row in order if errors[row] <= config.most_error]
+    return tuple(_spread_out(ranked, config.kept))

@@ -10,8 +10,7 @@ from pydantic import Field
 
 from mskgrasp.core.config import check_config, read_config
 from mskgrasp.core.shipped import config_file
-from mskgrasp.learning.compute_device import DeviceName
-from mskgrasp.learning.config import LearningConfig
+from mskgrasp.learning.config import DeviceName, LearningConfig
 from mskgrasp.learning.network_config import NetworkConfig, PatchNetworkConfig
 
 DEFAULT_CONFIG = config_file("train/default.yaml")

@@ -70,7 +70,7 @@ def run_trial(
         reason=done.reason,
         grasp=plan.grasp.as_vector().tolist(),
         quality=plan.quality,
-        certified=plan.certified,
+        planned_by=plan.planned_by,
         point_base=point.tolist(),
         predicted=mean.tolist(),
         predicted_std=np.sqrt(np.diag(covariance)).tolist(),

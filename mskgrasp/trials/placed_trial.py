@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.planning.grasp_plan import PlannedBy
 
 Key = tuple[str, str, int, str]
 """Part, condition, number and means of a trial."""
@@ -24,7 +25,7 @@ class PlacedTrial:
         condition: Name of the cell's condition.
         number: Index of the trial; all means share its scene.
         means: What planned the grasp, or was to plan it.
-        certified: The grasp was a certified one.
+        planned_by: What the grasp comes from; the networks where none was found.
         lifted: The part was lifted and held.
         reason: Reason why it was not lifted or not placed; empty where it was placed.
         resting: Index of the resting pose that was found; None where the part was not recognised.
@@ -49,7 +50,7 @@ class PlacedTrial:
     condition: str
     number: int
     means: str
-    certified: bool = False
+    planned_by: PlannedBy = "networks"
     lifted: bool = False
     reason: str = ""
     resting: int | None = None

@@ -65,7 +65,7 @@ def grasp_and_place(
         return replace(trial, reason=planned.reason, quality=planned.best_quality)
     trial = replace(
         trial,
-        certified=plan.certified,
+        planned_by=plan.planned_by,
         quality=None if np.isnan(plan.quality) else plan.quality,
         grasp=plan.grasp.as_vector().tolist(),
     )

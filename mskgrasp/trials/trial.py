@@ -8,6 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from mskgrasp.planning.grasp_plan import PlannedBy
+
 Policy = Literal["quality", "low_variance", "recentred", "certified"]
 REFUSED = "refused"
 """Reason of a trial in which no grasp was tried, as the best predicted quality was under the bound."""
@@ -59,8 +61,7 @@ class Trial:
         pose_base_obj: (7,) x y z qw qx qy qz of the part before the grasp; None without a tracker.
         predictions: Predictions of the compared models for this grasp, by label.
         refusal: Why all grasps were refused, in a line; empty where one was tried.
-        certified: Whether the grasp was a certified one; None where none was found, and in runs that did not
-            record it.
+        planned_by: What the grasp comes from; None where none was found.
     """
 
     part: str
@@ -84,7 +85,7 @@ class Trial:
     pose_base_obj: list[float] | None = None
     predictions: dict[str, Prediction] = field(default_factory=dict)
     refusal: str = ""
-    certified: bool | None = None
+    planned_by: PlannedBy | None = None
 
     @property
     def key(self) -> str:

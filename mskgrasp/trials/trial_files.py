@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -13,9 +13,9 @@ from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp, PartView
 from mskgrasp.dataset import depth_to_u16, u16_to_depth
-from mskgrasp.planning.grasp_plan import GraspPlan
+from mskgrasp.planning.grasp_plan import GraspPlan, PlannedBy
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 FOLDER = "trials"
 _ARRAYS = (
     "grasp_displacement", "grasp_displacement_cov", "swing", "swing_var", "qualities", "shortlist",
@@ -41,7 +41,7 @@ def write_trial(path: Path, frame: RgbdFrame, plan: GraspPlan | None, after: Rgb
         arrays |= _frame_arrays("after", after, fine=True)
     if plan is not None:
         arrays |= {f"plan_{name}": getattr(plan, name) for name in (*_ARRAYS, *_NUMBERS)}
-        arrays["plan_simulated"], arrays["plan_certified"] = plan.simulated, plan.certified
+        arrays["plan_planned_by"] = plan.planned_by
         arrays["plan_grasp"] = plan.grasp.as_vector()
         arrays["plan_candidates"] = plan.candidates.as_vector().astype(np.float32)
         view = plan.view
@@ -109,6 +109,14 @@ def _frame(name: str, arrays: dict[str, np.ndarray]) -> RgbdFrame:
     )
 
 
+def _planned_by(arrays: dict[str, np.ndarray]) -> PlannedBy:
+    stored = str(arrays["plan_planned_by"])
+    for one in get_args(PlannedBy):
+        if one == stored:
+            return one
+    raise ValueError(f"planned by '{stored}'")
+
+
 def _plan(arrays: dict[str, np.ndarray]) -> GraspPlan:
     rest: dict[str, Any] = {name: arrays[f"plan_{name}"] for name in _ARRAYS}
     rest |= {name: float(arrays[f"plan_{name}"]) for name in _NUMBERS}
@@ -124,7 +132,6 @@ def _plan(arrays: dict[str, np.ndarray]) -> GraspPlan:
         grasp=Grasp.from_vector(arrays["plan_grasp"].reshape(4)),
         candidates=Grasp.from_vector(arrays["plan_candidates"].astype(np.float64).reshape(-1, 4)),
         seconds={},
-        simulated=bool(arrays.get("plan_simulated", arrays.get("plan_certified", False))),
-        certified=bool(arrays.get("plan_certified", False)),
+        planned_by=_planned_by(arrays),
         **rest,
     )

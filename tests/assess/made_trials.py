@@ -13,7 +13,7 @@ def made(number: int, *, means: Means = "certified", condition: str = EXACT, **c
         condition=condition,
         number=number,
         means=means,
-        certified=means == "certified",
+        planned_by=means,
         lifted=True,
         resting=0,
         quality=0.96,

@@ -58,11 +58,19 @@ def test_the_better_means_counts():
 
 
 def test_grasps_that_the_networks_planned_are_not_called_certified():
-    none = [made(number, certified=False) for number in range(20)]
+    none = [made(number, planned_by="networks") for number in range(20)]
     assert verdict(rows(none), EXACT, TOLERANCE).endswith(" by the networks (no certified grasp)")
-    some = [made(number, certified=number < 15) for number in range(20)]
+    some = [made(number, planned_by="certified" if number < 15 else "networks") for number in range(20)]
     said = verdict(rows(some), EXACT, TOLERANCE)
     assert said.endswith(" by certified grasps in 15 of 20 attempts, else the networks")
+    tilting = [made(number, planned_by="tilting") for number in range(20)]
+    assert verdict(rows(tilting), EXACT, TOLERANCE).endswith(
+        " by grasps that tilt the part (no certified grasp)"
+    )
+    said = verdict(rows(some[:17] + tilting[:3]), EXACT, TOLERANCE)
+    assert said.endswith(
+        " by certified grasps in 15 and grasps that tilt the part in 3 of 20 attempts, else the networks"
+    )
     all_of_them = [made(number) for number in range(20)]
     assert verdict(rows(all_of_them), EXACT, TOLERANCE).endswith(" by certified grasps")
 

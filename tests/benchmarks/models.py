@@ -22,8 +22,7 @@ import torch
 from torch import Tensor
 
 from mskgrasp.core.errors import UsageError
-from mskgrasp.learning.compute_device import DeviceName
-from mskgrasp.learning.config import LearningConfig
+from mskgrasp.learning.config import DeviceName, LearningConfig
 from mskgrasp.learning.label_source import source_text
 from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.sides import Sides, split
@@ -108,6 +107,9 @@ def main() -> int:
         raise UsageError("--quick trains too little for the test parts; leave out --split test")
     if options.at_once < 1:
         raise UsageError(f"--at-once {options.at_once}: 1 or more")
+    if options.at_once > 1 and options.threads > 1:
+        # A forked process hangs at its first operation in threads that its parent has started.
+        raise UsageError("--threads belongs to one training at a time: leave it out with --at-once")
     torch.set_num_threads(options.threads)
     choices = paper_choices(
         options.patience, mixed_precision=options.mixed_precision, paper_seeds=options.paper_seeds

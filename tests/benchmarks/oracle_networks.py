@@ -36,7 +36,7 @@ class OracleSamples(Samples):
     def displacement_patches_of(self, rows: Tensor, device: torch.device | str) -> Tensor:
         """Get all images (n, 1 + k + 3 + m, r, c) of some rows: point and numbers as images, too."""
         patches = torch.cat([self.patches[rows], self.more_images[rows]], dim=1).to(device) * HEIGHT_STEP
-        point = self.point[rows] if self.point is not None else torch.zeros((len(rows), 0))
+        point = self.point[rows] if self.point is not None else self.numbers.new_zeros((len(rows), 0))
         known = torch.cat([point, self.numbers[rows]], dim=1).to(device)
         return torch.cat([patches, number_images(known, patches.shape[-2:], self.point is not None)], dim=1)
 

@@ -25,6 +25,7 @@ from mskgrasp.core.config import read_config
 from mskgrasp.core.metrics import bootstrap_interval
 from mskgrasp.core.settings import REGION, TABLE_Z
 from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.compute_device import compute_device
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models, load_models
 from mskgrasp.learning.network_config import Normalisation
@@ -65,7 +66,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="folder of report.json and report.md")
     options = parser.parse_args()
     torch.set_num_threads(min(2, os.cpu_count() or 1))
-    device = "cuda" if torch.cuda.is_available() else "cpu"
+    device = compute_device().type
     ours = PlannerConfig(n_candidates=options.candidates)
     paper = ours.model_copy(update={"chunk_size": 32, "recentre": False})
     planners = {

@@ -104,7 +104,9 @@ def test_a_training_that_fails_in_a_process_of_its_own_ends_the_others(looks, si
     made(looks, sides, tmp_path, [OWN])
     (OWN.folder(tmp_path, 0) / "validation.npz").unlink()
     other = replace(OWN, config=CONFIG.model_copy(update={"noise_std": 0.0}))
-    with pytest.raises(TrainingFailed, match="the training of Own with seed 0 failed: see above"):
+    with pytest.raises(
+        TrainingFailed, match="the training of Own with seed 0 failed .exit code 1.: see above"
+    ):
         made(looks, sides, tmp_path, [other], seeds=2, at_once=2)
     assert "Own with seed 0: " in (told := capfd.readouterr().err) and "other settings" in told
     assert not multiprocessing.active_children()

@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from mskgrasp.core.config import read_config
+from mskgrasp.learning.compute_device import compute_device
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import build_models
 from mskgrasp.learning.samples import Samples
@@ -36,7 +37,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0, help="for each network (default 20)")
     options = parser.parse_args()
     torch.set_num_threads(min(2, os.cpu_count() or 1))
-    device = "cuda" if torch.cuda.is_available() else "cpu"
+    device = str(compute_device())
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column(f"learning on {device}")
     for header in ("GQN samples/s", "GDN samples/s", "share in the network"):

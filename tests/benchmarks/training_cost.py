@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from mskgrasp.learning import held_out
-from mskgrasp.learning.compute_device import DeviceName, compute_device
+from mskgrasp.learning.compute_device import compute_device
+from mskgrasp.learning.config import DeviceName
 from mskgrasp.learning.grasp_models import Models, build_models
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples

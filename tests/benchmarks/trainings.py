@@ -26,20 +26,21 @@ from torch import Tensor
 from mskgrasp.core.errors import MskgraspError, UsageError, one_line
 from mskgrasp.core.files import exclusive_lock, write_whole
 from mskgrasp.learning import held_out
-from mskgrasp.learning.compute_device import DeviceName, compute_device
-from mskgrasp.learning.config import LearningConfig
+from mskgrasp.learning.compute_device import compute_device
+from mskgrasp.learning.config import DeviceName, LearningConfig
 from mskgrasp.learning.grasp_models import DESCRIPTION, ModelMeta, Models, load_models, save_model
 from mskgrasp.learning.samples import SAMPLES_VERSION, Samples
 from mskgrasp.learning.sides import Sides
 from mskgrasp.learning.trainer import Reporter, Stage, describe_networks, train
 from mskgrasp.runtime.progress import progress
+from mskgrasp.runtime.worker_process import ignore_ctrl_c, leave_with_parent
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.training_cost import TimeLeft, cost_of
 
 _CHECKPOINT = "checkpoint.safetensors"
 _MADE_OF = "made_of.json"
 _BUSY = 3
-"""Exit status of a training that another program is at."""
+"""Exit status of a training that another program is making."""
 _Job = tuple[Choice, int]
 _Make = Callable[[Choice, int, Reporter], bool]
 
@@ -138,7 +139,7 @@ def _made_at_once(
         steps.append(_steps(choice, samples, choice.sides(samples, sides)))
     # By fork the samples are shared instead of copied. CUDA allows it before its first use in this process.
     context = multiprocessing.get_context("fork")
-    done = context.Array("q", len(missing))
+    done = context.Array("q", len(missing), lock=False)  # one process writes each
     waiting, running, busy = list(range(len(missing))), dict[int, Any](), list[str]()
     try:
         with progress(unit="step", total=sum(steps), keep=bool(missing), hidden=not missing) as bar:
@@ -159,7 +160,9 @@ def _made_at_once(
                     if code == _BUSY:
                         busy.append(_name(*missing[k]))
                     elif code:
-                        raise TrainingFailed(f"the training of {_name(*missing[k])} failed: see above")
+                        raise TrainingFailed(
+                            f"the training of {_name(*missing[k])} failed (exit code {code}): see above"
+                        )
                 bar.update(sum(done) - bar.n)
     finally:
         for process in running.values():
@@ -169,6 +172,8 @@ def _made_at_once(
 
 
 def _run(make: _Make, choice: Choice, seed: int, reporter: Reporter) -> None:
+    ignore_ctrl_c()
+    leave_with_parent()
     try:
         sys.exit(0 if make(choice, seed, reporter) else _BUSY)
     except MskgraspError as error:

@@ -136,9 +136,11 @@ def test_where_the_part_always_tilts_it_is_planned_with_the_tilt(cell, planner, 
     tilts = dataclasses.replace(sure, swing=np.array([0.2, 0.0]))
     known = dataclasses.replace(grasps(resting), grasps=(), tilting=(poor, tilts), without={resting: reason})
     plan = CertifiedPlanner(planner, PART, known).plan(frame, np.random.default_rng(0))
-    assert plan.simulated and not plan.certified and np.linalg.norm(plan.swing) == pytest.approx(0.2)
-    assert f"{reason}; planned with one in which it always tilts alike" in capsys.readouterr().err
+    assert plan.planned_by == "tilting" and np.linalg.norm(plan.swing) == pytest.approx(0.2)
+    assert f"{reason}; planned with one in which it always tilts in the same way" in capsys.readouterr().err
     assert "2 grasps that tilt the part" in plan_text(plan)
+    CertifiedPlanner(planner, PART, known, lambda grasp: False).plan(frame, np.random.default_rng(0))
+    assert f"{reason}, and the arm reaches none of these; planned by the networks" in capsys.readouterr().err
     # A certified grasp of the pose comes first.
     both = dataclasses.replace(known, grasps=(sure,), without={})
     assert CertifiedPlanner(planner, PART, both).plan(frame, np.random.default_rng(0)).certified

@@ -10,6 +10,7 @@ import torch
 
 from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound, TableTooHigh
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
+from mskgrasp.learning.compute_device import compute_device
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
@@ -68,9 +69,12 @@ def test_the_same_generator_gives_the_same_plan_whatever_the_number_of_threads()
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
 def test_a_gpu_finds_as_good_a_grasp_as_a_cpu():
     plans = [
-        Planner(load_models(device=device), PlannerConfig(n_candidates=600), table_z=0.0, region=REGION).plan(
-            FRAME, np.random.default_rng(5)
-        )
+        Planner(
+            load_models(device=compute_device(device)),
+            PlannerConfig(n_candidates=600),
+            table_z=0.0,
+            region=REGION,
+        ).plan(FRAME, np.random.default_rng(5))
         for device in ("cpu", "cuda")
     ]
     assert np.allclose(plans[1].qualities, plans[0].qualities, atol=1e-5)
