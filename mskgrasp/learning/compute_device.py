@@ -11,8 +11,8 @@ from mskgrasp.learning.config import DeviceName
 def compute_device(name: DeviceName = "auto") -> torch.device:
     """Choose the device of networks, and set cuDNN up for it, in the whole process.
 
-    The same seed then gives the same weights on the same GPU. A GPU computes convolutions in float32 then: in TF32, torch's default, predictions differ from a CPU's by
-    micrometres.
+    The same seed then gives the same weights on the same GPU. A GPU computes convolutions in float32 then:
+    in TF32, torch's default, predictions differ from a CPU's by micrometres.
 
     Args:
         name: auto: the first CUDA device where there is one, else the CPU.
