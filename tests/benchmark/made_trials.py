@@ -13,7 +13,7 @@ def made(number: int, means: str = "ours", part: str = "nut", **changes) -> Plac
     another 0.05 mm.
     """
     values = dict(
-        part=part, condition="sapien", certified=False, resting=None, seeing=[0.0004, 0.0003, 0.0],
+        part=part, condition="sapien", resting=None, seeing=[0.0004, 0.0003, 0.0],
         carried=[0.00005, 0.0, 0.0], placed=[0.0003, 0.0, 0.002],
     )  # fmt: skip
     return made_trials.made(number, means=means, **(values | changes))  # type: ignore[arg-type]

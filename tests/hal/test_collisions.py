@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from hal.collisions import MARGIN, Clearances, check_joints, check_path, line_joints
+from hal.collisions import Clearances, check_joints, check_path, line_joints
 from hal.errors import OutOfWorkspace
 from hal.keep_out import Box, Capsule, camera_keep_out
 from hal.simulated import panda_limits
@@ -120,16 +119,3 @@ def test_a_line_out_of_reach_is_refused():
     far = Pose(position=np.array([1.2, 0.0, 0.3]), quat_wxyz=np.array([0.0, 1.0, 0.0, 0.0]))
     with pytest.raises(OutOfWorkspace, match="no straight line from here"):
         line_joints(PANDA_LINKS, READY, forward_pose(READY), far)
-
-
-def test_a_motion_is_checked_in_well_under_20_ms():
-    """Of processor time, the best of five: other programs share the machine."""
-    limits = replace(panda_limits(), keep_out=(CAMERA, post(0.2, 0.5), post(0.2, -0.5)))
-    start, goal = forward_pose(READY), pose_base_tcp(np.array([0.6, -0.1, 0.1, 1.2]))
-    took = []
-    for _ in range(5):
-        begun = time.thread_time()
-        check_path(PANDA_LINKS, limits, line_joints(PANDA_LINKS, READY, start, goal), "the line")
-        took.append(time.thread_time() - begun)
-    assert min(took) < 0.02
-    assert MARGIN == 0.02
