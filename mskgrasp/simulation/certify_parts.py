@@ -31,14 +31,13 @@ from mskgrasp.runtime.progress import note, progress
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.simulation.certify import (
     CERTIFY_VERSION,
-    SELECT_VERSION,
     CertifyConfig,
     Member,
     Stream,
     run_stream,
-    select_certified,
 )
 from mskgrasp.simulation.resting import resting_of
+from mskgrasp.simulation.select_certified import SELECT_VERSION, select_certified
 from mskgrasp.simulation.versions import versions
 
 LEAST_STREAM = 24

@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
-from mskgrasp.core.settings import ExecutionNoise
 from mskgrasp.parts import find_part
-from mskgrasp.planning.certified import radius_about_vertical
-from mskgrasp.simulation.certify import (
-    CertifyConfig,
-    Selected,
-    measured,
-    moment_share,
-    round_sizes,
-    select_certified,
-)
+from mskgrasp.simulation.certify import measured, round_sizes
 from mskgrasp.simulation.repeats import Repeat
-from tests.planning.test_certified import certified_grasp
 
 PART = find_part("hex_nut_m20")
 GRASP = np.array([0.0, 0.0, 0.0105, 0.0])
@@ -71,30 +59,6 @@ def test_the_residual_of_few_outcomes_is_that_of_a_new_one_about_the_fitted_line
     assert np.mean(found, axis=0) == pytest.approx((1 + 4 / 30) * std**2, rel=0.1)
 
 
-@pytest.mark.parametrize("differences", [0.0, 0.3, 0.6])
-def test_the_best_of_many_grasps_errs_by_as_much_as_is_stated(differences):
-    rng, radius, n = np.random.default_rng(2), radius_about_vertical(PART, 0), 60
-    chosen, least = np.zeros((n, 2)), np.zeros((n, 2))  # stated and true, m^2
-    for one in range(n):
-        stds = 1e-4 * np.exp(differences * rng.normal(size=12))
-        grasps = []
-        for k, std in enumerate(stds):
-            last, before = (
-                outcomes(rng, count, np.zeros((4, 3)), np.zeros(4), std * np.array([1, 1, 0, 0]))
-                for count in (24, 6)
-            )
-            grasps.append(measured(0, radius, GRASP + [0.01 * k, 0, 0, 0], last, before))
-        best = select_certified(PART, 0, grasps, CertifyConfig()).certified[0]
-        seems_best = min(grasps, key=lambda grasp: grasp.spread(radius))
-        for row, grasp in ((chosen, best), (least, seems_best)):
-            std = stds[round(grasp.grasp[0] / 0.01)]
-            row[one] = grasp.spread(radius), (1 + 4 / 30) * 2 * std**2
-    stated, true = np.sqrt(chosen.mean(axis=0))
-    measured_alone, true_of_that = np.sqrt(least.mean(axis=0))
-    assert stated == pytest.approx(true, rel=0.06)
-    assert measured_alone < 0.97 * true_of_that
-
-
 def test_a_grasp_that_never_lifts_has_no_outcome():
     failed = Repeat(
         reason="missed", error=np.zeros(4), displacement=np.full(4, np.nan), swing=np.full(2, np.nan)
@@ -102,76 +66,3 @@ def test_a_grasp_that_never_lifts_has_no_outcome():
     grasp = measured(0, 0.01, GRASP, [failed] * 5)
     assert (grasp.lifted, grasp.n) == (0, 5)
     assert np.isfinite(grasp.mean).all() and not grasp.mean.any()
-
-
-def test_grasps_are_certified_by_lifting_by_hanging_flat_and_by_their_spread():
-    config = CertifyConfig()
-    good = certified_grasp()
-    reasons = {}
-    for name, changes in (
-        ("lifts", dict(lifted=20)),
-        ("tilts", dict(swing=np.array([0.05, 0.0]))),
-        ("spreads", dict(residual=np.diag(np.square([5e-3, 0.0, 0.0, 0.0])))),
-    ):
-        bad = dataclasses.replace(good, **changes)
-        assert select_certified(PART, 0, [bad, good], config) == Selected(certified=(good,))
-        alone = select_certified(PART, 0, [bad], config)
-        assert not alone.certified and alone.tilting == ((bad,) if name == "tilts" else ())
-        reasons[name] = alone.reason
-    assert select_certified(PART, 0, [], config).reason == "the camera does not see it over the table"
-    assert "no grasp lifts it in 95%" in reasons["lifts"] and "83%" in reasons["lifts"]
-    assert "2 degrees" in reasons["tilts"]
-    assert "spreads by more than 2 mm" in reasons["spreads"]
-
-
-def test_a_grasp_is_not_certified_whose_part_its_weight_could_turn_between_the_pads():
-    """0.6 kg, 25 mm beside the pads, friction 0.4, 30 N: 0.147 N m; 2 x 12 N x 5 mm hold less."""
-    noise = ExecutionNoise(friction_pad_part=(0.4, 0.4), finger_force=(30.0, 30.0))
-    config = CertifyConfig(noise=noise)
-    heavy = dataclasses.replace(PART, mass=0.6)
-    turn = 0.7  # the pads' direction in the rest frame
-    beside = certified_grasp(
-        grasp=np.array([0.025 * np.cos(turn), 0.025 * np.sin(turn), 0.0105, turn]), mean=np.zeros(4)
-    )
-    carries = np.sqrt(1 - (0.6 * 9.81 / 24) ** 2)
-    assert moment_share(heavy, beside, config) == pytest.approx(0.6 * 9.81 * 0.025 / (0.12 * carries))
-    # Across the pads its centre of mass may lie where it will, and what it slides by counts.
-    across = certified_grasp(
-        grasp=np.array([-0.025 * np.sin(turn), 0.025 * np.cos(turn), 0.0105, turn]), mean=np.zeros(4)
-    )
-    assert moment_share(heavy, across, config) == pytest.approx(0.0, abs=1e-9)
-    slid = dataclasses.replace(beside, mean=np.array([0.025, 0.0, 0.0, 0.0]))
-    assert moment_share(heavy, slid, config) == pytest.approx(0.0, abs=1e-9)
-    assert select_certified(heavy, 0, [beside, across], config).certified == (across,)
-    alone = select_certified(heavy, 0, [beside], config)
-    assert not alone.certified and "its weight could turn it between the pads" in alone.reason
-    tilted = dataclasses.replace(beside, swing=np.array([0.2, 0.0]))
-    assert not select_certified(heavy, 0, [tilted], config).tilting
-    # As little as 95 in 100 simulations have is counted on: half of these products are under 0.5 x 40 N.
-    halves = CertifyConfig(
-        noise=ExecutionNoise(friction_pad_part=(0.5, 0.5), finger_force=(30.0, 50.0)), least_lifted=0.5
-    )
-    light = dataclasses.replace(PART, mass=0.01)
-    assert moment_share(light, beside, halves) == pytest.approx(
-        0.01 * 9.81 * 0.025 / (2 * 20 * 0.005), rel=1e-3
-    )
-
-
-def test_where_the_part_always_tilts_the_steadiest_of_these_grasps_are_kept():
-    tilts = certified_grasp(swing=np.array([0.2, 0.0]))
-    wavers = dataclasses.replace(tilts, grasp=GRASP + [0.01, 0, 0, 0], swing_cov=np.diag([0.04, 0.0]))
-    found = select_certified(PART, 0, [wavers, tilts], CertifyConfig())
-    # 0.2 rad over 15 mm are 3 mm: too much for a flat part, but the same every time.
-    assert found.tilting == (tilts,) and not found.certified and "it tilts" in found.reason
-
-
-def test_certified_grasps_are_spread_over_the_part():
-    config = CertifyConfig(kept=2)
-    near = [
-        certified_grasp(
-            grasp=GRASP + [1e-4 * k, 0, 0, 0], residual=np.diag([(1e-4 + 1e-6 * k) ** 2, 0, 0, 0])
-        )
-        for k in range(3)
-    ]
-    far = certified_grasp(grasp=GRASP + [0.01, 0, 0, 0], residual=np.diag([(3e-4) ** 2, 0, 0, 0]))
-    assert select_certified(PART, 0, [*near, far], config) == Selected(certified=(near[0], far))
