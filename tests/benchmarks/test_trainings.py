@@ -18,7 +18,8 @@ from mskgrasp.learning.trainer import Reporter
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.conftest import Boxes
 from tests.benchmarks.training_cost import cost_of, cost_table
-from tests.benchmarks.trainings import TrainingFailed, make_trainings
+from tests.benchmarks.trainings import make_trainings
+from tests.benchmarks.trainings_at_once import TrainingFailed
 from tests.learning.small import SHORT
 
 CONFIG = SHORT.model_copy(update={"sides": "catalogue"})

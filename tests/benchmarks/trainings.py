@@ -11,9 +11,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import multiprocessing
-import multiprocessing.connection
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +20,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mskgrasp.core.errors import MskgraspError, UsageError, one_line
+from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import exclusive_lock, write_whole
 from mskgrasp.learning import held_out
 from mskgrasp.learning.compute_device import compute_device
@@ -33,20 +30,14 @@ from mskgrasp.learning.samples import SAMPLES_VERSION, Samples
 from mskgrasp.learning.sides import Sides
 from mskgrasp.learning.trainer import Reporter, Stage, describe_networks, train
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.worker_process import ignore_ctrl_c, leave_with_parent
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.training_cost import TimeLeft, cost_of
+from tests.benchmarks.trainings_at_once import Job, make_at_once
 
 _CHECKPOINT = "checkpoint.safetensors"
 _MADE_OF = "made_of.json"
-_BUSY = 3
-"""Exit status of a training that another program is making."""
 _Job = tuple[Choice, int]
 _Make = Callable[[Choice, int, Reporter], bool]
-
-
-class TrainingFailed(MskgraspError):
-    """A training in a process of its own ended with an error."""
 
 
 def make_trainings(
@@ -91,7 +82,9 @@ def make_trainings(
             return alone and _make(choice, seed, looks, sides, groups, out, reporter, device)
 
     if at_once > 1:
-        busy = _made_at_once(missing, at_once, looks, sides, make)
+        busy = make_at_once(
+            _jobs(missing, looks, sides), at_once, lambda number, reporter: make(*missing[number], reporter)
+        )
     else:
         busy = _made_in_turn(missing, looks, sides, make, measure_s, device)
     if busy:
@@ -126,71 +119,15 @@ def _made_in_turn(
     return busy
 
 
-def _made_at_once(
-    missing: Sequence[_Job], at_once: int, looks: Looks, sides: Sides, make: _Make
-) -> list[str]:
-    """Make trainings in several processes; names of those that another program is at.
-
-    A training starts when that of the quality network which it needs is done.
-    """
-    steps = []
-    for choice, _ in missing:  # every process finds the samples read
+def _jobs(missing: Sequence[_Job], looks: Looks, sides: Sides) -> list[Job]:
+    """What can be made at once, with all samples read, which the processes then share."""
+    found = []
+    for choice, seed in missing:
         samples = choice.samples(looks.of(choice.config.network))
-        steps.append(_steps(choice, samples, choice.sides(samples, sides)))
-    # By fork the samples are shared instead of copied. CUDA allows it before its first use in this process.
-    context = multiprocessing.get_context("fork")
-    done = context.Array("q", len(missing), lock=False)  # one process writes each
-    waiting, running, busy = list(range(len(missing))), dict[int, Any](), list[str]()
-    try:
-        with progress(unit="step", total=sum(steps), keep=bool(missing), hidden=not missing) as bar:
-            while waiting or running:
-                unmade = {(missing[k][0].name, missing[k][1]) for k in (*waiting, *running)}
-                for k in list(waiting):
-                    choice, seed = missing[k]
-                    if len(running) < at_once and (choice.quality_of, seed) not in unmade:
-                        waiting.remove(k)
-                        running[k] = context.Process(
-                            target=_run, args=(make, choice, seed, _Counted(done, k)), daemon=True
-                        )
-                        running[k].start()
-                multiprocessing.connection.wait([one.sentinel for one in running.values()], timeout=1.0)
-                for k in [k for k, one in running.items() if not one.is_alive()]:
-                    code = running.pop(k).exitcode
-                    done[k] = steps[k]  # an early end, too, is all of it
-                    if code == _BUSY:
-                        busy.append(_name(*missing[k]))
-                    elif code:
-                        raise TrainingFailed(
-                            f"the training of {_name(*missing[k])} failed (exit code {code}): see above"
-                        )
-                bar.update(sum(done) - bar.n)
-    finally:
-        for process in running.values():
-            process.terminate()
-            process.join()
-    return busy
-
-
-def _run(make: _Make, choice: Choice, seed: int, reporter: Reporter) -> None:
-    ignore_ctrl_c()
-    leave_with_parent()
-    try:
-        sys.exit(0 if make(choice, seed, reporter) else _BUSY)
-    except MskgraspError as error:
-        sys.exit(one_line(f"{_name(choice, seed)}: {error}"))
-
-
-class _Counted(Reporter):
-    """Counts steps in memory that is shared among processes."""
-
-    def __init__(self, done: Any, number: int):
-        self._done, self._number = done, number
-
-    def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:  # noqa: ARG002
-        self._done[self._number] += done
-
-    def batch(self, loss: float) -> None:  # noqa: ARG002
-        self._done[self._number] += 1
+        steps = _steps(choice, samples, choice.sides(samples, sides))
+        needs = _name(replace(choice, name=choice.quality_of), seed) if choice.quality_of else ""
+        found.append(Job(name=_name(choice, seed), needs=needs, steps=steps))
+    return found
 
 
 def _steps(choice: Choice, samples: Samples, sides: Sides) -> int:
