@@ -182,12 +182,14 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
     errors = conditions["pose_errors"]
     pose_cov = np.diag(np.square([errors["position"], errors["position"], errors["turn"]]))
     rows = []
+    tilts = "; grasped so that it always tilts in the same way"
     for number, share in enumerate(part.resting_probability):
         if number in certified.like:
             continue
         alike = [other for other, (first, _) in certified.like.items() if first == number]
         grasps, _ = certified.of(number)
         radius = radius_about_vertical(part, number)
+        why_not = certified.without.get(number, "")
         best = min((1e3 * np.sqrt(one.score(pose_cov, radius)) for one in grasps), default=None)
         rows.append(
             (
@@ -195,12 +197,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
                 f"{share + part.resting_probability[alike].sum():.1%}",
                 len(grasps),
                 "-" if best is None else f"{best:.2f} mm",
-                certified.without.get(number, "")
-                + (
-                    "; grasped so that it always tilts in the same way"
-                    if certified.tilting_of(number)[0]
-                    else ""
-                ),
+                why_not + tilts if certified.tilting_of(number)[0] else why_not,
             )
         )
     rows.sort(key=lambda row: -float(row[1].rstrip("%")))

@@ -63,7 +63,8 @@ class LearningConfig(Config):
     symmetric: bool = True
     """Half of the samples are rotated by half a turn, half are mirrored: the physics is symmetric."""
     mixed_precision: bool = False
-    """The image branch trains in bfloat16, the rest in float32: faster on a GPU, or a CPU with AMX."""
+    """The image branch trains in bfloat16, the rest in float32: faster on a GPU, or on a CPU with
+    instructions for it (AMX)."""
     beta: float = Field(default=0.0, ge=0.0, le=1.0)
     """0: the paper's likelihood; 0.5: beta-NLL."""
     keep_best: bool = True

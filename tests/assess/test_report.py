@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
 from mskgrasp.assess.config import parse_tolerance
-from mskgrasp.assess.report import write_report
+from mskgrasp.assess.report import poses_section, write_report
 from mskgrasp.assess.trials import NOISY
 from tests.assess.made_trials import failed, made
 from tests.browser import Page
@@ -84,3 +85,13 @@ def test_a_part_that_nothing_lifts_gets_a_report_that_says_so_first(tmp_path):
     )
     assert headline.startswith("hex_nut_m20 was not grasped: none of 2 attempts lifted it (")
     assert "refused" in headline and "no grasp lifts it" in headline and "0 to 66%" in headline
+
+
+def test_a_pose_in_which_the_part_always_tilts_is_told_with_its_grasps():
+    tilting = certified_grasp(resting=2, swing=np.array([0.2, 0.0]))
+    known = certified(
+        certified_grasp(), tilting=(tilting,), without={2: "it tilts"}, like={}, conditions=CONDITIONS
+    )
+    (table,) = poses_section(PART, known, Path("grasps.png")).tables
+    (row,) = (row for row in table.rows if row[0] == "2")
+    assert row[2] == 0 and row[4] == "it tilts; grasped so that it always tilts in the same way"

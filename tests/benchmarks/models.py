@@ -304,7 +304,7 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument(
         "--mixed-precision", action="store_true",
-        help="the paper's networks train in bfloat16: faster on a CPU that computes with it",
+        help="the paper's networks train in bfloat16: faster on a GPU, or a CPU with instructions for it",
     )  # fmt: skip
     parser.add_argument("--known-parts", type=int, default=50, help="known parts to measure (default 50)")
     parser.add_argument(
