@@ -31,7 +31,10 @@ PUT_DOWN = 0.002
 """A part is released this much above the height at which it was grasped, m."""
 
 RELEASE = 0.02
-"""Least opening of the fingers that releases a part, m."""
+"""Opening of the fingers, more than that of the grasp, that releases a part for certain, m."""
+
+LEAST_RELEASE = 0.006
+"""The least that does where more would push the part, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,10 +188,10 @@ def let_go(cell: Cell, place: Grasp, *, opening: float, tallest: float = 0.0) ->
     Args:
         cell: The hand is at ``place`` and holds a part.
         place: Pose of the hand as a grasp, base frame; the hand may be a little higher.
-        opening: Distance of the pads afterwards, metres; 0 for the least that releases the part, which is
-            `RELEASE` more than now. The fingers had room on the way down to the grasp, but since then the
-            part has moved between them: one inside a bore may push it as it opens all the way. A hand that
-            opens less far opens as far as it does.
+        opening: Distance of the pads afterwards, metres. One that is not `LEAST_RELEASE` more than now
+            releases nothing, and stands for `RELEASE` more than now. The fingers had room on the way down to
+            the grasp, but since then the part has moved between them: one inside a bore may push it as it
+            opens all the way. A hand that opens less far opens as far as it does.
         tallest: Height of the tallest thing over the table, the part included, over which the hand rises, m.
 
     Raises:
@@ -199,7 +202,8 @@ def let_go(cell: Cell, place: Grasp, *, opening: float, tallest: float = 0.0) ->
     if not 0 <= opening <= stroke:
         raise ValueError(f"opening {opening} m is outside 0 .. {stroke} m")
     state = cell.arm.state()
-    width = max(opening, state.gripper_width + RELEASE)
+    enough = opening >= state.gripper_width + LEAST_RELEASE
+    width = opening if enough else state.gripper_width + RELEASE
     if width < state.max_width:
         cell.arm.move_gripper(width)
     else:

@@ -16,15 +16,30 @@ from mskgrasp.parts.write_solid import write_solid
 def make_box(cache: Path, name: str, size: tuple[float, float, float], mass: float) -> Part:
     """A box of `size` metres and `mass` kg, as a part folder under ``cache``."""
     mesh = trimesh.creation.box(np.array(size) * 1000)
+    solid = Solid(mesh=mesh, hulls=(np.asarray(mesh.vertices),))
+    return _write(cache, name, solid, mass / float(np.prod(size)))
+
+
+def make_rail(cache: Path, name: str, *, length: float, flange: float, web: float, density: float) -> Part:
+    """A rail of I profile, 37 mm high with flanges of 6 and 5 mm; metres and kg/m^3, as `make_box` does."""
+    boxes = []
+    for width, height, middle in ((flange, 6.0, 3.0), (web, 26.0, 19.0), (flange, 5.0, 34.5)):
+        box = trimesh.creation.box([1e3 * length, 1e3 * width, height])
+        boxes.append(box.apply_translation([0.0, 0.0, middle]))
+    hulls = tuple(np.asarray(box.vertices) for box in boxes)
+    return _write(cache, name, Solid(mesh=trimesh.boolean.union(boxes), hulls=hulls), density)
+
+
+def _write(cache: Path, name: str, solid: Solid, density: float) -> Part:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(cache))
         return write_solid(
-            Solid(mesh=mesh, hulls=(np.asarray(mesh.vertices),)),
+            solid,
             name=name,
             family="box",
             source="test",
             licence="Apache-2.0",
-            density=mass / float(np.prod(size)),
+            density=density,
             dimensions={},
             recipe_hash="test",
         )

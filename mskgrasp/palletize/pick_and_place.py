@@ -25,6 +25,7 @@ from mskgrasp.planning.certified_planner import planner_of_part
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import Target, drop_of, place, place_error, place_pose, turned_by
 from mskgrasp.planning.planner import Planner
+from mskgrasp.planning.release import release_opening
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.policies import RepeatedPlanner
 
@@ -179,11 +180,13 @@ class PickAndPlace:
         }[known.correction]
         assert by is not None  # truth is refused without a tracker
         drop = 0.0 if swing is None else drop_of(plan.grasp, plan.view, by[3], swing)
+        assert grasped.result is not None  # it succeeded
+        opening = release_opening(frame, plan, grasped.result.width)
         for target in targets:
             try:
                 place(
                     self._cell, self._pose(plan, by, target, drop), engine.recover,
-                    tallest=tallest, part_height=float(plan.view.size[2]),
+                    drop=drop, opening=opening, tallest=tallest, part_height=float(plan.view.size[2]),
                 )  # fmt: skip
             except OutOfWorkspace:
                 continue  # the other target may be reached

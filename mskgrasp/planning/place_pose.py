@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hal.cell import Cell
-from hal.errors import MotionAborted
+from hal.errors import MotionAborted, OutOfWorkspace
 from hal.execute import APPROACH, PUT_DOWN, clear_height, let_go
 from mskgrasp.core.geometry import (
     Pose,
@@ -23,6 +23,10 @@ from mskgrasp.core.grasp import Grasp, PartView
 
 EARLY = 0.007
 """Height above the target pose from which contact with the table counts as placed, metres."""
+_BELOW = 0.001
+"""Distance below the height of the grasp to which a part is lowered at most until it touches, metres."""
+_TOUCH_FORCE, _TOUCH_SPEED = 5.0, 0.02
+"""Force that is the table's touch, N, and speed towards it, m/s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,20 +179,23 @@ def place(
     pose: Grasp,
     recover: Callable[[MotionAborted], None],
     *,
+    drop: float = 0.0,
+    opening: float = 0.0,
     tallest: float = 0.0,
     part_height: float = 0.0,
     arrived: Callable[[], None] | None = None,
 ) -> None:
-    """Move the held part to a pose, release it and retract.
+    """Move the held part to a pose, lower it until it touches the table, release it and retract.
 
-    Where the way leads over something tall the hand rises straight first. The fingers open no farther than
-    needed, so as not to push neighbouring parts. A tilted part touches the table early, which ends the
-    motion; it is released there.
+    Where the way leads over something tall the hand rises straight first. A tilted part may touch the table
+    before it is at the pose, which ends the motion; it is released there.
 
     Args:
         cell: The arm has lifted the part.
         pose: As `place_pose` gives it.
         recover: Lets the arm move again after that contact, or raises an error.
+        drop: What `place_pose` was given: the part is lowered by as much at most, should it hang less low.
+        opening: Opening that releases it, as in `hal.let_go`: `mskgrasp.planning.release.release_opening`.
         tallest: Height of the tallest other thing over the table, metres.
         part_height: Height of the part, over which the open hand rises, metres.
         arrived: Called once the part is there, before the fingers open.
@@ -210,9 +217,26 @@ def place(
         if cell.arm.state().T_base_tcp.position[2] > pose.position[2] + EARLY:
             raise
         recover(error)
+    else:
+        _lower_to_touch(cell, pose, PUT_DOWN + drop + _BELOW, recover)
     if arrived is not None:
         arrived()
-    let_go(cell, pose, opening=0.0, tallest=max(tallest, part_height))
+    let_go(cell, pose, opening=opening, tallest=max(tallest, part_height))
+
+
+def _lower_to_touch(cell: Cell, pose: Grasp, by: float, recover: Callable[[MotionAborted], None]) -> None:
+    """Lower the part until it touches the table, by so much at most, metres: a part that falls shifts."""
+    x, y, z = pose.position
+    lowest = max(float(z) - by, float(cell.workspace.lowest_grasp_z(pose.position[:2])))
+    if lowest > z - _BELOW:
+        return
+    goal = replace(pose, position=np.array([x, y, lowest]))
+    try:
+        cell.arm.move_until_contact(goal.T_base_tcp, force=_TOUCH_FORCE, speed=_TOUCH_SPEED)
+    except OutOfWorkspace:
+        return  # a cell whose reflex is as light, or no straight line there: it falls the rest of the way
+    except MotionAborted as error:
+        recover(error)
 
 
 def _usual_height(cell: Cell, pose: Grasp) -> float:

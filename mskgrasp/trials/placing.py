@@ -22,12 +22,14 @@ from mskgrasp.parts import Part
 from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import (
+    EARLY,
     Target,
     displacement_of_point,
     drop_of,
     place,
     place_pose,
 )
+from mskgrasp.planning.release import release_opening
 from mskgrasp.trials.engine import PlansGrasps, TrialEngine
 from mskgrasp.trials.placed_trial import PlacedTrial
 
@@ -102,7 +104,8 @@ def grasp_and_place(
         expected=expected.tolist(),
         tilt=done.tilt,
     )
-    return _placed(engine, plan, seen, point, in_hand, expected, seeds[1], trial)
+    opening = release_opening(planned.frame, plan, done.result.width)
+    return _placed(engine, plan, seen, point, in_hand, expected, opening, seeds[1], trial)
 
 
 def _placed(
@@ -112,6 +115,7 @@ def _placed(
     point: np.ndarray,
     in_hand: Pose,
     expected: np.ndarray,
+    opening: float,
     target_seed: int,
     trial: PlacedTrial,
 ) -> PlacedTrial:
@@ -120,18 +124,21 @@ def _placed(
     turn = np.random.default_rng(target_seed).uniform(-TURNS, TURNS)
     x, y = workspace.centre
     drop = drop_of(plan.grasp, plan.view, float(expected[3]), np.nan_to_num(plan.swing))
-    released: list[Pose] = []
+    released: list[tuple[Pose, Pose]] = []
 
     def arrived() -> None:
         there = engine.part_pose()
         assert there is not None
-        released.append(engine.cell.arm.state().T_base_tcp.inverse() @ there)
+        released.append((there, engine.cell.arm.state().T_base_tcp.inverse() @ there))
 
     for theta in (turn, 0.0):
         target = Target(x=float(x), y=float(y), theta=float(theta))
         pose = place_pose(plan.grasp, expected, point, target, workspace.lowest_grasp_z, drop=drop)
         try:
-            place(engine.cell, pose, engine.recover, part_height=float(plan.view.size[2]), arrived=arrived)
+            place(
+                engine.cell, pose, engine.recover, drop=drop, opening=opening,
+                part_height=float(plan.view.size[2]), arrived=arrived,
+            )  # fmt: skip
             break
         except OutOfWorkspace:
             if released:
@@ -144,10 +151,13 @@ def _placed(
         return replace(trial, reason="OutOfWorkspace")
     after = engine.part_pose()
     assert after is not None
+    there, in_hand_there = released[0]
+    if after.position[2] > there.position[2] + EARLY:
+        return replace(trial, reason="not released")
     point_tcp = in_hand.apply(seen.inverse().apply(point))
     return replace(
         trial,
-        carried=_moved(in_hand, released[0], point_tcp).tolist(),
+        carried=_moved(in_hand, in_hand_there, point_tcp).tolist(),
         placed=_off(pose, seen, point, after, target).tolist(),
     )
 

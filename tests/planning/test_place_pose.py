@@ -209,8 +209,52 @@ def test_the_part_may_be_measured_at_its_place_before_the_fingers_open():
 
     pose = Grasp.from_vector(np.array([0.5, 0.2, 0.06, 0.0]))
     place(bench.cell, pose, recover, tallest=0.03, arrived=arrived)
-    assert there == pytest.approx([0.5, 0.2, 0.06], abs=1e-3)
+    assert there == pytest.approx([0.5, 0.2, 0.057])  # 1 mm lower than it was grasped, where nothing is met
     assert bench.seen == [[0.5, 0.2, 0.12], [0.5, 0.2, 0.06], [], [0.5, 0.2, 0.12]]
+
+
+@pytest.mark.parametrize(
+    ("z", "drop", "released"),
+    [
+        (0.06, 0.0, 0.057),
+        (0.06, 0.006, 0.051),  # it hangs less low than was expected
+        (0.06, 0.02, 0.05),  # met: the toy's table
+        (0.051, 0.0, 0.05),
+    ],
+)
+def test_a_part_is_lowered_until_it_touches(z: float, drop: float, released: float):
+    bench, there = WritingCell(0.16), []
+    arrived = lambda: there.append(float(bench.cell.arm.state().T_base_tcp.position[2]))  # noqa: E731
+    place(bench.cell, Grasp.from_vector(np.array([0.5, 0.2, z, 0.0])), recover, drop=drop, arrived=arrived)
+    assert there == pytest.approx([released])
+
+
+def test_a_part_that_was_grasped_low_is_not_lowered_until_the_pads_touch():
+    bench, there = WritingCell(0.16), []
+    bench.cell = dataclasses.replace(
+        bench.cell, workspace=dataclasses.replace(bench.cell.workspace, table_z=0.05)
+    )
+    low = float(bench.cell.workspace.lowest_grasp_z(np.array([0.5, 0.2])))
+    arrived = lambda: there.append(float(bench.cell.arm.state().T_base_tcp.position[2]))  # noqa: E731
+    place(bench.cell, Grasp.from_vector(np.array([0.5, 0.2, low + 0.002, 0.0])), recover, arrived=arrived)
+    assert there == pytest.approx([low])
+
+
+@pytest.mark.parametrize(
+    ("error", "recovered"),
+    [(MotionAborted("the reflex was quicker"), 1), (OutOfWorkspace("contact force 5 N is not under 4 N"), 0)],
+)
+def test_a_part_that_is_not_lowered_to_the_touch_is_released_where_it_is(
+    error: Exception, recovered: int, monkeypatch: pytest.MonkeyPatch
+):
+    bench, errors = WritingCell(0.16), []
+
+    def refuse(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr(bench.cell.arm, "move_until_contact", refuse)
+    place(bench.cell, Grasp.from_vector(np.array([0.5, 0.2, 0.06, 0.0])), errors.append)
+    assert len(errors) == recovered and bench.cell.arm.state().gripper_width > 0.05
 
 
 def test_a_place_over_which_the_part_cannot_be_carried_is_refused_before_anything_moves():

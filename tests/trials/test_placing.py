@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hal import Cell
+from hal import Cell, RgbdFrame
 from hal.errors import OutOfWorkspace
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, twist_and_swing
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, object_displacement
@@ -18,11 +20,14 @@ from mskgrasp.parts.alike_poses import alike_poses
 from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
+from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import Target, displacement_of_point, place, place_pose
 from mskgrasp.trials import placing
 from mskgrasp.trials.engine import TrialEngine, connected_engine
 from mskgrasp.trials.placed_trial import CORRECTIONS, PlacedTrial
 from mskgrasp.trials.placing import _moved, _off, _pose_error, as_turned, grasp_and_place
+from tests.boxes import make_rail
+from tests.planning.hand_made import planner
 from tests.planning.workspaces import WORKSPACE
 
 NUT = find_part("hex_nut_m20")
@@ -157,6 +162,44 @@ def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(engine: Tri
     lies = engine.part_pose()
     assert lies is not None
     assert np.hypot(*(lies.position[:2] - engine.cell.workspace.centre)) < 0.02
+
+
+@dataclass(frozen=True)
+class AcrossTheWeb:
+    """A planner that knows how a rail lies, and holds it by its web, beneath the upper flange."""
+
+    engine: TrialEngine
+
+    def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
+        lies = self.engine.part_pose()
+        assert lies is not None
+        along = lies.as_matrix()[:2, 0]
+        theta = (np.arctan2(along[1], along[0]) + np.pi / 2) % np.pi - np.pi / 2
+        plan = planner().plan(frame, rng)
+        return replace(
+            plan,
+            grasp=Grasp.from_vector(np.array([*lies.position[:2], 0.0175, theta])),
+            grasp_displacement=np.zeros(4),
+        )
+
+
+def test_a_part_held_beneath_an_overhang_is_not_taken_along(engine: TrialEngine, tmp_path: Path):
+    """The pads, up to 26.5 mm high, are beneath a flange at 32 mm that juts out 13.5 mm from the web."""
+    rail = make_rail(tmp_path, "rail", length=0.05, flange=0.037, web=0.01, density=2000.0)
+    feeder = engine.cell.feeder
+    assert feeder is not None
+    for seed in range(40):
+        feeder.present(str(rail.folder), seed)
+        lies = engine.part_pose()
+        assert lies is not None
+        if lies.as_matrix()[2, 2] > 0.99:
+            break
+    else:
+        raise AssertionError("it never stands on its thicker flange")
+    trial = PlacedTrial(part="rail", condition="any", number=0, means="networks")
+    done = grasp_and_place(engine, AcrossTheWeb(engine), rail, (seed, 4), trial, {})
+    assert done.reason == "" and done.placed is not None
+    assert np.hypot(*done.placed[:2]) < 1e-3 and abs(done.placed[2]) < 0.05
 
 
 @pytest.mark.parametrize(("n_refused", "reason"), [(1, ""), (2, "OutOfWorkspace")])
