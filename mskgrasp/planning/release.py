@@ -26,7 +26,7 @@ _STEP = 0.001
 _PAD_TOP, _PAD_THICKNESS = 0.009, 0.015
 """Upper face of a pad over the TCP, and distance from its face to its back, metres (Panda hand)."""
 _EDGE, _MARGIN = 0.003, 0.002
-"""What is seen so near to a pad's face may be the edge of the held part itself; a finger that is so far from an
+"""What is seen so near to a pad's face may be the edge of the held part itself; and a finger so far from an
 overhang is clear of it; metres."""
 _NOISE = 0.003
 """Heights that exceed the tips by less are noise, metres."""
@@ -59,7 +59,7 @@ def release_opening(frame: RgbdFrame, plan: GraspPlan, width: float) -> float:
 
 
 def _points_beside(frame: RgbdFrame, plan: GraspPlan) -> np.ndarray:
-    """(n, 2) distance from the middle between the pads, either way, and height over the TCP of what is seen."""
+    """(n, 2) of what is seen: distance from the middle between the pads, and height over the TCP, metres."""
     held = where_held(plan.grasp.as_vector()[None], np.nan_to_num(plan.grasp_displacement)[None])[0]
     points = Grasp.from_vector(held).T_base_grasp.inverse().apply(seen_points(frame))
     points = points[np.abs(points[:, 0]) <= FINGER_HALF_WIDTH]
