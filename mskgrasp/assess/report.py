@@ -182,7 +182,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
     errors = conditions["pose_errors"]
     pose_cov = np.diag(np.square([errors["position"], errors["position"], errors["turn"]]))
     rows = []
-    tilts = "; grasped so that it always tilts in the same way"
+    simulated = "; planned with the best that was simulated"
     for number, share in enumerate(part.resting_probability):
         if number in certified.like:
             continue
@@ -197,7 +197,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
                 f"{share + part.resting_probability[alike].sum():.1%}",
                 len(grasps),
                 "-" if best is None else f"{best:.2f} mm",
-                why_not + tilts if certified.tilting_of(number)[0] else why_not,
+                why_not + simulated if certified.uncertified_of(number)[0] else why_not,
             )
         )
     rows.sort(key=lambda row: -float(row[1].rstrip("%")))
@@ -224,7 +224,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
 
 def _grasps_section(part: Part, certified: CertifiedGrasps) -> Section:
     rows = []
-    for grasp in (*certified.grasps, *certified.tilting):
+    for grasp in (*certified.grasps, *certified.uncertified):
         x, y, z, theta = grasp.grasp
         low, high = grasp.lifted_interval
         std = np.sqrt(np.diag(grasp.residual))

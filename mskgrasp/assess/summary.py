@@ -58,7 +58,7 @@ class Row:
         condition: Name of the condition.
         means: What planned the grasps.
         certified: Share planned by a certified grasp.
-        tilting: Number planned by a grasp in which the part tilts in every simulation.
+        uncertified: Number planned by a simulated grasp that is not certified.
         lifted: Share lifted.
         within: By correction, the share of all attempts placed within the tolerance.
         within_distance: The same within each of `DISTANCES`, whatever the turn.
@@ -71,7 +71,7 @@ class Row:
     condition: str
     means: Means
     certified: Share
-    tilting: int
+    uncertified: int
     lifted: Share
     within: dict[Correction, Share]
     within_distance: dict[Correction, tuple[Share, ...]]
@@ -84,12 +84,12 @@ class Row:
     def planned_by(self) -> str:
         """What planned the grasps, in words: where a part has no certified grasp others did."""
         n, of = self.certified.n, self.certified.of
-        others = of - n - self.tilting
+        others = of - n - self.uncertified
         if self.means == "networks":
             return "the networks"
         if others == of:
             return "the networks (no certified grasp)"
-        counts = {"certified grasps": n, "grasps that tilt the part": self.tilting}
+        counts = {"certified grasps": n, "uncertified ones": self.uncertified}
         used = {name: count for name, count in counts.items() if count}
         if of in used.values():
             return next(iter(used)) + ("" if n else " (no certified grasp)")
@@ -107,7 +107,7 @@ class Row:
             condition=self.condition,
             means=self.means,
             certified=self.certified.to_json(),
-            tilting=self.tilting,
+            uncertified=self.uncertified,
             lifted=self.lifted.to_json(),
             within={name: share.to_json() for name, share in self.within.items()},
             within_distance={
@@ -155,7 +155,7 @@ def _row(
         condition=condition,
         means=means,
         certified=Share(n=sum(trial.planned_by == "certified" for trial in trials), of=n),
-        tilting=sum(trial.planned_by == "tilting" for trial in trials),
+        uncertified=sum(trial.planned_by == "uncertified" for trial in trials),
         lifted=Share(n=len(lifted), of=n),
         within={one: within(one, tolerance.distance, tolerance.angle) for one in CORRECTIONS},
         within_distance={

@@ -202,9 +202,9 @@ def _certified_text(one: TrialStatistics) -> list[str]:
     if one.certified is None:
         return []
     n, planned = one.certified
-    tilting = f"; in {one.tilting} the part tilts in every simulation" if one.tilting else ""
-    rest = "; the others are the networks'" if n + one.tilting < planned else ""
-    return [f"{n} of {planned} planned grasps are certified{tilting}{rest}"]
+    simulated = f", {one.uncertified} simulated but not certified" if one.uncertified else ""
+    rest = "; the others are the networks'" if n + one.uncertified < planned else ""
+    return [f"{n} of {planned} planned grasps are certified{simulated}{rest}"]
 
 
 def refused_text(reasons: Mapping[str, int], n_trials: int, n_lifted: int) -> str:

@@ -71,7 +71,7 @@ class TrialStatistics:
         flat_rotation_interval: The same of the turn.
         certified: Of the planned grasps of policy ``certified`` those that are certified, and their number;
             None for other policies, and where it was not recorded.
-        tilting: Of these, grasps in which the part tilts in every simulation; the others are the networks'.
+        uncertified: Of these, simulated ones that are not certified; the others are the networks'.
     """
 
     trials: int
@@ -99,7 +99,7 @@ class TrialStatistics:
     flat_rotation_rmse: float | None = None
     flat_rotation_interval: Interval | None = None
     certified: tuple[int, int] | None = None
-    tilting: int = 0
+    uncertified: int = 0
 
     @classmethod
     def of(
@@ -148,7 +148,7 @@ class TrialStatistics:
             flat_rotation_rmse=_rms(errors[1][flat]),
             flat_rotation_interval=_interval(errors[1][flat], parts[flat]),
             certified=(planned_by.count("certified"), len(planned_by)) if planned_by else None,
-            tilting=planned_by.count("tilting"),
+            uncertified=planned_by.count("uncertified"),
         )
 
 

@@ -30,7 +30,7 @@ from mskgrasp.core.json_text import parse_json
 from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.parts import Part, parts_folder
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 FILE = "grasps.json"
 _LEAST_SPREAD = 1e-12
 """Smaller spreads are alike: (1 um)^2."""
@@ -143,8 +143,9 @@ class CertifiedGrasps:
         part: Name of the part.
         part_hash: Its content hash.
         grasps: The grasps, those of a resting pose in the order of their expected error.
-        tilting: Grasps of resting poses that have no certified one, steadiest first: the part tilts in the
-            hand, always in the same way. Where it comes to hang is known, but it cannot be placed flat.
+        uncertified: The best simulated grasps of resting poses that have no certified one, least expected
+            error first. The part tilts in them, always in the same way, or is not always lifted, or its
+            displacement spreads too much (`mskgrasp.simulation.select_certified`).
         without: For resting poses without a certified grasp the reason, by index.
         like: For resting poses that look and behave as another one, its index and the turn (radians) by which
             their rest frame is turned against its, by index.
@@ -156,7 +157,7 @@ class CertifiedGrasps:
     part: str
     part_hash: str
     grasps: tuple[CertifiedGrasp, ...]
-    tilting: tuple[CertifiedGrasp, ...]
+    uncertified: tuple[CertifiedGrasp, ...]
     without: dict[int, str]
     like: dict[int, tuple[int, float]]
     stands: tuple[bool, ...]
@@ -166,9 +167,9 @@ class CertifiedGrasps:
         """Grasps of a resting pose, and the turn of the rest frame they are given in against the pose's."""
         return self._of(self.grasps, resting)
 
-    def tilting_of(self, resting: int) -> tuple[list[CertifiedGrasp], float]:
-        """The same of those in which the part tilts."""
-        return self._of(self.tilting, resting)
+    def uncertified_of(self, resting: int) -> tuple[list[CertifiedGrasp], float]:
+        """The same of those that are not certified."""
+        return self._of(self.uncertified, resting)
 
     def _of(self, grasps: Sequence[CertifiedGrasp], resting: int) -> tuple[list[CertifiedGrasp], float]:
         which, turn = self.like.get(resting, (resting, 0.0))
@@ -191,7 +192,7 @@ class CertifiedGrasps:
             hand=HAND_GEOMETRY,
             units="metres, radians; grasp: x y z theta in the rest frame of the resting pose",
             grasps=[grasp.to_json() for grasp in self.grasps],
-            tilting=[grasp.to_json() for grasp in self.tilting],
+            uncertified=[grasp.to_json() for grasp in self.uncertified],
             without={str(number): reason for number, reason in self.without.items()},
             like={str(number): list(other) for number, other in self.like.items()},
             stands=list(self.stands),
@@ -217,15 +218,15 @@ def read_certified(part: Part, folder: Path | None = None) -> CertifiedGrasps:
         values = parse_json(path.read_bytes())
         if values["schema_version"] != SCHEMA_VERSION:
             raise ValueError(f"schema version {values['schema_version']}, legal: {SCHEMA_VERSION}")
-        grasps, tilting = (
+        grasps, uncertified = (
             tuple(grasp_from_json(one, len(part.resting_probability)) for one in values[name])
-            for name in ("grasps", "tilting")
+            for name in ("grasps", "uncertified")
         )
         found = CertifiedGrasps(
             part=str(values["part"]),
             part_hash=str(values["part_hash"]),
             grasps=grasps,
-            tilting=tilting,
+            uncertified=uncertified,
             without={int(number): str(reason) for number, reason in values["without"].items()},
             like={int(number): (int(other), float(turn)) for number, (other, turn) in values["like"].items()},
             stands=tuple(map(bool, values["stands"])),

@@ -128,15 +128,15 @@ class CertifiedPlanner:
 
     def _tell(self, found: PartPose, plan: GraspPlan | None) -> None:
         """Report why no certified grasp is planned, unless the networks' was asked for."""
-        if not (self._certified.grasps or self._certified.tilting):
+        if not (self._certified.grasps or self._certified.uncertified):
             return
         resting = self._certified.like.get(found.resting, (found.resting, 0.0))[0]
         reason = self._certified.without.get(resting, "the arm reaches none of its certified grasps")
         if self._ambiguous(found):
             reason = "the image fits two poses of it"
-        elif plan is None and self._certified.tilting_of(found.resting)[0]:
+        elif plan is None and self._certified.uncertified_of(found.resting)[0]:
             reason += ", and the arm reaches none of these"
-        by = "by the networks" if plan is None else "with one in which it always tilts in the same way"
+        by = "by the networks" if plan is None else "with the best that was simulated"
         which = f"'{self._part.name}' in resting pose {found.resting}"
         note(f"{which} gets no certified grasp: {reason}; planned {by}")
 
@@ -146,8 +146,8 @@ class CertifiedPlanner:
         planned_by: PlannedBy = "certified"
         grasps, turn = self._certified.of(found.resting)
         if not grasps:
-            planned_by = "tilting"
-            grasps, turn = self._certified.tilting_of(found.resting)
+            planned_by = "uncertified"
+            grasps, turn = self._certified.uncertified_of(found.resting)
         if not grasps:
             return None
         view = planner.view(frame)

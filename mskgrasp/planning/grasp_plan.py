@@ -13,9 +13,9 @@ from mskgrasp.core.grasp import Grasp, PartView, to_object_displacement
 from mskgrasp.parts import Part
 from mskgrasp.perception.part_pose import PartPose
 
-PlannedBy = Literal["networks", "tilting", "certified"]
+PlannedBy = Literal["networks", "uncertified", "certified"]
 """What a planned grasp and its outcome come from: the networks' predictions, or simulations made beforehand,
-of a grasp in which the part tilts or of a certified one (`mskgrasp.planning.certified`)."""
+by which it is certified or not (`mskgrasp.planning.certified`)."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ def plan_text(plan: GraspPlan) -> str:
     n = len(plan.candidates)
     of = {
         "networks": f"best of {n}: {plan.qualities.max():.3f}",
-        "tilting": f"{n} grasps that tilt the part",
+        "uncertified": f"{n} simulated grasps, none certified",
         "certified": f"{n} certified grasps",
     }[plan.planned_by]
     return "\n".join(

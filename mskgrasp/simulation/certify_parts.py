@@ -262,7 +262,7 @@ def _read_stream(part: Part, stream: Stream, digest: str) -> list[CertifiedGrasp
 
 def _merged(plan: _Plan, config: CertifyConfig, conditions: dict[str, Any], digest: str) -> CertifiedGrasps:
     grasps: list[CertifiedGrasp] = []
-    tilting: list[CertifiedGrasp] = []
+    uncertified: list[CertifiedGrasp] = []
     without = dict(plan.without)
     for resting in dict.fromkeys(stream.resting for stream in plan.streams):
         found = [
@@ -273,14 +273,14 @@ def _merged(plan: _Plan, config: CertifyConfig, conditions: dict[str, Any], dige
         ]
         selected = select_certified(plan.part, resting, found, config)
         grasps += selected.certified
-        tilting += selected.tilting
+        uncertified += selected.uncertified
         if selected.reason:
             without[resting] = selected.reason
     return CertifiedGrasps(
         part=plan.part.name,
         part_hash=plan.part.content_hash,
         grasps=tuple(grasps),
-        tilting=tuple(tilting),
+        uncertified=tuple(uncertified),
         without=without,
         like=plan.like,
         stands=plan.stands,

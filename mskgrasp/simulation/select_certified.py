@@ -12,10 +12,12 @@ from mskgrasp.parts import Part
 from mskgrasp.planning.certified import CertifiedGrasp, radius_about_vertical, without_selection_bias
 from mskgrasp.simulation.certify import CertifyConfig, spread_out
 
-SELECT_VERSION = 2
+SELECT_VERSION = 3
 """Raised by every change after which others of the simulated grasps are certified."""
 GRAVITY = 9.81
 """m/s^2"""
+WORTH = 0.8
+"""Least share of its simulations that a grasp lifts which is kept where no grasp is certified."""
 
 
 def moment_share(part: Part, one: CertifiedGrasp, config: CertifyConfig) -> float:
@@ -54,12 +56,14 @@ class Selected:
 
     Attributes:
         certified: The certified ones.
-        tilting: Where there is none, those that fail by the tilt alone.
+        uncertified: Where there is none, the best of those that fail by one criterion: by the share lifted,
+            by the tilt, or by a spread of up to twice `CertifyConfig.most_error`. The networks would plan one
+            of these candidates, without knowing which is best.
         reason: Why there is no certified one; empty: there is.
     """
 
     certified: tuple[CertifiedGrasp, ...] = ()
-    tilting: tuple[CertifiedGrasp, ...] = ()
+    uncertified: tuple[CertifiedGrasp, ...] = ()
     reason: str = ""
 
 
@@ -67,46 +71,61 @@ def select_certified(
     part: Part, resting: int, grasps: Sequence[CertifiedGrasp], config: CertifyConfig
 ) -> Selected:
     """Select the certified grasps of a resting pose."""
-    errors = config.pose_errors
-    pose_cov = np.diag(np.square([errors.position, errors.position, errors.turn]))
-    radius = radius_about_vertical(part, resting)
     if not grasps:
         return Selected(reason="the camera does not see it over the table")
     lifting = [one for one in grasps if one.lifted >= config.least_lifted * one.n and one.lifted >= 3]
     if not lifting:
         best = max((one.lifted / one.n for one in grasps), default=0.0)
-        reason = f"no grasp lifts it in {config.least_lifted:.0%} of the simulations (best {best:.0%})"
-        return Selected(reason=reason)
-    flat = [one for one in lifting if one.swing @ one.swing + np.trace(one.swing_cov) <= TILT_LIMIT**2]
-    if not flat:
-        firm = without_selection_bias(_firm(part, lifting, config), radius)
-        # A tilt that is always the same moves no point from where it is expected in the hand.
-        errors = [float(np.sqrt(replace(one, swing=np.zeros(2)).score(pose_cov, radius))) for one in firm]
-        tilt = np.degrees(TILT_LIMIT)
+        most = [one for one in _flat(grasps) if one.lifted >= max(best, WORTH) * one.n]
         return Selected(
-            tilting=_steady(firm, errors, config),
-            reason=f"it tilts by more than {tilt:g} degrees in every grasp that lifts it",
+            uncertified=_steady(*_errors(part, most, config), config.most_error, config),
+            reason=f"no grasp lifts it in {config.least_lifted:.0%} of the simulations (best {best:.0%})",
         )
-    firm = without_selection_bias(_firm(part, flat, config), radius)
+    flat = _flat(lifting)
+    if not flat:
+        # A tilt that is always the same moves no point from where it is expected in the hand.
+        firm, _ = _errors(part, lifting, config)
+        _, errors = _errors(part, [replace(one, swing=np.zeros(2)) for one in lifting], config)
+        return Selected(
+            uncertified=_steady(firm, errors, config.most_error, config),
+            reason=f"it tilts by more than {np.degrees(TILT_LIMIT):g} degrees in every grasp that lifts it",
+        )
+    firm, errors = _errors(part, flat, config)
     if not firm:
         return Selected(reason="its weight could turn it between the pads in every grasp that lifts it")
-    errors = [float(np.sqrt(one.score(pose_cov, radius))) for one in firm]
-    steady = _steady(firm, errors, config)
+    steady = _steady(firm, errors, config.most_error, config)
     if not steady:
         most, least = 1e3 * config.most_error, 1e3 * min(errors)
-        return Selected(reason=f"every outcome spreads by more than {most:g} mm (least {least:.1f} mm)")
+        return Selected(
+            uncertified=_steady(firm, errors, 2 * config.most_error, config),
+            reason=f"every outcome spreads by more than {most:g} mm (least {least:.1f} mm)",
+        )
     return Selected(certified=steady)
 
 
-def _firm(part: Part, grasps: Sequence[CertifiedGrasp], config: CertifyConfig) -> list[CertifiedGrasp]:
-    """The grasps whose pads hold the part's weight."""
-    return [one for one in grasps if moment_share(part, one, config) <= 1]
+def _flat(grasps: Sequence[CertifiedGrasp]) -> list[CertifiedGrasp]:
+    """The grasps in which the part hangs as it lay."""
+    return [one for one in grasps if one.swing @ one.swing + np.trace(one.swing_cov) <= TILT_LIMIT**2]
+
+
+def _errors(
+    part: Part, grasps: Sequence[CertifiedGrasp], config: CertifyConfig
+) -> tuple[list[CertifiedGrasp], list[float]]:
+    """The grasps of one resting pose whose pads hold the part's weight, and their expected errors, metres."""
+    firm = [one for one in grasps if moment_share(part, one, config) <= 1]
+    if not firm:
+        return [], []
+    radius = radius_about_vertical(part, firm[0].resting)
+    errors = config.pose_errors
+    pose_cov = np.diag(np.square([errors.position, errors.position, errors.turn]))
+    firm = without_selection_bias(firm, radius)
+    return firm, [float(np.sqrt(one.score(pose_cov, radius))) for one in firm]
 
 
 def _steady(
-    grasps: Sequence[CertifiedGrasp], errors: Sequence[float], config: CertifyConfig
+    grasps: Sequence[CertifiedGrasp], errors: Sequence[float], most: float, config: CertifyConfig
 ) -> tuple[CertifiedGrasp, ...]:
-    """The grasps of little enough expected error (m), least first, apart from each other and not too many."""
+    """The grasps whose errors are at most so large, metres, least first, apart and not too many."""
     order = np.argsort(errors, kind="stable")
-    ranked = [grasps[row] for row in order if errors[row] <= config.most_error]
+    ranked = [grasps[row] for row in order if errors[row] <= most]
     return tuple(spread_out(ranked, config.kept))

@@ -15,7 +15,7 @@ from mskgrasp.core.grasp import Grasp, PartView
 from mskgrasp.dataset import depth_to_u16, u16_to_depth
 from mskgrasp.planning.grasp_plan import GraspPlan, PlannedBy
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 FOLDER = "trials"
 _ARRAYS = (
     "grasp_displacement", "grasp_displacement_cov", "swing", "swing_var", "qualities", "shortlist",

@@ -65,17 +65,14 @@ def test_shares_within_an_error_are_of_all_attempts_and_parts_that_hang_tilted_a
 
 
 def test_grasps_of_the_networks_are_told_from_certified_ones():
-    by = ("networks", "certified", "certified", "tilting")
+    by = ("networks", "certified", "certified", "uncertified")
     own = [trial(number=k, policy="certified", planned_by=one) for k, one in enumerate(by)]
     refused = trial(number=4, policy="certified", **NOTHING)
     found = summarise_trials([*own[:3], refused])
-    assert found.overall.certified == (2, 3) and found.overall.tilting == 0
+    assert found.overall.certified == (2, 3) and found.overall.uncertified == 0
     assert "2 of 3 planned grasps are certified; the others are the networks'" in printed(found)
     all_kinds = printed(summarise_trials(own))
-    assert (
-        "2 of 4 planned grasps are certified; in 1 the part tilts in every simulation; the others"
-        in all_kinds
-    )
+    assert "2 of 4 planned grasps are certified, 1 simulated but not certified; the others" in all_kinds
     assert "2 of 2 planned grasps are certified\n" in printed(summarise_trials(own[1:3]))
     assert summarise_trials([trial(planned_by="networks")]).overall.certified is None  # another policy
     compared = compare_models([replace(one, chosen_by="certified") for one in own], {})

@@ -53,7 +53,7 @@ def certified(*grasps: CertifiedGrasp, **changes) -> CertifiedGrasps:
         part=PART.name,
         part_hash=PART.content_hash,
         grasps=grasps,
-        tilting=(),
+        uncertified=(),
         without={2: "it is rare (probability 1.0%)"},
         like={1: (0, 0.5)},
         stands=(True,) * len(PART.resting_probability),
@@ -114,15 +114,15 @@ def test_the_radius_of_a_disc_is_its_own():
 
 def test_the_file_gives_back_what_was_written(tmp_path):
     tilting = certified_grasp(resting=2, swing=np.array([0.2, 0.0]))
-    written = certified(certified_grasp(), certified_grasp(resting=3, lifted=24), tilting=(tilting,))
+    written = certified(certified_grasp(), certified_grasp(resting=3, lifted=24), uncertified=(tilting,))
     written.write(tmp_path)
     read = read_certified(PART, tmp_path)
     assert [one.to_json() for one in read.grasps] == [one.to_json() for one in written.grasps]
     assert (read.without, read.like, read.stands) == (written.without, written.like, written.stands)
     grasps, turn = read.of(1)
     assert (len(grasps), turn) == (1, 0.5)  # pose 1 is pose 0, turned
-    assert read.of(2) == ([], 0.0) and read.tilting_of(1) == ([], 0.5)
-    assert [one.to_json() for one in read.tilting_of(2)[0]] == [tilting.to_json()]
+    assert read.of(2) == ([], 0.0) and read.uncertified_of(1) == ([], 0.5)
+    assert [one.to_json() for one in read.uncertified_of(2)[0]] == [tilting.to_json()]
 
 
 @pytest.mark.parametrize(

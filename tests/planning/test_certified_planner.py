@@ -134,11 +134,13 @@ def test_where_the_part_always_tilts_it_is_planned_with_the_tilt(cell, planner, 
     resting = resting_of(true)
     (poor, sure), reason = grasps(resting).grasps, "it tilts by more than 2 degrees"
     tilts = dataclasses.replace(sure, swing=np.array([0.2, 0.0]))
-    known = dataclasses.replace(grasps(resting), grasps=(), tilting=(poor, tilts), without={resting: reason})
+    known = dataclasses.replace(
+        grasps(resting), grasps=(), uncertified=(poor, tilts), without={resting: reason}
+    )
     plan = CertifiedPlanner(planner, PART, known).plan(frame, np.random.default_rng(0))
-    assert plan.planned_by == "tilting" and np.linalg.norm(plan.swing) == pytest.approx(0.2)
-    assert f"{reason}; planned with one in which it always tilts in the same way" in capsys.readouterr().err
-    assert "2 grasps that tilt the part" in plan_text(plan)
+    assert plan.planned_by == "uncertified" and np.linalg.norm(plan.swing) == pytest.approx(0.2)
+    assert f"{reason}; planned with the best that was simulated" in capsys.readouterr().err
+    assert "2 simulated grasps, none certified" in plan_text(plan)
     CertifiedPlanner(planner, PART, known, lambda grasp: False).plan(frame, np.random.default_rng(0))
     assert f"{reason}, and the arm reaches none of these; planned by the networks" in capsys.readouterr().err
     # A certified grasp of the pose comes first.

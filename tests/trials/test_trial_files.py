@@ -44,7 +44,7 @@ def stored(run: Path, one: Trial) -> tuple[RgbdFrame, GraspPlan]:
     frame = captured()
     plan = planner.plan(frame, np.random.default_rng(0))
     view = dataclasses.replace(plan.view, table_offset=-0.002)
-    plan = dataclasses.replace(plan, view=view, planned_by="tilting")
+    plan = dataclasses.replace(plan, view=view, planned_by="uncertified")
     write_trial(trial_file(run, one.key), frame, plan, None)
     append_trial(run / TRIALS, one.to_json())
     return frame, plan
@@ -58,7 +58,7 @@ def test_a_trial_is_read_back_equal_and_drawn(tmp_path: Path):
     np.testing.assert_allclose(again.depth, frame.depth, atol=1e-6)
     np.testing.assert_array_equal(again.T_base_camera.position, frame.T_base_camera.position)
     assert after is None and again.fine_colour is None  # stored only with a frame after the grasp
-    assert planned is not None and planned.planned_by == "tilting" and not planned.certified
+    assert planned is not None and planned.planned_by == "uncertified" and not planned.certified
     for field in dataclasses.fields(planned):
         if isinstance(value := getattr(plan, field.name), np.ndarray):
             np.testing.assert_allclose(getattr(planned, field.name), value, rtol=1e-6, err_msg=field.name)
