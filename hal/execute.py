@@ -28,13 +28,13 @@ RETREAT = 0.05
 """Height by which the open hand first rises on its way home, so that it does not drag the part along, m."""
 
 PUT_DOWN = 0.002
-"""A part is released this much above the height at which it was grasped, m."""
+"""Height above that of the grasp at which a part is put down, or from which it is lowered to the touch, m."""
 
 RELEASE = 0.02
 """Opening of the fingers, more than that of the grasp, that releases a part for certain, m."""
 
 LEAST_RELEASE = 0.006
-"""The least that does where more would push the part, m."""
+"""Opening of the fingers, more than that of the grasp, that barely releases a part, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,16 +182,16 @@ def lower(cell: Cell, grasp: Grasp, *, height: float = 0.0) -> None:
     cell.arm.move_to_pose(grasp.raised(height).T_base_tcp, speed=0.15)
 
 
-def let_go(cell: Cell, place: Grasp, *, opening: float, tallest: float = 0.0) -> None:
+def let_go(cell: Cell, place: Grasp, *, opening: float | None = None, tallest: float = 0.0) -> None:
     """Open the fingers and rise straight.
 
     Args:
         cell: The hand is at ``place`` and holds a part.
         place: Pose of the hand as a grasp, base frame; the hand may be a little higher.
-        opening: Distance of the pads afterwards, metres. One that is not `LEAST_RELEASE` more than now
-            releases nothing, and stands for `RELEASE` more than now. The fingers had room on the way down to
-            the grasp, but since then the part has moved between them: one inside a bore may push it as it
-            opens all the way. A hand that opens less far opens as far as it does.
+        opening: Distance of the pads afterwards, metres, at least `LEAST_RELEASE` more than now; None:
+            `RELEASE` more than now. The fingers had room on the way down to the grasp, but since then the
+            part has moved between them: one inside a bore may push it as it opens all the way. A hand that
+            opens less far opens as far as it does.
         tallest: Height of the tallest thing over the table, the part included, over which the hand rises, m.
 
     Raises:
@@ -199,11 +199,11 @@ def let_go(cell: Cell, place: Grasp, *, opening: float, tallest: float = 0.0) ->
         ValueError: The hand does not open so far.
     """
     stroke = cell.arm.limits.gripper.stroke
-    if not 0 <= opening <= stroke:
+    if opening is not None and not 0 <= opening <= stroke:
         raise ValueError(f"opening {opening} m is outside 0 .. {stroke} m")
     state = cell.arm.state()
-    enough = opening >= state.gripper_width + LEAST_RELEASE
-    width = opening if enough else state.gripper_width + RELEASE
+    now = state.gripper_width
+    width = now + RELEASE if opening is None else max(opening, now + LEAST_RELEASE)
     if width < state.max_width:
         cell.arm.move_gripper(width)
     else:

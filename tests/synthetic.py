@@ -81,13 +81,13 @@ def render(
     return depth.astype(np.float32)
 
 
-def frame(boxes: list[Box]) -> RgbdFrame:
-    """What a perfect overhead camera would capture."""
+def frame(boxes: list[Box], T_base_camera: Pose = OVERHEAD) -> RgbdFrame:
+    """What a perfect camera would capture, by default from straight above."""
     return RgbdFrame(
         colour=np.full((N_PIXELS, N_PIXELS, 3), 128, np.uint8),
-        depth=render(boxes),
+        depth=render(boxes, T_base_camera),
         intrinsics=INTRINSICS,
-        T_base_camera=OVERHEAD,
+        T_base_camera=T_base_camera,
         timestamp_s=0.0,
         serial="synthetic",
     )

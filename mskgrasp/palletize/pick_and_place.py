@@ -23,7 +23,15 @@ from mskgrasp.perception.footprint import seen_footprint
 from mskgrasp.perception.markers import planar_displacement
 from mskgrasp.planning.certified_planner import planner_of_part
 from mskgrasp.planning.grasp_plan import GraspPlan
-from mskgrasp.planning.place_pose import Target, drop_of, place, place_error, place_pose, turned_by
+from mskgrasp.planning.place_pose import (
+    Target,
+    drop_of,
+    place,
+    place_error,
+    place_pose,
+    taken_along,
+    turned_by,
+)
 from mskgrasp.planning.planner import Planner
 from mskgrasp.planning.release import release_opening
 from mskgrasp.trials.engine import TrialEngine
@@ -193,7 +201,10 @@ class PickAndPlace:
             except MotionAborted as error:
                 engine.recover(error)
                 return replace(known, reason="collided"), target, None
+            lies = engine.part_pose()
             engine.home()
+            if lies is not None and grasped.before is not None and taken_along(grasped.before, lies):
+                return replace(known, reason="not released"), target, None
             after = engine.capture()
             done = self._measured(frame, after, plan, grasped.before, target, replace(known, placed=True))
             return done, target, after

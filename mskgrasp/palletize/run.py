@@ -42,7 +42,7 @@ from mskgrasp.trials.cell_file import check_loads
 from mskgrasp.trials.engine import connected_engine
 
 SCENE_VERSION = 4
-"""Raised by every change after which `_pallets` draws other scenes from a seed."""
+"""Raised by every change after which a seed makes other placements."""
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,12 @@ from mskgrasp.core.geometry import (
     wrap_angle,
 )
 from mskgrasp.core.grasp import Grasp, PartView
+from mskgrasp.runtime.progress import note
 
 EARLY = 0.007
 """Height above the target pose from which contact with the table counts as placed, metres."""
+TAKEN_ALONG = 0.03
+"""Height over its place from which a part is still in the hand, which rises farther than that, metres."""
 _BELOW = 0.001
 """Distance below the height of the grasp to which a part is lowered at most until it touches, metres."""
 _TOUCH_FORCE, _TOUCH_SPEED = 5.0, 0.02
@@ -86,7 +89,7 @@ def place_pose(
         centre_base: (3,) the part's centre before the grasp, base frame, metres.
         target: Target of the part's centre.
         lowest_grasp_z: Gives the least z of grasps at points (..., 2), as `hal.Workspace.lowest_grasp_z`.
-        drop: As `drop_of` computes it: the hand releases the part so much higher, metres.
+        drop: As `drop_of` computes it: the hand comes so much less low, metres.
 
     Returns:
         Base frame; theta is not wrapped to half a turn, which would turn the part.
@@ -98,9 +101,11 @@ def place_pose(
     cos, sin = np.cos(theta), np.sin(theta)
     x = target.x - (cos * held[0] - sin * held[1])
     y = target.y - (sin * held[0] + cos * held[1])
-    # A part that has sunk in the hand is released higher, one that has risen lower.
-    z = grasp.position[2] - displacement[2] + drop + PUT_DOWN
-    z = max(z, float(lowest_grasp_z(np.array([x, y]))))
+    # A part that has sunk in the hand is held higher, one that has risen lower.
+    # Nor is the table as high there, if it slopes.
+    lowest = lowest_grasp_z(np.array([[x, y], grasp.position[:2]]))
+    z = grasp.position[2] - displacement[2] + drop + PUT_DOWN + float(lowest[0] - lowest[1])
+    z = max(z, float(lowest[0]))
     return Grasp(position=np.array([x, y, z]), theta=theta)
 
 
@@ -120,6 +125,16 @@ def place_error(before: Pose, after: Pose, centre_offset: np.ndarray, target: Ta
     centre = after.position[:2] + [cos * x - sin * y, sin * x + cos * y]
     distance = float(np.hypot(*(centre - [target.x, target.y])))
     return distance, turned_by(turn, target)
+
+
+def taken_along(lay: Pose, after: Pose) -> bool:
+    """Whether a part went up with the hand that was to release it.
+
+    Args:
+        lay: ``T_base_obj`` before the grasp.
+        after: ``T_base_obj`` once the hand has risen.
+    """
+    return bool(after.position[2] > lay.position[2] + TAKEN_ALONG)
 
 
 def turned_by(turn: float, target: Target) -> float:
@@ -180,7 +195,7 @@ def place(
     recover: Callable[[MotionAborted], None],
     *,
     drop: float = 0.0,
-    opening: float = 0.0,
+    opening: float | None = None,
     tallest: float = 0.0,
     part_height: float = 0.0,
     arrived: Callable[[], None] | None = None,
@@ -225,16 +240,19 @@ def place(
 
 
 def _lower_to_touch(cell: Cell, pose: Grasp, by: float, recover: Callable[[MotionAborted], None]) -> None:
-    """Lower the part until it touches the table, by so much at most, metres: a part that falls shifts."""
+    """Lower the part until it touches the table, by so much at most, metres: a part that falls shifts.
+
+    The pads stay clear of the table, whether the part touches it or not.
+    """
     x, y, z = pose.position
     lowest = max(float(z) - by, float(cell.workspace.lowest_grasp_z(pose.position[:2])))
-    if lowest > z - _BELOW:
+    if lowest >= z:
         return
     goal = replace(pose, position=np.array([x, y, lowest]))
     try:
         cell.arm.move_until_contact(goal.T_base_tcp, force=_TOUCH_FORCE, speed=_TOUCH_SPEED)
-    except OutOfWorkspace:
-        return  # a cell whose reflex is as light, or no straight line there: it falls the rest of the way
+    except OutOfWorkspace as error:
+        note(f"the part is let go {1e3 * PUT_DOWN:g} mm above the table: {error}")
     except MotionAborted as error:
         recover(error)
 

@@ -17,23 +17,22 @@ from mskgrasp.core.grasp import (
     PAD_REACH,
     Grasp,
 )
-from mskgrasp.perception.footprint import seen_points
+from mskgrasp.perception.footprint import pixel_pitch, seen_points
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.refine import where_held
 
 _STEP = 0.001
 """Distance of the openings that are looked at, metres."""
 _PAD_TOP, _PAD_THICKNESS = 0.009, 0.015
-"""Upper face of a pad over the TCP, and distance from its face to its back, metres (Panda hand)."""
-_EDGE, _MARGIN = 0.003, 0.002
-"""What is seen so near to a pad's face may be the edge of the held part itself; and a finger so far from an
-overhang is clear of it; metres."""
+"""Upper face of a pad's collision box over the TCP, and distance from its face to its back, metres."""
+_EDGE = 0.003
+"""What is seen so near to a pad's face may be the edge of the held part itself, metres."""
 _NOISE = 0.003
 """Heights that exceed the tips by less are noise, metres."""
 
 
-def release_opening(frame: RgbdFrame, plan: GraspPlan, width: float) -> float:
-    """Compute the opening of the fingers that frees the part, by the heights seen where it lay.
+def release_opening(frame: RgbdFrame, plan: GraspPlan, width: float) -> float | None:
+    """Compute the opening of the fingers that frees the part, by its heights as seen where it lay.
 
     Args:
         frame: The frame that the grasp was planned on.
@@ -41,27 +40,35 @@ def release_opening(frame: RgbdFrame, plan: GraspPlan, width: float) -> float:
         width: Distance of the pads that hold the part, metres.
 
     Returns:
-        Metres: `hal.execute.RELEASE` more than ``width``, or less where that would push the part; where a
-        finger is beneath an overhang the least opening that is clear of it, 0 if there is none.
+        Metres: `hal.execute.RELEASE` more than ``width``, less where that would push the part, or more where
+        a finger is beneath an overhang: the least opening that is clear of it, or the hand's. None, as
+        `hal.let_go` takes it, where the planner predicts no displacement: what is beside the fingers is not
+        known then.
     """
+    if not np.nan_to_num(plan.grasp_displacement).any():
+        return None
     points = _points_beside(frame, plan)
+    least, usual = width + LEAST_RELEASE, min(width + RELEASE, MAX_OPENING)
     if _highest(points, width / 2 + _EDGE, width / 2 + _PAD_THICKNESS) > _PAD_TOP:
-        for opening in np.arange(width + LEAST_RELEASE, MAX_OPENING, _STEP):
-            if _clear(points, opening / 2 - _MARGIN, opening):
+        margin = pixel_pitch(frame)
+        for opening in (*np.arange(usual, MAX_OPENING, _STEP), *np.arange(usual, least, -_STEP)):
+            if _clear(points, opening / 2 - margin, opening):
                 return float(opening)
-        return 0.0
-    least, most = width + LEAST_RELEASE, min(width + RELEASE, MAX_OPENING)
-    openings = np.arange(least, most, _STEP)
+        return MAX_OPENING
+    openings = np.arange(least, usual, _STEP)
     blocked = [not _clear(points, opening / 2 + _EDGE, opening) for opening in openings]
     if not any(blocked):
-        return most
+        return usual
     return float(openings[max(0, blocked.index(True) - 1)])
 
 
 def _points_beside(frame: RgbdFrame, plan: GraspPlan) -> np.ndarray:
-    """(n, 2) of what is seen: distance from the middle between the pads, and height over the TCP, metres."""
+    """(n, 2) of the part as seen: distance from the middle between the pads, height over the TCP, metres."""
     held = where_held(plan.grasp.as_vector()[None], np.nan_to_num(plan.grasp_displacement)[None])[0]
-    points = Grasp.from_vector(held).T_base_grasp.inverse().apply(seen_points(frame))
+    points, view = seen_points(frame) - [0.0, 0.0, plan.view.table_offset], plan.view
+    within = np.abs(view.T_base_box.inverse().apply(points)[:, :2])
+    points = points[(within <= np.asarray(view.size)[:2] / 2 + pixel_pitch(frame)).all(axis=1)]
+    points = Grasp.from_vector(held).T_base_grasp.inverse().apply(points)
     points = points[np.abs(points[:, 0]) <= FINGER_HALF_WIDTH]
     return np.column_stack([np.abs(points[:, 1]), points[:, 2]])
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from hal import RgbdFrame, let_go, lower
 from hal.errors import MotionAborted
+from hal.execute import RELEASE
 from mskgrasp.core.errors import MarkersNotFound
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.perception.markers import check_between_pads, planar_displacement
@@ -118,7 +119,8 @@ def _measure_by_tape(
             raise MarkersNotFound("not put down: the part met the table above the grasp pose") from error
         in_hand = False
         try:
-            let_go(engine.cell, plan.grasp, opening=safe_opening(plan), tallest=engine.passed)
+            opening = max(safe_opening(plan), min(width + RELEASE, MAX_OPENING))
+            let_go(engine.cell, plan.grasp, opening=opening, tallest=engine.passed)
         except MotionAborted as error:
             engine.recover(error)
             raise MarkersNotFound("touched: the hand met something as it retracted") from error

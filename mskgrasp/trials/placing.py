@@ -22,12 +22,12 @@ from mskgrasp.parts import Part
 from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import (
-    EARLY,
     Target,
     displacement_of_point,
     drop_of,
     place,
     place_pose,
+    taken_along,
 )
 from mskgrasp.planning.release import release_opening
 from mskgrasp.trials.engine import PlansGrasps, TrialEngine
@@ -105,17 +105,18 @@ def grasp_and_place(
         tilt=done.tilt,
     )
     opening = release_opening(planned.frame, plan, done.result.width)
-    return _placed(engine, plan, seen, point, in_hand, expected, opening, seeds[1], trial)
+    return _placed(engine, plan, lay, seen, point, in_hand, expected, opening, seeds[1], trial)
 
 
 def _placed(
     engine: TrialEngine,
     plan: GraspPlan,
+    lay: Pose,
     seen: Pose,
     point: np.ndarray,
     in_hand: Pose,
     expected: np.ndarray,
-    opening: float,
+    opening: float | None,
     target_seed: int,
     trial: PlacedTrial,
 ) -> PlacedTrial:
@@ -124,12 +125,12 @@ def _placed(
     turn = np.random.default_rng(target_seed).uniform(-TURNS, TURNS)
     x, y = workspace.centre
     drop = drop_of(plan.grasp, plan.view, float(expected[3]), np.nan_to_num(plan.swing))
-    released: list[tuple[Pose, Pose]] = []
+    released: list[Pose] = []
 
     def arrived() -> None:
         there = engine.part_pose()
         assert there is not None
-        released.append((there, engine.cell.arm.state().T_base_tcp.inverse() @ there))
+        released.append(engine.cell.arm.state().T_base_tcp.inverse() @ there)
 
     for theta in (turn, 0.0):
         target = Target(x=float(x), y=float(y), theta=float(theta))
@@ -151,13 +152,12 @@ def _placed(
         return replace(trial, reason="OutOfWorkspace")
     after = engine.part_pose()
     assert after is not None
-    there, in_hand_there = released[0]
-    if after.position[2] > there.position[2] + EARLY:
+    if taken_along(lay, after):
         return replace(trial, reason="not released")
     point_tcp = in_hand.apply(seen.inverse().apply(point))
     return replace(
         trial,
-        carried=_moved(in_hand, in_hand_there, point_tcp).tolist(),
+        carried=_moved(in_hand, released[0], point_tcp).tolist(),
         placed=_off(pose, seen, point, after, target).tolist(),
     )
 

@@ -106,9 +106,11 @@ def test_on_a_slope_the_hand_stays_above_the_table_where_it_places():
         place_pose(grasp, np.zeros(4), np.array([0.5, 0, 0.01]), target, slope.lowest_grasp_z)
         for target in (Target(x=0.4, y=0.0, theta=0.0), Target(x=0.7, y=0.0, theta=0.0))
     )
-    assert low.position[2] == pytest.approx(0.0125 + 0.002)
-    assert high.position[2] == pytest.approx(float(slope.lowest_grasp_z(np.array([0.7, 0.0]))))
-    assert high.position[2] > low.position[2] + 1e-3
+    assert low.position[2] == pytest.approx(0.0125 + 0.002 - 0.1 * 0.02)
+    assert high.position[2] == pytest.approx(0.0125 + 0.002 + 0.2 * 0.02)
+    target, risen = Target(x=0.7, y=0.0, theta=0.0), np.array([0.0, 0.0, 0.01, 0.0])
+    lowest = place_pose(grasp, risen, np.array([0.5, 0, 0.01]), target, slope.lowest_grasp_z)
+    assert lowest.position[2] == pytest.approx(float(slope.lowest_grasp_z(np.array([0.7, 0.0]))))
 
 
 def seen_box(yaw: float, height: float) -> PartView:
