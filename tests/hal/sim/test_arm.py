@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import hal.sim.arm
 from hal import Cell, execute_grasp, go_home, put_down
+from hal.execute import RELEASE
 from hal.sim import SapienCellConfig, sapien_cell
 from hal.sim.arm import is_vertical
 from hal.sim.world import SapienWorld
@@ -44,7 +45,7 @@ def test_long_steps_leave_a_part_in_the_hand_and_on_the_table_as_short_ones_do(
         assert result.holding
         descent = len(made)
         hands.append(result.T_base_tcp.inverse() @ cell.tracker.part_pose())
-        put_down(cell, grasp, opening=0.0)
+        put_down(cell, grasp, opening=result.width + RELEASE)
         placed.append(cell.tracker.part_pose())
         steps.append(len(made))
         if far:  # past the part, but not near the table; on the way down to the hinge a finger meets it
