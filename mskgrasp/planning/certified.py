@@ -210,14 +210,15 @@ def read_certified(part: Part, folder: Path | None = None) -> CertifiedGrasps:
     """Read a part's certified grasps, from the cache unless another folder is given.
 
     Raises:
-        BadPart: There are none, the file is damaged, or it belongs to another part or hand.
+        BadPart: There are none, or the file is damaged, of another version, part or hand.
     """
     path = (folder or certified_folder(part)) / FILE
     remedy = f"make them: python -m mskgrasp.assess {part.name}"
     try:
         values = parse_json(path.read_bytes())
         if values["schema_version"] != SCHEMA_VERSION:
-            raise ValueError(f"schema version {values['schema_version']}, legal: {SCHEMA_VERSION}")
+            versions = f"schema version {values['schema_version']}, legal: {SCHEMA_VERSION}"
+            raise BadPart(f"{path} was written by another version of mskgrasp ({versions}); {remedy}")
         grasps, uncertified = (
             tuple(grasp_from_json(one, len(part.resting_probability)) for one in values[name])
             for name in ("grasps", "uncertified")

@@ -25,7 +25,7 @@ from mskgrasp.runtime.progress import note
 EARLY = 0.007
 """Height above the target pose from which contact with the table counts as placed, metres."""
 TAKEN_ALONG = 0.03
-"""Height over its place from which a part is still in the hand, which rises farther than that, metres."""
+"""A part that is so much higher than it lay is still in the hand, which has risen farther, metres."""
 _BELOW = 0.001
 """Distance below the height of the grasp to which a part is lowered at most until it touches, metres."""
 _TOUCH_FORCE, _TOUCH_SPEED = 5.0, 0.02
@@ -89,7 +89,7 @@ def place_pose(
         centre_base: (3,) the part's centre before the grasp, base frame, metres.
         target: Target of the part's centre.
         lowest_grasp_z: Gives the least z of grasps at points (..., 2), as `hal.Workspace.lowest_grasp_z`.
-        drop: As `drop_of` computes it: the hand comes so much less low, metres.
+        drop: As `drop_of` computes it: the hand stays so much higher, metres.
 
     Returns:
         Base frame; theta is not wrapped to half a turn, which would turn the part.
@@ -102,7 +102,7 @@ def place_pose(
     x = target.x - (cos * held[0] - sin * held[1])
     y = target.y - (sin * held[0] + cos * held[1])
     # A part that has sunk in the hand is held higher, one that has risen lower.
-    # Nor is the table as high there, if it slopes.
+    # Where the table slopes it is not as high there.
     lowest = lowest_grasp_z(np.array([[x, y], grasp.position[:2]]))
     z = grasp.position[2] - displacement[2] + drop + PUT_DOWN + float(lowest[0] - lowest[1])
     z = max(z, float(lowest[0]))
@@ -252,7 +252,7 @@ def _lower_to_touch(cell: Cell, pose: Grasp, by: float, recover: Callable[[Motio
     try:
         cell.arm.move_until_contact(goal.T_base_tcp, force=_TOUCH_FORCE, speed=_TOUCH_SPEED)
     except OutOfWorkspace as error:
-        note(f"the part is let go {1e3 * PUT_DOWN:g} mm above the table: {error}")
+        note(f"the part is let go above the table, not lowered to it: {error}")
     except MotionAborted as error:
         recover(error)
 

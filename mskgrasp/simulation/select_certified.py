@@ -16,7 +16,7 @@ SELECT_VERSION = 3
 """Raised by every change after which others of the simulated grasps are certified."""
 GRAVITY = 9.81
 """m/s^2"""
-WORTH = 0.8
+LEAST_UNCERTIFIED = 0.8
 """Least share of its simulations that a grasp lifts which is kept where no grasp is certified."""
 
 
@@ -76,7 +76,7 @@ def select_certified(
     lifting = [one for one in grasps if one.lifted >= config.least_lifted * one.n and one.lifted >= 3]
     if not lifting:
         best = max((one.lifted / one.n for one in grasps), default=0.0)
-        most = [one for one in _flat(grasps) if one.lifted >= max(best, WORTH) * one.n]
+        most = [one for one in _flat(grasps) if one.lifted >= max(best, LEAST_UNCERTIFIED) * one.n]
         return Selected(
             uncertified=_steady(*_errors(part, most, config), config.most_error, config),
             reason=f"no grasp lifts it in {config.least_lifted:.0%} of the simulations (best {best:.0%})",

@@ -128,7 +128,7 @@ def test_the_file_gives_back_what_was_written(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (dict(schema_version=9), "schema version 9"),
+        (dict(schema_version=9), r"written by another version of mskgrasp \(schema version 9"),
         (dict(part_hash="0"), "another version of"),
         (dict(hand={}), "another hand"),
         (dict(grasps=[{}]), "is damaged"),
