@@ -24,6 +24,10 @@ MIN_PIXELS = 5
 """Smaller groups of pixels are specks: an M3 nut covers 6 pixels of 2.2 mm."""
 QUIET = 0.0003
 """Deviation of the heights above which an image is noisy, metres; one stored in 0.1 mm has up to 0.03."""
+LINK_DEVIATIONS = 4.0
+"""A smoothed pixel rises by chance, at a Gaussian's tail, once in 30 000 by more."""
+MEAN_NOISE = 0.28
+"""Deviation of a smoothed pixel over that of a pixel: 1 / (2 sqrt(pi)) for a Gaussian of one pixel."""
 _PLAUSIBLE_DEPTH = 20.0
 """Greatest plausible depth, metres: a depth in millimetres always exceeds it."""
 
@@ -63,8 +67,9 @@ def find_part_pixels(
 
     In a noisy image, heights are smoothed (Gaussian, 1 pixel) after clipping to twice ``min_height``, so that
     the edges of higher parts stay in place. Heights are relative to the measured table, so that a constant
-    depth error does not hide a flat part. Groups up to four pixels apart are joined, because noise splits
-    narrow parts. ``min_height`` is at least the standard deviation of a pixel's noise.
+    depth error does not hide a flat part. ``min_height`` is at least the standard deviation of a pixel's
+    noise. Noise splits narrow parts: groups up to four pixels apart are joined, and those between which
+    pixels of half that height lead from one to the other (hysteresis; Canny, IEEE PAMI 8, 1986).
 
     Args:
         depth: (h, w) metres, NaN where invalid.
@@ -85,7 +90,7 @@ def find_part_pixels(
     x_min, x_max, y_min, y_max = region
     near = (x > x_min - REGION_MARGIN) & (x < x_max + REGION_MARGIN)
     near &= (y > y_min - REGION_MARGIN) & (y < y_max + REGION_MARGIN)
-    table_offset, reach = 0.0, 1
+    table_offset, reach, link_height = 0.0, 1, min_height
     noise = _noise(heights, near)
     if noise > QUIET:
         min_height, reach = max(min_height, noise), 5
@@ -98,6 +103,7 @@ def find_part_pixels(
             )
         tops = tops - table_offset
         heights = _mean(heights - table_offset, 2 * min_height)
+        link_height = min(min_height, max(min_height / 2, LINK_DEVIATIONS * MEAN_NOISE * noise))
     raised = near & (heights > min_height)
     if raised.sum() > MOST_RAISED * max(near.sum(), 1):
         raise NoPartFound(
@@ -105,7 +111,7 @@ def find_part_pixels(
             f"table (median {np.median(tops[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
             f"{table_z:g} or the camera's pose is wrong; calibrate the camera anew"
         )
-    mask, n_other = _largest_group(raised, reach)
+    mask, n_other = _largest_group(raised, near & (heights > link_height), reach)
     if mask is None:
         highest = tops[near].max() if near.any() else np.nan
         raise NoPartFound(
@@ -261,13 +267,14 @@ def _mean(heights: np.ndarray, most: float) -> np.ndarray:
     return np.where(seen, total / np.maximum(weight, 1e-9), np.nan)
 
 
-def _largest_group(mask: np.ndarray, reach: int) -> tuple[np.ndarray | None, int]:
+def _largest_group(mask: np.ndarray, links: np.ndarray, reach: int) -> tuple[np.ndarray | None, int]:
     """Find the largest group of pixels, and the size of the second largest.
 
-    Pixels are of one group if discs of ``reach`` pixels around them touch; 1: neighbours.
+    Pixels are of one group if discs of ``reach`` pixels (1: neighbours) around them, or around ``links``
+    between them, touch.
     """
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
-    _, labels = cv2.connectedComponents(cv2.dilate(mask.astype(np.uint8), disc), connectivity=8)
+    _, labels = cv2.connectedComponents(cv2.dilate(links.astype(np.uint8), disc), connectivity=8)
     sizes = np.bincount(labels[mask], minlength=3)  # 0 is the background
     if sizes.max() < MIN_PIXELS:
         return None, 0

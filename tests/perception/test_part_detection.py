@@ -129,6 +129,19 @@ def test_a_narrow_part_is_one_part_through_noise(model):
         assert np.abs(noisy_view(depth, model, seed).centre_base - [0.455, 0.0, 0.0])[:2].max() < 0.01
 
 
+def test_a_thin_ring_is_one_part_through_the_noise_of_a_kinect():
+    """A wall of 2.5 mm, one pixel: half of its pixels float between its top and the table."""
+    around = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
+    size = (0.009, 0.0025, 0.012)
+    wall = [
+        Box(x=0.455 + 0.033 * np.cos(turn), y=0.033 * np.sin(turn), yaw=turn + np.pi / 2, size=size)
+        for turn in around
+    ]
+    depth = render(wall)
+    centres = [noisy_view(depth, "kinect2", seed).centre_base[:2] for seed in range(30)]
+    assert np.abs(np.array(centres) - [0.455, 0.0]).max() < 0.006
+
+
 @pytest.mark.parametrize("model", ["iid", "kinect2"])
 def test_an_empty_table_stays_empty_whatever_the_noise(model):
     for seed in range(30):
