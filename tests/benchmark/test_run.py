@@ -45,6 +45,7 @@ def test_other_parts_of_a_familiar_family_are_counted():
     assert known_families(("antipodal",), training, nuts) == {}
 
 
+@pytest.mark.slow
 def test_planners_are_compared_in_the_same_scene_and_stored_trials_are_kept(tmp_path):
     out = tmp_path / "out"
     planners = ("--planners", "centroid", "ours", "program", "--program", PROGRAM)

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from mskgrasp.core.config import read_config
 from mskgrasp.learning.config import LearningConfig
 from tests.benchmarks import ablation
@@ -16,6 +18,7 @@ def test_every_choice_differs_from_ours_and_from_the_others():
     assert len({one.model_dump_json() for one in found}) == len(found)
 
 
+@pytest.mark.slow
 def test_the_command_compares_a_choice_with_ours(boxes, tmp_path):
     done = run_here(
         ablation.main, "--data", str(boxes.data), "--out", str(tmp_path), "--gqn-epochs", "1",

@@ -105,6 +105,7 @@ def compared(boxes: Boxes, groups: Groups, choices: list[Choice], out, seeds: in
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_tables_are_made_from_nothing_and_a_stored_training_is_not_made_again(
     boxes, groups, choices, tmp_path
 ):
@@ -145,6 +146,7 @@ def test_the_papers_recipe_may_have_fewer_seeds_than_ours(boxes, groups, tmp_pat
     assert against == {title + PAPER: [PAPER_AS_OURS, OURS], title + PAPER_AS_OURS: [PAPER, OURS]}
 
 
+@pytest.mark.slow
 def test_the_command_runs_from_a_dataset_to_a_report(boxes, tmp_path):
     done = run_here(
         models.main, "--data", str(boxes.data), "--out", str(tmp_path), "--quick", "--only", PAPER_AS_OURS,

@@ -78,6 +78,7 @@ def test_few_parts_with_many_grasps_and_many_with_few_are_as_many_successes(boxe
     assert isinstance(whole, Sides)
 
 
+@pytest.mark.slow
 def test_the_command_runs_from_a_dataset_to_a_report(boxes, tmp_path: Path):
     done = run_here(oracles.main, "--data", str(boxes.data), "--out", str(tmp_path), "--quick")
     assert done.returncode == 0, done.stderr

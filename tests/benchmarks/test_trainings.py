@@ -92,6 +92,7 @@ def test_a_stopped_training_goes_on_to_the_same_predictions(looks, sides, tmp_pa
     assert not (folder / "checkpoint.safetensors").exists()
 
 
+@pytest.mark.slow
 def test_trainings_in_processes_of_their_own_are_the_same(looks, sides, tmp_path):
     in_turn = made(looks, sides, tmp_path / "in_turn", [OWN, OTHER], seeds=2)
     at_once = made(looks, sides, tmp_path / "at_once", [OWN, OTHER], seeds=2, at_once=3)

@@ -24,6 +24,7 @@ def test_a_shard_is_named_in_messages_by_its_part_and_number():
     )
 
 
+@pytest.mark.slow
 def test_a_shard_that_cannot_be_made_ends_the_work_in_one_line_and_leaves_those_before(
     collected: Path, tmp_path: Path
 ):

@@ -76,6 +76,7 @@ def test_a_real_arm_needs_a_terminal_or_a_yes(real, monkeypatch):
     assert not Operator(cell_from_yaml(SIMULATED)).asks
 
 
+@pytest.mark.slow
 def test_it_is_asked_in_a_terminal(real):
     code = (
         "import sys; from pathlib import Path; from hal import cell_from_yaml\n"

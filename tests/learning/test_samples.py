@@ -44,6 +44,7 @@ def held_out_of(names: tuple[str, ...], fraction: float) -> set[str]:
     return {name for name, side in part_sides(names, fraction, "name").items() if side == "validation"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("image", ["grasp", "object"])
 def test_several_processes_read_the_same_samples(dataset, image):
     network = PATCH.network.model_copy(update={"image": image})

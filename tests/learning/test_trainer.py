@@ -125,6 +125,7 @@ def test_a_mean_only_network_and_the_papers_optimiser_can_be_trained(samples, tm
     assert len(history) == 2 and models.meta.metrics["gdn"]["nll"] is None
 
 
+@pytest.mark.slow
 def test_a_network_can_learn_the_swing_and_is_judged_by_it(dataset, tmp_path):
     network = HAND.network.model_copy(update={"swing": True})
     longer = HAND.gdn.model_copy(update={"epochs": 40})
@@ -204,6 +205,7 @@ def test_a_picture_of_the_whole_part_is_that_of_the_samples(dataset):
     assert inputs.shape == (8, 1, 40, 40)
 
 
+@pytest.mark.slow
 def test_the_hand_network_learns_what_the_centre_alone_does_not_tell_and_is_calibrated(tmp_path):
     dataset = synthetic.write_dataset(tmp_path, n_parts=8, n_attempts=250, seed=1)
     samples = read_samples(dataset, HAND.network)

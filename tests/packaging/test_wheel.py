@@ -71,6 +71,7 @@ def test_every_shipped_file_is_in_the_wheel(installed):
         assert (packages / "mskgrasp" / path.relative_to(REPOSITORY)).read_bytes() == path.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_shipped_example_is_planned_from_an_empty_folder(installed, tmp_path):
     folder = tmp_path / "empty"
     folder.mkdir()

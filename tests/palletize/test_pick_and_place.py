@@ -40,6 +40,7 @@ class SimulatedOperator:
         return answer if answer in ("", "\n") else answer + "\n"
 
 
+@pytest.mark.slow
 def test_without_feeder_and_tracker_an_operator_places_parts_and_tape_measures(tmp_path, monkeypatch):
     """As on a real cell: the operator confirms every motion, and two tape squares measure the error."""
     tape = Tape(large=0.012, small=0.008)
@@ -75,6 +76,7 @@ def test_without_feeder_and_tracker_an_operator_places_parts_and_tape_measures(t
     assert unknown.placed and unknown.translation_error is None and "--tape" in unknown.unmeasured
 
 
+@pytest.mark.slow
 def test_the_picture_of_a_pallet_whose_first_part_failed_uses_no_heights_of_the_previous_pallet(tmp_path):
     cell = sapien_cell(SapienCellConfig(type="sapien", part=PART))
     slots = [Slot(x=0.5, y=0.06, theta=0.0, size=(0.09, 0.08))]

@@ -23,6 +23,7 @@ def hulls_of(part: Part) -> list[np.ndarray]:
     return [np.asarray(hull.vertices) for hull in trimesh.load_scene(part.hulls_path).dump()]
 
 
+@pytest.mark.slow
 def test_there_are_at_least_16_parts_of_10_families_and_none_dominates(builtin_parts):
     families = [part.family for part in builtin_parts.values()]
     assert len(families) >= 16

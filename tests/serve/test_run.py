@@ -105,6 +105,7 @@ def test_the_table_is_that_of_the_cell_or_of_the_simulated_one(tmp_path: Path):
     assert table.lowest_grasp_z(np.array([0.5, 0.0])) > table.table_z + 0.0095
 
 
+@pytest.mark.slow
 def test_with_a_token_and_little_time_a_server_answers_those_who_have_it_and_are_quick(tmp_path: Path):
     path = tmp_path / "token"
     path.write_text(TOKEN)

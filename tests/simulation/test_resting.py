@@ -27,6 +27,7 @@ def wing_nut(cache: Path, monkeypatch: pytest.MonkeyPatch) -> Part:
     return build_part("wing_nut_m20")
 
 
+@pytest.mark.slow
 def test_toppling_poses_are_those_that_attempts_leave_out(wing_nut: Part):
     found = resting_of(wing_nut)
     assert len(found.stands) == len(wing_nut.resting_probability)

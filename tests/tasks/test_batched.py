@@ -35,7 +35,7 @@ def outcomes(rows: list[int], physics: Physics) -> dict[str, torch.Tensor]:
     return toy_attempt(scene, physics).run(GRASPS[rows])
 
 
-@pytest.mark.parametrize("skip_air", [True, False])
+@pytest.mark.parametrize("skip_air", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_sub_scenes_do_not_depend_on_each_other(skip_air):
     physics = Physics(skip_air=skip_air)
     together = outcomes(list(range(len(REASONS))), physics)

@@ -75,6 +75,7 @@ def test_a_small_dataset_is_learned_and_every_file_of_a_model_is_written(dataset
         train.run_training(program(config, data=dataset, out=out, seed=1))
 
 
+@pytest.mark.slow
 def test_a_finished_training_is_not_taken_for_that_of_other_data(dataset, tmp_path, capsys):
     out, other = tmp_path / "model", tmp_path / "other"
     few = program(SHORT, data=dataset, out=out, epochs=1)

@@ -210,6 +210,7 @@ def test_a_part_held_beneath_an_overhang_is_not_taken_along(
     assert np.hypot(*done.placed[:2]) < 1e-3 and abs(done.placed[2]) < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n_refused", "reason"), [(1, ""), (2, "OutOfWorkspace")])
 def test_a_part_that_no_straight_line_leads_to_its_target_is_turned_less_or_not_placed(
     n_refused: int, reason: str, engine: TrialEngine, monkeypatch: pytest.MonkeyPatch

@@ -50,6 +50,7 @@ def test_independent_distances_inside_the_margin_pass_and_others_do_not(shift: f
     assert (share_passed(40, test) > 0.8) == passed
 
 
+@pytest.mark.slow
 def test_a_median_at_the_margin_passes_no_more_often_than_the_level():
     def test(rng: np.random.Generator) -> Equivalence:
         return median_excess(distances(rng) + MARGIN, distances(rng), PART, MARGIN, replicates=200)

@@ -10,6 +10,7 @@ from mskgrasp.validate.__main__ import main
 from tests.programs import run_here
 
 
+@pytest.mark.slow
 def test_the_production_settings_pass_every_closed_form_check(tmp_path):
     done = run_here(main, "--no-convergence", "--parts", "hex_nut_m20", "--out", str(tmp_path / "out"))
     assert done.returncode == 0, done.stdout + done.stderr

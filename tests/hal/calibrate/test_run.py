@@ -115,6 +115,7 @@ def taken(ink: str) -> list[Picture]:
     return kept
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_the_pictures(tmp_path: Path):
     with running("hal.calibrate", "--cell", str(SAPIEN), "--out", str(tmp_path / "out")) as process:
         deadline = time.monotonic() + 400

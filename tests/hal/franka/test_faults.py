@@ -163,6 +163,7 @@ def test_a_cable_pulled_in_mid_motion_is_reported_within_seconds(
         nudge(arm)
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_switched_off_in_mid_motion_is_reported(driver: DriverName, tmp_path: Path):
     with robot_for(driver) as robot, arm_at(tmp_path, driver, robot.host) as arm:
         with (
@@ -176,6 +177,7 @@ def test_a_robot_that_is_switched_off_in_mid_motion_is_reported(driver: DriverNa
         arm.state()
 
 
+@pytest.mark.slow
 def test_a_second_program_is_reported_and_the_first_goes_on(
     driver: DriverName, robot: FakeRobot, tmp_path: Path
 ):
@@ -207,7 +209,7 @@ def test_a_driver_process_that_dies_is_reported_and_the_arm_stops(
         nudge(arm)
 
 
-@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("ending", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
 def test_a_program_that_is_ended_in_mid_motion_leaves_an_arm_at_rest(
     driver: DriverName, robot: FakeRobot, tmp_path: Path, ending: signal.Signals
 ):
@@ -280,6 +282,7 @@ def test_a_driver_that_hangs_ends_after_its_program(
     robot.process.send_signal(signal.SIGCONT)
 
 
+@pytest.mark.slow
 def test_a_grasp_that_misses_is_the_same_outcome_however_it_is_reported(
     driver: DriverName, robot: FakeRobot, tmp_path: Path
 ):

@@ -83,6 +83,7 @@ def test_a_reflex_without_an_error_is_recovered_from(robot: FakeRobot, link: Dri
     assert link.ask("state", timeout_s=TIMEOUT_S)["mode"] == "idle"
 
 
+@pytest.mark.slow
 def test_a_driver_that_dies_on_a_line_leaves_poses_right_for_the_next():
     """The robot keeps the end effector's frame that the line had turned."""
     with franky_sim() as robot:

@@ -191,6 +191,7 @@ def free(robot: FakeRobot, link: DriverLink, tmp_path_factory: pytest.TempPathFa
     return robot
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shift", "turn", "motions"),
     [

@@ -42,6 +42,7 @@ def test_the_same_seed_gives_the_same_outcome_to_the_bit_whatever_came_before():
         assert np.array_equal(first[0], other[0]) and np.array_equal(first[2], other[2])
 
 
+@pytest.mark.slow
 def test_air_that_is_skipped_changes_outcomes_by_less_than_50_micrometres(monkeypatch: pytest.MonkeyPatch):
     # The median: a nut that turns as it is gripped beside its centre amplifies the last bits of its start.
     differences = []

@@ -50,6 +50,7 @@ def seen_at(grasp: Grasp, T_base_obj: Pose) -> np.ndarray:
     return grasp.T_base_grasp.inverse().apply(T_base_obj.position)[:2]
 
 
+@pytest.mark.slow
 def test_a_film_shows_the_shift_between_the_fingers_and_leaves_the_grasp_as_it_is(cell: Cell, block: Part):
     assert cell.tracker is not None
     for _ in range(2):  # the first grasp in a new engine is rounded differently

@@ -27,7 +27,7 @@ from tests.programs import run_here
 QUICK = ("--speed", "0.025")
 
 
-@pytest.mark.parametrize("kind", ["sapien", "mujoco"])
+@pytest.mark.parametrize("kind", [pytest.param("sapien", marks=pytest.mark.slow), "mujoco"])
 def test_a_simulated_table_tilted_by_half_a_degree_and_3_mm_off_is_measured(tmp_path: Path, kind: str):
     path = simulated_file(tmp_path, kind, height=0.003, slope=[0.0075, -0.0044])
     before = path.read_bytes()

@@ -85,6 +85,7 @@ def test_a_build_of_the_catalogue_that_is_stopped_keeps_the_rest_of_the_index(mo
     assert read_index().parts["washer_m36"].rating == rating
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
     code = (
@@ -112,6 +113,7 @@ def test_a_build_that_is_stopped_leaves_whole_parts_and_goes_on(own_cache, how):
     assert all(seconds[name] == 0 for name in finished[:2])
 
 
+@pytest.mark.slow
 def test_workers_of_a_killed_build_end_too(own_cache):
     code = (
         "from mskgrasp.parts.commands.command_line import main; "

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 import trimesh
 from manifold3d import Manifold
 
@@ -38,6 +39,7 @@ def imported(paths: list[Path], cache: Path, workers: int) -> dict[str, FileResu
         return {result.path.name: result for result in import_files(paths, OPTIONS, workers)}
 
 
+@pytest.mark.slow
 def test_one_process_and_two_give_the_same_bytes_and_refuse_the_same_files(tmp_path):
     paths = files(tmp_path / "cad")
     for workers in (1, 2):

@@ -101,6 +101,7 @@ def test_what_no_pieces_stand_for_is_refused_with_both_numbers(monkeypatch):
         convex_pieces(mesh_of(angle_body()))
 
 
+@pytest.mark.slow
 def test_the_same_mesh_gives_the_same_bytes_in_any_process_with_any_threads():
     pieces = convex_pieces(mesh_of(angle_body()))
     here = hashlib.sha256(b"".join(p.tobytes() for p in pieces)).hexdigest()
@@ -144,6 +145,7 @@ def test_a_sliver_is_taken_up_by_its_neighbour_instead_of_being_cut_to_pieces():
     assert len(decompose._join(MeshSurface(mesh), pieces, 0.7, 1.1, finish=decompose.split_slender)) == 1
 
 
+@pytest.mark.slow
 def test_a_fit_that_stops_early_decides_as_the_whole_fit_does():
     mesh = mesh_of(angle_body())
     surface = MeshSurface(mesh)

@@ -18,6 +18,7 @@ def down(quats: np.ndarray) -> np.ndarray:
     return -quat_to_matrix(quats)[:, 2]
 
 
+@pytest.mark.slow
 def test_the_lowest_hull_corner_of_every_pose_touches_the_table(builtin_parts):
     for part in builtin_parts.values():
         points = np.concatenate([h.vertices for h in trimesh.load_scene(part.hulls_path).dump()]) / 1000

@@ -28,6 +28,7 @@ def test_both_sides_of_a_nut_look_alike():
     assert {one.resting for one in looks[0].poses} == {0, 1}
 
 
+@pytest.mark.slow
 def test_every_resting_pose_is_looked_for_once():
     for name in ("hex_nut_m30", "l_bracket_60x40", "spur_gear_m3_z17"):
         found = [one.resting for look in known(name).looks for one in look.poses]
