@@ -195,6 +195,7 @@ class Answers(io.StringIO):
         return True
 
 
+@pytest.mark.slow
 def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):

@@ -167,6 +167,7 @@ def test_a_mixture_predicts_the_mean_and_variance_of_draws_from_it():
     assert torch.allclose(draws.var(dim=0), variance, rtol=0.03)
 
 
+@pytest.mark.slow
 def test_a_mixture_learns_that_a_peg_stays_or_turns_which_one_gaussian_cannot():
     models = {n: small_models(mixture=n, dropout=0.0).gdn for n in (1, 2)}
     generator = torch.Generator().manual_seed(0)

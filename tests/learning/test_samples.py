@@ -60,7 +60,7 @@ def test_several_processes_read_the_same_samples(dataset, image):
     assert (one.object_patches is None) == (image == "grasp")
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_damaged_shard_is_named_by_any_number_of_readers(tmp_path, workers):
     dataset = synthetic.write_dataset(tmp_path, n_parts=3, n_attempts=20, seed=0)
     bad = sorted((dataset / "shards").glob("*.h5"))[1]

@@ -142,6 +142,7 @@ def test_a_network_can_learn_the_swing_and_is_judged_by_it(dataset, tmp_path):
     assert 0 <= gdn["least_uncertain"]["10%"][2] <= gdn["least_uncertain"]["30%"][2] + 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("config", [SHORT, HAND], ids=["the paper's", "ours"])
 def test_what_learned_in_mixed_precision_is_as_good_and_predicts_in_float32(dataset, tmp_path, config):
     config = config.model_copy(update={"gqn": SHORT.gqn, "gdn": SHORT.gdn})

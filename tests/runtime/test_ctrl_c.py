@@ -46,8 +46,8 @@ run("program", main)
     ("program", "library"),
     [
         ("mskgrasp.plan", "yaml"),
-        ("mskgrasp.plan", "numpy"),
-        ("mskgrasp.plan", "torch"),
+        pytest.param("mskgrasp.plan", "numpy", marks=pytest.mark.slow),
+        pytest.param("mskgrasp.plan", "torch", marks=pytest.mark.slow),
         ("mskgrasp.validate", "yaml"),
         ("mskgrasp plan", "numpy"),
     ],

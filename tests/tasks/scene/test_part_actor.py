@@ -54,7 +54,9 @@ def test_parts_lie_still_where_they_are_placed(env, name):
         assert float(moved) < 2e-4
 
 
-@pytest.mark.parametrize("name", PARTS)
+@pytest.mark.parametrize(
+    "name", [*PARTS[:2], *(pytest.param(name, marks=pytest.mark.slow) for name in PARTS[2:])]
+)
 def test_a_descent_with_room_for_the_fingers_never_collides(env, name):
     """Points on the part's surface against the fingers' sweep, 2 mm larger all around, and the palm."""
     part = find_part(name)
