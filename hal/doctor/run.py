@@ -37,11 +37,11 @@ from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.runtime.console_table import report_console
 from mskgrasp.runtime.options import parse
 
-DESCRIPTION = """Checks a cell and prints one line a check: ok, warn or fail, and the remedy.
+DESCRIPTION = """Checks a cell and prints one line per check: ok, warn or fail, and the remedy.
 
 Drivers, connection, camera stream, calibration, workspace, the hand that the robot is configured for, the
-table's height in the depth image. Nothing moves without --move or --dry-run. The last line says what to do
-next. The exit code is 0 if nothing failed, else 1.
+table's height in the depth image. Nothing moves without --move, --dry-run or --gripper. The last line says
+what to do next. The exit code is 0 if nothing failed, else 1.
 
 --gripper, on a real cell, measures instead what the hand truly does, for simulation to use: the hand is homed
 and closes three times on nothing, which gives its speed; then it closes three times on a spring scale or load

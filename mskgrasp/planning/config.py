@@ -20,11 +20,11 @@ class PlannerConfig(Config):
     """Share of the candidates, best quality first, among which the variance score selects."""
     policy: Literal["low_variance", "quality", "certified"] = "low_variance"
     """quality: take the best quality, regardless of its variance (the paper's experiment 1). certified: of a
-    known part, take the certified grasp of least expected error; where it has none, one in which
-    the part always tilts in the same way, else as low_variance."""
+    known part, take the certified grasp of least expected error; where it has none, the best of
+    the simulated ones, else as low_variance."""
     min_quality: float | None = Field(default=None, ge=0.0, le=1.0)
     """Lowest predicted quality of a selected grasp; null: none for a plan and for experiments in simulation,
-    which measure what poor grasps do, as the paper did; 0.5 where the plan is carried out."""
+    which measure what poor grasps do, as the paper did; 0.5 where plans are carried out."""
     check_fingers: bool = False
     """Exclude grasps whose open fingers would collide with something in the depth image."""
     recentre: bool = True

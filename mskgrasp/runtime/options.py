@@ -49,10 +49,11 @@ def parse(
     rest, path = _take_config_option(list(sys.argv[1:] if argv is None else argv))
     path = path or default_config
     default = read_config(model, path) if path is not None else None
-    note = f" Settings come from --config FILE (default: {default_config}); options override it."
+    origin = f" (default: {default_config})" if default_config else ""
+    note = f"\n\nSettings come from --config FILE, a YAML file of these options{origin}; options override it."
     # Without a file there may be required options: tyro demands them.
     known: dict[str, Any] = {} if default is None else {"default": default}
-    description += (note if default_config else "") + _guide(prog)
+    description += note + _guide(prog)
     parsed = parse_arguments(
         model, rest, prog=prog, also_legal=["--config"], description=description, registry=registry, **known
     )
