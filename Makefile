@@ -96,8 +96,9 @@ format: $(READY) ## Format the code
 	$(RUN) ruff format .
 	$(RUN) ruff check --fix .
 
-reference: $(READY) ## Write docs/reference.md from docstrings
+reference: $(READY) ## Write docs/reference.md and docs/cell_file.md from docstrings and configurations
 	$(RUN) tests.docs.make_reference
+	$(RUN) tests.docs.make_cell_file
 
 results: $(READY) ## Render docs/results from stored reports (ARGS="--record NAME" runs a command anew)
 	$(RUN) tests.docs.make_results $(ARGS)
