@@ -63,7 +63,7 @@ class WorkspaceConfig(Config):
     """The TCP stays inside this box, base frame, m; by default 0.25, -0.4 and the table."""
     box_upper: Three = (0.75, 0.4, 0.75)
     """The other corner, m."""
-    min_height: float = Field(default=0.006, gt=0)
+    min_height: float = Field(default=0.003, gt=0)
     """Points lower than this over the table count as table, m: real tables are not level, cameras drift."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
     """Height by which a grasped part is lifted, m."""

@@ -42,19 +42,19 @@ class FrankaArmConfig(Config):
     """Model, which decides the joint limits."""
     joint_margin: float = Field(default=0.05, ge=0, le=0.5)
     """Margin to the joint limits, rad."""
-    max_speed: float = Field(default=0.25, gt=0, le=1.0)
+    max_speed: float = Field(default=0.1, gt=0, le=1.0)
     """Greatest speed of the TCP on a straight line, also if a program requests more, m/s."""
-    max_joint_speed: float = Field(default=0.3, gt=0, le=1.0)
+    max_joint_speed: float = Field(default=0.15, gt=0, le=1.0)
     """Greatest joint speed, as a fraction of the joint's limit."""
     acceleration: float = Field(default=1.0, gt=0, le=5.0)
     """Acceleration of the TCP on a straight line, m/s^2."""
     joint_acceleration: float = Field(default=2.0, gt=0, le=7.5)
     """Acceleration of each joint, and of the hand's rotation, rad/s^2."""
-    contact_torque: float = Field(default=20.0, gt=0, le=80)
+    contact_torque: float = Field(default=15.0, gt=0, le=80)
     """External torque on a joint at which the robot's reflex stops the arm, N m."""
-    contact_force: float = Field(default=20.0, gt=0, le=80)
+    contact_force: float = Field(default=15.0, gt=0, le=80)
     """External force at the TCP at which the reflex stops the arm, N."""
-    max_grasp_force: float = Field(default=40.0, gt=0, le=FRANKA_HAND.force[1])
+    max_grasp_force: float = Field(default=30.0, gt=0, le=FRANKA_HAND.force[1])
     """Greatest gripper force, N (Franka Hand: 70 N continuously)."""
     gripper_speed: float = Field(default=0.05, gt=0, le=FRANKA_HAND.speed[1])
     """Speed at which the pads' distance changes, twice that of each finger, m/s."""

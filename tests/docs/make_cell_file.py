@@ -37,9 +37,9 @@ INTRODUCTION = """\
 # The file of a cell
 
 Made from the configurations by `make reference`; do not edit. All keys of the YAML file that
-[`hal.open_cell`](cells.md) and `--cell` read: their defaults, legal values and meaning. SI units. Unknown keys
-are refused. Files to start from are in `configs/cells`; for a [real cell](real_cell.md) copy
-`panda_kinect2.yaml`, whose speeds and forces are lower than the defaults below.
+[`hal.open_cell`](cells.md) and `--cell` read: their defaults, legal values and meaning. SI units. Unknown
+keys are refused. Files to start from are in `configs/cells`; for a [real cell](real_cell.md) copy
+`panda_kinect2.yaml`.
 
 `type` selects the backend: `devices`, `sapien`, `mujoco`, `replay`, `recorded`, or one of
 [another package](backends.md).

@@ -52,7 +52,7 @@ def test_a_cell_is_built_without_connecting(tmp_path: Path):
         ({"arm": {"max_speed": 3.0}}, "arm: 'max_speed': input should be less than or equal to 1"),
         ({"arm": {"max_grasp_force": 200}}, "'max_grasp_force': input should be less than or equal to 70"),
         ({"arm": {"host": ""}}, "'host': string should have at least 1 character"),
-        ({"workspace": {"grasp_force": 60}}, "grasp_force 60 N is outside 0 .. 40 N"),
+        ({"workspace": {"grasp_force": 60}}, "grasp_force 60 N is outside 0 .. 30 N"),
         ({"workspace": {"region": [0.6, 0.74, -0.39, 0.39]}}, "cannot be grasped everywhere"),
         ({"workspace": {"region": [0.38, 0.9, -0.1, 0.1]}}, "reaches out of the box"),
         ({"workspace": {"home": [0, 0, 0, 0.5, 0, 1.5, 0]}}, "home puts joint 4 at 0.500 rad, outside"),

@@ -125,6 +125,9 @@ def write_cell(
         "acceleration": 3.0,
         "joint_acceleration": 6.0,
         "gripper_speed": 0.1,
+        "contact_force": 20.0,
+        "contact_torque": 20.0,
+        "max_grasp_force": 40.0,
         # A busy machine simulates several times slower than real time, and takes its time to start Python.
         "settle_s": 10.0,
         "patience_s": 100.0,
