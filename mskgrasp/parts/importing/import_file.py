@@ -132,7 +132,8 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
 
     Args:
         path: As in `import_file`.
-        unit: As in `import_file`; a part imported with another one counts only where this is None.
+        unit: As in `import_file`; None: that of the import. A file that was imported with another one is
+            imported again, with the same density, family and licence.
 
     Raises:
         BadPart: As in `import_file`.
@@ -141,11 +142,15 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
     stored = store.stored_recipe_hash(folder)
     if stored is not None:
         known, sha256 = store.read_part(folder), hashlib.sha256(read_content(path)).digest()
-        units = (None, *get_args(Unit)) if unit is None else (unit,)
-        for its_unit, bodies in itertools.product(units, get_args(Bodies)):
+        for its_unit, bodies in itertools.product((None, *get_args(Unit)), get_args(Bodies)):
             options = known.family, its_unit, known.density, known.licence, bodies
             if _recipe_hash(path, sha256, *options) == stored:
-                return known
+                if unit in (None, its_unit):
+                    return known
+                return import_part(
+                    path, unit=unit, family=known.family, density=known.density, licence=known.licence,
+                    bodies=bodies,
+                )  # fmt: skip
     return import_part(path, unit=unit)
 
 

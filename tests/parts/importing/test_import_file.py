@@ -80,11 +80,21 @@ def test_a_file_that_a_program_is_given_is_the_part_that_was_imported_from_it(tm
     assert part_of_file(file).density == 7850.0
     light = import_part(file, unit="mm", density=1050.0, licence="MIT", bodies="union")
     assert part_of_file(file).content_hash == part_of_file(file, unit="mm").content_hash == light.content_hash
-    assert part_of_file(file, unit="in").longest_axis == pytest.approx(0.004 * 25.4)
+    inches = part_of_file(file, unit="in")
+    assert inches.longest_axis == pytest.approx(0.004 * 25.4)
+    assert (inches.density, inches.licence) == (1050.0, "MIT")  # of the import
     assert part_of_file(file).longest_axis == pytest.approx(0.004 * 25.4)  # as it was imported last
     trimesh.creation.box((4, 3, 2.5)).export(file)
     assert part_of_file(file).extents == pytest.approx([0.004, 0.003, 0.0025])  # another file
     assert part_of_file(file).density == 7850.0
+
+
+def test_a_unit_that_the_import_did_not_name_leaves_the_density_as_it_is(tmp_path):
+    file = tmp_path / "box.stl"
+    trimesh.creation.box((40, 30, 20)).export(file)
+    light = import_part(file, density=2700.0)
+    assert part_of_file(file, unit="mm").mass == pytest.approx(light.mass)
+    assert part_of_file(file).mass == pytest.approx(light.mass)
 
 
 def write_open(file: Path) -> None:
