@@ -63,7 +63,7 @@ class WorkspaceConfig(Config):
     """The TCP stays inside this box, base frame, m; by default 0.25, -0.4 and the table."""
     box_upper: Three = (0.75, 0.4, 0.75)
     """The other corner, m."""
-    min_height: float = Field(default=0.003, gt=0)
+    min_height: float = Field(default=0.006, gt=0)
     """Points lower than this over the table count as table, m: real tables are not level, cameras drift."""
     lift_height: float = Field(default=0.1, gt=0, le=0.3)
     """Height by which a grasped part is lifted, m."""
@@ -137,7 +137,7 @@ class TableError(Config):
     height: float = Field(default=0.0, ge=-0.005, le=0.005)
     """Height in the region's middle over the stated one, m."""
     slope: tuple[float, float] = (0.0, 0.0)
-    """Rise along x and along y, m a metre."""
+    """Rise along x and along y, m a metre, each between -0.02 and 0.02."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -254,6 +254,6 @@ def main() -> int:
     print(
         f"wrote calibration.yaml, corners.png and residuals.png in {config.out}; look at both pictures, then"
     )
-    print("copy calibration.yaml to where camera.calibration of the cell file points, and add there what the")
-    print("line 'depth' says, if anything, to camera.depth_offset")
+    print("copy calibration.yaml to where camera.calibration of the cell file points; if the line 'depth'")
+    print("states a correction, add it to camera.depth_offset of the cell file")
     return 0

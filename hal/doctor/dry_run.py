@@ -12,6 +12,7 @@ from hal.cell import Cell
 from hal.doctor.checks import Finding
 from hal.errors import HalError
 from hal.execute import execute_grasp, go_home
+from hal.franka.config import FrankaArmConfig
 from mskgrasp.core.grasp import Grasp
 
 SLOWNESS = 0.1
@@ -19,14 +20,20 @@ SLOWNESS = 0.1
 IN_THE_AIR = 0.05
 """Height of the dry run over the lowest grasp, metres."""
 _SPEEDS = ("max_speed", "max_joint_speed")
+_FRANKA = ("panda_py", "franky")
 
 
 def slowed(values: dict[str, Any]) -> dict[str, Any]:
-    """A cell's values with a tenth of the speeds of its arm; a simulated arm has none."""
+    """A cell's values with a tenth of the speeds of its arm; a simulated arm has none.
+
+    A speed that the file of a Franka arm leaves out is a tenth of its default.
+    """
     slow = copy.deepcopy(values)
     arm = slow.get("arm")
     if isinstance(arm, dict):
         for name in _SPEEDS:
+            if name not in arm and arm.get("driver") in _FRANKA:
+                arm[name] = FrankaArmConfig.model_fields[name].default
             if isinstance(arm.get(name), (int, float)):
                 arm[name] *= SLOWNESS
     return slow

@@ -77,9 +77,11 @@ class Grip:
         if spread > _SAME_FORCE:
             force += ": readings differ; hold the scale straight between the pads and measure again"
         speed = f"speed  {1e3 * self.finger_speed:.1f} mm/s a finger, pads {2e3 * self.finger_speed:.1f} mm/s"
-        force_there, speed_there = f"{self.finger_force:.1f}", number(self.finger_speed, 4)
-        simulated = f"grasp_force: {force_there}, physics: {{finger_speed: {speed_there}}}"
-        return [width, speed, force, f"in a simulated cell's file: {simulated}; see docs/real_cell.md"]
+        simulated = [
+            f"grasp_force: {self.finger_force:.1f}",
+            f"physics: {{finger_speed: {number(self.finger_speed, 4)}}}",
+        ]
+        return [width, speed, force, "in the file of a simulated cell (docs/real_cell.md):", *simulated]
 
     def to_yaml(self) -> str:
         """Value of the key in the cell's file."""

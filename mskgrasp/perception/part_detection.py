@@ -68,8 +68,9 @@ def find_part_pixels(
     In a noisy image, heights are smoothed (Gaussian, 1 pixel) after clipping to twice ``min_height``, so that
     the edges of higher parts stay in place. Heights are relative to the measured table, so that a constant
     depth error does not hide a flat part. ``min_height`` is at least the standard deviation of a pixel's
-    noise. Noise splits narrow parts: groups up to four pixels apart are joined, and those between which
-    pixels of half that height lead from one to the other (hysteresis; Canny, IEEE PAMI 8, 1986).
+    noise. Noise splits narrow parts: groups up to four pixels apart are joined, and those up to eight pixels
+    apart between which pixels of half that height lead from one to the other (hysteresis; Canny, IEEE PAMI 8,
+    1986). Farther they do not lead: the high side of a tilted table consists of such pixels.
 
     Args:
         depth: (h, w) metres, NaN where invalid.
@@ -270,15 +271,20 @@ def _mean(heights: np.ndarray, most: float) -> np.ndarray:
 def _largest_group(mask: np.ndarray, links: np.ndarray, reach: int) -> tuple[np.ndarray | None, int]:
     """Find the largest group of pixels, and the size of the second largest.
 
-    Pixels are of one group if discs of ``reach`` pixels (1: neighbours) around them, or around ``links``
-    between them, touch.
+    Pixels are of one group if discs of a diameter of ``reach`` pixels (1: neighbours) around them touch, or
+    if ``links`` within twice as far, with their neighbours, connect them.
     """
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
-    _, labels = cv2.connectedComponents(cv2.dilate(links.astype(np.uint8), disc), connectivity=8)
+    pixels, between = mask.astype(np.uint8), cv2.dilate(links.astype(np.uint8), np.ones((3, 3), np.uint8))
+    discs, wide = (cv2.dilate(pixels, _disc(size)) for size in (reach, 2 * reach - 1))
+    _, labels = cv2.connectedComponents(np.bitwise_or(discs, np.bitwise_and(wide, between)), connectivity=8)
     sizes = np.bincount(labels[mask], minlength=3)  # 0 is the background
     if sizes.max() < MIN_PIXELS:
         return None, 0
     return mask & (labels == int(np.argmax(sizes))), int(np.sort(sizes)[-2])
+
+
+def _disc(diameter: int) -> np.ndarray:
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (diameter, diameter))
 
 
 @lru_cache(maxsize=4)

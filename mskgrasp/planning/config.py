@@ -24,7 +24,7 @@ class PlannerConfig(Config):
     the simulated ones, else as low_variance."""
     min_quality: float | None = Field(default=None, ge=0.0, le=1.0)
     """Lowest predicted quality of a selected grasp; null: none for a plan and for experiments in simulation,
-    which measure what poor grasps do, as the paper did; 0.5 where plans are carried out."""
+    which measure what poor grasps do, as the paper did; else 0.5."""
     check_fingers: bool = False
     """Exclude grasps whose open fingers would collide with something in the depth image."""
     recentre: bool = True

@@ -36,7 +36,6 @@ def cad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-@pytest.mark.slow
 def test_a_bar_is_assessed_and_placed_within_a_millimetre(cad, tmp_path, monkeypatch, capsys):
     out = tmp_path / "out"
     arguments = (cad / "bar.stl", "--out", out, "--simulations", 72, "--trials", 1, "--workers", 1)

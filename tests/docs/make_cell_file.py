@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 import yaml
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
@@ -32,6 +32,11 @@ from tests.docs.make_reference import parse, string_after
 from tests.docs.pages import ROOT
 
 PAGE = ROOT / "docs" / "cell_file.md"
+OF_ATTEMPTS = {
+    "coarse_rate_hz", "approach_clearance", "descend_speed", "lift_speed", "lift_height", "hold_s",
+    "skip_air", "finger_force",
+}  # fmt: skip
+"""Physics of the attempts that a dataset is made of. In a cell, programs command speeds and heights."""
 
 INTRODUCTION = """\
 # The file of a cell
@@ -63,7 +68,8 @@ SECTIONS: tuple[tuple[str, str, tuple[tuple[str, type[BaseModel]], ...]], ...] =
     ),
     (
         "type: sapien, type: mujoco",
-        "Simulated cells. Both have the keys of the first table.",
+        "Simulated cells. Both have the keys of the first table. Keys of `physics` that only attempts of a "
+        "dataset use, such as speeds of the hand, are left out.",
         (
             ("both", SimulatedCellConfig),
             ("`type: sapien`, in addition", SapienCellConfig),
@@ -101,6 +107,8 @@ def cell_file() -> str:
         for heading, model in models:
             bases = [other for _, other in models if other is not model and issubclass(model, other)]
             inherited = {name for base in bases for name in base.model_fields}
+            if model is Physics:
+                inherited |= OF_ATTEMPTS
             fields = {name: field for name, field in model.model_fields.items() if name not in inherited}
             rows = [row(name, field, model) for name, field in fields.items() if not _in_heading(field)]
             if rows:
@@ -143,8 +151,14 @@ def legal_of(field: FieldInfo) -> str:
         if get_origin(part) is Literal:
             return ", ".join(f"`{one}`" for one in get_args(part))
     signs = {Gt: ("gt", ">"), Ge: ("ge", ">="), Lt: ("lt", "<"), Le: ("le", "<=")}
-    bounds = []
-    for one in field.metadata:
+    bounds, metadata = [], list(field.metadata)
+    for item in get_args(field.annotation)[:1]:  # all items of a sequence have the bounds of the first
+        metadata += [
+            one for info in getattr(item, "__metadata__", ()) for one in getattr(info, "metadata", ())
+        ]
+    for one in metadata:
+        if isinstance(one, MinLen):
+            bounds.append("not empty")
         for kind, (attribute, sign) in signs.items():
             if isinstance(one, kind):
                 bound = getattr(one, attribute)

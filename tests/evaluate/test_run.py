@@ -112,7 +112,6 @@ def test_an_estimate_counts_the_missing_trials_and_makes_none_of_them(
     assert 0.1 < seconds < 100 and sorted(alone.rglob("*")) == files
 
 
-@pytest.mark.slow
 def test_models_are_compared_and_one_added_later_repeats_no_grasp(collected: Path, tmp_path: Path):
     out, part = tmp_path / "out", "parallel_key_a16x10x56"
     settings = dict(experiment="displacement", parts=(part,), lowess_data=collected)
@@ -150,7 +149,6 @@ def test_plans_are_made_as_on_a_cell_and_recentred(tmp_path: Path):
     assert plan is not None and len(plan.candidates) > 60
 
 
-@pytest.mark.slow
 def test_tape_agrees_with_the_tracker_or_measures_nothing(tmp_path: Path):
     report = evaluate(
         config(tmp_path / "out", measure="markers", parts=("washer_m36", "parallel_pin_12x60"), trials=1)

@@ -39,7 +39,6 @@ def test_a_grasp_planned_on_a_cad_file_lifts_the_part_in_simulation():
     assert printed.rstrip().endswith("\nlifted")
 
 
-@pytest.mark.slow
 def test_a_client_has_the_server_plan_and_place():
     with running("mskgrasp.serve", "--port", "0", "--workers", "1") as server:
         address = re.match(r"http://127\.0\.0\.1:\d+", server.stdout.readline())[0]
@@ -78,7 +77,6 @@ def test_a_planner_of_ones_own_takes_part_in_the_benchmark(tmp_path, monkeypatch
     assert row["planner"] == "highest" and row["lifted"]["of"] == 1
 
 
-@pytest.mark.slow
 def test_a_planner_program_takes_part_in_the_benchmark(tmp_path):
     program = f"{sys.executable} {EXAMPLES / 'planner_program.py'}"
     row = placed_by("program", tmp_path, "--program", program)

@@ -125,7 +125,6 @@ def test_a_mean_only_network_and_the_papers_optimiser_can_be_trained(samples, tm
     assert len(history) == 2 and models.meta.metrics["gdn"]["nll"] is None
 
 
-@pytest.mark.slow
 def test_a_network_can_learn_the_swing_and_is_judged_by_it(dataset, tmp_path):
     network = HAND.network.model_copy(update={"swing": True})
     longer = HAND.gdn.model_copy(update={"epochs": 40})
@@ -142,8 +141,9 @@ def test_a_network_can_learn_the_swing_and_is_judged_by_it(dataset, tmp_path):
     assert 0 <= gdn["least_uncertain"]["10%"][2] <= gdn["least_uncertain"]["30%"][2] + 0.2
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("config", [SHORT, HAND], ids=["the paper's", "ours"])
+@pytest.mark.parametrize(
+    "config", [pytest.param(SHORT, marks=pytest.mark.slow), HAND], ids=["the paper's", "ours"]
+)
 def test_what_learned_in_mixed_precision_is_as_good_and_predicts_in_float32(dataset, tmp_path, config):
     config = config.model_copy(update={"gqn": SHORT.gqn, "gdn": SHORT.gdn})
     samples = read_samples(dataset, config.network)

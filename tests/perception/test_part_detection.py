@@ -142,6 +142,23 @@ def test_a_thin_ring_is_one_part_through_the_noise_of_a_kinect():
     assert np.abs(np.array(centres) - [0.455, 0.0]).max() < 0.006
 
 
+@pytest.mark.parametrize("degrees", [0.0, 0.6])
+def test_two_parts_are_two_through_noise_on_a_tilted_table_too(degrees):
+    """The high side of a tilted table rises over half the least height, and leads from one to the other."""
+    size, gap = (0.04, 0.04, 0.02), 0.022
+    boxes = [Box(x=0.455 + side * (0.04 + gap) / 2, y=-0.09, yaw=0.0, size=size) for side in (-1, 1)]
+    depth = render(boxes)
+    points_y = (np.arange(depth.shape[0]) - depth.shape[0] / 2)[:, None] * PIXEL
+    for sign in (-1.0, 1.0):
+        tilted = depth + sign * np.radians(degrees) * points_y
+        for seed in range(5):
+            with pytest.raises(NoPartFound, match="two things"):
+                view_part(
+                    noisy(tilted, 0.0005, seed), INTRINSICS, OVERHEAD,
+                    table_z=TABLE_Z, region=REGION, min_height=0.003, alone=True,
+                )  # fmt: skip
+
+
 @pytest.mark.parametrize("model", ["iid", "kinect2"])
 def test_an_empty_table_stays_empty_whatever_the_noise(model):
     for seed in range(30):

@@ -55,3 +55,9 @@ def test_the_speeds_of_the_file_are_divided_by_ten_and_the_file_is_left_alone():
     assert slow == {"max_speed": pytest.approx(0.01), "max_joint_speed": pytest.approx(0.015), "host": "h"}
     assert values["arm"]["max_speed"] == 0.1
     assert slowed({"type": "sapien"}) == {"type": "sapien"}
+
+
+@pytest.mark.parametrize("driver", ["panda_py", "franky"])
+def test_speeds_that_the_file_leaves_out_are_a_tenth_of_the_defaults(driver):
+    slow = slowed({"type": "devices", "arm": {"driver": driver, "host": "h"}})["arm"]
+    assert slow["max_speed"] == pytest.approx(0.01) and slow["max_joint_speed"] == pytest.approx(0.015)

@@ -14,6 +14,7 @@ from hal.config import MeasuredGrip
 from hal.doctor import run as doctor
 from hal.doctor.gripper import Grip, NotMeasured, closing_speed
 from hal.replay import recorded_cell
+from hal.sim.config import SapienCellConfig
 from mskgrasp.core.geometry import Pose
 from tests.hal.franka.robots import FakeRobot, robot_for, write_cell
 from tests.hal.real_cell import REAL, REPLAYED
@@ -60,7 +61,7 @@ def test_speed_width_and_force_of_a_hand_are_written_into_its_cells_file(
     assert 0.005 < found.finger_speed < (0.03 if driver == "panda_py" else 0.2)
     assert found.max_width == pytest.approx(0.08, abs=2e-3)
     assert "readings 31, 33.5, 32 N" in done.stdout
-    assert "grasp_force: 32.0, physics: {finger_speed: " in done.stdout
+    assert "grasp_force: 32.0\nphysics: {finger_speed: " in done.stdout
 
 
 @pytest.mark.slow
@@ -140,7 +141,9 @@ def test_a_report_names_what_is_doubtful():
         grasp_force=30.0, forces=np.array([20.0, 32.0, 31.0]), speeds=np.array([0.024, 0.026, 0.025]),
         max_width=0.08, tape_width=0.074,
     )  # fmt: skip
-    width, speed, force, _ = grip.lines()
+    width, speed, force, _, *simulated = grip.lines()
+    cell = SapienCellConfig(type="sapien", **yaml.safe_load("\n".join(simulated)))
+    assert (cell.grasp_force, cell.physics.finger_speed) == (31.0, 0.025)
     assert "-6.0 mm by tape: other fingers" in width and "25.0 mm/s a finger, pads 50.0" in speed
     assert force.startswith("force  31.0 N a pad for 30 N") and "readings differ" in force
     assert yaml.safe_load(grip.to_yaml()) == {

@@ -125,6 +125,7 @@ def write_cell(
         "acceleration": 3.0,
         "joint_acceleration": 6.0,
         "gripper_speed": 0.1,
+        # Parts and touches of the tests are made for these.
         "contact_force": 20.0,
         "contact_torque": 20.0,
         "max_grasp_force": 40.0,
