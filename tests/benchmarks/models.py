@@ -112,8 +112,9 @@ def main() -> int:
         raise UsageError("--threads belongs to one training at a time: leave it out with --at-once")
     torch.set_num_threads(options.threads)
     choices = paper_choices(
-        options.patience, mixed_precision=options.mixed_precision, paper_seeds=options.paper_seeds
-    )
+        options.patience, mixed_precision=options.mixed_precision, paper_seeds=options.paper_seeds,
+        displacement_only=options.displacement_only,
+    )  # fmt: skip
     unknown = set(options.only or ()) - {one.name for one in choices}
     if unknown:
         raise UsageError(
@@ -305,6 +306,10 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "--mixed-precision", action="store_true",
         help="the paper's networks train in bfloat16: faster on a GPU, or a CPU with instructions for it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--displacement-only", action="store_true",
+        help="no quality network by the paper's recipe, the slowest of all: enough to compare displacements",
     )  # fmt: skip
     parser.add_argument("--known-parts", type=int, default=50, help="known parts to measure (default 50)")
     parser.add_argument(

@@ -24,7 +24,11 @@ _QUICK_ATTEMPTS = 1000
 
 
 def paper_choices(
-    patience: int, *, mixed_precision: bool = False, paper_seeds: int | None = None
+    patience: int,
+    *,
+    mixed_precision: bool = False,
+    paper_seeds: int | None = None,
+    displacement_only: bool = False,
 ) -> list[Choice]:
     """The paper's four networks by its own recipe, its best one by our recipe, and ours.
 
@@ -34,6 +38,8 @@ def paper_choices(
             a CPU that computes with it.
         paper_seeds: Greatest number of trainings by the paper's recipe, each of which takes four times as
             long as by ours.
+        displacement_only: By the paper's recipe no quality network is trained: that by our recipe, which then
+            comes first, stands in its place.
     """
     paper, ours = (read_config(LearningConfig, CONFIGS / f"{name}.yaml") for name in ("paper", "pretrained"))
     same = {"sides": "catalogue", "success_range": paper.success_range, "keep_best": True}
@@ -47,15 +53,12 @@ def paper_choices(
     ):  # fmt: skip
         network = paper.network.model_copy(update={"image": image, "variance": variance})
         config = paper.model_copy(update={"network": network})
-        quality_of = "" if name == PAPER else PAPER
+        quality_of = PAPER_AS_OURS if displacement_only else "" if name == PAPER else PAPER
         found.append(Choice(name=name, config=config, quality_of=quality_of, most_seeds=paper_seeds))
     views = paper.network.model_copy(update={"symmetric_views": ours.network.symmetric_views})
     trained_as_ours = ours.model_copy(update={"network": views, "mixed_precision": mixed_precision})
-    return [
-        *found,
-        Choice(name=PAPER_AS_OURS, config=trained_as_ours),
-        Choice(name=OURS, config=ours),
-    ]
+    recipe, own = Choice(name=PAPER_AS_OURS, config=trained_as_ours), Choice(name=OURS, config=ours)
+    return [recipe, *found, own] if displacement_only else [*found, recipe, own]
 
 
 def with_stages(config: LearningConfig, **changes: object) -> LearningConfig:

@@ -62,6 +62,10 @@ def test_all_models_stop_and_select_alike_and_the_papers_keep_their_own_recipe()
     assert [one.config.mixed_precision for one in fast] == 5 * [True] + [False]
     recipe, ours = choices[f"{PAPER}, our recipe"].config, choices[OURS].config
     assert recipe.model_copy(update={"network": ours.network}) == ours
+    alone = paper_choices(7, displacement_only=True)
+    assert {one.name: one.config for one in alone} == {name: one.config for name, one in choices.items()}
+    assert [one.name for one in alone if one.has_quality] == [PAPER_AS_OURS, OURS]
+    assert {one.quality_of for one in alone if not one.has_quality} == {PAPER_AS_OURS} == {alone[0].name}
 
 
 def test_a_share_of_the_attempts_leaves_what_is_measured_alone(boxes, groups):
