@@ -58,6 +58,7 @@ def test_a_bar_is_assessed_and_placed_within_a_millimetre(cad, tmp_path, monkeyp
         run(monkeypatch, *arguments, "--seed", 1)
 
 
+@pytest.mark.slow
 def test_a_block_too_wide_and_too_heavy_gets_a_report_that_says_so(cad, tmp_path, monkeypatch, capsys):
     trimesh.creation.box([120.0, 110.0, 100.0]).export(cad / "block.stl")
     out = tmp_path / "out"

@@ -139,6 +139,7 @@ def test_the_tables_are_made_from_nothing_and_a_stored_training_is_not_made_agai
     assert made == {path: path.stat().st_mtime_ns for path in made}
 
 
+@pytest.mark.slow
 def test_the_papers_recipe_may_have_fewer_seeds_than_ours(boxes, groups, tmp_path):
     by_name = {one.name: one for one in paper_choices(20, paper_seeds=1)}
     some = [small(by_name[PAPER], 1), small(by_name[PAPER_AS_OURS], 1), small(by_name[OURS], 1)]

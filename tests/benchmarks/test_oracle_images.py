@@ -64,6 +64,7 @@ def test_turning_and_mirroring_the_hand_flips_the_sides(turn, mirror):
     assert np.abs(image - other).max() > 0.01
 
 
+@pytest.mark.slow
 def test_rendered_heights_are_what_the_camera_sees(boxes, tmp_path):
     network = read_config(LearningConfig, CONFIGS / "pretrained.yaml").network
     assert isinstance(network, HandNetworkConfig)

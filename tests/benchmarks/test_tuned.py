@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 import torch
 
 from mskgrasp.core.shipped import PRETRAINED
@@ -12,6 +13,7 @@ from tests.benchmarks import tuned
 from tests.programs import run_here
 
 
+@pytest.mark.slow
 def test_the_displacement_of_known_parts_is_learned_and_the_quality_is_left(boxes, tmp_path: Path):
     out = tmp_path / "tuned"
     words = ("--data", boxes.data, "--attempts", "40", "--epochs", "12", "--learning-rate", "0.001")

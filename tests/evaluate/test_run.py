@@ -149,6 +149,7 @@ def test_plans_are_made_as_on_a_cell_and_recentred(tmp_path: Path):
     assert plan is not None and len(plan.candidates) > 60
 
 
+@pytest.mark.slow
 def test_tape_agrees_with_the_tracker_or_measures_nothing(tmp_path: Path):
     report = evaluate(
         config(tmp_path / "out", measure="markers", parts=("washer_m36", "parallel_pin_12x60"), trials=1)

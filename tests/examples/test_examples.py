@@ -77,6 +77,7 @@ def test_a_planner_of_ones_own_takes_part_in_the_benchmark(tmp_path, monkeypatch
     assert row["planner"] == "highest" and row["lifted"]["of"] == 1
 
 
+@pytest.mark.slow
 def test_a_planner_program_takes_part_in_the_benchmark(tmp_path):
     program = f"{sys.executable} {EXAMPLES / 'planner_program.py'}"
     row = placed_by("program", tmp_path, "--program", program)

@@ -39,6 +39,7 @@ def python(site: Path, folder: Path, *arguments: str) -> subprocess.CompletedPro
     )
 
 
+@pytest.mark.slow
 def test_its_own_tests_pass_the_contracts_of_arms_and_cameras(site: Path):
     tests = site.parent / "source"
     done = python(site, tests, "-m", "pytest", "-q", "-W", "error", "-c", "pyproject.toml", "tests")

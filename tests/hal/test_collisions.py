@@ -72,7 +72,7 @@ def test_no_random_motion_passes_through_what_a_hundred_times_finer_steps_meet()
     )  # fmt: skip
     clearances = Clearances.of(PANDA_LINKS, limits)
     accepted = 0
-    for _ in range(150):
+    for _ in range(60):
         start, goal = rng.uniform(JOINT_LOWER, JOINT_UPPER, (2, 7)) * 0.5 + READY * 0.5
         fine = start + np.linspace(0, 1, 2000)[:, None] * (goal - start)
         distances = clearances.at(fine)
@@ -85,7 +85,7 @@ def test_no_random_motion_passes_through_what_a_hundred_times_finer_steps_meet()
             assert least > -0.006
         except OutOfWorkspace:
             assert least < 1e-6
-    assert accepted > 10
+    assert accepted > 4
 
 
 def test_an_arm_that_stands_too_near_may_leave_but_come_no_nearer():

@@ -47,7 +47,10 @@ class StopAfter(Reporter):
             raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize(("after", "batch_norm"), [(1, False), (2, False), (4, False), (1, True), (4, True)])
+@pytest.mark.parametrize(
+    ("after", "batch_norm"),
+    [*(pytest.param(n, False, marks=pytest.mark.slow) for n in (1, 2, 4)), (1, True), (4, True)],
+)
 def test_a_stopped_run_goes_on_to_the_same_weights(samples, tmp_path, after, batch_norm):
     path = tmp_path / "checkpoint.safetensors"
     stages = {
@@ -125,6 +128,7 @@ def test_a_mean_only_network_and_the_papers_optimiser_can_be_trained(samples, tm
     assert len(history) == 2 and models.meta.metrics["gdn"]["nll"] is None
 
 
+@pytest.mark.slow
 def test_a_network_can_learn_the_swing_and_is_judged_by_it(dataset, tmp_path):
     network = HAND.network.model_copy(update={"swing": True})
     longer = HAND.gdn.model_copy(update={"epochs": 40})

@@ -76,6 +76,7 @@ def test_without_feeder_and_tracker_an_operator_places_parts_and_tape_measures(t
     assert unknown.placed and unknown.translation_error is None and "--tape" in unknown.unmeasured
 
 
+@pytest.mark.slow
 def test_the_picture_of_a_pallet_whose_first_part_failed_uses_no_heights_of_the_previous_pallet(tmp_path):
     cell = sapien_cell(SapienCellConfig(type="sapien", part=PART))
     slots = [Slot(x=0.5, y=0.06, theta=0.0, size=(0.09, 0.08))]

@@ -81,7 +81,7 @@ def test_near_duplicates_share_a_side_however_long_the_chain():
     entries = [
         entry(f"{family}-{n}", family, tuple(rng.uniform(15, 150, 3)))
         for family in ("bar", "plate")
-        for n in range(400)
+        for n in range(150)
     ]
     group = near_duplicates(entries)
     for a in entries:

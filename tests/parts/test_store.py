@@ -143,6 +143,7 @@ def test_what_a_killed_build_left_is_swept_away_later(own_cache):
     assert not abandoned.exists() and recent.exists()
 
 
+@pytest.mark.slow
 def test_a_killed_build_leaves_whole_parts_only(own_cache):
     build = subprocess.Popen([sys.executable, "-m", "mskgrasp.parts", "build"], stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 60

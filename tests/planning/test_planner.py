@@ -207,6 +207,7 @@ def test_a_grasp_beside_which_something_stands_is_left_out():
     assert not fingers_free(scene, free.candidates[free.shortlist].as_vector()).all()
 
 
+@pytest.mark.slow
 def test_planning_on_a_real_cell_loads_no_simulator():
     code = (
         "import sys\n"

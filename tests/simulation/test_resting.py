@@ -76,6 +76,7 @@ def test_a_cache_that_cannot_be_written_is_not_used(wing_nut: Part, tmp_path: Pa
     assert resting_of(wing_nut).toppled > 0
 
 
+@pytest.mark.slow
 def test_no_renderer_is_needed(wing_nut: Part):
     program = (
         "import sys\n"

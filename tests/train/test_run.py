@@ -89,6 +89,7 @@ def test_a_finished_training_is_not_taken_for_that_of_other_data(dataset, tmp_pa
         train.run_training(few.model_copy(update={"data": other}))
 
 
+@pytest.mark.slow
 def test_a_training_that_was_killed_as_it_began_begins_again(dataset, tmp_path):
     out = tmp_path / "model"
     out.mkdir()

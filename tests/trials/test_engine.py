@@ -217,6 +217,7 @@ def test_a_real_cell_is_not_connected_where_nobody_can_be_asked(tmp_path, monkey
         pass
 
 
+@pytest.mark.slow
 def test_a_part_that_hooks_on_a_finger_is_taken_away_by_the_next_scene(tmp_path: Path):
     """The pads close within the bore of a nut that stands on its edge, and cannot leave it."""
     with connected_engine(SIMULATED_CELL, yes=True, picture=tmp_path / "next.png", tape=None) as engine:
@@ -234,7 +235,7 @@ def test_a_part_that_hooks_on_a_finger_is_taken_away_by_the_next_scene(tmp_path:
         np.testing.assert_allclose(engine.cell.arm.state().joints, engine.cell.workspace.home, atol=0.01)
 
 
-@pytest.mark.parametrize("cell", ["sapien", "mujoco"])
+@pytest.mark.parametrize("cell", ["sapien", pytest.param("mujoco", marks=pytest.mark.slow)])
 def test_a_new_scene_empties_the_hand_and_is_as_after_going_home(cell: str, tmp_path: Path):
     path, (seed, _) = config_file(f"cells/{cell}.yaml"), trial_seeds(0, "washer_m36", 0)
     with connected_engine(path, yes=True, picture=tmp_path / "next.png", tape=None) as engine:

@@ -22,6 +22,7 @@ def test_another_density_scales_mass_and_inertia_alone(tmp_path):
     assert heavy.content_hash != part.content_hash and find_part("hex_nut_m20").mass == part.mass
 
 
+@pytest.mark.slow
 def test_joining_within_a_larger_distance_leaves_fewer_hulls(tmp_path):
     part = find_part("u_bolt_nuts_m6x18x50")
     exact, fine, coarse = (

@@ -12,6 +12,7 @@ from mskgrasp.validate.config import Setting
 from mskgrasp.validate.outcomes import draw_grasps, run_settings
 
 
+@pytest.mark.slow
 def test_grasps_are_tried_once_and_read_afterwards(tmp_path):
     folders = [find_part("hex_nut_m20").folder]
     settings = [

@@ -31,6 +31,7 @@ def test_a_hand_that_was_never_homed_is_homed_by_the_first_command_and_not_by_co
             assert arm.state().max_width == pytest.approx(0.0797)
 
 
+@pytest.mark.slow
 def test_fingers_that_open_less_far_are_opened_as_far_as_they_go(tmp_path: Path):
     """Changed fingers: until the hand is homed it believes in those before."""
     with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
@@ -84,6 +85,7 @@ def test_a_part_over_what_the_reflex_holds_is_refused(tmp_path: Path):
             arm.set_load(replace(LOAD, mass=1.2))  # a refusal is no fault
 
 
+@pytest.mark.slow
 def test_a_load_that_the_robot_refuses_is_a_fault(tmp_path: Path):
     with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
         robot.order("reflex")
@@ -118,6 +120,7 @@ def test_a_touch_that_the_reflex_would_end_is_refused_and_is_no_fault(tmp_path: 
         assert arm.move_until_contact(here, force=5.0) is None
 
 
+@pytest.mark.slow
 def test_another_end_effector_in_desk_is_reported(tmp_path: Path):
     """Our server alone: franky-sim's hand cannot be taken off."""
     with fci5() as robot:
@@ -126,6 +129,7 @@ def test_another_end_effector_in_desk_is_reported(tmp_path: Path):
             arm_at(tmp_path, "panda_py", robot.host).connect()
 
 
+@pytest.mark.slow
 def test_pads_that_meet_something_on_their_way_are_reported(tmp_path: Path):
     """Our server alone: the fingers of franky-sim never come to rest when pressed against a stop."""
     with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
@@ -145,6 +149,7 @@ def test_the_config_bounds_the_speed_whatever_a_program_asks_for(tmp_path: Path)
         assert time.monotonic() - begin > 15 / 8 * 0.05 / 0.05 * 0.9
 
 
+@pytest.mark.slow
 def test_a_motion_that_the_solver_gives_up_is_planned_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A motion of days is what makes it give up every time."""
     impossible = [2, 3]

@@ -144,6 +144,7 @@ def test_a_state_is_measured_after_it_was_asked_for(driver: DriverName, robot: F
                 assert arm._measure().mode == mode
 
 
+@pytest.mark.slow
 def test_a_cable_pulled_in_mid_motion_is_reported_within_seconds(
     driver: DriverName, robot: FakeRobot, tmp_path: Path
 ):

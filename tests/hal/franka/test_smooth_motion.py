@@ -37,6 +37,10 @@ LINES = [
     pytest.param((0.0, 0.0, -0.11), 0.0, 0.25, id="descent at 0.25 m/s"),
     pytest.param((-0.1, -0.16, 0.05), 0.0, 0.25, id="aslant at 0.25 m/s"),
 ]
+MOSTLY_SLOW = [
+    *(pytest.param(*line.values, id=line.id, marks=pytest.mark.slow) for line in LINES[:-1]),
+    LINES[-1],
+]
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +95,7 @@ def off_line(points: np.ndarray, begin: np.ndarray, end: np.ndarray) -> float:
     return float(np.linalg.norm(np.cross(points - begin, way), axis=1).max())
 
 
-@pytest.mark.parametrize(("shift", "turn", "speed"), LINES)
+@pytest.mark.parametrize(("shift", "turn", "speed"), MOSTLY_SLOW)
 def test_franky_commands_a_straight_line_as_smooth_as_planned(
     robot: FakeRobot, link: DriverLink, tmp_path: Path, shift, turn: float, speed: float
 ):
@@ -143,13 +147,7 @@ def panda() -> Iterator[FakeRobot]:
         yield panda
 
 
-@pytest.mark.parametrize(
-    ("shift", "turn", "speed"),
-    [
-        *(pytest.param(*line.values, id=line.id, marks=pytest.mark.slow) for line in LINES[:-1]),
-        LINES[-1],
-    ],
-)
+@pytest.mark.parametrize(("shift", "turn", "speed"), MOSTLY_SLOW)
 def test_panda_py_is_commanded_along_a_straight_line_as_smooth_as_planned(
     panda: FakeRobot, tmp_path: Path, shift, turn: float, speed: float
 ):

@@ -66,7 +66,7 @@ def test_colour_is_rgb_registered_to_depth_and_no_view_of_the_drivers_memory(ben
     assert np.array_equal(kept[0], first.colour) and np.array_equal(kept[1], first.depth, equal_nan=True)
 
 
-@pytest.mark.parametrize("source", ["factory", "calibration", "config"])
+@pytest.mark.parametrize("source", ["factory", "calibration", pytest.param("config", marks=pytest.mark.slow)])
 def test_intrinsics_come_from_the_config_then_the_calibration_then_the_factory(bench: Bench, source: str):
     measured = np.array([[366.0, 0, 255.5], [0, 366.5, 210.0], [0, 0, 1]])
     settings: dict[str, Any] = {}
@@ -98,12 +98,17 @@ def test_a_frame_is_exposed_after_it_was_asked_for(bench: Bench):
     ("fault", "error", "message"),
     [
         ("stalled", CaptureFailed, "its stream stands still"),
-        ("slow", CaptureFailed, "its stream stands still"),
-        ("frozen", CaptureFailed, "stale"),
-        ("late", CaptureFailed, r"more than 0.4 s late \(latency_s\)"),
-        ("skewed", CaptureFailed, "without colour of the same moment"),
+        pytest.param("slow", CaptureFailed, "its stream stands still", marks=pytest.mark.slow),
+        pytest.param("frozen", CaptureFailed, "stale", marks=pytest.mark.slow),
+        pytest.param("late", CaptureFailed, r"more than 0.4 s late \(latency_s\)", marks=pytest.mark.slow),
+        pytest.param("skewed", CaptureFailed, "without colour of the same moment", marks=pytest.mark.slow),
         ("dark", CaptureFailed, r"measured 0.0% of its depth image.*min_valid"),
-        ("hung", CommunicationLost, "did not answer 'capture' within 2.6 s and was killed"),
+        pytest.param(
+            "hung",
+            CommunicationLost,
+            "did not answer 'capture' within 2.6 s and was killed",
+            marks=pytest.mark.slow,
+        ),
         ("crash", CommunicationLost, "SIGSEGV"),
     ],
 )
@@ -217,6 +222,7 @@ TABLE = (0.5, 0.0, 0.4, 0.4, 0.0, 139)
 REGION = (0.38, 0.62, -0.12, 0.12)
 
 
+@pytest.mark.slow
 def test_tape_of_12_and_8_mm_is_found_in_the_fine_colour(bench: Bench):
     """On a plate 30 mm high; depth is 24 mm too far, which the camera corrects first."""
     squares = np.array([[0.47, 0.01, 0.03], [0.53, -0.012, 0.03]])

@@ -27,7 +27,10 @@ def cell() -> Iterator[Cell]:
         yield cell
 
 
-@pytest.mark.parametrize(("part", "offset"), [("hex_nut_m30", (0.004, 0.003)), ("hinge_60x30", (0.0, 0.004))])
+@pytest.mark.parametrize(
+    ("part", "offset"),
+    [pytest.param("hex_nut_m30", (0.004, 0.003), marks=pytest.mark.slow), ("hinge_60x30", (0.0, 0.004))],
+)
 def test_long_steps_leave_a_part_in_the_hand_and_on_the_table_as_short_ones_do(
     cell: Cell, monkeypatch, part: str, offset: tuple[float, float]
 ):

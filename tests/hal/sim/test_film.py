@@ -76,6 +76,7 @@ def test_a_film_shows_the_shift_between_the_fingers_and_leaves_the_grasp_as_it_i
     assert first.side.part.any() and first.side.empty.any() and not first.above.empty.any()
 
 
+@pytest.mark.slow
 def test_the_hand_is_hidden_from_above_only(cell: Cell, block: Part):
     grasp = beside(cell, block)
     with film(cell, grasp).recorded() as frames:

@@ -49,7 +49,9 @@ def cell() -> Iterator[Cell]:
         yield cell
 
 
-@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize(
+    "part", [*PARTS[:2], *(pytest.param(part, marks=pytest.mark.slow) for part in PARTS[2:])]
+)
 def test_a_known_motion_is_measured_to_half_a_millimetre_and_half_a_degree(cell: Cell, part: str):
     resting, rng = present(cell, part), np.random.default_rng(PARTS.index(part))
     for _ in range(2):

@@ -1,5 +1,7 @@
 """Parallel building: on all cores, what is up to date is kept, what failed is not tried again."""
 
+import pytest
+
 from mskgrasp.parts import build_part, read_part
 from mskgrasp.parts.builtin import recipe_hash
 from mskgrasp.parts.catalogue import Index, LeftOut
@@ -9,6 +11,7 @@ EMPTY = Index(parts={}, left_out={})
 NAMES = ("hex_nut_m20", "parallel_key_b20x12x80", "parallel_pin_12x60", "washer_m36")
 
 
+@pytest.mark.slow
 def test_two_workers_build_what_one_builds(builtin_parts):
     found = {built.name: built for built in build_parts(NAMES, EMPTY, 2)}
     assert set(found) == set(NAMES)

@@ -213,6 +213,7 @@ def test_two_million_triangles_become_a_part_in_bounded_time_and_memory(tmp_path
     assert used.ru_utime - before < 60 and used.ru_maxrss < 4 * 2**20  # kB
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_whole_parts_only_and_lists_what_was_done(tmp_path, own_cache):
     box(tmp_path / "a.stl")
     for number in range(3):

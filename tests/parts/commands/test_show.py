@@ -20,6 +20,7 @@ def test_a_part_is_drawn_into_a_file_of_its_name(tmp_path: Path, monkeypatch: py
     assert matplotlib.image.imread(tmp_path / "washer_m36.png").std() > 0.05
 
 
+@pytest.mark.slow
 def test_a_part_with_a_toppling_pose_is_shown_with_its_count_and_probability(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):

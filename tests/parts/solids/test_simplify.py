@@ -22,6 +22,7 @@ def test_a_fine_mesh_is_decimated_within_the_reported_distance():
     assert thin.volume == pytest.approx(TORUS_VOLUME, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_mesh_too_rough_to_be_decimated_is_refused():
     rough = torus(700, 160)
     rng = np.random.default_rng(2)

@@ -19,6 +19,7 @@ def test_a_tee_weighs_like_crossing_pipes_and_three_beads():
     assert solid.mesh.volume == pytest.approx(expected, rel=0.003)
 
 
+@pytest.mark.slow
 def test_tees_are_open_at_three_ends():
     for name in (*family("pipe_tee"), *family("hose_tee"), *family("nut_tee")):
         solid = made(name)
