@@ -102,6 +102,7 @@ def test_trainings_in_processes_of_their_own_are_the_same(looks, sides, tmp_path
             np.testing.assert_array_equal(other["validation"].quality, one["validation"].quality)
 
 
+@pytest.mark.slow
 def test_a_training_that_fails_in_a_process_of_its_own_ends_the_others(looks, sides, tmp_path, capfd):
     made(looks, sides, tmp_path, [OWN])
     (OWN.folder(tmp_path, 0) / "validation.npz").unlink()
@@ -127,6 +128,7 @@ def test_a_folder_of_other_settings_or_attempts_is_refused(looks, sides, tmp_pat
         made(looks, sides, tmp_path, [replace(OWN, name="Another"), replace(OWN, quality_of="Another")])
 
 
+@pytest.mark.slow
 def test_a_training_of_another_process_is_left_to_it(looks, sides, tmp_path):
     folder = OWN.folder(tmp_path, 0)
     folder.mkdir(parents=True)

@@ -160,6 +160,7 @@ def _hash_of(name: str) -> str:
     return build_part(name).content_hash
 
 
+@pytest.mark.slow
 def test_two_processes_may_build_the_same_part_at_once(own_cache, builtin_parts):
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         hashes = pool.map(_hash_of, ["hex_nut_m20"] * 4, chunksize=1)

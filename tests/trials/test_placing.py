@@ -183,7 +183,7 @@ class AcrossTheWeb:
         )
 
 
-@pytest.mark.parametrize("usual", [False, True])
+@pytest.mark.parametrize("usual", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_part_held_beneath_an_overhang_is_not_taken_along(
     usual: bool, engine: TrialEngine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

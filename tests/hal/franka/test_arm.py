@@ -98,6 +98,7 @@ def test_a_load_that_the_robot_refuses_is_a_fault(tmp_path: Path):
         assert robot.load()[0] == pytest.approx(0.4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("driver", ["franky", pytest.param("panda_py", marks=pytest.mark.slow)])
 def test_a_part_that_slips_away_after_closing_is_not_held(tmp_path: Path, driver: DriverName):
     """The hand goes on to report its grasp; the fingers close."""

@@ -74,6 +74,7 @@ def on_colour(pictures: list[Picture]) -> HandEye:
     return solve_hand_eye(BOARD, views)
 
 
+@pytest.mark.slow
 def test_on_colour_registered_with_depth_that_is_too_far_the_camera_is_displaced_along_rows(
     pictures: list[Picture],
 ):
@@ -83,6 +84,7 @@ def test_on_colour_registered_with_depth_that_is_too_far_the_camera_is_displaced
     assert found.half_translation_m < 0.5 * abs(along_rows)  # in both halves alike: `repeatable` is silent
 
 
+@pytest.mark.slow
 def test_on_infrared_the_camera_is_where_it_is_whatever_depth_measures(pictures: list[Picture]):
     found = solve_hand_eye(BOARD, [picture.view(BOARD) for picture in pictures])
     assert np.abs(shift_on_the_table(found)).max() < 0.3e-3

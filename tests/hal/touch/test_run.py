@@ -42,6 +42,7 @@ def test_a_simulated_table_tilted_by_half_a_degree_and_3_mm_off_is_measured(tmp_
     assert path.read_bytes() == before and "mm from the stated" in done.stdout
 
 
+@pytest.mark.slow
 def test_the_shipped_simulated_cell_has_the_table_that_it_states(tmp_path: Path):
     done = run_here(touch.main, "--cell", str(CELLS / "mujoco.yaml"), "--out", str(tmp_path), *QUICK)
     assert done.returncode == 0, done.stderr

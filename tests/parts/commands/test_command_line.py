@@ -2,11 +2,13 @@
 
 import matplotlib.image
 import numpy as np
+import pytest
 import trimesh
 
 from mskgrasp.parts import parts_folder, starter_names
 
 
+@pytest.mark.slow
 def test_build_list_and_show_work_one_after_the_other(program, tmp_path):
     built = program("build", "washer_m36", "parallel_key_b20x12x80")
     assert built.returncode == 0 and built.stdout.startswith("2 parts ready, 2 built now")

@@ -43,7 +43,9 @@ def descend(env, monkeypatch, depth: float, height: float) -> tuple[bool, float]
     return int(info["failure"][0]) == 4, peak[0]
 
 
-@pytest.mark.parametrize("height", [0.01, 0.0103, 0.0107, 0.0111])
+@pytest.mark.parametrize(
+    "height", [0.01, *(pytest.param(height, marks=pytest.mark.slow) for height in (0.0103, 0.0107)), 0.0111]
+)
 def test_the_reflex_depends_neither_on_the_rate_nor_on_the_phase_of_a_step(at_rate, monkeypatch, height):
     """A finger that stops 0.6 mm over the block, grazes it, is sent 0.4 mm into it, or 2 mm."""
     clear, graze, light, deep = (

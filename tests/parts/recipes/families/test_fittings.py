@@ -22,6 +22,7 @@ def test_a_plug_weighs_like_thread_collar_and_square():
     assert made("square_plug_11x36").mesh.volume == pytest.approx(expected, rel=0.003)
 
 
+@pytest.mark.slow
 def test_fittings_are_open_from_end_to_end():
     names = [*family("hex_nipple"), *family("pipe_union"), *family("hose_barb"), *family("cable_gland")]
     names += [*family("kf_flange"), *family("neck_flange"), *family("check_valve")]
