@@ -11,6 +11,8 @@ from pathlib import Path
 # One core a process, here and in all that are started: the tests measure nothing, and threads of torch,
 # OpenBLAS and Mesa only get in each other's way. Read when those are loaded.
 os.environ |= {"OMP_NUM_THREADS": "1", "LP_NUM_THREADS": "1"} | os.environ
+# Hundreds of processes are started, each of which would compile all modules of the checkout.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import pytest
 from hypothesis import settings
