@@ -179,10 +179,10 @@ def _success_row(one: TrialStatistics) -> tuple[str, ...]:
 def _success_text(summary: SuccessSummary) -> list[str]:
     overall, paper = summary.overall, summary.paper
     rate = "-" if overall.success_rate is None else f"{overall.success_rate:.1%}"
-    lines = [
-        f"{rate} lifted, 95 % interval {interval_text(overall.success_interval, digits=1)} (paper: "
-        f"{paper['simulated']:.1%} simulated, {paper['real']:.1%} real)"
-    ]
+    text = f"{rate} lifted, 95 % interval {interval_text(overall.success_interval, digits=1)}"
+    if overall.certified is None:  # the paper does not know its parts beforehand
+        text += f" (paper: {paper['simulated']:.1%} simulated, {paper['real']:.1%} real)"
+    lines = [text]
     lines.append(refused_text(overall.reasons, overall.trials, overall.successes))
     lines += _certified_text(overall)
     if overall.unmeasured:

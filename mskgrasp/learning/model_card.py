@@ -40,8 +40,7 @@ def model_card(meta: ModelMeta) -> str:
         "# Model card",
         "",
         "Predicts, for grasps of a parallel gripper from above, the probability that they lift the part, and",
-        "how the part moves in the hand, with its uncertainty. Loaded by `mskgrasp.plan`, `evaluate` and",
-        "`palletize`.",
+        "how the part moves in the hand, with its uncertainty. Loaded by every program that plans.",
         "",
         "## Data",
         "",
@@ -143,7 +142,8 @@ def _axis_rows(gdn: dict[str, Any]) -> list[tuple[str, ...]]:
         rows.append(
             (f"inside the {level} % interval", *(f"{axes[f'coverage_{level}'][name]:.1%}" for name in names))
         )
-    ause = f"AUSE of random's: translation {gdn['ause_translation']:.2f}, rotation {gdn['ause_rotation']:.2f}"
+    each = ", ".join(f"{name} {gdn[f'ause_{name}']:.2f}" for name in ("translation", "rotation"))
+    ause = f"AUSE, relative to a random order: {each}"
     return [*rows, (ause, *("" for _ in names))]
 
 

@@ -79,6 +79,7 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
 def engine_sections(record: dict[str, Any]) -> list[Section]:
     """Differences in words and by part, those that disagree most first, read from ``engines.json``."""
     found = [_in_words(record)]
+    found += [f"Bound missed: {one}." for one in record["failed"]]
     found += [
         f"{count} grasps: {ours} in MuJoCo, {theirs} in SAPIEN"
         for ours, theirs, count in record["disagreements"]

@@ -160,7 +160,9 @@ def test_the_readme_states_the_stored_intervals_of_the_comparison_of_engines():
     report = dict(
         engines={"all": whole, "sapien, starts moved by 0.1 mm": whole, "nut": whole, "bolt": whole},
         intervals=dict(agreement=[0.8, 0.95], shift_median=[3e-4, 6e-4], shift_p90=[2e-3, 5e-3]),
+        failed=["S agrees in 90.0%, at least 95% is needed"],
     )
     (row,) = dict(ROWS)["engines"](StoredReport(name="engines", facts={}, report=report))
     assert row.interval == "80.0 - 95.0 %; 0.30 - 0.60 mm; 2.00 - 5.00 mm"
     assert row.n == "20 grasps of 2 parts, 11 lifted in both"
+    assert row.text.endswith("; bound missed: S agrees in 90.0%, at least 95% is needed")
