@@ -403,7 +403,7 @@ class Arm(Device):
         for leg in legs:
             check_line(limits, here, leg)
             if self.links is not None:
-                path = line_joints(self.links, joints, here, leg)
+                path = line_joints(self.links, limits, joints, here, leg)
                 check_path(self.links, limits, path, "the straight line to this pose")
                 joints = path[-1]
             here = leg

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field
 
 from mskgrasp.core.config import Config, check_config, read_yaml
 from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import Pose
 
 NORM_TOLERANCE = 1e-3
@@ -96,9 +97,7 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
         "# Metres; quaternion w x y z. Made by python -m hal.calibrate.\n"
     ) + yaml.safe_dump(values, sort_keys=False, default_flow_style=None)
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(path.name + ".tmp")
-    unfinished.write_text(text, encoding="utf-8")
-    unfinished.replace(path)
+    write_whole(path, text.encode())
 
 
 def read_calibration(path: Path, *, serial: str | None) -> Calibration:

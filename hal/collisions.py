@@ -139,18 +139,21 @@ def check_path(links: Links, limits: ArmLimits, path: np.ndarray, what: str) -> 
         near, far = np.concatenate([near, distances]), np.concatenate([distances, far])
 
 
-def line_joints(links: Links, start: np.ndarray, here: Pose, goal: Pose) -> np.ndarray:
+def line_joints(links: Links, limits: ArmLimits, start: np.ndarray, here: Pose, goal: Pose) -> np.ndarray:
     """Joints (k, n) along the straight line from ``here``, where the joints are ``start`` (n,), to a pose.
 
+    An arm that stands outside its limits may return.
+
     Raises:
-        OutOfWorkspace: The arm does not reach all of it.
+        OutOfWorkspace: The arm does not reach all of it within its joint limits.
     """
+    lower, upper = np.minimum(limits.joint_lower, start), np.maximum(limits.joint_upper, start)
     distance, angle = pose_distance(here, goal)
     n = max(1, int(np.ceil(max(distance / _LINE_M, angle / _LINE_RAD))))
     for steps in (n, _FINER * n):
         line = straight_line(here, goal, np.linspace(0, 1, steps + 1)[1:])
         joints, errors = links.joints_along(line, start)
-        if errors.max() < POSE_TOLERANCE:
+        if errors.max() < POSE_TOLERANCE and ((lower <= joints) & (joints <= upper)).all():
             return np.concatenate([start[None], joints])
     raise OutOfWorkspace(
         f"no straight line from here to TCP {shown(goal.position)} m within the joint limits"

@@ -159,10 +159,6 @@ class Page:
         self._ask("Page.stopScreencast")
         return self._frame
 
-    def pdf(self, path: Path) -> None:
-        """The page on paper."""
-        path.write_bytes(base64.b64decode(self._ask("Page.printToPDF", printBackground=True)["data"]))
-
     def _wait_for_load(self) -> None:
         # Events of the empty page before may still come: only the page itself says that it is there.
         deadline = time.monotonic() + _PATIENCE_S

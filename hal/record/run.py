@@ -62,7 +62,10 @@ def _frames(config: RecordConfig) -> int:
 
 def _run(config: RecordConfig, command: str) -> int:
     """Run a program of this project on the recorded cell, and return its exit code."""
-    words = shlex.split(command)
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise UsageError(f"--run {command!r}: {error}; close the quote") from error
     if not words or words[0].split(".")[0] not in ("mskgrasp", "hal"):
         raise UsageError(
             f"--run {command!r}: the first word must be a program of this project, such as mskgrasp.plan"

@@ -81,7 +81,7 @@ def _check_reachable(address: str) -> None:
     host, _, port = address.rpartition(":")
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=10).close()
-    except (OSError, OverflowError) as error:
+    except (OSError, OverflowError, UnicodeError) as error:
         raise WorkerFailed(
             f"no cluster answers at {address} ({getattr(error, 'strerror', None) or error}); "
             "start one with: ray start --head"

@@ -15,7 +15,7 @@ from mskgrasp.core.files import write_whole
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.dataset import ShardInfo, list_shards, read_shard
-from mskgrasp.dataset.shards import read_columns
+from mskgrasp.dataset.shards import read_columns, success_rate
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.grasp_figures import draw_contact_sheet
 from mskgrasp.reports.section import Section
@@ -87,7 +87,6 @@ def _summarise_part(
     discarded: Counter[str] = Counter()
     for _, info in shards:
         discarded.update(info.discarded)
-    rate = float(success.mean()) if len(success) else 0.0
     return PartSummary(
         part=name,
         family=shards[0][1].family,
@@ -99,7 +98,7 @@ def _summarise_part(
         median_tilt=_median(tilt),
         failures={FAILURES[code]: int(n) for code, n in enumerate(np.bincount(failure)) if code and n},
         discarded=dict(discarded),
-        kept=part_filter.takes_success(rate),
+        kept=part_filter.takes_success(success_rate(success)),
     )
 
 

@@ -26,6 +26,7 @@ from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.core.files import LOCK, exclusive_lock
 from mskgrasp.dataset import ShardInfo, read_shard, read_success, shard_path
 from mskgrasp.dataset.labels import ShardLabels, read_labels
+from mskgrasp.dataset.shards import success_rate
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.catalogue import read_index, representative_entries
 from mskgrasp.runtime.cli import make_folder
@@ -77,6 +78,8 @@ def check_labels(info: ShardInfo, config: CollectConfig) -> None:
         intrinsics=config.camera.intrinsics().tolist(),
     )
     changed = [key for key, value in settings.items() if np.asarray(getattr(info, key)).tolist() != value]
+    if info.T_base_camera.position[2] != config.camera.height:
+        changed.append("camera.height")
     if changed:
         raise BadDataset(f"{name} were made with other settings ({', '.join(changed)} differ); use those")
     if info.versions.get("simulation") != str(SIMULATION_VERSION):
@@ -143,8 +146,8 @@ def _collect(config: CollectConfig, parts: list[Part], known: Mapping[tuple[str,
 
 def passing_parts(config: CollectConfig, parts: list[Part]) -> list[Part]:
     """The parts whose success rate in their first shard the part filter takes."""
-    rates = {part.name: read_success(shard_path(config.out, part.name, 0))[0].mean() for part in parts}
-    return [part for part in parts if config.part_filter.takes_success(float(rates[part.name]))]
+    first = {part.name: read_success(shard_path(config.out, part.name, 0))[0] for part in parts}
+    return [part for part in parts if config.part_filter.takes_success(success_rate(first[part.name]))]
 
 
 def _make_missing(config: CollectConfig, tasks: list[ShardTask], parts: list[Part]) -> None:

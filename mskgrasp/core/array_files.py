@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tokenize
 import zipfile
 import zlib
 from pathlib import Path
@@ -11,6 +12,9 @@ from typing import Any
 import numpy as np
 
 from mskgrasp.core.files import write_whole
+
+BAD_HEADER = (ValueError, TypeError, SyntaxError, tokenize.TokenError)
+"""What numpy raises for an array whose header, a literal of Python, is cut off or holds something else."""
 
 
 def write_arrays(path: Path, **arrays: Any) -> None:
@@ -37,7 +41,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
-    except ValueError as error:
+    except BAD_HEADER as error:
         raise ValueError("an array is cut off, or holds objects in place of numbers") from error
     except (LookupError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         # RuntimeError: an unknown compression, or a changed bit that stands for encryption.

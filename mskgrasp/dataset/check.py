@@ -16,7 +16,7 @@ from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.dataset.attempts import ShardInfo, problems
 from mskgrasp.dataset.ranges import range_problems
-from mskgrasp.dataset.shards import read_unchecked, shard_path
+from mskgrasp.dataset.shards import read_unchecked, shard_path, success_rate
 from mskgrasp.parts import store
 
 SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise", "fidelity")
@@ -125,8 +125,7 @@ def _examine(path: Path) -> tuple[_Shard | None, list[str]]:
         reasons = list(problems(attempts)) or list(range_problems(attempts, info))
     n = len(attempts)
     digest = hashlib.sha256(np.ascontiguousarray(attempts.grasp).tobytes()).hexdigest() if n else ""
-    rate = float(attempts.success.mean()) if n else 0.0
-    return _Shard(path=path, info=info, n=n, rate=rate, grasps=digest), reasons
+    return _Shard(path=path, info=info, n=n, rate=success_rate(attempts.success), grasps=digest), reasons
 
 
 def _settings(folder: Path, faults: list[Fault]) -> dict[str, Any]:

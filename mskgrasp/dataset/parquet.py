@@ -147,7 +147,11 @@ def _table(attempts: Attempts, info: ShardInfo, schema: pyarrow.Schema, path: Pa
     for name, column in COLUMNS.items():
         if name not in values:
             rows = getattr(attempts, name)
-            missing = np.isnan(rows).reshape(n, -1).any(axis=1) if column.dtype == "float32" else np.zeros(n)
+            missing = (
+                np.isnan(rows).any(axis=tuple(range(1, rows.ndim)))
+                if column.dtype == "float32"
+                else np.zeros(n)
+            )
             values[name] = [None if gone else row.tolist() for row, gone in zip(rows, missing, strict=True)]
     return pa.Table.from_pydict(values, schema=schema)
 

@@ -163,6 +163,11 @@ def read_success(path: Path) -> tuple[np.ndarray, ShardInfo]:
     return arrays["success"], info
 
 
+def success_rate(success: np.ndarray) -> float:
+    """Share of attempts that lifted the part, of (n,) bool; 0 where all were discarded."""
+    return float(success.mean()) if len(success) else 0.0
+
+
 def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], ShardInfo]:
     path = Path(path)
     if not path.is_file():

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor, nn
 
 from mskgrasp.core.errors import BadModel
+from mskgrasp.core.files import write_whole
 from mskgrasp.learning.model_metrics import EpochMetrics
 
 
@@ -55,10 +55,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     names = ("fingerprint", "samples_version", "stage", "epoch")
     progress = {name: getattr(checkpoint, name) for name in names}
     progress["history"] = [one.to_json() for one in checkpoint.history]
-    temporary = path.with_name(path.name + ".tmp")
-    save_file(tensors, temporary, metadata={"progress": json.dumps(progress)})
-    temporary.chmod(0o644)  # safetensors creates it readable by its owner only
-    os.replace(temporary, path)
+    write_whole(path, save(tensors, metadata={"progress": json.dumps(progress)}))
 
 
 def read_checkpoint(path: Path) -> Checkpoint:

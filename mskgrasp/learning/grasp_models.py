@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,12 +13,12 @@ import numpy as np
 import torch
 from pydantic import Field, ValidationError, field_validator, model_validator
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file, save
 from torch import Tensor
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadModel, MissingModel
-from mskgrasp.core.files import read_bounded
+from mskgrasp.core.files import read_bounded, write_whole
 from mskgrasp.core.grasp import HAND_GEOMETRY
 from mskgrasp.core.json_text import parse_json
 from mskgrasp.core.metrics import INTERVAL_LEVELS, half_width_of, normal_half_width
@@ -226,13 +225,9 @@ def save_model(folder: Path, models: Models) -> None:
     _check_finite(weights, "the trained networks", "train again with a lower learning rate")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    temporary = folder / (WEIGHTS + ".tmp")
-    save_file({name: value.contiguous().cpu() for name, value in weights.items()}, temporary)
-    temporary.chmod(0o644)  # safetensors creates it readable by its owner only
-    os.replace(temporary, folder / WEIGHTS)
-    temporary = folder / (DESCRIPTION + ".tmp")
-    temporary.write_text(json.dumps(models.meta.model_dump(mode="json"), indent=2) + "\n", encoding="utf-8")
-    os.replace(temporary, folder / DESCRIPTION)
+    write_whole(folder / WEIGHTS, save({name: value.contiguous().cpu() for name, value in weights.items()}))
+    described = json.dumps(models.meta.model_dump(mode="json"), indent=2) + "\n"
+    write_whole(folder / DESCRIPTION, described.encode())
 
 
 def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -> Models:

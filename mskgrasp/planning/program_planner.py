@@ -110,6 +110,14 @@ class ProgramPlanner:
     def _ask(self, request: str) -> str:
         process = self._started()
         assert process.stdin is not None
+        if not self._lines.empty():  # would be taken for the answer to this request, and so on
+            line = self._lines.get()
+            if line is not None:
+                raise BadPlanner(
+                    f"the program {self._command!r} wrote more than one line for a request, last "
+                    f"{line.strip()[:200]!r}"
+                )
+            self._lines.put(None)
         try:
             process.stdin.write(request + "\n")
             process.stdin.flush()

@@ -32,8 +32,9 @@ def listening(host: str, port: int) -> socket.socket:
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
         listener = socket.socket(family, kind, protocol)
-    except OSError as error:
-        raise UsageError(f"cannot listen on {host}: {error.strerror}; choose another --host") from error
+    except (OSError, UnicodeError) as error:  # a label of a name that is empty or too long
+        reason = getattr(error, "strerror", None) or "it is no name of a host"
+        raise UsageError(f"cannot listen on {host}: {reason}; choose another --host") from error
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.lib import format as npy
 
+from mskgrasp.core.array_files import BAD_HEADER
 from mskgrasp.serve.rejection import Rejected
 
 MIN_SIDE = 16
@@ -76,7 +77,7 @@ def _array(name: str, data: bytes, most: int) -> np.ndarray:
         version = npy.read_magic(file)
         read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[version]
         shape, fortran, dtype = read(file, max_header_size=_NPY_HEADER)
-    except (ValueError, KeyError, SyntaxError, RecursionError, MemoryError) as error:
+    except (*BAD_HEADER, KeyError, RecursionError, MemoryError) as error:
         raise Rejected(400, f"array {name} has no header of numpy's; write it with numpy.savez") from error
     if (
         dtype.kind not in "fiu" or dtype.itemsize > 8 or dtype == np.float16

@@ -107,6 +107,11 @@ class Dispatcher:
             except ProcessEnded as error:
                 _settle(job, (503, error_body(str(error))))
                 await self._start_again(process)
+            except Exception as error:  # whatever it is, this process must serve on
+                _settle(
+                    job, (500, error_body(f"the request could not be handed on ({error!r}); report this"))
+                )
+                await self._start_again(process)
             else:
                 _settle(job, answer)
             del job  # a body of megabytes is not kept until the next one comes

@@ -12,16 +12,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import torch
+
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import UsageError
-from mskgrasp.core.files import is_leftover, write_whole
+from mskgrasp.core.files import exclusive_lock, is_leftover, write_whole
 from mskgrasp.dataset.fingerprint import dataset_fingerprint
 from mskgrasp.learning.compute_device import compute_device
 from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, read_meta, save_model
 from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples, read_samples
-from mskgrasp.learning.sides import split
+from mskgrasp.learning.sides import Sides, split
 from mskgrasp.learning.trainer import Reporter, train
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import Bar, advance_to, note, progress
@@ -102,6 +104,15 @@ def run_training(config: TrainConfig) -> int:
         skipped = ", ".join(f"{n} ({why})" for why, n in samples.skipped.items())
         print(f"unusable attempts: {skipped}")
     cli.make_folder(out)
+    with exclusive_lock(out) as alone:
+        if not alone:
+            raise UsageError(f"another training is writing into {out}; wait for it, or choose another --out")
+        _train_into(out, config, samples, sides, device)
+    return 0
+
+
+def _train_into(out: Path, config: TrainConfig, samples: Samples, sides: Sides, device: torch.device) -> None:
+    """Train, and write every file of the run; nobody else writes into the folder."""
     write_config(config, out / "config.yaml")
     with closing(_ProgressBar(out / "log.csv")) as bar:
         models, history = train(
@@ -117,7 +128,6 @@ def run_training(config: TrainConfig) -> int:
     save_model(out, models)  # last: it says that the training is finished
     (out / CHECKPOINT).unlink(missing_ok=True)
     _summarise(models.meta.metrics, out)
-    return 0
 
 
 def _check_out(config: TrainConfig, out: Path) -> None:

@@ -55,7 +55,10 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
         f"{name}{SHIFTED}": compare_outcomes(found[f"{name}{SHIFTED}"], found[name])
         for name in ("sapien", "mujoco")
     }
-    by_part = {part.name: compare_outcomes(_of(mujoco, part.name), _of(sapien, part.name)) for part in parts}
+    by_part = {
+        part.name: compare_outcomes(*(_of(one, part.folder.name) for one in (mujoco, sapien)))
+        for part in parts
+    }
     differing = disagreements(mujoco, sapien)
     failed = complaints(rows["all"])
     record = {

@@ -43,7 +43,7 @@ def main() -> int:
     took = []
     for _ in range(options.repeats):
         begun = time.thread_time()
-        check_path(PANDA_LINKS, limits, line_joints(PANDA_LINKS, READY, start, goal), "the line")
+        check_path(PANDA_LINKS, limits, line_joints(PANDA_LINKS, limits, READY, start, goal), "the line")
         took.append(time.thread_time() - begun)
     print(f"a motion is checked in {1e3 * min(took):.1f} ms (best), {1e3 * np.median(took):.1f} ms (median)")
     return int(min(took) > MOST_S)

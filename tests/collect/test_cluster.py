@@ -21,6 +21,7 @@ from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.dataset import list_shards
 from mskgrasp.parts import find_part
 from mskgrasp.parts.store import pack_part, receive_part
+from mskgrasp.runtime.executor import WorkerFailed
 from tests.collecting import PARTS, REPOSITORY, assert_equal, command
 
 RAY = [sys.executable, "-m", "ray.scripts.scripts"]
@@ -234,6 +235,12 @@ def test_a_cluster_that_loses_a_node_makes_the_same_bytes_as_one_machine(collect
 def test_what_is_no_address_is_a_usage_error(address):
     with pytest.raises(UsageError, match="host:port"):
         cluster.check_cluster(address)
+
+
+@pytest.mark.parametrize("host", ["a..b", "a" * 64])
+def test_a_host_that_cannot_be_one_is_one_line(host):
+    with pytest.raises(WorkerFailed, match=f"no cluster answers at {host}:6379"):
+        cluster._check_reachable(f"{host}:6379")
 
 
 def test_without_the_extra_the_command_says_what_to_install(tmp_path):

@@ -254,12 +254,18 @@ def test_a_dataset_is_made_again_from_its_labels_but_for_a_part_that_has_changed
 
 
 @pytest.mark.parametrize(
-    ("labels", "seed", "code", "message"),
-    [("all", "6", 1, "other settings (seed differ)"), ("none", "5", 2, "no file of labels")],
+    ("labels", "option", "value", "code", "message"),
+    [
+        ("all", "--seed", "6", 1, "other settings (seed differ)"),
+        ("all", "--camera.height", "0.9", 1, "other settings (camera.height differ)"),
+        ("none", "--seed", "5", 2, "no file of labels"),
+    ],
 )
-def test_labels_of_another_dataset_or_none_are_refused(collected, tmp_path, labels, seed, code, message):
+def test_labels_of_another_dataset_or_none_are_refused(
+    collected, tmp_path, labels, option, value, code, message
+):
     export_labels(collected, tmp_path / "all.labels")
-    chosen = ("--labels", str(tmp_path / f"{labels}.labels"), "--seed", seed)
+    chosen = ("--labels", str(tmp_path / f"{labels}.labels"), option, value)
     done = run_here(main, *arguments(tmp_path / "other", *chosen))
     assert done.returncode == code and message in done.stderr
     assert not (tmp_path / "other").exists()

@@ -48,6 +48,18 @@ def test_what_is_no_archive_of_arrays_is_a_value_error_of_one_line(tmp_path: Pat
         write_arrays(path, a=np.array([{}], dtype=object))
 
 
+@pytest.mark.parametrize(
+    "header", ["{'descr': '<f8', 'shape': (3,", "{['a']: 1, 'descr': '<f8', 'shape': (3,)}"]
+)
+def test_a_header_that_is_no_literal_is_a_value_error_of_one_line(tmp_path: Path, header: str):
+    with zipfile.ZipFile(tmp_path / "one.npz", "w") as file:
+        text = header.encode() + b"\n"
+        file.writestr("a.npy", b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text)
+    with pytest.raises(ValueError, match="cut off") as raised:
+        read_arrays(tmp_path / "one.npz")
+    assert "\n" not in str(raised.value)
+
+
 def test_an_array_that_claims_to_be_larger_than_the_memory_is_a_value_error(tmp_path: Path):
     header = io.BytesIO()
     npy.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (10**15,)})

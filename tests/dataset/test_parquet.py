@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import cv2
 import numpy as np
@@ -12,7 +13,7 @@ import yaml
 
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.grasp import FAILURES
-from mskgrasp.dataset import list_shards, read_shard
+from mskgrasp.dataset import Attempts, list_shards, read_shard, write_shard
 from mskgrasp.dataset.commands.command_line import main
 from mskgrasp.dataset.parquet import export_parquet
 
@@ -44,5 +45,13 @@ def test_parquet_holds_every_column_with_units_images_and_a_card(collected, join
     head, rest = card.removeprefix("---\n").split("---\n", 1)
     assert yaml.safe_load(head)["configs"][0]["data_files"] == "data.parquet"
     assert "| attempts | 12 |" in rest and "## Layout" in rest
+    first, *_ = list_shards(collected)
+    copy = tmp_path / "discarded" / "shards"
+    shutil.copytree(collected, copy.parent)
+    attempts, info = read_shard(first)
+    nothing = Attempts(**{name: values[:0] for name, values in vars(attempts).items()})
+    write_shard(copy / first.name, nothing, info)
+    export_parquet(copy.parent, tmp_path / "discarded.parquet")
+    assert pyarrow.parquet.read_table(tmp_path / "discarded.parquet").num_rows == 12 - len(attempts)
     with pytest.raises(UsageError, match=r"README\.md exists, and is not overwritten"):
         export_parquet(collected, out.with_name("other.parquet"))

@@ -11,7 +11,7 @@ from hal.collisions import Clearances, check_joints, check_path, line_joints
 from hal.errors import OutOfWorkspace
 from hal.keep_out import Box, Capsule, camera_keep_out
 from hal.simulated import panda_limits
-from mskgrasp.core.geometry import Pose
+from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply
 from mskgrasp.core.grasp import pose_base_tcp
 from mskgrasp.core.panda_body import PANDA_LINKS
 from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER, forward_pose
@@ -104,7 +104,7 @@ def test_an_arm_that_stands_too_near_may_leave_but_come_no_nearer():
 
 def test_the_joints_of_a_line_keep_the_hand_on_it():
     start, goal = forward_pose(READY), pose_base_tcp(np.array([0.6, -0.1, 0.1, 1.2]))
-    path = line_joints(PANDA_LINKS, READY, start, goal)
+    path = line_joints(PANDA_LINKS, panda_limits(), READY, start, goal)
     assert path[0] == pytest.approx(READY) and np.abs(np.diff(path, axis=0)).max() < 0.25
     shares = np.linspace(0, len(path) - 1, 500)
     fine = np.stack([np.interp(shares, np.arange(len(path)), column) for column in path.T], axis=1)
@@ -118,4 +118,22 @@ def test_the_joints_of_a_line_keep_the_hand_on_it():
 def test_a_line_out_of_reach_is_refused():
     far = Pose(position=np.array([1.2, 0.0, 0.3]), quat_wxyz=np.array([0.0, 1.0, 0.0, 0.0]))
     with pytest.raises(OutOfWorkspace, match="no straight line from here"):
-        line_joints(PANDA_LINKS, READY, forward_pose(READY), far)
+        line_joints(PANDA_LINKS, panda_limits(), READY, forward_pose(READY), far)
+
+
+@pytest.mark.parametrize("angle", [-2.8, 2.8])
+def test_a_turn_beyond_a_joints_limit_is_refused_and_one_back_within_it_is_not(angle: float):
+    """From the ready pose the last joint has 2.1 rad to one side and 3.7 rad to the other."""
+    here, limits = forward_pose(READY), panda_limits()
+    turned = Pose(
+        position=here.position, quat_wxyz=quat_multiply(quat_about_z(np.array(angle)), here.quat_wxyz)
+    )
+    if angle > 0:
+        line_joints(PANDA_LINKS, limits, READY, here, turned)
+        return
+    with pytest.raises(OutOfWorkspace, match="within the joint limits"):
+        line_joints(PANDA_LINKS, limits, READY, here, turned)
+    free = replace(limits, joint_upper=limits.joint_upper + 1)
+    beyond = line_joints(PANDA_LINKS, free, READY, here, turned)[-1]
+    assert beyond[6] > limits.joint_upper[6]
+    assert line_joints(PANDA_LINKS, limits, beyond, turned, here)[-1] == pytest.approx(READY, abs=1e-2)

@@ -102,6 +102,18 @@ def test_a_program_that_fails_is_one_line(lines, message, program):
     assert "\n" not in str(caught.value)
 
 
+def test_a_second_line_for_a_request_is_not_taken_for_the_answer_to_the_next(program):
+    answered = answer("{'grasp': [0.4, 0.0, 0.02, 0.1 * number]}")
+    planner = program(f"{answered}\n{answered}")
+    ask(planner)
+    deadline = time.monotonic() + 30
+    while planner._lines.empty():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    with pytest.raises(BadPlanner, match="more than one line for a request"):
+        ask(planner)
+
+
 def test_a_program_that_does_not_answer_is_ended(program):
     with pytest.raises(BadPlanner, match="did not answer within 1 s; does it flush"):
         ask(program("time.sleep(60)", timeout_s=1.0))

@@ -27,6 +27,12 @@ def test_a_name_is_read_without_its_port(host: str, name: str):
     assert name_of(host) == name
 
 
+@pytest.mark.parametrize("host", ["a..b", "a" * 64 + ".b", "no.such.host.invalid"])
+def test_what_is_no_host_is_refused(host: str):
+    with pytest.raises(UsageError, match=f"cannot listen on {host}: .*; choose another --host"):
+        listening(host, 0)
+
+
 def test_an_address_that_is_taken_is_refused():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

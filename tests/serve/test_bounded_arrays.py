@@ -68,8 +68,10 @@ def lying(body: bytes, size: int) -> bytes:
         (lambda: lying(packed(bytes(300_000_000)), 1000), 400, "damaged|header"),
         (lambda: packed(b"\x93NUMPY\x01\x00" + struct.pack("<H", 60_000) + b" " * 60_000), 400, "no header"),
         (lambda: packed(b"\x93NUMPY\x09\x00" + bytes(100)), 400, "no header"),
+        (lambda: packed(b"\x93NUMPY\x01\x00\x0b\x00{'shape':(3" + bytes(100)), 400, "no header"),
+        (lambda: packed(b"\x93NUMPY\x01\x00\x0b\x00{['shape']:1" + bytes(100)), 400, "no header"),
     ],
-    ids=("bomb", "lying bomb", "long header", "unknown version"),
+    ids=("bomb", "lying bomb", "long header", "unknown version", "cut literal", "unhashable key"),
 )
 def test_a_bomb_is_refused_without_being_unpacked(make: Callable[[], bytes], status: int, message: str):
     body = make()

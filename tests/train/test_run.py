@@ -7,6 +7,7 @@ import torch
 
 from mskgrasp.core.config import read_config
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.files import exclusive_lock
 from mskgrasp.dataset import shard_path, write_shard
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import load_models
@@ -64,6 +65,7 @@ def test_a_small_dataset_is_learned_and_every_file_of_a_model_is_written(dataset
         "model.json",
         "metrics.json",
         "card.md",
+        ".lock",
         "uncertainty.png",
         "log.csv",
         "curves.png",
@@ -95,6 +97,14 @@ def test_a_training_that_was_killed_as_it_began_begins_again(dataset, tmp_path):
     out.mkdir()
     (out / "config.yaml.0123.tmp").touch()
     assert train.run_training(program(SHORT, data=dataset, out=out, epochs=1)) == 0
+
+
+def test_two_trainings_do_not_write_into_one_folder(dataset, tmp_path):
+    out = tmp_path / "model"
+    out.mkdir()
+    with exclusive_lock(out), pytest.raises(UsageError, match="another training is writing into"):
+        train.run_training(program(SHORT, data=dataset, out=out, epochs=1))
+    assert [path.name for path in out.iterdir()] == [".lock"]
 
 
 def test_mistakes_on_the_command_line_are_one_line_each(tmp_path, dataset):

@@ -14,6 +14,7 @@ import tyro
 from rich.console import Console
 from rich.text import Text
 
+from hal.hand import HAND_MASS, PAYLOAD
 from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts import store
 from mskgrasp.parts.commands.grade import coarse_note
@@ -26,9 +27,6 @@ _FLAG = tyro.conf.FlagCreatePairsOff
 
 _TABLE_WIDTH = 130
 _COLOURS = {"imported": "green", "repaired": "yellow", "refused": "red", "unchanged": "dim"}
-
-PAYLOAD_KG = 3.0
-"""Payload of a Panda (Franka Emika, Panda datasheet)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,9 +176,10 @@ def _warnings(part: Part, unit: str) -> list[str]:
             f"{part.name} is {longest:.4g} mm long; the usual size is "
             f"{USUAL_SIZE_MM[0]:.0f} to {USUAL_SIZE_MM[1]:.0f} mm: is the unit right?{hint}"
         )
-    if part.mass > PAYLOAD_KG:
+    carried = PAYLOAD - HAND_MASS
+    if part.mass > carried:
         found.append(
-            f"{part.name} weighs {part.mass:.3g} kg, the arm carries {PAYLOAD_KG:g} kg: is --density right?"
+            f"{part.name} weighs {part.mass:.3g} kg, the arm carries {carried:.3g} kg: is --density right?"
         )
     return found
 

@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import json
 import re
+import shlex
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,6 +31,8 @@ from mskgrasp.parts.solids.solid import Solid
 from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION, stamp
 from mskgrasp.parts.write_solid import write_solid
 
+STEEL = 7850.0
+"""Density of parts unless stated, kg/m^3."""
 USUAL_DENSITY = (10.0, 25_000.0)
 """From foam to osmium, kg/m^3."""
 
@@ -61,7 +64,7 @@ def import_file(
     name: str | None = None,
     family: str = "imported",
     unit: Unit | None = None,
-    density: float = 7850.0,
+    density: float = STEEL,
     licence: str = "NOASSERTION",
     bodies: Bodies = "one",
     check_name: Callable[[str], None] = lambda name: None,
@@ -130,13 +133,16 @@ def import_part(path: Path, **options: object) -> Part:
 def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
     """The part of a CAD file that a program is given: as it was imported from it, else imported as steel.
 
+    A file that has changed since it was imported as anything but steel is refused: the part would weigh what
+    nobody stated.
+
     Args:
         path: As in `import_file`.
         unit: As in `import_file`; None: that of the import. A file that was imported with another one is
             imported again, with the same density, family and licence.
 
     Raises:
-        BadPart: As in `import_file`.
+        BadPart: As in `import_file`; the file has changed.
     """
     folder = store.parts_folder() / legal_name(path.stem)
     stored = store.stored_recipe_hash(folder)
@@ -151,6 +157,12 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
                     path, unit=unit, family=known.family, density=known.density, licence=known.licence,
                     bodies=bodies,
                 )  # fmt: skip
+        if known.density != STEEL and known.name not in builtin_names():
+            raise BadPart(
+                f"{path} is not what part '{known.name}' of {known.density:g} kg/m^3 was imported from: run "
+                f"`python -m mskgrasp.parts import {shlex.quote(str(path))} --density {known.density:g}`, or "
+                "rename the file"
+            )
     return import_part(path, unit=unit)
 
 

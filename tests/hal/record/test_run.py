@@ -100,6 +100,7 @@ def wait_for_frame(recording: Path) -> None:
     ("arguments", "code", "message"),
     [
         (["--frames", "0"], 2, "greater than or equal to 1"),
+        (["--run", "mskgrasp.plan 'x"], 2, "No closing quotation"),
         (["--run", "rm -r x"], 2, "the first word must be a program of this project"),
         (["--run", "mskgrasp.plan --cell a.yaml"], 2, "leave out --cell"),
         (["--cell", "none.yaml"], 2, "none.yaml"),

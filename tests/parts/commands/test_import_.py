@@ -170,7 +170,7 @@ def test_an_unusual_size_or_weight_is_imported_with_a_warning(importing, tmp_pat
     assert done.code == 0
     warnings = done.stderr.splitlines()
     assert warnings[0].startswith("warning: block is 160 mm long; the usual size is 20 to 150 mm")
-    assert warnings[1] == "warning: block weighs 8.04 kg, the arm carries 3 kg: is --density right?"
+    assert warnings[1] == "warning: block weighs 8.04 kg, the arm carries 2.27 kg: is --density right?"
     assert "inch is 3 mm long" in warnings[2] and "(--unit in would make it 76.2 mm)" in warnings[2]
 
 

@@ -85,7 +85,11 @@ def test_a_file_that_a_program_is_given_is_the_part_that_was_imported_from_it(tm
     assert (inches.density, inches.licence) == (1050.0, "MIT")  # of the import
     assert part_of_file(file).longest_axis == pytest.approx(0.004 * 25.4)  # as it was imported last
     trimesh.creation.box((4, 3, 2.5)).export(file)
-    assert part_of_file(file).extents == pytest.approx([0.004, 0.003, 0.0025])  # another file
+    with pytest.raises(BadPart, match=r"not what part 'box' of 1050 kg/m\^3 .* --density 1050`"):
+        part_of_file(file)  # another file
+    import_part(file, unit="mm")
+    trimesh.creation.box((4, 3, 2)).export(file)
+    assert part_of_file(file, unit="mm").extents == pytest.approx([0.004, 0.003, 0.002])
     assert part_of_file(file).density == 7850.0
 
 

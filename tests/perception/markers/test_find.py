@@ -58,7 +58,7 @@ def test_noise_of_colour_and_depth_holes_and_flying_pixels_cost_little():
     assert np.abs(found.points_base[:, 2] - HEIGHT).max() < 2.5e-3
 
 
-def new_sizes_heights_stand_in_for_depth():
+def test_stated_heights_stand_in_for_depth():
     frame = draw(BEFORE)
     blind = dataclasses.replace(frame, depth=np.full_like(frame.depth, np.nan))
     found = find(blind, heights=(HEIGHT, HEIGHT))
