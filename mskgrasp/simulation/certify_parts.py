@@ -28,7 +28,7 @@ from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
 from mskgrasp.planning.run_inputs import model_digests
 from mskgrasp.runtime.progress import note, progress
-from mskgrasp.runtime.worker_pool import Work, results
+from mskgrasp.runtime.worker_pool import Work, results, whole
 from mskgrasp.simulation.certify import (
     CERTIFY_VERSION,
     CertifyConfig,
@@ -96,7 +96,7 @@ def certify(
         total=sum(one.simulations for one in missing), unit="simulation", title="certify", hidden=hidden
     )
     made = results(
-        Work(_certifier, _Settings(config=config, models=models), name=_stream_name, rest=_whole),
+        Work(_certifier, _Settings(config=config, models=models), name=_stream_name, rest=whole),
         missing,
         workers,
     )
@@ -224,11 +224,6 @@ def _certifier(settings: _Settings) -> Iterator[Callable[[Stream], Iterator[_Mad
 
 def _stream_name(stream: Stream) -> str:
     return f"stream {stream.key} of part '{Path(stream.part).name}'"
-
-
-def _whole(stream: Stream, n_results: int) -> Stream:
-    """A stream whose process died is made again from its beginning."""
-    return stream
 
 
 def _conditions(config: CertifyConfig, models: Path) -> dict[str, Any]:
