@@ -21,6 +21,8 @@ RESOLUTION = 0.005
 """Greatest amount by which a link may come nearer between two checked points of a motion, metres."""
 _SLACK = 1e-3
 """Tolerance of an arm that stands too near already, metres: it rests as exactly as its drives hold it."""
+_AT_LIMIT = 1e-3
+"""Tolerance of an arm that stands at a joint's limit, rad."""
 _LINE_M, _LINE_RAD = 0.04, 0.1
 """Steps at which the joints of a straight line are solved; between them the hand is off it by 0.5 mm."""
 _FINER = 4
@@ -142,12 +144,10 @@ def check_path(links: Links, limits: ArmLimits, path: np.ndarray, what: str) -> 
 def line_joints(links: Links, limits: ArmLimits, start: np.ndarray, here: Pose, goal: Pose) -> np.ndarray:
     """Joints (k, n) along the straight line from ``here``, where the joints are ``start`` (n,), to a pose.
 
-    An arm that stands outside its limits may return.
-
     Raises:
         OutOfWorkspace: The arm does not reach all of it within its joint limits.
     """
-    lower, upper = np.minimum(limits.joint_lower, start), np.maximum(limits.joint_upper, start)
+    lower, upper = limits.joint_lower - _AT_LIMIT, limits.joint_upper + _AT_LIMIT
     distance, angle = pose_distance(here, goal)
     n = max(1, int(np.ceil(max(distance / _LINE_M, angle / _LINE_RAD))))
     for steps in (n, _FINER * n):
@@ -156,5 +156,6 @@ def line_joints(links: Links, limits: ArmLimits, start: np.ndarray, here: Pose, 
         if errors.max() < POSE_TOLERANCE and ((lower <= joints) & (joints <= upper)).all():
             return np.concatenate([start[None], joints])
     raise OutOfWorkspace(
-        f"no straight line from here to TCP {shown(goal.position)} m within the joint limits"
+        f"no straight line from here to TCP {shown(goal.position)} m within the joint limits; move to other "
+        "joints first"
     )

@@ -10,10 +10,10 @@ import numpy as np
 from hal.arm import JOINT_TOLERANCE, Held
 from hal.camera import RgbdFrame
 from hal.cell import Cell
-from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, OutOfWorkspace, Stopped
+from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, Stopped
 from hal.hand import Load
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import HOLD_S, PAD_REACH, Grasp
+from mskgrasp.core.grasp import HOLD_S, PAD_REACH, SAME_HAND, Grasp
 
 APPROACH = 0.12
 """Least height over the table from which the straight descent begins, m; tall things raise it."""
@@ -32,9 +32,6 @@ PUT_DOWN = 0.002
 
 RELEASE = 0.02
 """Opening of the fingers, more than that of the grasp, that releases a part for certain, m."""
-
-_SAME_STROKE = 2e-4
-"""By how much a hand that the networks know may open less far than theirs, m."""
 
 LEAST_RELEASE = 0.006
 """Opening of the fingers, more than that of the grasp, that barely releases a part, m."""
@@ -71,11 +68,12 @@ def execute_grasp(cell: Cell, grasp: Grasp, *, tallest: float = 0.0, load: Load 
     Raises:
         NotCalibrated: The camera's pose was measured by hand; nothing moves.
         LoadTooHeavy: The arm cannot carry the part; nothing moves.
-        OutOfWorkspace: The grasp is refused before the arm moves; fingers may have opened.
+        OutOfWorkspace: A pose is refused before anything moves, or the way to one where it begins: the arm
+            then stands over the part or at it, and may hold it.
         HalError: The arm was lost or stopped; a motion that met resistance is a result, not an error.
     """
     refuse_by_hand(cell)
-    arm, lift, moved = cell.arm, cell.workspace.lift_height, False
+    arm, lift = cell.arm, cell.workspace.lift_height
     above = above_grasp(cell, grasp, tallest=tallest)
     target, lifted = grasp.T_base_tcp, grasp.raised(lift).T_base_tcp
     if load is not None:
@@ -85,7 +83,6 @@ def execute_grasp(cell: Cell, grasp: Grasp, *, tallest: float = 0.0, load: Load 
     try:
         arm.open_gripper()
         arm.move_to_pose(above, speed=0.4)
-        moved = True
         arm.move_to_pose(target, speed=0.25)
         closed = arm.grasp(cell.workspace.grasp_force)
         if closed.holding:
@@ -95,10 +92,7 @@ def execute_grasp(cell: Cell, grasp: Grasp, *, tallest: float = 0.0, load: Load 
             arm.wait(HOLD_S)
     except Stopped:
         raise
-    except (MotionAborted, OutOfWorkspace) as error:
-        if not moved and isinstance(error, OutOfWorkspace):
-            raise
-        # The way to a pose is checked where it begins.
+    except MotionAborted as error:
         state = arm.state()
         return GraspResult(
             lifted=False,
@@ -206,7 +200,7 @@ def let_go(cell: Cell, place: Grasp, *, opening: float | None = None, tallest: f
         ValueError: The hand does not open so far.
     """
     stroke = cell.arm.limits.gripper.stroke
-    if opening is not None and not 0 <= opening <= stroke + _SAME_STROKE:
+    if opening is not None and not 0 <= opening <= stroke + SAME_HAND:
         raise ValueError(f"opening {opening} m is outside 0 .. {stroke} m")
     state = cell.arm.state()
     now = state.gripper_width

@@ -82,9 +82,10 @@ def _check_reachable(address: str) -> None:
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=10).close()
     except (OSError, OverflowError, UnicodeError) as error:
+        found = getattr(error, "strerror", None) or error
+        reason = "no host has such a name" if isinstance(error, UnicodeError) else found
         raise WorkerFailed(
-            f"no cluster answers at {address} ({getattr(error, 'strerror', None) or error}); "
-            "start one with: ray start --head"
+            f"no cluster answers at {address} ({reason}); start one with: ray start --head"
         ) from error
 
 

@@ -44,6 +44,8 @@ FINGER_THICKNESS = 0.026
 """Distance from a pad's face to the back of the finger, metres."""
 PALM_HEIGHT = 0.0374
 """Height of the lower face of the hand's collision hull over the TCP, metres."""
+SAME_HAND = 2e-4
+"""Greatest difference of a dimension by which two hands count as the same, metres."""
 HAND_GEOMETRY = {
     "pad_reach": PAD_REACH,
     "max_opening": MAX_OPENING,

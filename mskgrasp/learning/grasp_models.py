@@ -19,7 +19,7 @@ from torch import Tensor
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadModel, MissingModel
 from mskgrasp.core.files import read_bounded, write_whole
-from mskgrasp.core.grasp import HAND_GEOMETRY
+from mskgrasp.core.grasp import HAND_GEOMETRY, SAME_HAND
 from mskgrasp.core.json_text import parse_json
 from mskgrasp.core.metrics import INTERVAL_LEVELS, half_width_of, normal_half_width
 from mskgrasp.core.shipped import PRETRAINED
@@ -30,8 +30,6 @@ from mskgrasp.learning.networks import GraspDisplacementNetwork, GraspQualityNet
 from mskgrasp.learning.symmetry import N_VIEWS, views
 
 SCHEMA_VERSION = 1
-SAME_HAND = 2e-4
-"""Dimensions of a hand may differ by this much, metres: drawings are rounded."""
 MOST_BYTES = 2**24
 """Largest description of a model; the shipped one has 66 kB."""
 WEIGHTS = "model.safetensors"

@@ -113,9 +113,10 @@ class ProgramPlanner:
         if not self._lines.empty():  # would be taken for the answer to this request, and so on
             line = self._lines.get()
             if line is not None:
+                _kill(process)
                 raise BadPlanner(
-                    f"the program {self._command!r} wrote more than one line for a request, last "
-                    f"{line.strip()[:200]!r}"
+                    f"the program {self._command!r} wrote more than one line for a request "
+                    f"({line.strip()[:200]!r}); print one answer each, and anything else to stderr"
                 )
             self._lines.put(None)
         try:

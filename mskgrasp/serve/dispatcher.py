@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+import traceback
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -107,10 +108,9 @@ class Dispatcher:
             except ProcessEnded as error:
                 _settle(job, (503, error_body(str(error))))
                 await self._start_again(process)
-            except Exception as error:  # whatever it is, this process must serve on
-                _settle(
-                    job, (500, error_body(f"the request could not be handed on ({error!r}); report this"))
-                )
+            except Exception:  # whatever it is, the server must go on
+                traceback.print_exc()
+                _settle(job, (500, error_body("the server failed on this request; its log says how")))
                 await self._start_again(process)
             else:
                 _settle(job, answer)

@@ -188,7 +188,7 @@ class CellPanel(Panel):
             done = self.engine.grasp(plan, self._part)
             result = done.result
             if result is None:
-                self.page.tell("the arm refuses this grasp; nothing moved")
+                self.page.tell("the arm refuses this grasp, or the way to it")
                 return
             if result.aborted is not None:
                 self.page.tell(f"**the arm stopped**: {result.aborted}")

@@ -137,6 +137,14 @@ def main() -> int:
         share=options.share,
     )
     options.out.mkdir(parents=True, exist_ok=True)
+    without = options.out / "displacement_only"
+    if options.displacement_only != without.exists() and any(options.out.glob("*/seed_*")):
+        raise UsageError(
+            f"{options.out} holds trainings {'without' if without.exists() else 'with'} the paper's quality "
+            "network; choose another --out"
+        )
+    if options.displacement_only:
+        without.touch()
     names = [samples.parts[number] for number in torch.unique(samples.part[groups.known]).tolist()]
     (options.out / "known_parts.txt").write_text("\n".join(names) + "\n", encoding="utf-8")
     if options.estimate:

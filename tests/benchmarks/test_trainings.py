@@ -123,9 +123,6 @@ def test_a_folder_of_other_settings_or_attempts_is_refused(looks, sides, tmp_pat
     fewer = replace(sides, training=sides.training[::2])
     with pytest.raises(UsageError, match="training of other rows"):
         made(looks, fewer, tmp_path, [OWN])
-    # Its quality network would be told as its own otherwise.
-    with pytest.raises(UsageError, match="training of other quality_of"):
-        made(looks, sides, tmp_path, [replace(OWN, name="Another"), replace(OWN, quality_of="Another")])
 
 
 @pytest.mark.slow

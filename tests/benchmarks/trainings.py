@@ -168,7 +168,7 @@ def _make(
     config = choice.config.model_copy(update={"seed": seed})
     samples = choice.samples(looks.of(config.network))
     sides = choice.sides(samples, sides)
-    _check_origin(folder, _origin(choice, config, samples, sides))
+    _check_origin(folder, _origin(config, samples, sides))
     models = _trained(choice, config, samples, sides, out, reporter, compute_device(device))
     for name, rows in groups.items():
         if not (path := folder / f"{name}.npz").exists():
@@ -247,10 +247,9 @@ def displacement_trained(
     return models
 
 
-def _origin(choice: Choice, config: LearningConfig, samples: Samples, sides: Sides) -> dict[str, Any]:
+def _origin(config: LearningConfig, samples: Samples, sides: Sides) -> dict[str, Any]:
     rows = np.concatenate([sides.training.numpy(), sides.validation.numpy()])
-    quality = {"quality_of": choice.quality_of} if choice.quality_of else {}
-    return quality | {
+    return {
         "settings": config.model_dump(mode="json"),
         "data": samples.fingerprint,
         "samples_version": SAMPLES_VERSION,
@@ -263,7 +262,7 @@ def _check_origin(folder: Path, origin: dict[str, Any]) -> None:
     path = folder / _MADE_OF
     if path.exists():
         before = json.loads(path.read_text(encoding="utf-8"))
-        if changed := [name for name in origin | before if before.get(name) != origin.get(name)]:
+        if changed := [name for name, value in origin.items() if before.get(name) != value]:
             raise UsageError(
                 f"{folder} holds a training of other {' and '.join(changed)}; choose another --out"
             )

@@ -26,6 +26,8 @@ PAPER = dict(translation=2.4e-3, rotation=math.radians(7.0))
 variance, known and novel objects pooled, m and rad."""
 FORMER = " (with the weights that shipped before)"
 """Mark of a row."""
+SUPERSEDED = "Recorded before "
+"""Beginning of a note in a stored record which names a change of the code since."""
 HEADER = ("result", "split", "n", "interval", "command")
 _BLOCK = re.compile(r"(<!-- results -->\n).*?(<!-- end -->)", re.S)
 
@@ -83,6 +85,8 @@ def shown_rows() -> list[tuple[str, Callable[[StoredReport], list[ReadmeRow]]]]:
 def _line(row: ReadmeRow, stored: StoredReport) -> str:
     facts = stored.facts
     first = f"[{row.name}]({page_of(stored.name)}): {row.text}"
+    if any(note.startswith(SUPERSEDED) for note in facts.get("notes", [])):
+        first += "; recorded before a change that the page names"
     if stored.of_former_model:
         first += FORMER
     cells = (first, row.split or facts["split"], row.n or facts["n"], row.interval, facts["command"])
@@ -139,8 +143,8 @@ def _certified(stored: StoredReport) -> list[ReadmeRow]:
     return [
         ReadmeRow(
             name="certified grasps, by the CAD",
-            text=f"{found['success_rate']:.1%} lifted, displacement RMSE {_finely(found)}; exact camera, the "
-            "engine in which they were certified",
+            text=f"{found['success_rate']:.1%} lifted, displacement RMSE {_finely(found)}; "
+            f"{_certified_share(found)}; exact camera, the engine in which they were certified",
             interval=f"{_between(found['success_interval'], 100, '%')}; {_rmse_intervals(found, 2)}",
             n=f"{found['trials']} trials of {found['measured_parts']} parts",
         )
@@ -155,13 +159,19 @@ def _certified_elsewhere(where: str) -> Callable[[StoredReport], list[ReadmeRow]
         return [
             ReadmeRow(
                 name=f"certified grasps, by the CAD, {where}",
-                text=f"{found['success_rate']:.1%} lifted, displacement RMSE {_finely(found)}",
+                text=f"{found['success_rate']:.1%} lifted, displacement RMSE {_finely(found)}; "
+                f"{_certified_share(found)}",
                 interval=f"{_between(found['success_interval'], 100, '%')}; {_rmse_intervals(found, 2)}",
                 n=f"{found['trials']} trials of {found['measured_parts']} parts",
             )
         ]
 
     return rows
+
+
+def _certified_share(statistics: dict[str, Any]) -> str:
+    certified, planned = statistics["certified"]
+    return f"{certified} of {planned} planned grasps are certified"
 
 
 def _finely(statistics: dict[str, Any]) -> str:
@@ -298,41 +308,31 @@ def _displacement_same_data(stored: StoredReport) -> list[ReadmeRow]:
 
 def _validation(stored: StoredReport) -> list[ReadmeRow]:
     report = _report(stored)
-    (found,) = (
-        one
-        for one in report["errors"]
-        if (one["setting"], one["reference"]) == ("production", report["yardstick"])
-    )
+    finest = "{rate_hz} Hz, {position_iterations} it".format(**report["settings"]["references"][1])
+    yardstick = report["yardstick"]
+    return [
+        _against(report, "production", yardstick, "labels against finer steps"),
+        _against(report, "production", finest, "the same against the finest steps"),
+        _against(report, finest, yardstick, "these finer steps against the finest"),
+    ]
+
+
+def _against(report: dict[str, Any], setting: str, reference: str, name: str) -> ReadmeRow:
+    """A row of the errors of one setting against another."""
+    pair = (setting, reference)
+    (found,) = (one for one in report["errors"] if (one["setting"], one["reference"]) == pair)
     shift, success = found["equivalence"]["displacement"], found["equivalence"]["success"]
     shown = "shown" if found["equivalent"] else "not shown"
-    finest = report["settings"]["references"][1]
-    finest = f"{finest['rate_hz']} Hz, {finest['position_iterations']} it"
-    finer, converged = (
-        next(
-            one["equivalence"]["displacement"]
-            for one in report["errors"]
-            if {one["setting"], one["reference"]} == {setting, finest}
-        )
-        for setting in ("production", report["yardstick"])
+    steps = [report.get(one, one).replace(" it", " iterations") for one in pair]
+    return ReadmeRow(
+        name=name,
+        text=f"{' against '.join(steps)}: median displacement {1e3 * shift['estimate']:.2f} mm beyond that "
+        f"of starts moved by 10 um, success {100 * success['estimate']:+.1f} points; equivalence within "
+        f"{1e3 * shift['margin']:g} mm and {100 * success['margin']:g} points is {shown}",
+        interval=f"90 %: {_between((shift['low'], shift['high']), 1e3, 'mm', digits=2)}, "
+        f"{_between((success['low'], success['high']), 100, 'points')}",
+        n=f"{found['n']} grasps of {success['parts']} parts, {shift['n']} lifted in both",
     )
-    setting, yardstick = (report[name].replace(" it", " iterations") for name in ("production", "yardstick"))
-    return [
-        ReadmeRow(
-            name="labels against finer steps",
-            text=f"{setting} (simulation version {report['versions']['simulation']}) against {yardstick}: "
-            f"median displacement {1e3 * shift['estimate']:.2f} mm beyond that of starts moved by 10 um, "
-            f"success {100 * success['estimate']:+.1f} points; equivalence within "
-            f"{1e3 * shift['margin']:g} mm and {100 * success['margin']:g} points is {shown}. Against "
-            f"{finest.replace(' it', ' iterations')} {1e3 * finer['estimate']:.2f} mm, from which "
-            f"{yardstick} are {1e3 * converged['estimate']:.2f} mm off: there it is not shown",
-            interval=f"90 %: {_between((shift['low'], shift['high']), 1e3, 'mm', digits=2)}, "
-            f"{_between((success['low'], success['high']), 100, 'points')}; "
-            + "; ".join(
-                _between((one["low"], one["high"]), 1e3, "mm", digits=2) for one in (finer, converged)
-            ),
-            n=f"{found['n']} grasps of {success['parts']} parts; against the finest steps {finer['n']}",
-        )
-    ]
 
 
 def _engines(stored: StoredReport) -> list[ReadmeRow]:

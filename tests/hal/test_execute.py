@@ -246,25 +246,6 @@ def test_contact_is_a_result_after_which_the_arm_must_be_recovered(cell: Cell, a
         arm.move_gripper(0.05)
 
 
-def test_a_way_that_is_refused_over_the_part_ends_the_grasp_as_a_contact_does(cell: Cell, arm: WritingArm):
-    """The poses may be reached; the line to the second of them is looked at where it begins."""
-    check, lines = arm._check_line, []
-
-    def check_line(limits, *legs):
-        lines.append(legs)
-        if len(lines) > 1:
-            raise OutOfWorkspace("no straight line from here")
-        check(limits, *legs)
-
-    arm._check_line = check_line
-    result = execute_grasp(cell, GRASP)
-    assert (result.lifted, result.holding, result.aborted) == (False, False, "no straight line from here")
-    assert arm.log[-1][0] == "pose" and len(lines) == 2
-    lines.append(())
-    with pytest.raises(OutOfWorkspace):  # of the first motion, nothing but the fingers have moved
-        execute_grasp(cell, GRASP)
-
-
 def test_a_stop_is_raised_and_nothing_follows(cell: Cell, arm: WritingArm, monkeypatch):
     def stopped(force: float) -> GraspOutcome:
         arm.stop()

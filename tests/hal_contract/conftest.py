@@ -9,11 +9,7 @@ from hal import Cell, cell_from_yaml
 
 CELLS = Path(__file__).parents[2] / "configs" / "cells"
 
-SLOW_ON_A_ROBOT = (
-    "test_a_hand_that_meets_nothing_arrives", "test_a_straight_motion_arrives",
-    "test_a_line_that_leaves_the_reach_on_its_way_is_refused",
-    "test_an_arm_outside_its_context_refuses_and_can_be_opened_again",
-)  # fmt: skip
+SLOW_ON_A_ROBOT = ("test_a_hand_that_meets_nothing_arrives", "test_a_straight_motion_arrives")
 """Contracts that take ten seconds and more of a robot that is simulated in real time."""
 
 

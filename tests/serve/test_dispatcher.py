@@ -71,6 +71,30 @@ def test_what_exceeds_queue_or_time_is_503_and_a_process_that_dies_is_replaced(p
     asyncio.run(story())
 
 
+def test_an_error_that_nobody_foresaw_is_a_500_and_the_next_request_is_answered(
+    process: PlannerProcess, monkeypatch, capsys
+):
+    answered = process.ask
+
+    def once(*arguments):
+        monkeypatch.setattr(process, "ask", answered)
+        raise ZeroDivisionError("of a pipe")
+
+    monkeypatch.setattr(process, "ask", once)
+
+    async def story() -> None:
+        dispatcher = Dispatcher([process], waiting=1, timeout_s=60.0)
+        dispatcher.open()
+        status, message = await ask(dispatcher)
+        assert status == 500 and "its log says how" in message["error"]  # pyright: ignore
+        assert (await ask(dispatcher))[0] == 200
+        assert dispatcher.status == {"workers": 1, "working": 1, "requests": 0}
+        await dispatcher.close()
+
+    asyncio.run(story())
+    assert "ZeroDivisionError: of a pipe" in capsys.readouterr().err
+
+
 def test_requests_that_nobody_can_answer_are_not_kept(tmp_path: Path, capsys):
     models = tmp_path / "model"
     shutil.copytree(PRETRAINED, models)

@@ -6,7 +6,6 @@ import hashlib
 import itertools
 import json
 import re
-import shlex
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,6 +29,7 @@ from mskgrasp.parts.solids.simplify import for_collision
 from mskgrasp.parts.solids.solid import Solid
 from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION, stamp
 from mskgrasp.parts.write_solid import write_solid
+from mskgrasp.runtime.progress import note
 
 STEEL = 7850.0
 """Density of parts unless stated, kg/m^3."""
@@ -133,8 +133,7 @@ def import_part(path: Path, **options: object) -> Part:
 def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
     """The part of a CAD file that a program is given: as it was imported from it, else imported as steel.
 
-    A file that has changed since it was imported as anything but steel is refused: the part would weigh what
-    nobody stated.
+    A file that has changed since is imported again with the same density, family and licence, and a note.
 
     Args:
         path: As in `import_file`.
@@ -142,7 +141,7 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
             imported again, with the same density, family and licence.
 
     Raises:
-        BadPart: As in `import_file`; the file has changed.
+        BadPart: As in `import_file`.
     """
     folder = store.parts_folder() / legal_name(path.stem)
     stored = store.stored_recipe_hash(folder)
@@ -157,11 +156,10 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
                     path, unit=unit, family=known.family, density=known.density, licence=known.licence,
                     bodies=bodies,
                 )  # fmt: skip
-        if known.density != STEEL and known.name not in builtin_names():
-            raise BadPart(
-                f"{path} is not what part '{known.name}' of {known.density:g} kg/m^3 was imported from: run "
-                f"`python -m mskgrasp.parts import {shlex.quote(str(path))} --density {known.density:g}`, or "
-                "rename the file"
+        if known.name not in builtin_names():
+            note(f"{path} has changed since its import; imported again with {known.density:g} kg/m^3")
+            return import_part(
+                path, unit=unit, family=known.family, density=known.density, licence=known.licence
             )
     return import_part(path, unit=unit)
 

@@ -42,7 +42,6 @@ class Scale(io.StringIO):
 ANSWERS = ["y", "79.5", "y", "31", "y", "33,5", "y", "32", "y"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("driver", ["franky", pytest.param("panda_py", marks=pytest.mark.slow)])
 def test_speed_width_and_force_of_a_hand_are_written_into_its_cells_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, driver

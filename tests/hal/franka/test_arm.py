@@ -85,7 +85,6 @@ def test_a_part_over_what_the_reflex_holds_is_refused(tmp_path: Path):
             arm.set_load(replace(LOAD, mass=1.2))  # a refusal is no fault
 
 
-@pytest.mark.slow
 def test_a_load_that_the_robot_refuses_is_a_fault(tmp_path: Path):
     with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
         robot.order("reflex")
@@ -150,7 +149,6 @@ def test_the_config_bounds_the_speed_whatever_a_program_asks_for(tmp_path: Path)
         assert time.monotonic() - begin > 15 / 8 * 0.05 / 0.05 * 0.9
 
 
-@pytest.mark.slow
 def test_a_motion_that_the_solver_gives_up_is_planned_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A motion of days is what makes it give up every time."""
     impossible = [2, 3]
