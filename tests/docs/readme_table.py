@@ -77,7 +77,7 @@ def shown_rows() -> list[tuple[str, Callable[[StoredReport], list[ReadmeRow]]]]:
     known = {path.stem for path in REPORTS.glob("*.json")}
     found = []
     for name, rows in ROWS:
-        sizes = (f"{name}_full", name, f"{name}_certified", f"{name}_quick")
+        sizes = (f"{name}_full", name, f"{name}_list", f"{name}_certified", f"{name}_quick")
         found += [(one, rows) for one in sizes if one in known][:1]
     return found
 
