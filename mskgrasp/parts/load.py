@@ -16,8 +16,8 @@ def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:
     """Load a part; a built-in one is built and a CAD file imported the first time, which takes seconds.
 
     A CAD file that was imported before is the part that it became then, with the density given then; with
-    another ``unit`` it is imported again with that density. Another file becomes a part of its name with the
-    density of steel, in place of one imported from another file.
+    another ``unit``, or once the file has changed, it is imported again with that density. A file that was
+    never imported becomes a part of its name with the density of steel.
 
     Args:
         source: Name of a part, a part folder, or an STL, OBJ, PLY, GLB, 3MF or STEP file.

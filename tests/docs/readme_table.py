@@ -140,44 +140,25 @@ def _displacement(stored: StoredReport) -> list[ReadmeRow]:
 
 def _certified(stored: StoredReport) -> list[ReadmeRow]:
     found = _report(stored)["policies"][POLICY_NAMES["certified"]]
-    return [
-        ReadmeRow(
-            name="certified grasps, by the CAD",
-            text=f"{found['success_rate']:.1%} lifted, displacement RMSE {_finely(found)}; "
-            f"{_certified_share(found)}; exact camera, the engine in which they were certified",
-            interval=f"{_between(found['success_interval'], 100, '%')}; {_rmse_intervals(found, 2)}",
-            n=f"{found['trials']} trials of {found['measured_parts']} parts",
-        )
-    ]
+    return [_certified_row(found, "exact camera, the engine in which they were certified")]
 
 
 def _certified_elsewhere(where: str) -> Callable[[StoredReport], list[ReadmeRow]]:
     """A row of imported CAD under other conditions."""
-
-    def rows(stored: StoredReport) -> list[ReadmeRow]:
-        found = _report(stored)["overall"]
-        return [
-            ReadmeRow(
-                name=f"certified grasps, by the CAD, {where}",
-                text=f"{found['success_rate']:.1%} lifted, displacement RMSE {_finely(found)}; "
-                f"{_certified_share(found)}",
-                interval=f"{_between(found['success_interval'], 100, '%')}; {_rmse_intervals(found, 2)}",
-                n=f"{found['trials']} trials of {found['measured_parts']} parts",
-            )
-        ]
-
-    return rows
+    return lambda stored: [_certified_row(_report(stored)["overall"], f"imported CAD, {where}")]
 
 
-def _certified_share(statistics: dict[str, Any]) -> str:
-    certified, planned = statistics["certified"]
-    return f"{certified} of {planned} planned grasps are certified"
-
-
-def _finely(statistics: dict[str, Any]) -> str:
-    """RMSE of precise grasps."""
-    rotation = math.degrees(statistics["rotation_rmse"])
-    return f"{1e3 * statistics['translation_rmse']:.2f} mm, {rotation:.2f} degrees"
+def _certified_row(found: dict[str, Any], where: str) -> ReadmeRow:
+    certified, planned = found["certified"]
+    rotation = math.degrees(found["rotation_rmse"])
+    return ReadmeRow(
+        name="certified grasps, by the CAD",
+        text=f"{where}: {found['success_rate']:.1%} lifted, displacement RMSE "
+        f"{1e3 * found['translation_rmse']:.2f} mm, {rotation:.2f} degrees; {certified} of {planned} planned "
+        "grasps are certified",
+        interval=f"{_between(found['success_interval'], 100, '%')}; {_rmse_intervals(found, 2)}",
+        n=f"{found['trials']} trials of {found['measured_parts']} parts",
+    )
 
 
 def _assessed(stored: StoredReport) -> list[ReadmeRow]:
@@ -208,9 +189,11 @@ def _benchmark(stored: StoredReport) -> list[ReadmeRow]:
         f"without; centroid and short axis {simple.value:.1%}"
     )
     if "certified" in rows:
-        corrected, plain = (rows["certified"].first(name) for name in ("predicted", "none"))
-        shares += [corrected, plain]
-        text += f"; certified grasps, by the CAD, {corrected.value:.1%}, without correction {plain.value:.1%}"
+        known, known_plain = (rows["certified"].first(name) for name in ("predicted", "none"))
+        shares += [known, known_plain]
+        text += (
+            f"; certified grasps, by the CAD, {known.value:.1%}, without correction {known_plain.value:.1%}"
+        )
     return [
         ReadmeRow(
             name=f"placed within {TOLERANCE}",
@@ -402,8 +385,8 @@ ROWS: tuple[tuple[str, Callable[[StoredReport], list[ReadmeRow]]], ...] = (
     ("success", _success),
     ("displacement", _displacement),
     ("certified", _certified),
-    ("success_certified_cad_kinect2", _certified_elsewhere("imported CAD, noise of a Kinect v2")),
-    ("success_certified_cad_mujoco", _certified_elsewhere("imported CAD, in MuJoCo")),
+    ("success_certified_cad_kinect2", _certified_elsewhere("noise of a Kinect v2")),
+    ("success_certified_cad_mujoco", _certified_elsewhere("in MuJoCo")),
     ("assessed", _assessed),
     ("benchmark", _benchmark),
     ("palletize", _palletize),
