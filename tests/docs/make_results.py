@@ -57,7 +57,8 @@ from mskgrasp.validate.tables import label_error_section, validation_sections
 from tests.benchmarks.report import markdown_rows
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT
-from tests.docs.readme_table import README, ROWS, rendered_readme
+from tests.docs.readme_rows import ROWS
+from tests.docs.readme_table import README, rendered_readme
 from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored
 from tests.docs.uses_of_test_parts import commit, log_use
 from tests.sim_in_the_loop.regression import Row, shipped_weights, stored_figures

@@ -14,7 +14,8 @@ from tests.docs import stored_reports
 from tests.docs.make_results import FACTS, rendered
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT, without_code
-from tests.docs.readme_table import FORMER, HEADER, README, ROWS, rendered_readme, shown_rows, table
+from tests.docs.readme_rows import ROWS
+from tests.docs.readme_table import FORMER, HEADER, README, rendered_readme, shown_rows, table
 from tests.docs.stored_reports import REPORTS, RUNS, StoredReport, read_stored
 from tests.sim_in_the_loop.regression import shipped_weights
 

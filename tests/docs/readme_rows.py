@@ -1,0 +1,347 @@
+"""Rows of the README's table of results, each a function of a stored report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from mskgrasp.benchmark.report import TOLERANCE
+from mskgrasp.benchmark.summary import stored_row
+from mskgrasp.evaluate.comparison import POLICY_NAMES
+from mskgrasp.palletize.report import GOAL
+from mskgrasp.validate.config import SHIFTED
+from tests.benchmarks.paper_choices import OURS, PAPER_AS_OURS
+from tests.docs.stored_reports import StoredReport
+
+PAPER = dict(translation=2.4e-3, rotation=math.radians(7.0))
+"""Zhao, Liang and Kroemer (arXiv 1909.02129): displacement RMSE in simulation at high quality and low
+variance, known and novel objects pooled, m and rad."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadmeRow:
+    """A row, as Markdown; split and n are those of the stored run unless stated.
+
+    Attributes:
+        name: Subject, linked to the results page.
+        text: The figures.
+        interval: Of each figure, in the same order.
+        split: Parts of these figures alone.
+        n: Of these figures alone.
+    """
+
+    name: str
+    text: str
+    interval: str
+    split: str = ""
+    n: str = ""
+
+
+def _success(stored: StoredReport) -> list[ReadmeRow]:
+    found = _report(stored)["overall"]
+    return [
+        ReadmeRow(
+            name="best quality",
+            text=f"{found['success_rate']:.1%} lifted, no sensor noise "
+            f"(paper in simulation: {_report(stored)['paper']['simulated']:.1%})",
+            interval=_between(found["success_interval"], 100, "%"),
+        ),
+        ReadmeRow(
+            name="best quality",
+            text=f"displacement RMSE {_rmse(found)} about the vertical (predicting zero: "
+            f"{_rmse(found, '_of_zero')}); {found['tilted']['value']:.1%} hang tilted by more than 2 degrees",
+            interval=f"{_rmse_intervals(found)}; {_between(found['tilted']['interval'], 100, '%')}",
+            n=f"{found['measured']} trials of {found['measured_parts']} parts that were lifted",
+        ),
+    ]
+
+
+def _rmse(statistics: dict[str, Any], of: str = "") -> str:
+    return f"{_mm(statistics[f'translation_rmse{of}'])}, {_degrees(statistics[f'rotation_rmse{of}'])}"
+
+
+def _displacement(stored: StoredReport) -> list[ReadmeRow]:
+    model = next(iter(_report(stored)["models"].values()))
+    paper = f"{_mm(PAPER['translation'])}, {_degrees(PAPER['rotation'])}"
+    found = []
+    for name, policy, theirs in (
+        ("high quality, low variance, as in the paper", "low_variance", f"; paper: {paper}"),
+        ("high quality, low variance, recentred", "recentred", ""),
+    ):
+        both, novel = model[policy]["all"], model[policy]["novel"]
+        found.append(
+            ReadmeRow(
+                name=name,
+                text=f"displacement RMSE {_rmse(both)} (predicting zero: {_rmse(both, '_of_zero')}{theirs}); "
+                f"novel parts alone: {_rmse(novel)}",
+                interval=f"{_rmse_intervals(both)}; {_rmse_intervals(novel)}",
+                n=f"{both['measured']} trials of {both['measured_parts']} parts, {novel['measured']} of "
+                f"{novel['measured_parts']} novel ones",
+            )
+        )
+    return found
+
+
+def _certified(stored: StoredReport) -> list[ReadmeRow]:
+    found = _report(stored)["policies"][POLICY_NAMES["certified"]]
+    return [_certified_row(found, "exact camera, the engine in which they were certified")]
+
+
+def _certified_elsewhere(where: str) -> Callable[[StoredReport], list[ReadmeRow]]:
+    """A row of imported CAD under other conditions."""
+    return lambda stored: [_certified_row(_report(stored)["overall"], f"imported CAD, {where}")]
+
+
+def _certified_row(found: dict[str, Any], where: str) -> ReadmeRow:
+    certified, planned = found["certified"]
+    rotation = math.degrees(found["rotation_rmse"])
+    return ReadmeRow(
+        name="certified grasps, by the CAD",
+        text=f"{where}: {found['success_rate']:.1%} lifted, displacement RMSE "
+        f"{1e3 * found['translation_rmse']:.2f} mm, {rotation:.2f} degrees; {certified} of {planned} planned "
+        "grasps are certified",
+        interval=f"{_between(found['success_interval'], 100, '%')}; {_rmse_intervals(found, 2)}",
+        n=f"{found['trials']} trials of {found['measured_parts']} parts",
+    )
+
+
+def _assessed(stored: StoredReport) -> list[ReadmeRow]:
+    whole, agreement, parts = _report(stored)["tables"]
+    fresh = dict(zip(whole["header"], whole["rows"][-1], strict=True))
+    (agrees,) = (row[-1] for row in agreement["rows"] if row[0] == "1 mm")
+    turned = sum(row[-1] == "yes" for row in parts["rows"])
+    share, between = fresh["placed within 1 mm"].rstrip("]").split(" [")
+    return [
+        ReadmeRow(
+            name="assessed parts in fresh scenes",
+            text=f"{share} of all attempts placed within 1 mm, corrected by the prediction of certified "
+            f"grasps; for {agrees} parts this lies within the interval that the part's report stated from a "
+            f"few trials, for {turned} where the turn must be within 2 degrees, too",
+            interval=between.replace("%, ", " - ").replace("%", " %"),
+            n=f"{fresh['trials']} attempts",
+        )
+    ]
+
+
+def _benchmark(stored: StoredReport) -> list[ReadmeRow]:
+    rows = {row["planner"]: stored_row(row) for row in _report(stored)["rows"]}
+    ours = rows["ours"]
+    corrected, plain, simple = ours.first("predicted"), ours.first("none"), rows["centroid"].first("none")
+    shares = [corrected, plain, simple]
+    text = (
+        f"{corrected.value:.1%} of all attempts corrected by the prediction, {plain.value:.1%} "
+        f"without; centroid and short axis {simple.value:.1%}"
+    )
+    if "certified" in rows:
+        known, known_plain = (rows["certified"].first(name) for name in ("predicted", "none"))
+        shares += [known, known_plain]
+        text += (
+            f"; certified grasps, by the CAD, {known.value:.1%}, without correction {known_plain.value:.1%}"
+        )
+    return [
+        ReadmeRow(
+            name=f"placed within {TOLERANCE}",
+            text=text,
+            interval="; ".join(_between(one.interval, 100, "%") for one in shares),
+            n=f"{corrected.of} attempts at {ours.n_parts} parts by each planner",
+        )
+    ]
+
+
+def _palletize(stored: StoredReport) -> list[ReadmeRow]:
+    report = _report(stored)
+    each = [report["corrections"][name] for name in ("predicted", "none", "truth")]
+    gain = report["gain"]["predicted"]
+    met = "met" if gain["translation_ratio"] <= GOAL else "not met"
+    corrected, plain, true = (
+        f"{1e3 * one['median_translation']:.2f} mm, {_degrees(one['median_rotation'])}" for one in each
+    )
+    return [
+        ReadmeRow(
+            name="placing",
+            text=f"median error {corrected} corrected by the prediction; {plain} without; {true} corrected "
+            f"by the true displacement; corrected by the prediction it is {gain['translation_ratio']:.2f} of "
+            f"that without (goal: {GOAL:g} at most, {met})",
+            interval="; ".join(_between(one["median_translation_interval"], 1e3, "mm", 2) for one in each)
+            + f"; ratio {_between(gain['translation_ratio_interval'], 1, '', 2).rstrip()}",
+            n=f"{report['compared']} placements of {report['parts_compared']} parts for each correction",
+        )
+    ]
+
+
+def _shipped_model(stored: StoredReport) -> list[ReadmeRow]:
+    report = _report(stored)["metrics"]["test"]
+    quality, displacement = report["gqn"], report["gdn"]
+    between = displacement["intervals"]
+    return [
+        ReadmeRow(
+            name="random grasps",
+            text=f"quality accuracy on balanced data {quality['balanced_accuracy']:.1%}",
+            interval=_between(quality["intervals"]["balanced_accuracy"], 100, "%"),
+            n=f"{quality['n']} grasps",
+        ),
+        ReadmeRow(
+            name="random grasps",
+            text=f"displacement RMSE {1e3 * displacement['translation_rmse']:.2f} mm, "
+            f"{math.degrees(displacement['rotation_rmse']):.2f} degrees",
+            interval=f"{_between(between['translation_rmse'], 1e3, 'mm', digits=2)}, "
+            f"{_between(between['rotation_rmse'], math.degrees(1), 'degrees', digits=2)}",
+            n=f"{displacement['n']} grasps that lifted the part",
+        ),
+    ]
+
+
+def _equal_recipes(stored: StoredReport) -> list[ReadmeRow]:
+    found = _report(stored)["scores"]["novel"]
+    ours, paper = found[OURS], found[PAPER_AS_OURS]
+
+    def errors(one: dict[str, Any]) -> str:
+        accuracy = f"{one['balanced_accuracy']['mean']:.1%} accurate"
+        return f"{accuracy}, {_mm(one['translation']['mean'])}, {_degrees(one['rotation']['mean'])}"
+
+    trained = _report(stored)["n"].partition(",")[0]  # "trained on ... attempts at ... parts"
+    text = f"{trained}, both by our recipe: ours {errors(ours)}; the paper's network {errors(paper)}"
+    interval = "; ".join(
+        f"{_between(one['balanced_accuracy']['interval'], 100, '%')}, "
+        f"{_between(one['translation']['interval'], 1e3, 'mm')}, "
+        f"{_between(one['rotation']['interval'], math.degrees(1), 'degrees')}"
+        for one in (ours, paper)
+    )
+    n = f"{ours['n']} grasps of {ours['parts']} parts, {ours['successes']} successes; three trainings each"
+    split = stored.facts["split"].partition(";")[0]
+    return [ReadmeRow(name="random grasps", text=text, interval=interval, split=split, n=n)]
+
+
+def _displacement_same_data(stored: StoredReport) -> list[ReadmeRow]:
+    models = _report(stored)["models"]
+    ours, paper = (models[name]["recentred"]["novel"] for name in ("ours", "gcip_mv"))
+
+    def errors(one: dict[str, Any]) -> str:
+        within = one["within"][0]["value"]
+        return f"RMSE {_rmse(one)}, {within:.1%} of all attempts off by at most 1 mm"
+
+    interval = "; ".join(
+        f"{_rmse_intervals(one)}, {_between(one['within'][0]['interval'], 100, '%')}" for one in (ours, paper)
+    )
+    return [
+        ReadmeRow(
+            name="planned grasps of these two networks",
+            text=f"high quality, low variance, recentred: ours {errors(ours)}; the paper's {errors(paper)}",
+            interval=interval,
+            n=f"{ours['trials']} trials of {ours['measured_parts']} parts with each",
+        )
+    ]
+
+
+def _validation(stored: StoredReport) -> list[ReadmeRow]:
+    report = _report(stored)
+    finest = "{rate_hz} Hz, {position_iterations} it".format(**report["settings"]["references"][1])
+    yardstick = report["yardstick"]
+    return [
+        _against(report, "production", yardstick, "labels against finer steps"),
+        _against(report, "production", finest, "the same against the finest steps"),
+        _against(report, finest, yardstick, "these finer steps against the finest"),
+    ]
+
+
+def _against(report: dict[str, Any], setting: str, reference: str, name: str) -> ReadmeRow:
+    """A row of the errors of one setting against another."""
+    pair = (setting, reference)
+    (found,) = (one for one in report["errors"] if (one["setting"], one["reference"]) == pair)
+    shift, success = found["equivalence"]["displacement"], found["equivalence"]["success"]
+    shown = "shown" if found["equivalent"] else "not shown"
+    steps = [report.get(one, one).replace(" it", " iterations") for one in pair]
+    return ReadmeRow(
+        name=name,
+        text=f"{' against '.join(steps)}: median displacement {1e3 * shift['estimate']:.2f} mm beyond that "
+        f"of starts moved by 10 um, success {100 * success['estimate']:+.1f} points; equivalence within "
+        f"{1e3 * shift['margin']:g} mm and {100 * success['margin']:g} points is {shown}",
+        interval=f"90 %: {_between((shift['low'], shift['high']), 1e3, 'mm', digits=2)}, "
+        f"{_between((success['low'], success['high']), 100, 'points')}",
+        n=f"{found['n']} grasps of {success['parts']} parts, {shift['n']} lifted in both",
+    )
+
+
+def _engines(stored: StoredReport) -> list[ReadmeRow]:
+    report = _report(stored)
+    whole, between = report["engines"]["all"], report["intervals"]
+    parts = [name for name in report["engines"] if name != "all" and not name.endswith(SHIFTED)]
+    shifts = (_between(between[name], 1e3, "mm", digits=2) for name in ("shift_median", "shift_p90"))
+    return [
+        ReadmeRow(
+            name="labels against a second engine, MuJoCo",
+            text=f"success agrees in {whole['agreement']:.1%}; where both lift the part, displacement "
+            f"differs by {1e3 * whole['shift_median']:.2f} mm (median; 90th percentile "
+            f"{1e3 * whole['shift_p90']:.2f} mm)"
+            + "".join(f"; bound missed: {one}" for one in report["failed"]),
+            interval=f"{_between(between['agreement'], 100, '%')}; {'; '.join(shifts)}",
+            n=f"{whole['n']} grasps of {len(parts)} parts, {whole['n_both']} lifted in both",
+        )
+    ]
+
+
+def _collect(stored: StoredReport) -> list[ReadmeRow]:
+    cells = _cells(stored)
+    text = f"{cells['grasps/s']} grasps/s, {cells['time']} for the demo dataset"
+    return [ReadmeRow(name="collecting", text=text, interval=stored.facts["intervals"])]
+
+
+def _plan(stored: StoredReport) -> list[ReadmeRow]:
+    times, ratios = _report(stored)["tables"]
+    ours, paper = (dict(zip(times["header"], row, strict=True)) for row in times["rows"][:2])
+    text = (
+        f"{ours['median, ms']} ms on two cores with the shipped model; the paper's network "
+        f"{paper['median, ms']} ms, {ratios['rows'][0][1]} times as long"
+    )
+    return [ReadmeRow(name="planning", text=text, interval=f"{ours['interval of the median']} ms")]
+
+
+def _cells(stored: StoredReport) -> dict[str, str]:
+    """First row of a report's first table, by column."""
+    first = _report(stored)["tables"][0]
+    return dict(zip(first["header"], first["rows"][0], strict=True))
+
+
+def _report(stored: StoredReport) -> dict[str, Any]:
+    assert isinstance(stored.report, dict)
+    return stored.report
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.1f} mm"
+
+
+def _degrees(radians: float) -> str:
+    return f"{math.degrees(radians):.1f} degrees"
+
+
+def _rmse_intervals(found: dict[str, Any], digits: int = 1) -> str:
+    translation = _between(found["translation_interval"], 1e3, "mm", digits)
+    return f"{translation}, {_between(found['rotation_interval'], math.degrees(1), 'degrees', digits)}"
+
+
+def _between(ends: Any, scale: float, unit: str, digits: int = 1) -> str:
+    low, high = (f"{scale * end:.{digits}f}" for end in ends)
+    return f"{low} to {high} {unit}" if "-" in low + high else f"{low} - {high} {unit}"
+
+
+ROWS: tuple[tuple[str, Callable[[StoredReport], list[ReadmeRow]]], ...] = (
+    ("success", _success),
+    ("displacement", _displacement),
+    ("certified", _certified),
+    ("success_certified_cad_kinect2", _certified_elsewhere("noise of a Kinect v2")),
+    ("success_certified_cad_mujoco", _certified_elsewhere("in MuJoCo")),
+    ("assessed", _assessed),
+    ("benchmark", _benchmark),
+    ("palletize", _palletize),
+    ("shipped_model", _shipped_model),
+    ("equal_recipes", _equal_recipes),
+    ("displacement_same_data", _displacement_same_data),
+    ("validation", _validation),
+    ("engines", _engines),
+    ("collect", _collect),
+    ("plan_speed", _plan),
+)
+"""Name of each report of the table, and its rows; one that is not stored yet has none."""
