@@ -60,8 +60,9 @@ def draw_success(summary: SuccessSummary, path: Path) -> None:
             left.axvspan(*overall.success_interval, color=PALE_BLUE, zorder=0, lw=0)
             rate = overall.success_rate
             left.axvline(rate, color=_OURS["quality"], lw=1.2, label=f"all: {rate:.1%}")
-        paper = summary.paper["simulated"]
-        left.axvline(paper, color=INK, lw=1, ls="--", label=f"paper, simulated: {paper:.1%}")
+        if overall.certified is None:  # the paper does not know its parts beforehand
+            paper = summary.paper["simulated"]
+            left.axvline(paper, color=INK, lw=1, ls="--", label=f"paper, simulated: {paper:.1%}")
         rest = f", the worst {len(shown)} of {len(rows)}" if len(rows) > len(shown) else ""
         left.set_title(f"Lifted, by {'family' if by_family else 'part'}{rest}")
         left.set(xlim=(-0.02, 1.02), xlabel="share of grasps, 95 % Wilson intervals")
