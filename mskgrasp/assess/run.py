@@ -27,7 +27,7 @@ from mskgrasp.simulation.certify_parts import certify
 from mskgrasp.trials.placed_scenes import placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 
-SCENE_VERSION = 4
+SCENE_VERSION = 5
 """Raised by every change after which a seed makes other trials."""
 _MAY_CHANGE = ("parts", "out", "tolerance", "trials", "workers", "quick", "simulations", *BY_CONTENT)
 

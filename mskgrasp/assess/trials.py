@@ -11,7 +11,7 @@ from typing import Any, Literal
 import yaml
 
 from mskgrasp.core.files import write_whole
-from mskgrasp.core.seeds import trial_seeds
+from mskgrasp.core.seeds import spread_trial_seeds, trial_seeds
 from mskgrasp.parts import Part, find_part
 from mskgrasp.planning.certified import CertifiedGrasps
 from mskgrasp.planning.certified_planner import CertifiedPlanner, reachable_by
@@ -46,6 +46,7 @@ class AssessSetup:
         cells: Files of the simulated cells by condition.
         out: Folder of the part's report.
         seed: Seed of the run.
+        spread: The resting poses of the scenes are as frequent as they are probable; else drawn at random.
     """
 
     source: str
@@ -54,6 +55,7 @@ class AssessSetup:
     cells: dict[str, Path]
     out: Path
     seed: int
+    spread: bool = True
 
 
 def write_cells(out: Path) -> dict[str, Path]:
@@ -81,6 +83,7 @@ def scene_tasks(part: Part, n_trials: int) -> list[SceneTask]:
 def trial_bench(setup: AssessSetup) -> Iterator[Callable[[SceneTask], Iterator[PlacedTrial]]]:
     """Make the trials of a scene by certified grasps and by the networks alone."""
     part = find_part(setup.source)
+    seeds_of = spread_trial_seeds if setup.spread else trial_seeds
     nothing = replace(setup.certified, grasps=(), uncertified=())
     with ExitStack() as stack:
         found: dict[str, tuple[TrialEngine, dict[str, CertifiedPlanner]]] = {}
@@ -101,7 +104,7 @@ def trial_bench(setup: AssessSetup) -> Iterator[Callable[[SceneTask], Iterator[P
 
         def run(task: SceneTask) -> Iterator[PlacedTrial]:
             engine, planners = bench(task.condition)
-            seeds = trial_seeds(setup.seed, part.name, task.number)
+            seeds = seeds_of(setup.seed, part.name, task.number)
             for means in task.means:
                 trial = PlacedTrial(part=part.name, condition=task.condition, number=task.number, means=means)
                 yield grasp_and_place(engine, planners[means], part, seeds, trial, setup.certified.like)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import zlib
 
 import numpy as np
 
 _TRIAL = zlib.crc32(b"trial")
+_GOLDEN = (5**0.5 - 1) / 2
+_NEAR = 1 / 64
+"""Distance within which a scene's first random number counts as the one wanted."""
 
 
 def scene_seeds(seed: int, part: str, number: int, draw: int = 0) -> tuple[int, int]:
@@ -38,6 +42,37 @@ def trial_seeds(seed: int, part: str, number: int) -> tuple[int, int]:
         The seed of the part's place and turn, and that of all that is drawn after it.
     """
     return _two_words([seed, zlib.crc32(part.encode()), number, 0, _TRIAL])
+
+
+def spread_trial_seeds(seed: int, part: str, number: int) -> tuple[int, int]:
+    """Seeds as of `trial_seeds`, for few trials: their resting poses are as frequent as they are probable.
+
+    The first random number of a scene decides its resting pose (`mskgrasp.parts.resting_pose`). Those of
+    consecutive trials follow the golden ratio's sequence, which fills the unit interval evenly however many
+    there are (Weyl), from a start of the seed's.
+
+    Args:
+        seed: Seed of the run.
+        part: Name of the part.
+        number: Index of the trial among those of the part.
+
+    Returns:
+        The seed of the part's place and turn, and that of all that is drawn after it.
+    """
+    words = [seed, zlib.crc32(part.encode()), number, 0, _TRIAL]
+    wanted = np.random.default_rng([seed, words[1], _TRIAL]).random() + number * _GOLDEN
+    drawn = (_two_words([*words, draw]) for draw in itertools.count(1))
+    return next(seeds for seeds in drawn if _turns_apart(_first_number(seeds[0]), wanted) < _NEAR)
+
+
+def _first_number(scene: int) -> float:
+    return np.random.RandomState(scene).random_sample()
+
+
+def _turns_apart(first: float, second: float) -> float:
+    """Distance of two numbers on a circle of circumference one."""
+    off = first - second
+    return abs(off - round(off))
 
 
 def _two_words(entropy: list[int]) -> tuple[int, int]:

@@ -145,7 +145,7 @@ def fresh_trials(part: Part, out: Path, n: int, workers: int) -> list[PlacedTria
     begin_trials(out, certified)
     setup = AssessSetup(
         source=str(part.folder), certified=certified, models=PRETRAINED, cells=write_cells(out), out=out,
-        seed=FRESH_SEED,
+        seed=FRESH_SEED, spread=False,
     )  # fmt: skip
     tasks = [
         SceneTask(source=setup.source, part=part.name, condition=EXACT, number=number, means=("certified",))
