@@ -27,6 +27,7 @@ def looks(boxes) -> SuccessLooks:
     return SuccessLooks(boxes.data, (0.0, 1.0), CONFIG.network)
 
 
+@pytest.mark.slow
 def test_all_successes_and_some_failures_are_kept(boxes, looks):
     samples = looks.of(CONFIG.network)
     successes = sum(int(read_shard(path)[0].success.sum()) for path in list_shards(boxes.data))

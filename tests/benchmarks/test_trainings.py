@@ -48,6 +48,7 @@ def made(looks: Looks, sides: Sides, out: Path, choices: list[Choice], seeds: in
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_choice_can_take_the_quality_network_of_another(looks, sides, tmp_path):
     found = made(looks, sides, tmp_path, [OWN, OTHER])
     assert len(found["Own"][0]["validation"].quality) == len(sides.validation)
@@ -74,6 +75,7 @@ class _Stopped(Exception):
     pass
 
 
+@pytest.mark.slow
 def test_a_stopped_training_goes_on_to_the_same_predictions(looks, sides, tmp_path, monkeypatch):
     whole = made(looks, sides, tmp_path / "whole", [OWN])["Own"][0]["validation"]
 

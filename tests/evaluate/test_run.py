@@ -84,6 +84,7 @@ def test_several_processes_resume_a_run_with_equal_trials(alone: Path, tmp_path:
         assert page.complaints == []
 
 
+@pytest.mark.slow
 def test_a_run_with_other_settings_or_another_model_is_refused_and_a_copy_of_its_own_is_not(
     alone: Path, tmp_path: Path
 ):
@@ -112,6 +113,7 @@ def test_an_estimate_counts_the_missing_trials_and_makes_none_of_them(
     assert 0.1 < seconds < 100 and sorted(alone.rglob("*")) == files
 
 
+@pytest.mark.slow
 def test_models_are_compared_and_one_added_later_repeats_no_grasp(collected: Path, tmp_path: Path):
     out, part = tmp_path / "out", "parallel_key_a16x10x56"
     settings = dict(experiment="displacement", parts=(part,), lowess_data=collected)

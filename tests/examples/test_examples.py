@@ -39,6 +39,7 @@ def test_a_grasp_planned_on_a_cad_file_lifts_the_part_in_simulation():
     assert printed.rstrip().endswith("\nlifted")
 
 
+@pytest.mark.slow
 def test_a_client_has_the_server_plan_and_place():
     with running("mskgrasp.serve", "--port", "0", "--workers", "1") as server:
         address = re.match(r"http://127\.0\.0\.1:\d+", server.stdout.readline())[0]
@@ -63,6 +64,7 @@ def placed_by(planner: str, folder: Path, *options: str) -> dict:
     return row
 
 
+@pytest.mark.slow
 def test_a_planner_of_ones_own_takes_part_in_the_benchmark(tmp_path, monkeypatch):
     code = (EXAMPLES / "own_planner.py").read_text(encoding="utf-8")
     (name, value) = re.search(r'^    (\w+) = "(own_planner:\w+)"$', code, re.MULTILINE).groups()

@@ -47,6 +47,7 @@ def test_its_own_tests_pass_the_contracts_of_arms_and_cameras(site: Path):
     assert " passed" in done.stdout and "skipped" not in done.stdout
 
 
+@pytest.mark.slow
 def test_a_grasp_is_planned_in_its_cell_without_any_simulator(site: Path, tmp_path: Path):
     code = (
         "import sys; sys.modules['sapien'] = sys.modules['mani_skill'] = None\n"

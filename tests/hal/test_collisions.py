@@ -62,6 +62,7 @@ def test_forearm_and_wrist_keep_off_the_table():
     checked([READY, grasp])
 
 
+@pytest.mark.slow
 def test_no_random_motion_passes_through_what_a_hundred_times_finer_steps_meet():
     """What is accepted keeps a distance everywhere; what is refused is too near somewhere, or nearly."""
     rng = np.random.default_rng(0)

@@ -81,7 +81,9 @@ def test_a_grasp_lifts_a_part_and_the_simulator_agrees(cell: Cell):
     assert cell.tracker.part_pose().position == pytest.approx(before, abs=2e-3)
 
 
-@pytest.mark.parametrize("force", [5.0, pytest.param(20.0, marks=pytest.mark.slow), 70.0])
+@pytest.mark.parametrize(
+    "force", [pytest.param(5.0, marks=pytest.mark.slow), pytest.param(20.0, marks=pytest.mark.slow), 70.0]
+)
 def test_a_part_is_lifted_whatever_the_grip_force(cell: Cell, force: float):
     """The reflex must not take the commanded grip for a collision."""
     assert cell.feeder is not None and cell.tracker is not None

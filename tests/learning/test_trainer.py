@@ -145,6 +145,7 @@ def test_a_network_can_learn_the_swing_and_is_judged_by_it(dataset, tmp_path):
     assert 0 <= gdn["least_uncertain"]["10%"][2] <= gdn["least_uncertain"]["30%"][2] + 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "config", [pytest.param(SHORT, marks=pytest.mark.slow), HAND], ids=["the paper's", "ours"]
 )
@@ -234,6 +235,7 @@ def uncalibrated(models: Models) -> Models:
     )
 
 
+@pytest.mark.slow
 def test_training_ends_when_the_validation_loss_stops_falling_and_resumes_to_the_same_end(samples, tmp_path):
     # A rate this high does not improve for long.
     stage = StageConfig(learning_rate=0.05, schedule="constant", epochs=40, batch_size=32, patience=2)

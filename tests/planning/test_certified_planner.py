@@ -157,6 +157,7 @@ def test_where_an_image_fits_two_poses_the_networks_plan(cell, planner, capsys):
     assert "the image fits two poses of it; planned by the networks" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_in_a_pose_that_topples_in_the_simulation_the_networks_plan(cell, planner, capsys):
     frame, true = present(cell, 2)
     resting = resting_of(true)

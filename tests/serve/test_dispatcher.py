@@ -14,6 +14,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.serve.config import ServeConfig
 from mskgrasp.serve.dispatcher import Dispatcher
@@ -33,6 +35,7 @@ async def ask(dispatcher: Dispatcher) -> tuple[int, object]:
         return error.status, str(error)
 
 
+@pytest.mark.slow
 def test_what_exceeds_queue_or_time_is_503_and_a_process_that_dies_is_replaced(process: PlannerProcess):
     async def story() -> None:
         dispatcher = Dispatcher([process], waiting=1, timeout_s=60.0)

@@ -50,6 +50,7 @@ def test_a_model_that_is_damaged_is_reported_when_it_is_loaded(tmp_path: Path):
         process.stop()
 
 
+@pytest.mark.slow
 def test_a_process_that_the_system_refuses_can_be_started_later():
     process = PlannerProcess(planner_settings(ServeConfig()))
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)

@@ -117,6 +117,7 @@ def test_a_part_that_the_camera_does_not_see_has_no_grasp(simulator: Simulator, 
     assert grasp is None and depth.shape == (160, 160)
 
 
+@pytest.mark.slow
 def test_a_part_that_is_not_at_rest_is_drawn_again_and_discarded_where_it_never_is(
     simulator: Simulator, monkeypatch
 ):

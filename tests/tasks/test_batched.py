@@ -35,6 +35,7 @@ def outcomes(rows: list[int], physics: Physics) -> dict[str, torch.Tensor]:
     return toy_attempt(scene, physics).run(GRASPS[rows])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("skip_air", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_sub_scenes_do_not_depend_on_each_other(skip_air):
     physics = Physics(skip_air=skip_air)
@@ -48,6 +49,7 @@ def test_sub_scenes_do_not_depend_on_each_other(skip_air):
             )
 
 
+@pytest.mark.slow
 def test_what_a_carried_block_did_is_told_for_its_own_sub_scene():
     found = outcomes(list(range(len(REASONS))), Physics())
     lift = Physics().lift_height

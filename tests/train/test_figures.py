@@ -54,7 +54,7 @@ def test_curves_of_a_run_without_variances_are_drawn_beside_the_trivial_predicto
 @pytest.mark.parametrize(
     ("components", "changes"),
     [
-        (["x", "y", "z", "theta"], {}),
+        pytest.param(["x", "y", "z", "theta"], {}, marks=pytest.mark.slow),
         (["x", "y", "z", "theta", "swing_x", "swing_y"], {"swing": True, "mixture": 2}),
     ],
 )

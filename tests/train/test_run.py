@@ -23,6 +23,7 @@ def program(config: LearningConfig, **changes) -> TrainConfig:
     return TrainConfig(**(config.model_dump() | {"device": "cpu"} | changes))
 
 
+@pytest.mark.slow
 def test_one_number_of_epochs_stands_for_both_networks_and_is_what_a_stopped_run_needs(dataset, tmp_path):
     out = tmp_path / "model"
     assert train.run_training(program(SHORT, data=dataset, out=out, epochs=1)) == 0

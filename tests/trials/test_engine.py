@@ -87,6 +87,7 @@ def test_a_grasp_over_the_part_misses_and_one_on_its_top_collides(box_cell: BoxC
     )
 
 
+@pytest.mark.slow
 def test_a_held_part_is_put_down_on_the_way_home_not_dropped(box_cell: BoxCell):
     planned = box_cell.present()
     assert planned.plan is not None and box_cell.engine.grasp(planned.plan).reason == ""

@@ -142,6 +142,7 @@ def test_the_columns_that_follow_from_one_placement_are_what_placing_so_would_gi
     assert trial.error("seen") == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(engine: TrialEngine):
     part = find_part("t_nut_m16x18")
     planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=800), engine.cell)

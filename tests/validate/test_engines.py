@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from mskgrasp.validate.__main__ import main
 from mskgrasp.validate.compare import compare_outcomes
@@ -68,6 +69,7 @@ def test_tilts_are_counted_by_the_engine_that_has_them():
     assert tilted(mujoco, sapien) == dict(n=len(held), mujoco=3, both=2, sapien=4)
 
 
+@pytest.mark.slow
 def test_both_engines_try_the_same_grasps(tmp_path: Path):
     done = run_here(
         main, "--engine", "mujoco", "--parts", "hex_nut_m30", "--grasps-per-part", "3", "--workers", "1",

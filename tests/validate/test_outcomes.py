@@ -37,6 +37,7 @@ def test_grasps_are_tried_once_and_read_afterwards(tmp_path):
         run_settings(settings, drawn, {}, tmp_path, 1, counts.append)
 
 
+@pytest.mark.slow
 def test_parts_that_a_setting_does_not_change_are_left_out(tmp_path):
     folders = [find_part("hex_nut_m20").folder]
     drawn = draw_grasps(folders, 1, 0, tmp_path, 1, lambda _: None)

@@ -87,6 +87,7 @@ def test_groups_are_those_that_maniskill_records(trajectories, recorded):
     assert set(theirs_json["episodes"][0]) <= set(ours_json["episodes"][0])
 
 
+@pytest.mark.slow
 def test_an_exported_attempt_is_reproduced_from_its_files_alone(trajectories, joined):
     record = json.loads(trajectories.with_suffix(".json").read_text())
     kwargs = dict(record["env_info"]["env_kwargs"], obs_mode="none", render_backend="none")

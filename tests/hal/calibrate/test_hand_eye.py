@@ -91,6 +91,7 @@ def test_a_tenth_of_a_pixel_of_noise_leaves_less_than_a_millimetre_and_a_tenth_o
     assert np.max(millimetres) < 1.0 and np.max(degrees) < 0.1
 
 
+@pytest.mark.slow
 def test_the_halves_of_the_pictures_say_how_large_the_error_is():
     """One draw of the noise may make the halves agree by chance; of several the median tells."""
     poses = hand_poses(24, 30)

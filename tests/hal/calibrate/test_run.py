@@ -63,6 +63,7 @@ def test_with_a_cameras_noise_the_error_stays_in_millimetres(pictures: list[Pict
     assert millimetres < 2.0 and degrees < 0.2
 
 
+@pytest.mark.slow
 def test_the_pictures_can_be_solved_again_into_a_file_that_can_be_read(folder: Path, tmp_path: Path):
     for _ in range(2):
         lines = solve(CalibrateConfig(out=tmp_path), folder, BOARD, None)
@@ -96,6 +97,7 @@ def test_pictures_with_and_without_infrared_are_not_mixed(tmp_path: Path):
         solve(CalibrateConfig(out=tmp_path), tmp_path, TOY_BOARD, None)
 
 
+@pytest.mark.slow
 def test_stored_pictures_whose_infrared_shows_no_board_name_the_print(tmp_path: Path):
     for index, picture in enumerate(taken("laser")):
         blank = dataclasses.replace(picture, infrared=np.full_like(picture.depth, 4400, np.uint16))

@@ -46,6 +46,7 @@ def test_a_wrong_cell_file_is_a_finding_and_a_missing_one_an_error(tmp_path: Pat
         list(examine(tmp_path / "none.yaml", move=False))
 
 
+@pytest.mark.slow
 def test_a_hand_that_desk_does_not_know_is_found_over_the_wire(tmp_path: Path):
     with fci5() as robot:
         path = write_cell(tmp_path, "panda_py", robot.host, contact_force=15.0)

@@ -19,6 +19,7 @@ from mskgrasp.core.geometry import Pose
 from tests.hal.franka.robots import arm_at, fci5, robot_for
 
 
+@pytest.mark.slow
 def test_a_hand_that_was_never_homed_is_homed_by_the_first_command_and_not_by_connecting(tmp_path: Path):
     with fci5() as robot:
         robot.order("unhomed")

@@ -30,6 +30,7 @@ def try_grasp(cell: Cell, part: str, seed: int, offset: np.ndarray) -> tuple[np.
     return displacement, float(tilt), after.as_vector()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_outcome_to_the_bit_whatever_came_before():
     offset = np.array([0.004, -0.003])
     with mujoco_cell(CONFIG).connected() as cell:

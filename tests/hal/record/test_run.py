@@ -64,6 +64,7 @@ def test_ctrl_c_keeps_the_frames(cell_file: Path, tmp_path: Path):
     assert read_recording(out).n_frames == 1
 
 
+@pytest.mark.slow
 def test_a_program_that_did_not_hear_ctrl_c_is_reported(cell_file: Path, tmp_path: Path):
     """A terminal sends Ctrl-C to both, `kill` to one alone."""
     out, inner = tmp_path / "run.h5", tmp_path / "inner.h5"

@@ -62,6 +62,7 @@ def test_a_known_motion_is_measured_to_half_a_millimetre_and_half_a_degree(cell:
         assert distance < 0.7 and angle < 0.9, f"with a Kinect's noise and {GREY_NOISE} grey levels"
 
 
+@pytest.mark.slow
 def test_a_grasp_that_shifts_and_turns_a_part_is_measured_on_the_table_as_it_was_in_the_hand(cell: Cell):
     """Askew and off the middle: the truth is the pose in the hand, while the part is held aloft."""
     resting = present(cell, "parallel_key_b20x12x80")

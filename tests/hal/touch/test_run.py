@@ -106,6 +106,7 @@ def test_a_driver_that_dies_in_the_middle_of_a_touch_leaves_nothing_half_written
     assert path.read_bytes() == before and not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_touches_that_fit_no_plane_write_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     touched = touches._touch
 

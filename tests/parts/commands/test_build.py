@@ -28,6 +28,7 @@ EMPTY = Index(parts={}, left_out={})
 NAMES = ("hex_nut_m20", "parallel_key_b20x12x80", "parallel_pin_12x60", "washer_m36")
 
 
+@pytest.mark.slow
 def test_the_program_builds_lists_and_draws(capsys, tmp_path):
     assert main(["build", *NAMES, "--workers", "1"]) == 0
     assert "4 parts ready, 4 built now" in capsys.readouterr().out

@@ -46,6 +46,7 @@ def table(stdout: str) -> dict[str, str]:
     return {re.split(r"\s{2,}", line)[0]: line for line in lines[1:-1]}
 
 
+@pytest.mark.slow
 def test_a_folder_with_all_a_user_may_have_in_it(program, tmp_path, own_cache):
     folder = tmp_path / "CAD Daten für Köln"
     (folder / "unten").mkdir(parents=True)

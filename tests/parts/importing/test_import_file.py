@@ -177,6 +177,7 @@ def test_a_density_must_be_that_of_a_solid(tmp_path, density):
     assert ("not g/cm^3" in str(caught.value)) == (density == 7.85)
 
 
+@pytest.mark.slow
 def test_a_step_part_has_the_mass_of_the_formula(tmp_path):
     export_step(Box(40, 30, 20) - Cylinder(8, 30), tmp_path / "block.step")
     imported = import_file(tmp_path / "block.step", density=2700)

@@ -85,6 +85,7 @@ def test_there_are_hundreds_of_recipes_and_no_family_dominates():
     assert len(light) >= 1500
 
 
+@pytest.mark.slow
 def test_meshes_are_closed_single_bodies_about_their_centroid(family_parts):
     for part in family_parts.values():
         # As it is stored: trimesh would merge corners that lie nearer than it can tell apart in metres.
@@ -95,6 +96,7 @@ def test_meshes_are_closed_single_bodies_about_their_centroid(family_parts):
         assert 0.020 <= part.longest_axis <= 0.150, part.name
 
 
+@pytest.mark.slow
 def test_hulls_are_few_small_and_stout(family_parts):
     for part in family_parts.values():
         hulls = hulls_of(part)
@@ -107,6 +109,7 @@ def test_hulls_are_few_small_and_stout(family_parts):
             assert aspect_ratio(points) <= 50, part.name
 
 
+@pytest.mark.slow
 def test_points_of_the_mesh_lie_in_the_hulls_and_points_far_outside_do_not(family_parts):
     """Independent of how the error is measured when a part is built: random points, counted."""
     for part in family_parts.values():
@@ -126,6 +129,7 @@ def test_points_of_the_mesh_lie_in_the_hulls_and_points_far_outside_do_not(famil
         assert abs(in_hulls - mesh.volume) < 0.11 * mesh.volume + error, part.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["cpu", "gpu"])
 def test_physx_takes_every_hull_as_it_is_and_mass_and_inertia_too(family_parts, kind):
     folders = " ".join(str(part.folder) for part in family_parts.values())

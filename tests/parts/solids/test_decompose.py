@@ -113,6 +113,7 @@ def test_the_same_mesh_gives_the_same_bytes_in_any_process_with_any_threads():
         assert there.stdout.strip() == here
 
 
+@pytest.mark.slow
 def test_exact_pieces_of_a_tee_are_joined_within_the_closer_bound():
     exact = tee().solid()
     joined = fewest_hulls(exact.mesh, exact.hulls)

@@ -86,6 +86,7 @@ def test_what_no_fine_layers_represent_becomes_as_close_as_coarse_ones_are(tmp_p
     assert part.hull_volume_ratio == pytest.approx(40 * 30 / (40 * 30 - holes), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_same_mesh_gives_the_same_bytes_in_another_process():
     here = hashlib.sha256(b"".join(p.tobytes() for p in mesh_pieces(mesh_of(honeycomb())))).hexdigest()
     there = subprocess.run(

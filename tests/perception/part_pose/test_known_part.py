@@ -60,7 +60,7 @@ def test_the_pose_at_a_place_and_turn_is_the_resting_pose_moved_there(turn):
 
 def test_the_outline_reaches_as_far_as_the_points_at_any_turn():
     for look in known("spur_gear_m3_z17").looks:
-        for turn in np.linspace(0, 2 * np.pi, 50):
+        for turn in np.linspace(0, 2 * np.pi, 12):
             across = np.array([np.cos(turn), np.sin(turn)])
             reach = (look.few[::5, :2] @ across).max()
             assert (look.outline @ across).max() == pytest.approx(reach, abs=1e-7)

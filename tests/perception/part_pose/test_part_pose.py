@@ -13,7 +13,11 @@ from mskgrasp.parts import find_part
 from mskgrasp.parts.alike_poses import PartSurface
 from tests.perception.part_pose.cells import find, kinect2, posed, presented, resting_at
 
-PARTS = ("l_bracket_60x40", "spur_gear_m3_z17", "hinge_60x30", "pillow_block_80x32")
+PARTS = (
+    "l_bracket_60x40",
+    "spur_gear_m3_z17",
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("hinge_60x30", "pillow_block_80x32")),
+)
 
 
 def planar_error(found: Pose, true: Pose) -> tuple[float, float]:

@@ -13,7 +13,9 @@ from tasks.robot.motion import PandaMotion, run_up
 SOFT = {"finger_stiffness": 2000.0, "finger_damping": 50.0}
 
 
-@pytest.mark.parametrize("depth", [0.005, 0.02, 0.06, 0.15])
+@pytest.mark.parametrize(
+    "depth", [0.005, *(pytest.param(depth, marks=pytest.mark.slow) for depth in (0.02, 0.06)), 0.15]
+)
 @pytest.mark.parametrize("place", [(0.4, -0.1), (0.5, 0.0), (0.6, 0.1)])
 def test_a_descent_overshoots_by_less_than_half_the_table_clearance(env, boxes, depth, place):
     far = np.array([[0.5, -0.5, 0.015, 1, 0, 0, 0]])
