@@ -50,6 +50,7 @@ def test_a_client_has_the_server_plan_and_place():
     assert abs(x - 0.45) < 0.03 and abs(y - 0.1) < 0.03  # the grasp is near the block's centre
 
 
+@pytest.mark.slow
 def test_the_maniskill_task_runs_in_a_loop():
     printed = run("maniskill_task.py", "hex_nut_m30", "3")
     assert re.search(r"^[1-3] of 3 lifted, median shift [\d.]+ mm$", printed, re.MULTILINE)

@@ -188,7 +188,9 @@ def test_fingers_cannot_let_go_by_any_opening(cell: Cell, opening: float):
         let_go(cell, Grasp.from_vector(np.array([0.5, 0.0, 0.1, 0.0])), opening=opening)
 
 
-@pytest.mark.parametrize(("opening", "pushed"), [(0.08, True), (0.041, False)])
+@pytest.mark.parametrize(
+    ("opening", "pushed"), [pytest.param(0.08, True, marks=pytest.mark.slow), (0.041, False)]
+)
 def test_a_finger_in_a_bore_leaves_the_part_where_it_is_if_it_opens_no_farther_than_it_must(
     cell: Cell, opening: float, pushed: bool
 ):

@@ -22,6 +22,7 @@ from tests import synthetic
 from tests.learning.small import HAND, PATCH, SHORT
 
 
+@pytest.mark.slow
 def test_one_success_is_no_batch_to_normalise(samples, tmp_path):
     training = split(samples, PATCH).training
     held = training[samples.success[training]]

@@ -37,6 +37,7 @@ def test_names_are_sorted_and_fit_for_a_folder():
     assert all(set(name) <= set("abcdefghijklmnopqrstuvwxyz0123456789_-") for name in names)
 
 
+@pytest.mark.slow
 def test_parts_are_20_to_150_mm_long_and_can_be_gripped(builtin_parts):
     for part in builtin_parts.values():
         assert 0.020 <= part.longest_axis <= 0.150, part.name

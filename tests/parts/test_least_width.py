@@ -37,6 +37,7 @@ def test_a_ball_is_held_beside_its_centre_as_far_as_friction_allows(imported):
     assert least_widths(part).min() == pytest.approx(0.1 / (1 + FRICTION**2), rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_wall_of_a_wide_cup_is_thin(imported):
     part = imported(trimesh.creation.annulus(r_min=56.0, r_max=60.0, height=80.0))
     upright = np.isclose(part.resting.position[:, 2], 0.04, atol=1e-3)

@@ -59,6 +59,7 @@ def test_an_unknown_part_is_an_error_that_names_a_similar_one():
         part_names(("hex_nut_m3x",), TRAINING)
 
 
+@pytest.mark.slow
 def test_a_held_out_set_of_the_catalogue_leaves_out_what_the_model_was_trained_on():
     names = ("l_bracket_40x40", "shaft_collar_25", "hex_nut_m20")  # two of the side "test", one of "train"
     for name in names:

@@ -236,6 +236,7 @@ def test_a_part_that_hooks_on_a_finger_is_taken_away_by_the_next_scene(tmp_path:
         np.testing.assert_allclose(engine.cell.arm.state().joints, engine.cell.workspace.home, atol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell", ["sapien", pytest.param("mujoco", marks=pytest.mark.slow)])
 def test_a_new_scene_empties_the_hand_and_is_as_after_going_home(cell: str, tmp_path: Path):
     path, (seed, _) = config_file(f"cells/{cell}.yaml"), trial_seeds(0, "washer_m36", 0)

@@ -9,9 +9,17 @@ from mskgrasp.parts.recipes.cad import screws
 from mskgrasp.parts.solids.measure import aspect_ratio, hull_fit
 from tests.parts.recipes.cad.made_parts import made, needs_cad
 
+FAMILIES = sorted({recipe.family for recipe in screws.recipes()})
+
 
 @needs_cad
-@pytest.mark.parametrize("family", sorted({recipe.family for recipe in screws.recipes()}))
+@pytest.mark.parametrize(
+    "family",
+    [
+        *FAMILIES[::4],
+        *(pytest.param(one, marks=pytest.mark.slow) for one in FAMILIES if one not in FAMILIES[::4]),
+    ],
+)
 def test_one_screw_of_each_family_is_closed_and_its_hulls_fit(listed, family):
     name = max(name for name, recipe in listed.items() if recipe.family == family)
     solid = made(listed, name)
