@@ -17,7 +17,7 @@ from hal.simulated import SimulatedArm, contact_fault, joint_motion_s
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import MAX_OPENING, PAD_REACH
 from mskgrasp.core.minimum_jerk import minimum_jerk_steps
-from mskgrasp.core.panda_kinematics import forward, track
+from mskgrasp.core.panda_kinematics import forward, forward_pose, track
 from tasks.robot.reflex import Reflex
 
 SETTLE_S = 0.15
@@ -90,11 +90,12 @@ class SapienArm(SimulatedArm[SapienWorld]):
     def _straight(self, T_base_tcp: Pose, speed: float) -> tuple[Tensor, float]:
         """Joint waypoints (k, 7) of the straight line to a pose, with its start, and its duration, s."""
         start = self._target()
-        here = Pose.from_matrix(forward(start)[0].numpy())
+        here = forward_pose(start.numpy())
         line, seconds = self._line(here, T_base_tcp, speed)
-        joints, error = track(torch.as_tensor(line.as_matrix()), start)
-        self._check_tracked(joints.numpy(), float(error.max()), T_base_tcp)
-        return torch.cat([start[None], joints]), seconds
+        # Half of torch's time for single poses.
+        joints, error = track(line.as_matrix(), start.numpy())
+        self._check_tracked(joints, float(error.max()), T_base_tcp)
+        return torch.cat([start[None], torch.from_numpy(joints)]), seconds
 
     def _follow(self, waypoints: Tensor, seconds: float, *, limit: float | None = None) -> None:
         """Move along joint waypoints (k, 7), evenly spaced, with a minimum-jerk profile.

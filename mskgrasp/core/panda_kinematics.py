@@ -8,6 +8,8 @@ convention), end effector turned by -45 degrees and moved by 0.1034 m (Franka Ha
 from __future__ import annotations
 
 import math
+from functools import lru_cache
+from types import ModuleType
 
 import numpy as np
 from array_api_compat import array_namespace, device
@@ -46,13 +48,11 @@ def forward(q: Array) -> tuple[Array, Array]:
         jacobian: (..., 6, 7), linear rows above angular ones, base frame.
     """
     xp = array_namespace(q)
-    frames = joint_frames(q)
-    frame = frames[7]
-    tip = frame[..., :3, 3]
-    axes = xp.stack([joint_frame[..., :3, 2] for joint_frame in frames[:7]], axis=-1)
-    origins = xp.stack([joint_frame[..., :3, 3] for joint_frame in frames[:7]], axis=-1)
+    frames = xp.stack(joint_frames(q), axis=-3)
+    tip = frames[..., 7, :3, 3]
+    axes, origins = (xp.moveaxis(frames[..., :7, :3, column], -1, -2) for column in (2, 3))
     linear = xp.linalg.cross(axes, tip[..., None] - origins, axis=-2)
-    return frame, xp.concat([linear, axes], axis=-2)
+    return frames[..., 7, :, :], xp.concat([linear, axes], axis=-2)
 
 
 def joint_frames(q: Array) -> list[Array]:
@@ -62,10 +62,10 @@ def joint_frames(q: Array) -> list[Array]:
         q: (..., 7) joint angles, radians.
     """
     xp = array_namespace(q)
-    angles = [*components(q), xp.full(q.shape[:-1], -math.pi / 4, dtype=q.dtype, device=device(q))]
-    links = _links(
-        xp.stack(angles, axis=-1), (*DH_A, 0.0), (*DH_D, FLANGE_OFFSET + TCP_OFFSET), (*DH_ALPHA, 0.0)
-    )
+    of_cosine, of_sine, fixed = _link_terms(xp, q.dtype, device(q))
+    hand = xp.full((*q.shape[:-1], 1), -math.pi / 4, dtype=q.dtype, device=device(q))
+    angles = xp.concat([q, hand], axis=-1)[..., None, None]
+    links = xp.cos(angles) * of_cosine + xp.sin(angles) * of_sine + fixed
     frame = links[..., 0, :, :]
     frames = [frame]
     for joint in range(1, 8):
@@ -79,26 +79,20 @@ def forward_pose(q: np.ndarray) -> Pose:
     return Pose.from_matrix(forward(q)[0])
 
 
-def _links(theta: Array, a: tuple[float, ...], d: tuple[float, ...], alpha: tuple[float, ...]) -> Array:
-    """(..., k, 4, 4) transforms of links at angles (..., k)."""
-    xp = array_namespace(theta)
-    c, s = xp.cos(theta), xp.sin(theta)
-
-    def constant(values: list[float]) -> Array:
-        vector = xp.asarray(values, dtype=theta.dtype, device=device(theta))
-        return xp.broadcast_to(vector, theta.shape)
-
-    zero, one = xp.zeros_like(theta), xp.ones_like(theta)
-    ca, sa = constant([math.cos(angle) for angle in alpha]), constant([math.sin(angle) for angle in alpha])
-    d_sa = constant([-offset * math.sin(angle) for offset, angle in zip(d, alpha, strict=True)])
-    d_ca = constant([offset * math.cos(angle) for offset, angle in zip(d, alpha, strict=True)])
-    entries = [
-        *(c, -s, zero, constant(list(a))),
-        *(s * ca, c * ca, -sa, d_sa),
-        *(s * sa, c * sa, ca, d_ca),
-        *(zero, zero, zero, one),
-    ]
-    return xp.reshape(xp.stack(entries, axis=-1), (*theta.shape, 4, 4))
+@lru_cache
+def _link_terms(xp: ModuleType, dtype: object, at: object) -> tuple[Array, Array, Array]:
+    """Factors of cosine and sine of a link's angle in its transform, and the rest: arrays (8, 4, 4)."""
+    terms = np.zeros((3, 8, 4, 4))
+    of_cosine, of_sine, fixed = terms
+    for link, (a, d, alpha) in enumerate(
+        zip((*DH_A, 0.0), (*DH_D, FLANGE_OFFSET + TCP_OFFSET), (*DH_ALPHA, 0.0), strict=True)
+    ):
+        c, s = math.cos(alpha), math.sin(alpha)
+        of_cosine[link, :3, :2] = [[1, 0], [0, c], [0, s]]
+        of_sine[link, :3, :2] = [[0, -1], [c, 0], [s, 0]]
+        fixed[link] = [[0, 0, 0, a], [0, 0, -s, -d * s], [0, 0, c, d * c], [0, 0, 0, 1]]
+    of_cosine, of_sine, fixed = (xp.asarray(term, dtype=dtype, device=at) for term in terms)
+    return of_cosine, of_sine, fixed
 
 
 def top_down(grasps: Array) -> tuple[Array, Array]:
