@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from mskgrasp.core.config import Config
 
@@ -22,3 +22,12 @@ class RecordConfig(Config):
     """Time from one frame to the next, s."""
     run: str | None = None
     """Record a program and its options instead, without --cell: "mskgrasp.evaluate --models models/demo"."""
+
+    @model_validator(mode="after")
+    def _frames_or_program(self) -> RecordConfig:
+        fields = type(self).model_fields
+        names = [name for name in ("frames", "interval") if getattr(self, name) != fields[name].default]
+        if self.run is not None and names:
+            given = " and ".join(f"--{name}" for name in names)
+            raise ValueError(f"--run records what the program does: leave out {given}")
+        return self

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from hal.sensor_noise import NoiseModel
 from mskgrasp.core.config import Config
@@ -68,6 +68,12 @@ class BenchmarkConfig(Config):
         if len(set(names)) < len(names):
             raise ValueError(f"a planner is named twice: {' '.join(names)}")
         return names
+
+    @model_validator(mode="after")
+    def _grasps_of_a_part(self) -> BenchmarkConfig:
+        if self.part and self.grasps is None:
+            raise ValueError("part is that of --grasps; parts to be grasped are named by --parts")
+        return self
 
     @property
     def n_trials(self) -> int:

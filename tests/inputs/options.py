@@ -152,6 +152,7 @@ ROWS = [
         lambda at: ["--grasps", at.file("a.yaml", "format: [1"), "--part", "hex_nut_m30"],
         "a.yaml",
     ),
+    Row("benchmark", "a part without grasps", _words("--part", "hex_nut_m30"), "that of --grasps"),
     Row(
         "serve",
         "an address that is no address",
@@ -179,6 +180,12 @@ ROWS = [
         "another program",
         _words("--cell", "cell.yaml", "--out", "a.h5", "--run", "rm -rf x"),
         "must be a program of this project",
+    ),
+    Row(
+        "record",
+        "frames of a program",
+        _words("--cell", "cell.yaml", "--out", "a.h5", "--frames", "3", "--run", "mskgrasp.plan"),
+        "leave out --frames",
     ),
     Row(
         "record",

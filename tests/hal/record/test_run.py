@@ -112,7 +112,7 @@ def wait_for_frame(recording: Path) -> None:
 def test_wrong_input_is_one_line(
     cell_file: Path, tmp_path: Path, arguments: list[str], code: int, message: str
 ):
-    given = {"--cell": str(cell_file), "--out": str(tmp_path / "out.h5"), "--interval": "0"}
+    given = {"--cell": str(cell_file), "--out": str(tmp_path / "out.h5")}
     given |= dict(zip(arguments[::2], (a.format(cell=cell_file) for a in arguments[1::2]), strict=True))
     done = record(*(word for pair in given.items() for word in pair))
     assert done.returncode == code, done.stderr
