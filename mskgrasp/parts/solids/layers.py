@@ -6,7 +6,6 @@ parts are; slopes and roundings become steps within a tolerance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -83,29 +82,46 @@ class Layer:
     section: Any
 
 
+class TurnedMesh:
+    """A mesh turned so that a direction is up, and its sections.
+
+    Attributes:
+        turn: (3, 3) from the mesh's axes.
+        levels: Heights of the faces across the direction, and of both ends, mm.
+    """
+
+    def __init__(self, mesh: trimesh.Trimesh, direction: np.ndarray) -> None:
+        """Turn a watertight mesh, millimetres, so that a unit vector (3,) is up."""
+        self.turn = _turned_to_z(direction)
+        vertices = np.asarray(mesh.vertices) @ self.turn.T
+        self._body = Manifold(Mesh64(np.array(vertices, np.float64), np.array(mesh.faces, np.uint64)))
+        self._sections: dict[float, Any] = {}
+        self.levels = _levels(vertices[mesh.faces], mesh.face_normals @ direction, mesh.area_faces)
+
+    def section(self, z: float) -> Any:
+        """Polygons (shapely) at a height, mm."""
+        if z not in self._sections:
+            loops = [shapely.Polygon(loop).buffer(0) for loop in self._body.slice(z).to_polygons()]
+            # Even-odd: holes lie within outlines, and islands within holes.
+            section = shapely.Polygon()
+            for loop in sorted(loops, key=lambda loop: -loop.area):
+                section = section.symmetric_difference(loop)
+            self._sections[z] = section
+        return self._sections[z]
+
+
 class Layers:
-    """A mesh turned so that a direction is up, and cut into layers.
+    """A turned mesh cut into layers.
 
     Attributes:
         count: Approximate number of convex pieces.
     """
 
-    def __init__(self, mesh: trimesh.Trimesh, direction: np.ndarray, tolerances: Tolerances) -> None:
-        """Cut a mesh.
-
-        Args:
-            mesh: Watertight, millimetres.
-            direction: (3,) unit vector.
-            tolerances: Tolerances of the layers.
-        """
-        self._turn = _turned_to_z(direction)
-        vertices = np.asarray(mesh.vertices) @ self._turn.T
-        self._body = Manifold(Mesh64(np.array(vertices, np.float64), np.array(mesh.faces, np.uint64)))
-        self._sections: dict[float, Any] = {}
-        levels = _levels(vertices[mesh.faces], mesh.face_normals @ direction, mesh.area_faces)
+    def __init__(self, mesh: TurnedMesh, tolerances: Tolerances) -> None:
+        """Cut a mesh within tolerances of the layers."""
+        self._mesh = mesh
         self._layers = [
-            replace(layer, section=_simplified(layer.section, tolerances))
-            for layer in self._cut(levels, tolerances)
+            replace(layer, section=_simplified(layer.section, tolerances)) for layer in self._cut(tolerances)
         ]
         self.count = float(sum(_count(layer.section) for layer in self._layers) or np.inf)
 
@@ -118,22 +134,26 @@ class Layers:
             for part in _polygons(layer.section):
                 if part.area >= _LEAST_AREA_MM2:
                     found += [
-                        prism(corners, layer.low, layer.high) @ self._turn
+                        prism(corners, layer.low, layer.high) @ self._mesh.turn
                         for corners in convex_polygons(part)
                         if _width(corners) > _LEAST_WIDTH_MM
                     ]
         return found if 0 < len(found) <= MOST_PIECES else None
 
-    def _cut(self, levels: Sequence[float], tolerances: Tolerances) -> list[Layer]:
+    def _cut(self, tolerances: Tolerances) -> list[Layer]:
         """Layers within the tolerances; none where too many sections would be needed."""
         found: list[Layer] = []
+        used: set[float] = set()
+        levels = self._mesh.levels
         pending = list(zip(levels[:-1], levels[1:], strict=True))[::-1]
         while pending:
-            if len(self._sections) > _MOST_SECTIONS:
+            if len(used) > _MOST_SECTIONS:
                 return []
             low, high = pending.pop()
             margin, middle = min(0.02, 0.1 * (high - low)), (low + high) / 2
-            first, section, last = (self._section(z) for z in (low + margin, middle, high - margin))
+            heights = low + margin, middle, high - margin
+            used.update(heights)
+            first, section, last = map(self._mesh.section, heights)
             thin = high - low <= tolerances.thickness
             width = tolerances.sections
             if not thin and not (_alike(first, section, width) and _alike(section, last, width)):
@@ -143,16 +163,6 @@ class Layers:
             else:
                 found.append(Layer(low=low, high=high, section=section))
         return found
-
-    def _section(self, z: float) -> Any:
-        if z not in self._sections:
-            loops = [shapely.Polygon(loop).buffer(0) for loop in self._body.slice(z).to_polygons()]
-            # Even-odd: holes lie within outlines, and islands within holes.
-            section = shapely.Polygon()
-            for loop in sorted(loops, key=lambda loop: -loop.area):
-                section = section.symmetric_difference(loop)
-            self._sections[z] = section
-        return self._sections[z]
 
 
 def _levels(triangles: np.ndarray, cosines: np.ndarray, areas: np.ndarray) -> list[float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import trimesh
@@ -195,7 +196,9 @@ class _Surface:
 
     def __init__(self, triangles: np.ndarray) -> None:
         self.triangles = triangles
-        self._tree = KDTree(triangles.mean(axis=1))
+        centres = triangles.mean(axis=1)
+        self._radius = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
+        self._tree = KDTree(centres)
 
     def distance_to(self, points: np.ndarray) -> np.ndarray:
         """Distance of points (n, 3)."""
@@ -209,11 +212,16 @@ class _Surface:
     def _by_nearest(self, points: np.ndarray, count: int) -> np.ndarray:
         """Distance to the triangles whose centres are nearest."""
         count = min(count, len(self.triangles))
-        nearest = np.reshape(self._tree.query(points, k=count)[1], (len(points), count))
+        distances, nearest = (
+            np.reshape(one, (len(points), count)) for one in self._tree.query(points, k=count)
+        )
         best = np.full(len(points), np.inf)
-        for column in nearest.T:
-            closest = trimesh.triangles.closest_point(self.triangles[column], points)
-            best = np.minimum(best, np.linalg.norm(closest - points, axis=1))
+        for distance, column in zip(distances.T, nearest.T, strict=True):
+            # A triangle is no nearer than its centre less its radius.
+            rows = np.flatnonzero(distance - self._radius[column] < best)
+            if len(rows):
+                closest = trimesh.triangles.closest_point(self.triangles[column[rows]], points[rows])
+                best[rows] = np.minimum(best[rows], np.linalg.norm(closest - points[rows], axis=1))
         return best
 
 
@@ -226,6 +234,13 @@ def _p95(distance: np.ndarray, area: np.ndarray) -> float:
 
 def aspect_ratio(points: np.ndarray) -> float:
     """Length of a convex body divided by its least thickness."""
+    return _aspect_ratio(np.ascontiguousarray(points, dtype=np.float64).tobytes())
+
+
+@lru_cache(maxsize=4096)
+def _aspect_ratio(coordinates: bytes) -> float:
+    """The same; a search of pieces asks for it again and again of those that it leaves alone."""
+    points = np.frombuffer(coordinates).reshape(-1, 3)
     hull = ConvexHull(points)
     corners = points[hull.vertices]
     heights = corners @ hull.equations[:, :3].T

@@ -24,7 +24,7 @@ from mskgrasp.parts.solids.decompose import (
     split_slender,
     with_few_corners,
 )
-from mskgrasp.parts.solids.layers import Layers, Tolerances, layer_directions
+from mskgrasp.parts.solids.layers import Layers, Tolerances, TurnedMesh, layer_directions
 from mskgrasp.parts.solids.measure import MOST_P95_MM, MOST_VOLUME_RATIO, HullFit, MeshSurface
 from mskgrasp.parts.solids.pieces import merge_in_steps
 
@@ -98,7 +98,7 @@ class _Search:
     def __init__(self, mesh_mm: trimesh.Trimesh) -> None:
         self._mesh = mesh_mm
         self._surface = MeshSurface(mesh_mm)
-        self._directions = layer_directions(mesh_mm)
+        self._turned = [TurnedMesh(mesh_mm, direction) for direction in layer_directions(mesh_mm)]
 
     def fine(self, tolerances: Tolerances) -> list[np.ndarray] | None:
         """Few pieces within the bounds of a fine part; None where there are none or too many."""
@@ -132,7 +132,7 @@ class _Search:
 
     def _sets(self, tolerances: Tolerances) -> Iterator[list[np.ndarray]]:
         """Sets of pieces, each of layers across another direction, the one of the fewest pieces first."""
-        layers = [Layers(self._mesh, direction, tolerances) for direction in self._directions]
+        layers = [Layers(mesh, tolerances) for mesh in self._turned]
         for one in sorted(layers, key=lambda one: one.count)[:_TRIED_DIRECTIONS]:
             pieces = one.pieces()
             if pieces is not None:

@@ -48,19 +48,31 @@ def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[
             if other != number and (boxes[other][0] <= high).all() and (boxes[other][1] >= low).all()
         ]
         union = Manifold.batch_boolean([bodies[n] for n in (number, *near)], OpType.Add)
+        sides = np.unique(np.round(ConvexHull(points).equations, 6), axis=0)
         for other in near:
-            points = _extended(points, pieces[number], pieces[other], bodies[other], union, reach_mm)
+            plane = _plane_between(sides, pieces[other])
+            if plane is not None:
+                points = _extended(points, plane, bodies[other], union, reach_mm)
         found.append(_without_flat_corners(points))
     return found
 
 
 def _extended(
-    points: np.ndarray, own: np.ndarray, other: np.ndarray, body: Manifold, union: Manifold, reach_mm: float
+    points: np.ndarray,
+    plane: tuple[np.ndarray, float],
+    body: Manifold,
+    union: Manifold,
+    reach_mm: float,
 ) -> np.ndarray:
-    """Points (n, 3) and those corners of a neighbour's adjacent slice that keep the union unchanged."""
-    plane = _plane_between(own, other)
-    if plane is None:
-        return points
+    """Points (n, 3) and those corners of a neighbour's adjacent slice that keep the union unchanged.
+
+    Args:
+        points: Of the piece.
+        plane: Normal and offset of its side beyond which the neighbour lies.
+        body: The neighbour.
+        union: Of the piece and all its neighbours.
+        reach_mm: Depth of the slice.
+    """
     normal, offset = plane
     # trim_by_plane keeps the side that the normal points to.
     slab = body.trim_by_plane(tuple(-normal), -(offset + reach_mm))
@@ -81,12 +93,11 @@ def _extended(
     return points
 
 
-def _plane_between(points: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, float] | None:
-    """The side of a convex body (outward normal, offset) beyond which a body lies that touches it."""
-    planes = np.unique(np.round(ConvexHull(points).equations, 6), axis=0)
-    beyond = (other @ planes[:, :3].T + planes[:, 3]).min(axis=0)
+def _plane_between(sides: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """The side (outward normal, offset), of planes (k, 4), beyond which a body lies that touches it."""
+    beyond = (other @ sides[:, :3].T + sides[:, 3]).min(axis=0)
     best = int(beyond.argmax())
-    return (planes[best, :3], -float(planes[best, 3])) if abs(beyond[best]) < _TOUCH_MM else None
+    return (sides[best, :3], -float(sides[best, 3])) if abs(beyond[best]) < _TOUCH_MM else None
 
 
 def _without_flat_corners(points: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from mskgrasp.parts.solids import solid as s
-from mskgrasp.parts.solids.layers import Layers, Tolerances, layer_directions
+from mskgrasp.parts.solids.layers import Layers, Tolerances, TurnedMesh, layer_directions
 from mskgrasp.parts.solids.measure import hull_fit
 from tests.parts.solids.test_decompose import angle_body, mesh_of
 
@@ -16,7 +16,7 @@ FINE = Tolerances(sections=0.4, outline=0.15, thickness=0.6, holes=0.5)
 def pieces_of(
     mesh: trimesh.Trimesh, direction: np.ndarray, tolerances: Tolerances = FINE
 ) -> list[np.ndarray]:
-    found = Layers(mesh, np.asarray(direction, dtype=float), tolerances).pieces()
+    found = Layers(TurnedMesh(mesh, np.asarray(direction, dtype=float)), tolerances).pieces()
     assert found is not None
     return found
 
@@ -62,7 +62,7 @@ def test_small_holes_are_filled_where_the_tolerance_says_so():
 
 def test_the_direction_of_the_extrusion_has_the_fewest_pieces_by_estimate_and_in_fact():
     mesh = mesh_of(angle_body() - s.drill(4, (30, -1, 15), "y", 10))
-    counts = {tuple(d): Layers(mesh, d, FINE) for d in layer_directions(mesh)}
+    counts = {tuple(d): Layers(TurnedMesh(mesh, d), FINE) for d in layer_directions(mesh)}
     best = min(counts, key=lambda d: counts[d].count)
     numbers = {d: len(layers.pieces() or ()) for d, layers in counts.items()}
     assert numbers[best] == min(numbers.values())
