@@ -27,6 +27,10 @@ SIMILAR_HEIGHT, SIMILAR_AREA, SIMILAR_SHARE = 0.5e-3, 6e-6, 0.03
 """The same for resting poses that are looked for together at first."""
 MOST_ORDERS = 72
 """Greatest order of symmetry other than a full one."""
+MOST_RIVALS, RIVAL_SHARE, RIVAL_APART = 4, 0.3, np.radians(9)
+"""So many other turns, so far apart, at which a part nearly looks the same: less of its area differs."""
+_BESIDE = 5
+"""Degrees within which there is none that looks more alike."""
 MOST_COMPARED = 12
 """Similar resting poses that are distinguished; more of them are facets of a body of revolution."""
 FEW_POINTS = 20000
@@ -78,6 +82,8 @@ class Look:
         from_above: Heights of it as seen from straight above.
         top: Height of the highest point, metres.
         radius: Greatest distance of a point from the vertical through the part's origin, metres.
+        rivals: Turns at which it nearly looks the same, radians: by a tooth of a gear with holes, or by half
+            a turn of a plate with holes at one end.
     """
 
     poses: tuple[Lying, ...]
@@ -86,6 +92,7 @@ class Look:
     from_above: HeightMap
     top: float
     radius: float
+    rivals: tuple[float, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,6 +239,24 @@ class _Seen:
             self._same_at(t, similar, 1) for t in turns
         )
 
+    def rivals(self, order: int) -> tuple[float, ...]:
+        """Turns within the period of a symmetry at which it nearly looks the same, the likest first."""
+        if not order:
+            return ()
+        period, every = 2 * np.pi / order, max(1, len(self.levels) // 3000)
+        turns = np.linspace(0, period, max(3, round(np.degrees(period))), endpoint=False)
+        shares = np.array([self.differs(self, turn, SIMILAR_HEIGHT, every) for turn in turns]) / self.area
+        steps = range(-_BESIDE, _BESIDE + 1)
+        least = shares <= np.min([np.roll(shares, step) for step in steps], axis=0)
+        found = [0.0]
+        for turn, share in sorted(
+            zip(turns[least].tolist(), shares[least].tolist(), strict=True), key=lambda one: one[1]
+        ):
+            off = np.abs((np.array(found) - turn + period / 2) % period - period / 2)
+            if share < RIVAL_SHARE and off.min() > RIVAL_APART and len(found) <= MOST_RIVALS:
+                found.append(turn)
+        return tuple(found[1:])
+
     def _same_at(self, turn: float, similar: bool, every: int, slack: float = 1.0) -> bool:
         height = SIMILAR_HEIGHT if similar else SAME_HEIGHT
         return self.differs(self, turn, height, every) <= slack * self.allowed(similar)
@@ -279,4 +304,5 @@ def _look(group: list[tuple[_Seen, float]]) -> Look:
         from_above=first.from_above,
         top=float(points[:, 2].max()),
         radius=float(np.linalg.norm(points[:, :2], axis=1).max()),
+        rivals=first.rivals(poses[0].order),
     )

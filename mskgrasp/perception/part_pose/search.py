@@ -17,6 +17,8 @@ LOOK_MODES = 6
 """The most of one look."""
 MOST_REFINED, NEAR_COST = 3, 30.0
 """So many resting poses of a look are refined at the end, if their cost exceeds the least by less."""
+_TRIED, _SETTLED = 1.6, 0.4
+"""First and final fits at nearer turns are the same, in turns between neighbouring tries."""
 _DEPENDS_WITHIN = 1.5
 """A pixel's height depends on the pose where heights differ within so many pixels."""
 
@@ -84,11 +86,19 @@ def search(seen: Seen, known: KnownPart) -> list[Fit]:
     for effort, n in ((ROUGH, 6 + n_looks // 3), (CLOSER, 3 + n_looks // 4), (CLOSE, 2 + n_looks // 8)):
         fits = _best([improve(fit, seen, known, effort) for fit in fits], n)
     found = []
-    for fit in fits:
+    for fit in [*_turned(fits[0], seen, known), *fits[1:]]:
         likely = _resting_poses(fit, seen, known)
         near = [one for one in likely[:MOST_REFINED] if one.cost < likely[0].cost + NEAR_COST]
         found += [improve(one, seen, known, FINAL) for one in near]
-    return _best(found, len(found))
+    return _best(found, len(found), apart=_SETTLED)
+
+
+def _turned(fit: Fit, seen: Seen, known: KnownPart) -> list[Fit]:
+    """A fit, and the same turned to where the part nearly looks the same, if that may be better."""
+    rivals = [replace(fit, pose=fit.pose + [0.0, 0.0, turn]) for turn in fit.look.rivals]
+    fits = [fit, *(improve(rival, seen, known, CLOSE) for rival in rivals)]
+    least = min(one.cost for one in fits)
+    return sorted((one for one in fits if one.cost < least + NEAR_COST), key=lambda one: one.cost)
 
 
 def _coarse(seen: Seen, known: KnownPart) -> list[Fit]:
@@ -137,26 +147,26 @@ def _turn_step(look: Look) -> float:
     return float(np.clip(4e-3 / look.radius, np.radians(3), np.radians(8)))
 
 
-def _best(fits: list[Fit], n: int) -> list[Fit]:
-    """The best fits of which no two are nearly the same."""
+def _best(fits: list[Fit], n: int, apart: float = _TRIED) -> list[Fit]:
+    """The best fits of which no two are nearly the same, by so many turns between tries."""
     kept: list[Fit] = []
     for fit in sorted(fits, key=lambda fit: fit.cost):
         rivals = [other for other in kept if other.look is fit.look]
-        if len(rivals) < LOOK_MODES and not any(_near(fit, other) for other in rivals):
+        if len(rivals) < LOOK_MODES and not any(_near(fit, other, apart) for other in rivals):
             kept.append(fit)
         if len(kept) == n:
             break
     return kept
 
 
-def _near(a: Fit, b: Fit) -> bool:
+def _near(a: Fit, b: Fit, steps: float) -> bool:
     if a.lying is not b.lying:
         return False
     if not a.lying.order:
         return True
     period = a.lying.period
     apart = abs((a.pose[2] - b.pose[2] + period / 2) % period - period / 2)
-    return apart < 1.6 * _turn_step(a.look)
+    return apart < steps * _turn_step(a.look)
 
 
 def improve(fit: Fit, seen: Seen, known: KnownPart, effort: Effort) -> Fit:

@@ -23,6 +23,13 @@ def test_a_washer_has_any_turn_and_a_bracket_one():
     assert orders("l_bracket_60x40")[0] == 1
 
 
+def test_a_block_with_ports_nearly_looks_the_same_after_half_a_turn_and_a_bracket_at_no_other_turn():
+    block = {look.poses[0].resting: look.rivals for look in known("port_block_55x35").looks}
+    assert np.degrees(block[6]) == pytest.approx([180], abs=1)
+    assert all(look.rivals == () for look in known("l_bracket_60x40").looks)
+    assert all(look.rivals == () for look in known("washer_m36").looks if look.poses[0].order == 0)
+
+
 def test_both_sides_of_a_nut_look_alike():
     looks = known("hex_nut_m30").looks
     assert {one.resting for one in looks[0].poses} == {0, 1}

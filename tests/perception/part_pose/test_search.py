@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mskgrasp.perception.part_detection import find_part_pixels
 from mskgrasp.perception.part_pose.part_pose import see
-from mskgrasp.perception.part_pose.search import CLOSE, Effort, Fit, improve, search
+from mskgrasp.perception.part_pose.search import CLOSE, Effort, Fit, _turned, improve, search
 from tests.perception.part_pose.cells import kinect2, known, posed, resting_at
 
 NAME = "l_bracket_60x40"
@@ -46,3 +48,10 @@ def test_the_best_fit_comes_first_and_the_search_is_repeatable(image):
     fits = search(image, known(NAME))
     assert [fit.cost for fit in fits] == sorted(fit.cost for fit in fits)
     assert np.array_equal(search(image, known(NAME))[0].pose, fits[0].pose)
+
+
+def test_a_fit_turned_to_where_the_part_nearly_looks_the_same_is_turned_back(image):
+    fit = start((0, 0, -2.0))
+    fit = replace(fit, look=replace(fit.look, rivals=(2.0,)))
+    best = _turned(fit, image, known(NAME))[0]
+    assert abs(best.pose[2] - 0.8) < np.radians(0.7)
