@@ -233,6 +233,7 @@ def test_parts_that_the_first_shard_shows_outside_the_filter_get_no_further_shar
             ]
 
 
+@pytest.mark.slow
 def test_a_dataset_is_made_again_from_its_labels_but_for_a_part_that_has_changed(collected, tmp_path):
     labels, again = tmp_path / "all.labels", tmp_path / "again"
     export_labels(collected, labels)

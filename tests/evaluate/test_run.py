@@ -103,6 +103,7 @@ def test_a_run_with_other_settings_or_another_model_is_refused_and_a_copy_of_its
         evaluate(config(alone, trials=3, noise="kinect2", models=models))
 
 
+@pytest.mark.slow
 def test_an_estimate_counts_the_missing_trials_and_makes_none_of_them(
     alone: Path, capsys: pytest.CaptureFixture[str]
 ):

@@ -163,6 +163,7 @@ LEFT_OUT = {
 """Recipes whose hulls are too far from the mesh, or whose part is another one's; the build says which."""
 
 
+@pytest.mark.slow
 def test_the_published_table_is_that_of_these_parts(family_parts):
     with open(Path(__file__).parents[3] / "docs" / "catalogue.csv", encoding="utf-8", newline="") as file:
         rows = {row["name"]: row for row in csv.DictReader(file)}
