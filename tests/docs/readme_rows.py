@@ -334,6 +334,7 @@ ROWS: tuple[tuple[str, Callable[[StoredReport], list[ReadmeRow]]], ...] = (
     ("success_certified_cad_kinect2", _certified_elsewhere("noise of a Kinect v2")),
     ("success_certified_cad_mujoco", _certified_elsewhere("in MuJoCo")),
     ("assessed", _assessed),
+    ("assessed_catalogue", _assessed),
     ("benchmark", _benchmark),
     ("palletize", _palletize),
     ("shipped_model", _shipped_model),
