@@ -44,7 +44,7 @@ class AssessConfig(Config):
     """Folder for report.html, grasps.json, grasps.isaac.yaml and trials.jsonl; with several parts, of a
     folder for each, and index.html."""
     quick: bool = False
-    """A third of the simulations and trials: under three minutes on two cores."""
+    """A third of the simulations and trials: about three minutes on two cores."""
     unit: Unit | None = None
     """Unit of a CAD file's coordinates, where the format states none; mm if not given."""
     models: Path = PRETRAINED
