@@ -40,7 +40,7 @@ PART = (
     "mskgrasp/parts/write_solid.py",
     *(
         f"mskgrasp/parts/solids/{name}.py"
-        for name in ("measure", "stable_poses", "solid", "pieces", "decompose", "overlap")
+        for name in ("measure", "stable_poses", "solid", "pieces", "merging", "decompose", "overlap")
     ),
 )
 IMPORT = (

@@ -22,7 +22,7 @@ from mskgrasp.parts.solids.measure import (
     MeshSurface,
     aspect_ratio,
 )
-from mskgrasp.parts.solids.pieces import merge_in_steps
+from mskgrasp.parts.solids.merging import merge_in_steps
 from mskgrasp.parts.solids.solid import cut, few_corners
 
 MOST_HULLS = 48

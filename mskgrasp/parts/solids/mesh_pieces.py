@@ -26,7 +26,7 @@ from mskgrasp.parts.solids.decompose import (
 )
 from mskgrasp.parts.solids.layers import Layers, Tolerances, TurnedMesh, layer_directions
 from mskgrasp.parts.solids.measure import MOST_P95_MM, MOST_VOLUME_RATIO, HullFit, MeshSurface
-from mskgrasp.parts.solids.pieces import merge_in_steps
+from mskgrasp.parts.solids.merging import merge_in_steps
 
 MOST_MESH_HULLS = 128
 """Greatest number of pieces of a mesh."""

@@ -17,7 +17,8 @@ from manifold3d import Manifold, OpType
 from scipy.spatial import ConvexHull, QhullError
 
 from mskgrasp.parts.solids import solid as s
-from mskgrasp.parts.solids.pieces import convex_polygons, merge_hulls, split_by, turned_pieces
+from mskgrasp.parts.solids.merging import merge_hulls
+from mskgrasp.parts.solids.pieces import convex_polygons, split_by, turned_pieces
 
 HULL_DETAIL_MM = 0.15
 """Size of detail that hulls leave out of an outline or profile: small chamfers, the facets of fillets."""

@@ -15,7 +15,8 @@ from mskgrasp.parts.recipes.cad.hulls import turned_hulls
 from mskgrasp.parts.recipes.recipe import ALUMINIUM, STEEL, Recipe
 from mskgrasp.parts.solids import solid as s
 from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, aspect_ratio
-from mskgrasp.parts.solids.pieces import merge_hulls, split_by, turned_pieces
+from mskgrasp.parts.solids.merging import merge_hulls
+from mskgrasp.parts.solids.pieces import split_by, turned_pieces
 from mskgrasp.parts.solids.shape import HULL_DETAIL_MM
 
 CAST_IRON = 7200.0

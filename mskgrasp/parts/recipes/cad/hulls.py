@@ -11,7 +11,8 @@ from manifold3d import Manifold, Mesh64
 
 from mskgrasp.parts.solids import solid as s
 from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, aspect_ratio
-from mskgrasp.parts.solids.pieces import convex_polygons, merge_hulls, turned_pieces
+from mskgrasp.parts.solids.merging import merge_hulls
+from mskgrasp.parts.solids.pieces import convex_polygons, turned_pieces
 from mskgrasp.parts.solids.shape import FILLED_BORE_MM, HULL_DETAIL_MM
 
 _NOISE_MM = 0.02
