@@ -11,7 +11,7 @@ from typing import Any, Literal
 import yaml
 
 from mskgrasp.core.files import write_whole
-from mskgrasp.core.seeds import spread_trial_seeds, trial_seeds
+from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.parts import Part, find_part
 from mskgrasp.planning.certified import CertifiedGrasps
 from mskgrasp.planning.certified_planner import CertifiedPlanner, reachable_by
@@ -83,7 +83,6 @@ def scene_tasks(part: Part, n_trials: int) -> list[SceneTask]:
 def trial_bench(setup: AssessSetup) -> Iterator[Callable[[SceneTask], Iterator[PlacedTrial]]]:
     """Make the trials of a scene by certified grasps and by the networks alone."""
     part = find_part(setup.source)
-    seeds_of = spread_trial_seeds if setup.spread else trial_seeds
     nothing = replace(setup.certified, grasps=(), uncertified=())
     with ExitStack() as stack:
         found: dict[str, tuple[TrialEngine, dict[str, CertifiedPlanner]]] = {}
@@ -104,7 +103,7 @@ def trial_bench(setup: AssessSetup) -> Iterator[Callable[[SceneTask], Iterator[P
 
         def run(task: SceneTask) -> Iterator[PlacedTrial]:
             engine, planners = bench(task.condition)
-            seeds = seeds_of(setup.seed, part.name, task.number)
+            seeds = trial_seeds(setup.seed, part.name, task.number, spread=setup.spread)
             for means in task.means:
                 trial = PlacedTrial(part=part.name, condition=task.condition, number=task.number, means=means)
                 yield grasp_and_place(engine, planners[means], part, seeds, trial, setup.certified.like)

@@ -28,7 +28,7 @@ def scene_seeds(seed: int, part: str, number: int, draw: int = 0) -> tuple[int, 
     return _two_words([seed, zlib.crc32(part.encode()), number, *([draw] if draw else [])])
 
 
-def trial_seeds(seed: int, part: str, number: int) -> tuple[int, int]:
+def trial_seeds(seed: int, part: str, number: int, *, spread: bool = False) -> tuple[int, int]:
     """Seeds of the scene of a trial or placement, whatever the planner.
 
     No dataset has this scene, not even one of the same seed: a network meets no image that it learned.
@@ -37,29 +37,16 @@ def trial_seeds(seed: int, part: str, number: int) -> tuple[int, int]:
         seed: Seed of the run.
         part: Name of the part.
         number: Index of the trial among those of the part.
-
-    Returns:
-        The seed of the part's place and turn, and that of all that is drawn after it.
-    """
-    return _two_words([seed, zlib.crc32(part.encode()), number, 0, _TRIAL])
-
-
-def spread_trial_seeds(seed: int, part: str, number: int) -> tuple[int, int]:
-    """Seeds as of `trial_seeds`, for few trials: their resting poses are as frequent as they are probable.
-
-    The first random number of a scene decides its resting pose (`mskgrasp.parts.resting_pose`). Those of
-    consecutive trials follow the golden ratio's sequence, which fills the unit interval evenly however many
-    there are (Weyl), from a start of the seed's.
-
-    Args:
-        seed: Seed of the run.
-        part: Name of the part.
-        number: Index of the trial among those of the part.
+        spread: Resting poses are as frequent as they are probable, however few the trials. The first random
+            number of a scene decides its pose (`mskgrasp.parts.resting_pose`); those of consecutive trials
+            follow the golden ratio's sequence, which fills the unit interval evenly (Weyl).
 
     Returns:
         The seed of the part's place and turn, and that of all that is drawn after it.
     """
     words = [seed, zlib.crc32(part.encode()), number, 0, _TRIAL]
+    if not spread:
+        return _two_words(words)
     wanted = np.random.default_rng([seed, words[1], _TRIAL]).random() + number * _GOLDEN
     drawn = (_two_words([*words, draw]) for draw in itertools.count(1))
     return next(seeds for seeds in drawn if _turns_apart(_first_number(seeds[0]), wanted) < _NEAR)

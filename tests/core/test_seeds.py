@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import itertools
+from functools import partial
 
 import numpy as np
 
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.seeds import scene_seeds, spread_trial_seeds, trial_seeds
+from mskgrasp.core.seeds import scene_seeds, trial_seeds
 from mskgrasp.parts.resting_pose import random_resting_pose
+
+spread_trial_seeds = partial(trial_seeds, spread=True)
 
 
 def test_the_seeds_are_those_that_datasets_were_made_with():
