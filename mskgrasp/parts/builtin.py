@@ -15,6 +15,7 @@ from mskgrasp.parts import store
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
 from mskgrasp.parts.recipes import cad, families
 from mskgrasp.parts.recipes.recipe import Recipe
+from mskgrasp.parts.solids.one_thread import hold_manifold_to_one_thread
 from mskgrasp.parts.versions import PART_VERSION, stamp
 from mskgrasp.parts.write_solid import with_hulls, write_solid
 
@@ -63,6 +64,7 @@ def build_part(name: str) -> Part:
     recipe = recipe_of(name)
     if is_built(name):
         return store.read_part(store.parts_folder() / name)
+    hold_manifold_to_one_thread()
     dimensions = {
         key.removesuffix("_mm"): value / 1000 if key.endswith("_mm") else value
         for key, value in recipe.dimensions.items()

@@ -76,6 +76,9 @@ def measure(folder: Path, unit: Unit | None, every: int = 1) -> tuple[list[Outco
     # Loaded before the clock starts; a user's import of many files loads it once, too.
     from mskgrasp.parts.importing.import_file import import_file
     from mskgrasp.parts.importing.select_files import select_files
+    from mskgrasp.parts.solids.one_thread import hold_manifold_to_one_thread
+
+    hold_manifold_to_one_thread()  # as an import does, before the files are looked at
 
     outcomes: list[Outcome] = []
     others: list[str] = []

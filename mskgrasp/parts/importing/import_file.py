@@ -25,6 +25,7 @@ from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
 from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, MeshFile, read_content, read_mesh
 from mskgrasp.parts.part import Part
 from mskgrasp.parts.solids.mesh_pieces import mesh_pieces
+from mskgrasp.parts.solids.one_thread import hold_manifold_to_one_thread
 from mskgrasp.parts.solids.simplify import for_collision
 from mskgrasp.parts.solids.solid import Solid
 from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION, stamp
@@ -87,6 +88,7 @@ def import_file(
             reason.
     """
     check_density(density)
+    hold_manifold_to_one_thread()
     name = legal_name(path.stem if name is None else name)
     content = read_content(path)
     sha256 = hashlib.sha256(content).digest()
