@@ -26,6 +26,8 @@ EARLY = 0.007
 """Height above the target pose from which contact with the table counts as placed, metres."""
 TAKEN_ALONG = 0.03
 """A part that is so much higher than it lay is still in the hand, which has risen farther, metres."""
+_NEAR = 0.02
+"""Height above the target pose from which the part is lowered slowly, metres."""
 _BELOW = 0.001
 """Distance below the height of the grasp to which a part is lowered at most until it touches, metres."""
 _TOUCH_FORCE, _TOUCH_SPEED = 5.0, 0.02
@@ -226,6 +228,8 @@ def place(
         up = Pose(position=np.array([x, y, above.position[2]]), quat_wxyz=here.quat_wxyz)
         cell.arm.move_to_pose(up, speed=0.25)
     cell.arm.move_to_pose(above, speed=0.25)
+    if pose.position[2] + _NEAR < above.position[2]:
+        cell.arm.move_to_pose(pose.raised(_NEAR).T_base_tcp, speed=0.25)
     try:
         cell.arm.move_to_pose(pose.T_base_tcp, speed=0.1)
     except MotionAborted as error:
