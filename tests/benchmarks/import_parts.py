@@ -2,8 +2,8 @@
 
 Imports the CAD files of a folder (anybody's; `tests.benchmarks.cad_files` exports a set) into a cache folder
 of its own, one after the other on one core. Files that are no single watertight body by the reader's own
-repair are listed and not counted. ``--speed-up N`` imports them again with one process and with N, compares
-the wall time, and checks that the parts are the same to the last byte.
+repair are listed and not counted. ``--speed-up N`` imports them again with N processes, as a user does,
+compares the wall time, and checks that the parts are the same to the last byte.
 """
 
 from __future__ import annotations
@@ -30,12 +30,13 @@ from tests.benchmarks.report import show
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """One watertight file: its part, or the reason why there is none, and processor seconds."""
+    """One watertight file: its part, or the reason why there is none, and seconds: processor's and wall."""
 
     path: Path
     part: Part | None
     reason: str
     seconds: float
+    wall: float
 
 
 def main() -> None:
@@ -49,26 +50,28 @@ def main() -> None:
     parser.add_argument("--unit", choices=get_args(Unit), help="unit of STL, OBJ and PLY (default mm)")
     parser.add_argument("--every", type=int, default=1, help="import every n-th file only (default 1)")
     parser.add_argument(
-        "--speed-up", type=int, default=0, metavar="N", help="time one process against N, too"
+        "--speed-up", type=int, default=0, metavar="N", help="import them with N processes, too"
     )
     parser.add_argument("--out", type=Path, help="folder for report.json")
     options = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
-    outcomes, no_bodies = measure(options.folder, cast("Unit | None", options.unit), options.every)
+    unit = cast("Unit | None", options.unit)
+    with tempfile.TemporaryDirectory() as folder:
+        outcomes, no_bodies = measure(options.folder, unit, Path(folder), options.every)
+        alone = _contents(Path(folder))
     if not any(one.part for one in outcomes):
         parser.error(
             f"no file of {options.folder} becomes a part: {'; '.join(no_bodies[:3]) or 'none found'}"
         )
     tables = [_summary(outcomes, no_bodies), _files(outcomes)]
     if options.speed_up:
-        files = [outcome.path for outcome in outcomes]
-        tables.insert(1, _speed_up(files, cast("Unit | None", options.unit), options.speed_up))
+        tables.insert(1, _speed_up(outcomes, alone, unit, options.speed_up))
     n = f"{len(outcomes)} watertight files; {len(no_bodies)} others were not counted"
     show(tables, options.out, {"n": n})
 
 
-def measure(folder: Path, unit: Unit | None, every: int = 1) -> tuple[list[Outcome], list[str]]:
-    """Import the files of a folder one by one.
+def measure(folder: Path, unit: Unit | None, cache: Path, every: int = 1) -> tuple[list[Outcome], list[str]]:
+    """Import the files of a folder one by one into an empty cache.
 
     Returns:
         Outcomes of the watertight files, and a line for each of the others.
@@ -82,19 +85,20 @@ def measure(folder: Path, unit: Unit | None, every: int = 1) -> tuple[list[Outco
 
     outcomes: list[Outcome] = []
     others: list[str] = []
-    with tempfile.TemporaryDirectory() as cache, store.kept_in(Path(cache)):
+    with store.kept_in(cache):
         for path in progress(select_files([folder]).files[::every], unit="file"):
             reason = _no_body(path, unit)
             if reason:
                 others.append(reason)
                 continue
-            start = time.process_time()
+            start, began = time.process_time(), time.perf_counter()
             part, reason = None, ""
             try:
                 part = import_file(path, unit=unit).parts[0]
             except BadPart as error:
                 reason = str(error)
-            one = Outcome(path=path, part=part, reason=reason, seconds=time.process_time() - start)
+            seconds, wall = time.process_time() - start, time.perf_counter() - began
+            one = Outcome(path=path, part=part, reason=reason, seconds=seconds, wall=wall)
             outcomes.append(one)
             note(", ".join(str(cell) for cell in _row(one)))
     return outcomes, others
@@ -147,23 +151,28 @@ def _summary(outcomes: Sequence[Outcome], others: Sequence[str]) -> Table:
     return Table(header=("of all files", ""), rows=rows, caption="All files")
 
 
-def _speed_up(files: Sequence[Path], unit: Unit | None, workers: int) -> Table:
-    """Wall time of one process and of several; the parts' bytes are compared."""
-    seconds, contents = [], []
-    for n in (1, workers):
-        with tempfile.TemporaryDirectory() as cache, store.kept_in(Path(cache)):
-            start = time.perf_counter()
-            results = import_files(files, _options(unit), n)
-            for _ in progress(results, unit="file", total=len(files), title=f"{n} processes"):
-                pass
-            seconds.append(time.perf_counter() - start)
-            contents.append(
-                {str(path.relative_to(cache)): path.read_bytes() for path in Path(cache).rglob("*.*")}
-            )
-    same = "yes" if contents[0] == contents[1] else "no"
-    rows = [(f"{n} processes, s", f"{s:.0f}") for n, s in zip((1, workers), seconds, strict=True)]
-    rows += [("speed-up", f"{seconds[0] / seconds[1]:.2f}"), ("the same bytes", same)]
+def _speed_up(outcomes: Sequence[Outcome], alone: dict[str, bytes], unit: Unit | None, workers: int) -> Table:
+    """Wall time of one process and of several, their start included; the parts' bytes are compared."""
+    with tempfile.TemporaryDirectory() as cache, store.kept_in(Path(cache)):
+        start = time.perf_counter()
+        results = import_files([one.path for one in outcomes], _options(unit), workers)
+        for _ in progress(results, unit="file", total=len(outcomes), title=f"{workers} processes"):
+            pass
+        together = time.perf_counter() - start
+        same = "yes" if _contents(Path(cache)) == alone else "no"
+    one = sum(outcome.wall for outcome in outcomes)
+    rows = [
+        ("1 process, s", f"{one:.0f}"),
+        (f"{workers} processes, s", f"{together:.0f}"),
+        (f"{workers} processes, s a file", f"{together / len(outcomes):.1f}"),
+        ("speed-up", f"{one / together:.2f}"),
+        ("the same bytes", same),
+    ]
     return Table(header=("wall time", ""), rows=rows, caption="One process and several")
+
+
+def _contents(cache: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(cache)): path.read_bytes() for path in cache.rglob("*.*") if path.is_file()}
 
 
 def _options(unit: Unit | None) -> ImportOptions:
