@@ -86,8 +86,11 @@ def draw_grasps(part: Part, certified: CertifiedGrasps, path: Path) -> None:
             turned = Pose(position=np.zeros(3), quat_wxyz=part.resting.quat_wxyz[number]).apply(vertices)
             _top_view(axis, 1e3 * turned, np.asarray(mesh.faces))
             grasps, _ = certified.of(number)
-            for rank, grasp in enumerate(grasps):
+            reach = 1e3 * float(np.abs(turned[:, :2]).max())
+            for rank, grasp in reversed(list(enumerate(grasps))):  # the best one on top
                 _jaw(axis, grasp.grasp, BLUE if rank == 0 else FAINT)
+                reach = max(reach, 1e3 * (float(np.abs(grasp.grasp[:2]).max()) + MAX_OPENING / 2))
+            axis.set(xlim=(-reach - 6, reach + 6), ylim=(-reach - 6, reach + 6))
             share = _share_of(part, certified, number)
             axis.set_title(f"pose {number}: {share:.0%}, {len(grasps)} grasps", fontsize=9)
             axis.set(aspect="equal", xlabel="mm")
@@ -109,9 +112,6 @@ def _top_view(axis: Axes, vertices: np.ndarray, faces: np.ndarray) -> None:
     axis.add_collection(PolyCollection(list(triangles[:, :, :2]), facecolors=colours, edgecolors="none"))
     outline = vertices[ConvexHull(vertices[:, :2]).vertices, :2]
     axis.fill(*outline.T, facecolor="none", edgecolor=PALE, linewidth=0.8)
-    reach = 1e3 * MAX_OPENING / 2 + 8
-    span = np.abs(vertices[:, :2]).max() + 4
-    axis.set(xlim=(-max(span, reach), max(span, reach)), ylim=(-max(span, reach), max(span, reach)))
 
 
 def _jaw(axis: Axes, grasp: np.ndarray, colour: str) -> None:
