@@ -154,10 +154,12 @@ class WritingCell:
         start = Pose(position=np.array([0.4, 0.0, z]), quat_wxyz=DOWN)
         cell.arm.move_to_pose(start)
         self.seen: list[list[float]] = []
+        self.speeds: list[float] = []
         self.cell, move = cell, cell.arm.move_to_pose
 
         def noted(T_base_tcp: Pose, *, speed: float = 0.1) -> None:
             self.seen.append(np.asarray(T_base_tcp.position).round(4).tolist())
+            self.speeds.append(speed)
             move(T_base_tcp, speed=speed)
 
         cell.arm.move_to_pose = noted
@@ -190,15 +192,23 @@ def test_a_tall_part_rises_before_it_goes_aside_and_the_hand_leaves_over_it():
     assert bench.seen == [
         [0.4, 0.0, 0.235],  # 16 cm, the part's 6 cm, and 15 mm
         [0.5, 0.2, 0.235],
+        [0.5, 0.2, 0.08],
         [0.5, 0.2, 0.06],
         [0.5, 0.2, 0.2045],  # over the part itself
     ]
 
 
-def test_a_low_part_goes_straight_aside():
+def test_a_low_part_goes_straight_aside_and_slowly_over_the_last_20_mm():
     bench = WritingCell(0.16)
     place(bench.cell, Grasp.from_vector(np.array([0.5, 0.2, 0.06, 0.0])), recover, tallest=0.03)
-    assert bench.seen == [[0.5, 0.2, 0.12], [0.5, 0.2, 0.06], [0.5, 0.2, 0.12]]
+    assert bench.seen == [[0.5, 0.2, 0.12], [0.5, 0.2, 0.08], [0.5, 0.2, 0.06], [0.5, 0.2, 0.12]]
+    assert bench.speeds == [0.25, 0.25, 0.1, 0.25]
+
+
+def test_a_tall_part_that_hangs_just_over_its_place_is_lowered_slowly_all_the_way():
+    bench = WritingCell(0.19)
+    place(bench.cell, Grasp.from_vector(np.array([0.5, 0.2, 0.15, 0.0])), recover)
+    assert bench.seen == [[0.5, 0.2, 0.17], [0.5, 0.2, 0.15], [0.5, 0.2, 0.17]]
 
 
 def test_the_part_may_be_measured_at_its_place_before_the_fingers_open():
@@ -212,7 +222,7 @@ def test_the_part_may_be_measured_at_its_place_before_the_fingers_open():
     pose = Grasp.from_vector(np.array([0.5, 0.2, 0.06, 0.0]))
     place(bench.cell, pose, recover, tallest=0.03, arrived=arrived)
     assert there == pytest.approx([0.5, 0.2, 0.057])  # 1 mm lower than it was grasped, where nothing is met
-    assert bench.seen == [[0.5, 0.2, 0.12], [0.5, 0.2, 0.06], [], [0.5, 0.2, 0.12]]
+    assert bench.seen == [[0.5, 0.2, 0.12], [0.5, 0.2, 0.08], [0.5, 0.2, 0.06], [], [0.5, 0.2, 0.12]]
 
 
 @pytest.mark.parametrize(
