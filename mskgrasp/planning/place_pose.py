@@ -27,7 +27,8 @@ EARLY = 0.007
 TAKEN_ALONG = 0.03
 """A part that is so much higher than it lay is still in the hand, which has risen farther, metres."""
 _NEAR = 0.02
-"""Height above the target pose from which the part is lowered slowly, metres."""
+"""Height above the target pose from which the part is lowered slowly, metres; more than `EARLY`, so that
+it meets the table slowly where it hangs lower than expected, too."""
 _BELOW = 0.001
 """Distance below the height of the grasp to which a part is lowered at most until it touches, metres."""
 _TOUCH_FORCE, _TOUCH_SPEED = 5.0, 0.02

@@ -13,8 +13,8 @@ def hold_manifold_to_one_thread() -> None:
     """Make manifold3d compute in the thread that calls it, if this process has not used it before.
 
     Its thread pool has one thread for each core. Bodies of parts are too small to be shared out: the others
-    wait for work by spinning, a quarter of an import's processor time, which a worker process beside this
-    one needs. The pool has no other setting than the cores on which its first user may run.
+    wait for work by spinning, on two cores a quarter of an import's processor time, which a worker process
+    beside this one needs. The pool has no other setting than the cores on which its first user may run.
     """
     if not hasattr(os, "sched_setaffinity"):  # Linux alone has it
         return
