@@ -145,6 +145,7 @@ def _least_outside(hull: ConvexHull, corners: np.ndarray, sides: Sequence[np.nda
         gap = gap[free, None]
         ends = np.take_along_axis(before[free], chosen[free, None], axis=2)
         reach = np.where(ends < 0, gap / np.maximum(gap - ends, gap), 1.0).min(axis=2)
+        # Split at the point into four, each with three of the shrunk edges.
         shrunk = (weights * reach.prod(axis=1, keepdims=True) / reach).sum(axis=1)
         best[free] = np.maximum(best[free], shrunk)
     return (volumes * best.reshape(volumes.shape)).sum(axis=1)
