@@ -13,11 +13,12 @@ import numpy as np
 from mskgrasp.assess.config import Tolerance
 from mskgrasp.assess.figures import draw_grasps, draw_shares
 from mskgrasp.assess.scene import scene_page
-from mskgrasp.assess.summary import DISTANCES, Row, Share, summarise, summary_json, verdict
+from mskgrasp.assess.summary import DISTANCES, Row, summarise, summary_json, verdict
 from mskgrasp.assess.trials import EXACT, NOISY
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.grasp import MAX_OPENING, TILT_LIMIT
 from mskgrasp.core.metrics import wilson_interval
+from mskgrasp.core.share import Share
 from mskgrasp.parts import Part
 from mskgrasp.parts.least_width import least_widths
 from mskgrasp.planning.certified import CertifiedGrasps, radius_about_vertical

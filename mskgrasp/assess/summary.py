@@ -12,7 +12,7 @@ import numpy as np
 from mskgrasp.assess.config import Tolerance
 from mskgrasp.assess.trials import MEANS, Means
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.metrics import wilson_interval
+from mskgrasp.core.share import Share
 from mskgrasp.trials.placed_trial import CORRECTIONS, Correction, PlacedTrial
 
 DISTANCES = (1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3)
@@ -26,28 +26,6 @@ ADVICE: dict[Correction, str] = {
     "seen": "look at the part in the hand",
 }
 OTHERWISE = "use a fixture or another pose"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Share:
-    """A share of attempts with its 95 % interval (Wilson)."""
-
-    n: int
-    of: int
-
-    @property
-    def value(self) -> float:
-        """The share; 0 of no attempt."""
-        return self.n / self.of if self.of else 0.0
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % interval; everything where nothing was tried."""
-        return wilson_interval(self.n, self.of) if self.of else (0.0, 1.0)
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain values."""
-        return dict(n=self.n, of=self.of, share=self.value, interval=list(self.interval))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,14 +112,14 @@ def summarise(trials: Sequence[PlacedTrial], tolerance: Tolerance, tilt_limit: f
 def _row(
     condition: str, means: Means, trials: Sequence[PlacedTrial], tolerance: Tolerance, tilt_limit: float
 ) -> Row:
-    n = len(trials)
+    parts = [trial.part for trial in trials]
     errors = {one: [trial.error(one) for trial in trials] for one in CORRECTIONS}
 
     def within(correction: Correction, distance: float, angle: float) -> Share:
-        hits = (
+        hits = [
             error is not None and error[0] <= distance and error[1] <= angle for error in errors[correction]
-        )
-        return Share(n=sum(hits), of=n)
+        ]
+        return Share.count(hits, parts)
 
     lifted = [trial for trial in trials if trial.lifted]
     off = np.array(
@@ -154,9 +132,9 @@ def _row(
     return Row(
         condition=condition,
         means=means,
-        certified=Share(n=sum(trial.planned_by == "certified" for trial in trials), of=n),
+        certified=Share.count([trial.planned_by == "certified" for trial in trials], parts),
         uncertified=sum(trial.planned_by == "uncertified" for trial in trials),
-        lifted=Share(n=len(lifted), of=n),
+        lifted=Share.count([trial.lifted for trial in trials], parts),
         within={one: within(one, tolerance.distance, tolerance.angle) for one in CORRECTIONS},
         within_distance={
             one: tuple(within(one, distance, np.inf) for distance in DISTANCES) for one in CORRECTIONS

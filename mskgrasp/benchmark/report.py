@@ -22,19 +22,17 @@ from mskgrasp.benchmark.summary import (
     DISTANCES,
     STAGES,
     Budget,
-    PlacedShare,
     Refusal,
     Row,
     budgets,
     by_planner,
     refusals,
-    share,
     stored_row,
-    stored_share,
     summarise,
     summary_json,
 )
 from mskgrasp.core.files import write_whole
+from mskgrasp.core.share import Share
 from mskgrasp.reports.html import write_html
 from mskgrasp.reports.quantities import counted
 from mskgrasp.reports.section import Figure, Section, settings_section
@@ -108,7 +106,7 @@ def stored_sections(values: Mapping[str, Any]) -> list[Section]:
     known = ("cell", "noise", "seed", "trained_on", "chosen_by", "known_families")
     facts = RunFacts(parts=(), settings={}, **{name: values[name] for name in known})
     rows = [stored_row(one) for one in values["rows"]]
-    refused = [Refusal(**dict(one, placed=stored_share(one["placed"]))) for one in values["refusals"]]
+    refused = [Refusal(**dict(one, placed=Share.from_json(one["placed"]))) for one in values["refusals"]]
     budget = [Budget(**one) for one in values["budgets"] if not one["part"]]
     none = Path()
     return [
@@ -281,7 +279,7 @@ def _parts_section(trials: Sequence[PlacedTrial], facts: RunFacts) -> Section:
             hits = np.array(
                 [e is not None and e[0] <= DISTANCE and e[1] <= ANGLE for e in errors], dtype=bool
             )
-            found = share(hits, [part.name] * len(hits))
+            found = Share.count(hits, [part.name] * len(hits))
             shares.append(f"{found.n} of {found.of}")
         rows.append((part.name, part.family, part.standard or "-", part.split, *shares))
     return Section(
@@ -292,6 +290,6 @@ def _parts_section(trials: Sequence[PlacedTrial], facts: RunFacts) -> Section:
     )
 
 
-def _share(found: PlacedShare) -> str:
+def _share(found: Share) -> str:
     low, high = found.interval
     return f"{found.value:.0%} [{low:.0%}, {high:.0%}]"

@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.metrics import clustered_wilson_interval
 from mskgrasp.core.seeds import trial_seeds
+from mskgrasp.core.share import Share
 from mskgrasp.trials.placed_trial import Correction, PlacedTrial
 from mskgrasp.trials.trial import REFUSED as PLANNER_REFUSED
 
@@ -34,30 +34,6 @@ _CORRECTION: dict[Column, Correction] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlacedShare:
-    """A share of attempts.
-
-    Attributes:
-        n: Number that count.
-        of: Number of attempts.
-        interval: 95 %, Wilson's by parts, since attempts at one part are alike (`clustered_wilson_interval`).
-    """
-
-    n: int
-    of: int
-    interval: tuple[float, float]
-
-    @property
-    def value(self) -> float:
-        """The share; 0 of no attempt."""
-        return self.n / self.of if self.of else 0.0
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain values."""
-        return dict(n=self.n, of=self.of, share=self.value, interval=list(self.interval))
-
-
-@dataclass(frozen=True, kw_only=True)
 class Row:
     """Trials of one planner.
 
@@ -72,12 +48,12 @@ class Row:
 
     planner: str
     n_parts: int
-    lifted: PlacedShare
-    within: dict[Column, tuple[tuple[PlacedShare, ...], ...]]
+    lifted: Share
+    within: dict[Column, tuple[tuple[Share, ...], ...]]
     reasons: dict[str, int]
     wrong_pose: int
 
-    def first(self, column: Column) -> PlacedShare:
+    def first(self, column: Column) -> Share:
         """Share within `DISTANCE` and `ANGLE`."""
         return self.within[column][DISTANCES.index(DISTANCE)][ANGLES.index(ANGLE)]
 
@@ -109,7 +85,7 @@ class Refusal:
     bound: float
     refused: float
     parts: int
-    placed: PlacedShare
+    placed: Share
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,24 +145,17 @@ def _row(planner: str, trials: Sequence[PlacedTrial], seed: int) -> Row:
         errors = [placing_error(trial, column, seed) or (np.inf, np.inf) for trial in trials]
         off, turn = np.array(errors).T
         within[column] = tuple(
-            tuple(share((off <= distance) & (turn <= angle), parts) for angle in ANGLES)
+            tuple(Share.count((off <= distance) & (turn <= angle), parts) for angle in ANGLES)
             for distance in DISTANCES
         )
     return Row(
         planner=planner,
         n_parts=len(set(parts)),
-        lifted=share(np.array([trial.lifted for trial in trials]), parts),
+        lifted=Share.count(np.array([trial.lifted for trial in trials]), parts),
         within=within,
         reasons=dict(sorted(Counter(trial.reason for trial in trials if trial.reason).items())),
         wrong_pose=sum(trial.wrong_pose for trial in trials),
     )
-
-
-def share(hits: np.ndarray, parts: Sequence[str]) -> PlacedShare:
-    """Share of attempts (n,) that count, with the parts (n,) that were tried."""
-    _, which = np.unique(np.asarray(parts, dtype=str), return_inverse=True)
-    interval = clustered_wilson_interval(np.bincount(which, weights=hits), np.bincount(which))
-    return PlacedShare(n=int(hits.sum()), of=len(hits), interval=interval)
 
 
 def refusals(trials: Sequence[PlacedTrial], seed: int) -> list[Refusal]:
@@ -214,7 +183,8 @@ def refusals(trials: Sequence[PlacedTrial], seed: int) -> list[Refusal]:
             found.append(
                 Refusal(
                     planner=planner, bound=max(0.0, float(qualities[tried].min())),
-                    refused=float(1 - tried.mean()), parts=len(set(names)), placed=share(hits[tried], names),
+                    refused=float(1 - tried.mean()), parts=len(set(names)),
+                    placed=Share.count(hits[tried], names),
                 )
             )  # fmt: skip
     return list(dict.fromkeys(found))
@@ -261,19 +231,13 @@ def _budget(planner: str, part: str, trials: Sequence[PlacedTrial]) -> Budget:
     return Budget(planner=planner, part=part, n=len(placed), distance=distance, turn=turn)
 
 
-def stored_share(values: Mapping[str, Any]) -> PlacedShare:
-    """The share that `PlacedShare.to_json` converted."""
-    low, high = values["interval"]
-    return PlacedShare(n=values["n"], of=values["of"], interval=(low, high))
-
-
 def stored_row(values: Mapping[str, Any]) -> Row:
     """The row that `Row.to_json` converted."""
-    within: dict[Column, tuple[tuple[PlacedShare, ...], ...]] = {
-        column: tuple(tuple(map(stored_share, shares)) for shares in values["within"][column])
+    within: dict[Column, tuple[tuple[Share, ...], ...]] = {
+        column: tuple(tuple(map(Share.from_json, shares)) for shares in values["within"][column])
         for column in COLUMNS
     }
-    return Row(**dict(values, lifted=stored_share(values["lifted"]), within=within))
+    return Row(**dict(values, lifted=Share.from_json(values["lifted"]), within=within))
 
 
 def summary_json(

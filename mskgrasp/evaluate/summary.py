@@ -11,7 +11,8 @@ import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import TILT_LIMIT
-from mskgrasp.core.metrics import clustered_wilson_interval, coverage, rms_interval
+from mskgrasp.core.metrics import coverage, rms_interval
+from mskgrasp.core.share import Share
 from mskgrasp.trials.lowess import TURN_LENGTH
 from mskgrasp.trials.trial import Prediction, Trial
 
@@ -32,16 +33,6 @@ MOST_WORST = 10
 """Trials that are shown as the worst."""
 
 Interval = tuple[float, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Share:
-    """A share with its interval of 95 %, Wilson's by parts."""
-
-    n: int
-    of: int
-    value: float
-    interval: Interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +103,7 @@ class TrialStatistics:
             prediction: The prediction that is compared with the measurement, by default `own_prediction`; a
                 trial without one has no error.
         """
-        n_success = sum(trial.success for trial in trials)
+        lifted = Share.count([trial.success for trial in trials], [trial.part for trial in trials])
         planning = [trial.planning_s for trial in trials if trial.planning_s is not None]
         tilts = np.array([trial.tilt for trial in trials if trial.tilt is not None])
         compared, measured, predicted, std = _measurements(trials, prediction or own_prediction)
@@ -124,9 +115,9 @@ class TrialStatistics:
         known = len(parts) > 0 and np.isfinite(std).all() and np.isfinite(measured).all()
         return cls(
             trials=len(trials),
-            successes=n_success,
-            success_rate=n_success / len(trials) if trials else None,
-            success_interval=_share([t.success for t in trials], trials).interval if trials else None,
+            successes=lifted.n,
+            success_rate=lifted.value if trials else None,
+            success_interval=lifted.interval if trials else None,
             reasons=_counts(trial.reason for trial in trials if trial.reason),
             unmeasured=_counts(trial.unmeasured.split(":")[0] for trial in trials if trial.unmeasured),
             median_planning_s=float(np.median(planning)) if planning else None,
@@ -257,18 +248,16 @@ def _within(trials: Sequence[Trial], compared: Sequence[Trial], distances: np.nd
     if not compared:
         return None
     off = dict(zip((trial.key for trial in compared), distances.tolist(), strict=True))
-    return [_share([off.get(trial.key, np.inf) <= most for trial in trials], trials) for most in WITHIN]
+    parts = [trial.part for trial in trials]
+    return [Share.count([off.get(trial.key, np.inf) <= most for trial in trials], parts) for most in WITHIN]
 
 
 def _tilted(lifted: Sequence[Trial]) -> Share | None:
-    return _share([(trial.tilt or 0.0) > TILT_LIMIT for trial in lifted], lifted) if lifted else None
-
-
-def _share(hits: Sequence[bool], trials: Sequence[Trial]) -> Share:
-    """Share of trials that count."""
-    _, which = np.unique([trial.part for trial in trials], return_inverse=True)
-    interval = clustered_wilson_interval(np.bincount(which, weights=hits), np.bincount(which))
-    return Share(n=sum(hits), of=len(hits), value=sum(hits) / len(hits), interval=interval)
+    if not lifted:
+        return None
+    return Share.count(
+        [(trial.tilt or 0.0) > TILT_LIMIT for trial in lifted], [trial.part for trial in lifted]
+    )
 
 
 def compare_tape(trials: Sequence[Trial]) -> TapeComparison | None:

@@ -1,7 +1,7 @@
 import pytest
 
 from mskgrasp.assess.config import parse_tolerance
-from mskgrasp.assess.summary import DISTANCES, Share, summarise, verdict
+from mskgrasp.assess.summary import DISTANCES, summarise, verdict
 from mskgrasp.assess.trials import EXACT
 from mskgrasp.core.grasp import TILT_LIMIT
 from tests.assess.made_trials import failed, made
@@ -15,8 +15,8 @@ def rows(trials, tolerance=TOLERANCE):
 
 def test_shares_are_of_all_attempts():
     (row,) = rows([made(0), made(1), failed(2), made(3, tilt=0.2)])
-    assert row.lifted == Share(n=3, of=4)
-    assert row.within["predicted"] == Share(n=3, of=4) and row.within["none"].n == 0
+    assert (row.lifted.n, row.lifted.of) == (3, 4)
+    assert row.within["predicted"] == row.lifted and row.within["none"].n == 0
     assert [share.n for share in row.within_distance["predicted"]] == [0, 0, 3, 3, 3, 3]
     assert len(row.within_distance["none"]) == len(DISTANCES)
     assert row.reasons == {"slipped": 1} and row.tilted == 1

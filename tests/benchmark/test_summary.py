@@ -9,7 +9,6 @@ from mskgrasp.benchmark.summary import (
     budgets,
     placing_error,
     refusals,
-    share,
     stages,
     summarise,
 )
@@ -43,15 +42,6 @@ def test_the_camera_at_the_hand_has_the_stated_errors_and_the_same_for_all_plann
     ours, other = (placing_error(made(0, means, **here), "camera", 0) for means in ("ours", "centroid"))
     assert ours == other != placing_error(made(0, **here), "camera", 1)
     assert placing_error(failed(0), "camera", 0) is None
-
-
-def test_the_interval_of_a_share_is_wide_where_parts_differ():
-    hits = np.repeat([True, False] * 5, 20)
-    low, high = share(hits, np.repeat([f"part {n}" for n in range(10)], 20)).interval
-    alike = share(hits, ["part"] * 200).interval
-    assert low < 0.3 < alike[0] < 0.5 < alike[1] < 0.7 < high
-    assert share(np.zeros(0, bool), []).interval == (0.0, 1.0)
-    assert share(np.ones(100, bool), ["a", "b"] * 50).interval[0] < 0.97  # nothing is certain
 
 
 def test_precision_rises_as_attempts_of_low_quality_are_refused():

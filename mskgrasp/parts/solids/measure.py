@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import trimesh
@@ -16,6 +16,8 @@ from mskgrasp.parts.part import FINE_P95_MM, FINE_VOLUME_RATIO
 
 MOST_SAMPLES = 12_000
 """Number of points on each surface at which hulls and mesh are compared."""
+_KEPT = 6
+"""Number of sets of hulls whose comparison is kept: as many as a search joins pieces in steps."""
 
 MOST_ASPECT_RATIO = 50.0
 """PhysX on a GPU drops hulls whose length is about 64 times their thickness."""
@@ -118,20 +120,28 @@ def hull_fit(mesh_mm: trimesh.Trimesh, hulls_mm: Sequence[np.ndarray]) -> HullFi
 
 
 class MeshSurface:
-    """A mesh prepared for comparison with several sets of hulls."""
+    """A mesh prepared for comparison with several sets of hulls.
+
+    Attributes:
+        volume: Of the mesh, mm^3.
+        surface: Its triangles, finely cut.
+        samples: (n, 3) points on it, mm.
+        areas: (n,) that each represents, mm^2.
+    """
 
     def __init__(self, mesh_mm: trimesh.Trimesh) -> None:
         """Refine the surface and build its search tree."""
         # Copies: manifold3d takes neither a read-only array nor a view with strides.
         body = Manifold(Mesh64(np.array(mesh_mm.vertices, np.float64), np.array(mesh_mm.faces, np.uint64)))
         self._step = float(np.max(mesh_mm.extents)) / 40
-        self._volume = float(mesh_mm.volume)
-        self._surface = _Surface(_triangles(body.refine_to_length(self._step)))
-        self._samples, self._areas = _samples(self._surface.triangles)
+        self.volume = float(mesh_mm.volume)
+        self.surface = _Surface(_triangles(body.refine_to_length(self._step)))
+        self.samples, self.areas = _samples(self.surface.triangles)
+        self._compared: dict[bytes, _Comparison] = {}
 
     def fit(self, hulls_mm: Sequence[np.ndarray]) -> HullFit:
         """Compare the surface of the union of the hulls with that of the mesh."""
-        return self._fit(_Union(hulls_mm, self._step))
+        return self._compare(hulls_mm).fit
 
     def fit_within(
         self,
@@ -148,34 +158,56 @@ class MeshSurface:
             most_ratio: Volume of the union by the mesh's, or the mesh's by the union's.
             most_outward: Largest distance from the hulls' surface to the mesh.
         """
-        union = _Union(hulls_mm, self._step)
-        if not 1 / most_ratio <= union.volume / self._volume <= most_ratio:
+        compared = self._compare(hulls_mm)
+        union = compared.union
+        if not 1 / most_ratio <= union.volume / self.volume <= most_ratio:
             return None
-        outward = self._surface.distance_to(union.samples)
         # The 95th percentile is certain where more than 5 % of both surfaces is beyond it already.
-        beyond = float(union.areas[outward > most_p95].sum())
-        both = float(union.areas.sum() + self._areas.sum())
-        if outward.max() > most_outward or beyond > 0.0501 * both:
+        beyond = float(union.areas[compared.outward > most_p95].sum())
+        both = float(union.areas.sum() + self.areas.sum())
+        if compared.outward.max() > most_outward or beyond > 0.0501 * both:
             return None
-        fit = self._fit(union, outward)
-        return fit if fit.p95 <= most_p95 else None
+        return compared.fit if compared.fit.p95 <= most_p95 else None
 
     def outward_largest(self, hulls_mm: Sequence[np.ndarray]) -> float:
         """Largest distance from the surface of the union of the hulls to the mesh."""
-        return float(self._surface.distance_to(_Union(hulls_mm, self._step).samples).max())
+        return float(self._compare(hulls_mm).outward.max())
 
-    def _fit(self, union: _Union, outward: np.ndarray | None = None) -> HullFit:
-        if outward is None:
-            outward = self._surface.distance_to(union.samples)
-        inward = _Surface(union.triangles).distance_to(self._samples)
+    def _compare(self, hulls_mm: Sequence[np.ndarray]) -> _Comparison:
+        """The comparison with some hulls: a search asks for the last few again, with other bounds."""
+        key = b"".join(np.asarray(points, dtype=np.float64).tobytes() for points in hulls_mm)
+        found = self._compared.pop(key, None) or _Comparison(self, _Union(hulls_mm, self._step))
+        self._compared[key] = found
+        if len(self._compared) > _KEPT:
+            del self._compared[next(iter(self._compared))]
+        return found
+
+
+class _Comparison:
+    """Distances between a mesh and the union of some hulls, computed when they are asked for."""
+
+    def __init__(self, mesh: MeshSurface, union: _Union) -> None:
+        self.union = union
+        self._mesh = mesh
+
+    @cached_property
+    def outward(self) -> np.ndarray:
+        """Distance from the union's samples to the mesh."""
+        return self._mesh.surface.distance_to(self.union.samples)
+
+    @cached_property
+    def fit(self) -> HullFit:
+        """Measures of both directions."""
+        mesh, union, outward = self._mesh, self.union, self.outward
+        inward = _Surface(union.triangles).distance_to(mesh.samples)
         return HullFit(
             largest=float(max(outward.max(), inward.max())),
-            p95=_p95(np.concatenate([outward, inward]), np.concatenate([union.areas, self._areas])),
-            volume_ratio=float(union.volume / self._volume),
+            p95=_p95(np.concatenate([outward, inward]), np.concatenate([union.areas, mesh.areas])),
+            volume_ratio=float(union.volume / mesh.volume),
             outward_largest=float(outward.max()),
             outward_p95=_p95(outward, union.areas),
             inward_largest=float(inward.max()),
-            inward_p95=_p95(inward, self._areas),
+            inward_p95=_p95(inward, mesh.areas),
         )
 
 

@@ -15,6 +15,9 @@ MODES = 16
 """Turns and looks that are fitted roughly."""
 LOOK_MODES = 6
 """The most of one look."""
+HOPELESS = 300.0
+"""Fits whose cost exceeds the least by more are given up. In 360 images of validation parts the poses found
+are the same to the bit without this bound, and take 1.7 times as long."""
 MOST_REFINED, NEAR_COST = 3, 30.0
 """So many resting poses of a look are refined at the end, if their cost exceeds the least by less."""
 _TRIED, _SETTLED = 1.6, 0.4
@@ -81,10 +84,10 @@ FINAL = Effort(rounds=3, draws=64, pixels=1000, reach=0.2e-3, fine=True)
 
 def search(seen: Seen, known: KnownPart) -> list[Fit]:
     """Find the poses that fit an image, the best first."""
-    fits = _best(_coarse(seen, known), MODES + len(known.looks) // 2)
+    fits = _hopeful(_best(_coarse(seen, known), MODES + len(known.looks) // 2))
     n_looks = len(known.looks)  # of many some differ little
     for effort, n in ((ROUGH, 6 + n_looks // 3), (CLOSER, 3 + n_looks // 4), (CLOSE, 2 + n_looks // 8)):
-        fits = _best([improve(fit, seen, known, effort) for fit in fits], n)
+        fits = _hopeful(_best([improve(fit, seen, known, effort) for fit in fits], n))
     found = []
     for fit in [*_turned(fits[0], seen, known), *fits[1:]]:
         likely = _resting_poses(fit, seen, known)
@@ -157,6 +160,11 @@ def _best(fits: list[Fit], n: int, apart: float = _TRIED) -> list[Fit]:
         if len(kept) == n:
             break
     return kept
+
+
+def _hopeful(fits: list[Fit]) -> list[Fit]:
+    """The fits, the best first, without those that are far behind it."""
+    return [fit for fit in fits if fit.cost < fits[0].cost + HOPELESS]
 
 
 def _near(a: Fit, b: Fit, steps: float) -> bool:

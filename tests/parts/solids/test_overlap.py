@@ -7,7 +7,7 @@ from scipy.spatial import ConvexHull
 
 from mskgrasp.parts.recipes.families import recipes
 from mskgrasp.parts.solids import solid as s
-from mskgrasp.parts.solids.overlap import REACH_MM, overlapped
+from mskgrasp.parts.solids.overlap import REACH_MM, _least_outside, overlapped
 
 
 def union(hulls):
@@ -71,3 +71,20 @@ def test_one_piece_and_pieces_apart_stay():
     apart = [s.box(0, 1, 0, 1, 0, 1), s.box(2, 3, 0, 1, 0, 1)]
     for pieces in ([apart[0]], apart):
         assert all(np.array_equal(a, b) for a, b in zip(overlapped(pieces), pieces, strict=True))
+
+
+def test_the_bound_of_what_lies_outside_is_one_and_close():
+    """Random bodies, each corner of which is given to the first of them."""
+    rng, shares = np.random.default_rng(0), []
+    for _ in range(20):
+        bodies = [rng.normal(size=(12, 3)) + rng.uniform(0, 3, size=3) for _ in range(3)]
+        whole = union(bodies)
+        corners = np.concatenate(bodies[1:])
+        sides = [ConvexHull(body).equations for body in bodies]
+        bounds = _least_outside(ConvexHull(bodies[0]), corners, sides)
+        for corner, bound in zip(corners, bounds, strict=True):
+            outside = (Manifold.hull_points(np.concatenate([bodies[0], corner[None]])) - whole).volume()
+            assert bound <= outside + 1e-9
+            if outside > 0.01:
+                shares.append(bound / outside)
+    assert len(shares) > 100 and np.median(shares) > 0.2

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import mskgrasp.perception.part_pose.search
 from mskgrasp.perception.part_detection import find_part_pixels
 from mskgrasp.perception.part_pose.part_pose import see
 from mskgrasp.perception.part_pose.search import CLOSE, Effort, Fit, _turned, improve, search
@@ -47,6 +48,12 @@ def test_the_truth_costs_less_than_poses_around_it(image):
 def test_the_best_fit_comes_first_and_the_search_is_repeatable(image):
     fits = search(image, known(NAME))
     assert [fit.cost for fit in fits] == sorted(fit.cost for fit in fits)
+    assert np.array_equal(search(image, known(NAME))[0].pose, fits[0].pose)
+
+
+def test_fits_far_behind_the_best_are_given_up_without_effect(image, monkeypatch):
+    fits = search(image, known(NAME))
+    monkeypatch.setattr(mskgrasp.perception.part_pose.search, "HOPELESS", np.inf)
     assert np.array_equal(search(image, known(NAME))[0].pose, fits[0].pose)
 
 
