@@ -140,9 +140,10 @@ def _benchmark(stored: StoredReport) -> list[ReadmeRow]:
         text += (
             f"; certified grasps, by the CAD, {known.value:.1%}, without correction {known_plain.value:.1%}"
         )
+    cell = ", in MuJoCo" if "--cell mujoco" in stored.facts["command"] else ""
     return [
         ReadmeRow(
-            name=f"placed within {TOLERANCE}",
+            name=f"placed within {TOLERANCE}{cell}",
             text=text,
             interval="; ".join(_between(one.interval, 100, "%") for one in shares),
             n=f"{corrected.of} attempts at {ours.n_parts} parts by each planner",
@@ -336,6 +337,7 @@ ROWS: tuple[tuple[str, Callable[[StoredReport], list[ReadmeRow]]], ...] = (
     ("assessed", _assessed),
     ("assessed_catalogue", _assessed),
     ("benchmark", _benchmark),
+    ("benchmark_mujoco", _benchmark),
     ("palletize", _palletize),
     ("shipped_model", _shipped_model),
     ("equal_recipes", _equal_recipes),
