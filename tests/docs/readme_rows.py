@@ -140,7 +140,7 @@ def _benchmark(stored: StoredReport) -> list[ReadmeRow]:
         text += (
             f"; certified grasps, by the CAD, {known.value:.1%}, without correction {known_plain.value:.1%}"
         )
-    cell = ", in MuJoCo" if "--cell mujoco" in stored.facts["command"] else ""
+    cell = ", in MuJoCo" if stored.name == "benchmark_mujoco" else ""
     return [
         ReadmeRow(
             name=f"placed within {TOLERANCE}{cell}",

@@ -147,6 +147,9 @@ def test_the_readme_states_the_share_placed_and_that_of_a_simple_planner():
     (found,) = dict(ROWS)["benchmark"](StoredReport(name="benchmark", facts={}, report=report))
     assert found.text.startswith("90.0% of all attempts corrected by the prediction, 90.0% without; centroid")
     assert found.interval.count("10.0 - 90.0 %") == 3 and found.n == "20 attempts at 4 parts by each planner"
+    stored = StoredReport(name="benchmark_mujoco", facts={}, report=report)
+    (other,) = dict(ROWS)["benchmark_mujoco"](stored)
+    assert other.name == f"{found.name}, in MuJoCo" and other.text == found.text
 
 
 def test_a_run_of_the_paper_s_size_has_a_command_that_its_configuration_fits():
