@@ -151,7 +151,7 @@ def _row(planner: str, trials: Sequence[PlacedTrial], seed: int) -> Row:
     return Row(
         planner=planner,
         n_parts=len(set(parts)),
-        lifted=Share.count(np.array([trial.lifted for trial in trials]), parts),
+        lifted=Share.count([trial.lifted for trial in trials], parts),
         within=within,
         reasons=dict(sorted(Counter(trial.reason for trial in trials if trial.reason).items())),
         wrong_pose=sum(trial.wrong_pose for trial in trials),

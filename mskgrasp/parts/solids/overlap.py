@@ -93,9 +93,9 @@ def _extended(
     # What is outside only grows with the piece, so that the bound need not be computed again.
     outside, added = _least_outside(hull, corners, sides), _added(hull, corners).sum(axis=1)
     volume, number = Manifold.hull_points(points).volume(), -1
-    for piece in slices:
+    for one in slices:
         most_slender = max(0.9 * MOST_ASPECT_RATIO, aspect_ratio(points))
-        for corner in piece:
+        for corner in one:
             number += 1
             if outside[number] > _CERTAIN * _OUTSIDE * added[number]:
                 continue
