@@ -10,6 +10,7 @@ from mskgrasp.core.config import Config
 
 _Channels = Annotated[int, Field(ge=1, le=512)]
 _Convolutions = Annotated[tuple[_Channels, ...], Field(min_length=1, max_length=6)]
+_Blocks = tuple[Annotated[int, Field(ge=0, le=8)], ...]
 
 
 class _NetworkConfig(Config):
@@ -92,6 +93,11 @@ class PatchNetworkConfig(_NetworkConfig):
         return self.image == "object"
 
     @property
+    def of_displacement(self) -> PatchNetworkConfig:
+        """The architecture whose quality network has the layers and the input of the displacement network."""
+        return self
+
+    @property
     def patch_shape(self) -> tuple[int, int]:
         """Rows and columns of a patch."""
         return self.patch_pixels, self.patch_pixels
@@ -122,19 +128,22 @@ class HandNetworkConfig(_NetworkConfig):
     """Number of its pixels across the closing direction; null: all that the patch has."""
     layers: _Convolutions = (16, 32)
     """Channels of the quality network's convolutions, each of which halves the image."""
+    blocks: _Blocks = ()
+    """Residual blocks after each of them (He et al. 2016); empty: none."""
     displacement_layers: _Convolutions = (16, 32, 32)
     """Channels of the displacement network's convolutions."""
-    displacement_blocks: tuple[Annotated[int, Field(ge=0, le=8)], ...] = ()
-    """Residual blocks after each of them (He et al. 2016); empty: none."""
+    displacement_blocks: _Blocks = ()
+    """Residual blocks after each of them; empty: none."""
 
     @model_validator(mode="after")
     def _blocks_follow_layers(self) -> HandNetworkConfig:
-        n_blocks, n_layers = len(self.displacement_blocks), len(self.displacement_layers)
-        if n_blocks not in (0, n_layers):
-            raise ValueError(
-                f"displacement_blocks has {n_blocks} numbers, displacement_layers has {n_layers}; give one "
-                "for each, or none"
-            )
+        for before in ("", "displacement_"):
+            n_blocks, n_layers = (len(getattr(self, f"{before}{name}")) for name in ("blocks", "layers"))
+            if n_blocks not in (0, n_layers):
+                raise ValueError(
+                    f"{before}blocks has {n_blocks} numbers, {before}layers has {n_layers}; give one for "
+                    "each, or none"
+                )
         return self
 
     @model_validator(mode="after")
@@ -150,6 +159,18 @@ class HandNetworkConfig(_NetworkConfig):
                 "quality_columns must leave the same number of the patch's columns on either side"
             )
         return self
+
+    @property
+    def of_displacement(self) -> HandNetworkConfig:
+        """The architecture whose quality network has the layers and the input of the displacement network."""
+        return self.model_copy(
+            update={
+                "quality_stride": 1,
+                "quality_columns": None,
+                "layers": self.displacement_layers,
+                "blocks": self.displacement_blocks,
+            }
+        )
 
     @property
     def patch_shape(self) -> tuple[int, int]:

@@ -82,7 +82,7 @@ def make_features(
         n_action = 4 if config.sees_object and not quality else 3
         return PatchFeatures(config, normalisation, n_action)
     if quality:
-        return HandFeatures(config, normalisation, config.layers, config.quality_shape)
+        return HandFeatures(config, normalisation, config.layers, config.quality_shape, config.blocks)
     return HandFeatures(
         config, normalisation, config.displacement_layers, config.patch_shape, config.displacement_blocks
     )

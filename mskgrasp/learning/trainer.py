@@ -1,4 +1,7 @@
-"""Training of the GQN and then of the GDN, which resumes from a checkpoint with identical results."""
+"""Training of the GQN and then of the GDN, which resumes from a checkpoint with identical results.
+
+In between, if asked for, the layers of the GDN learn the quality, from attempts that failed, too.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ from mskgrasp.learning.checkpoint import (
     restore_checkpoint,
     write_checkpoint,
 )
-from mskgrasp.learning.config import LearningConfig
+from mskgrasp.learning.config import LearningConfig, StageConfig
 from mskgrasp.learning.cuda_graphs import GraphedStep
 from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models
 from mskgrasp.learning.model_metrics import EpochMetrics
@@ -101,8 +104,24 @@ def describe_networks(samples: Samples, training_rows: Tensor, config: LearningC
     )
 
 
+def stages_of(models: Models, config: LearningConfig) -> dict[str, Models]:
+    """Names of the networks that are trained, in order, with the models that each belongs to.
+
+    That of ``transfer`` is the quality network of models of their own, on the same device: a new one with the
+    layers and the input of the displacement network.
+    """
+    if config.transfer is None:
+        return {"gqn": models, "gdn": models}
+    meta = models.meta.model_copy(update={"network": models.meta.network.of_displacement})
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(config.seed)
+        gqn = GraspQualityNetwork(meta.network, meta.normalisation)
+    before = Models(gqn=gqn.to(models.device), gdn=models.gdn, meta=meta)
+    return {"gqn": models, "transfer": before, "gdn": models}
+
+
 class Stage:
-    """Training of one of the two networks."""
+    """Training of one network: ``gqn``, ``transfer`` or ``gdn``, of which the first two learn the quality."""
 
     def __init__(
         self,
@@ -117,14 +136,15 @@ class Stage:
         self.training_rows, self.rows = sides.training, sides.validation
         self.seen = samples.on(models.device)
         self.noise = torch.Generator(models.device)
-        network = models.gqn if name == "gqn" else models.gdn
+        self.of_quality = name != "gdn"
+        network = models.gqn if self.of_quality else models.gdn
         network.features.mixed_precision = config.mixed_precision
         self.network: GraspQualityNetwork | GraspDisplacementNetwork = network
-        self.settings = config.gqn if name == "gqn" else config.gdn
+        self.settings: StageConfig = getattr(config, name)
         n_success = int(samples.success[self.training_rows].sum())
         n_failure = len(self.training_rows) - n_success
         self.n_each = min(n_success, n_failure)
-        self.n_samples = 2 * self.n_each if name == "gqn" else n_success
+        self.n_samples = 2 * self.n_each if self.of_quality else n_success
         self.batches = math.ceil(self.n_samples / self.settings.batch_size)
         if self.settings.batch_norm:
             if self.n_samples < 2:
@@ -163,7 +183,7 @@ class Stage:
         return rate
 
     def epoch(self, number: int, reporter: Reporter) -> EpochMetrics:
-        """Train one epoch (the GQN on as many failures as successes) and validate."""
+        """Train one epoch (the quality on as many failures as successes) and validate."""
         started = time.perf_counter()
         device = self.models.device
         # Every epoch seeds its own generators, so that a checkpoint needs to store only its number.
@@ -193,10 +213,10 @@ class Stage:
         )
 
     def order(self, generator: torch.Generator) -> Tensor:
-        """Draw the rows of an epoch in random order; the GQN sees as many failures as successes."""
+        """Draw the rows of an epoch in random order; to the quality as many failures as successes belong."""
         success = self.samples.success[self.training_rows]
         kinds = (self.training_rows[success], self.training_rows[~success])
-        if self.name == "gqn":
+        if self.of_quality:
             kinds = tuple(
                 rows[torch.randperm(len(rows), generator=generator)][: self.n_each] for rows in kinds
             )
@@ -211,8 +231,8 @@ class Stage:
         Augmented by rotation, mirroring and noise, on the networks' device.
         """
         s, device = self.seen, self.models.device
-        if self.name == "gqn":
-            patches = s.quality_patches_of(rows, device, self.config.network)
+        if self.of_quality:
+            patches = s.quality_patches_of(rows, device, self.models.meta.network)
         else:
             patches = s.displacement_patches_of(rows, device)
         centre, target = s.centre_grasp[rows], s.targets(rows, self.config.network)
@@ -229,7 +249,7 @@ class Stage:
     def _step(self, rows: Tensor) -> Tensor:
         patches, centre, target, success = self.batch(rows)
         height, theta = self.seen.height[rows], self.seen.theta[rows]
-        if self.name == "gqn":
+        if self.of_quality:
             loss = nn.functional.cross_entropy(self.models.gqn(patches, centre, height), success.long())
         else:
             loss = self.models.gdn.loss(patches, centre, height, theta, target, self.config.beta)
@@ -251,7 +271,7 @@ class Stage:
         fold_batch_norms(self.network.features)
 
     def _validate(self) -> dict[str, float]:
-        if self.name == "gqn":
+        if self.of_quality:
             success = self.samples.success[self.rows].double()
             quality = torch.from_numpy(held_out.predict_quality(self.models, self.samples, self.rows))
             # The loss is that of balanced data: the correction to the base rate is undone.
@@ -318,7 +338,10 @@ def train(
         models = build_models(meta)
     models.gqn.to(device)
     models.gdn.to(device)
-    networks: dict[str, nn.Module] = {"gqn": models.gqn, "gdn": models.gdn}
+    stages = stages_of(models, config)
+    networks: dict[str, nn.Module] = {
+        name: one.gdn if name == "gdn" else one.gqn for name, one in stages.items()
+    }
     saved = read_checkpoint(checkpoint_path) if checkpoint_path.exists() else None
     if saved is not None and saved.fingerprint != samples.fingerprint:
         raise UsageError(f"{checkpoint_path} was made from other data; choose another --out or delete it")
@@ -328,16 +351,20 @@ def train(
             f"version {SAMPLES_VERSION}; choose another --out or delete it"
         )
 
+    if saved is not None and saved.stage not in stages:
+        raise UsageError(f"{checkpoint_path} was made with other settings; choose another --out or delete it")
+
     history: list[EpochMetrics] = list(saved.history) if saved else []
-    for name, network in networks.items():
-        if saved is not None and saved.stage == "gdn" and name == "gqn":
-            continue
+    for name in list(stages)[list(stages).index(saved.stage) if saved else 0 :]:
+        network = networks[name]
         if quality is not None and name == "gqn":
             network.load_state_dict(quality.state_dict())
             continue
-        if name == "gdn":
+        if name == "gdn" and config.transfer is None:
             models.gdn.start_from(models.gqn)
-        stage = Stage(name, models, samples, sides, config)
+        elif name == "gdn":
+            models.gdn.features.load_state_dict(stages["transfer"].gqn.features.state_dict())
+        stage = Stage(name, stages[name], samples, sides, config)
         best: dict[str, Tensor] = {}
         done = 0
         if saved is not None and saved.stage == name:

@@ -31,13 +31,14 @@ from tests.benchmarks.trainings import make_trainings
 
 
 def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
-    """Our configuration, and the same with one choice undone."""
+    """Our configuration, and the same with one choice undone or made."""
     paper = read_config(LearningConfig, CONFIGS / "paper.yaml").network
 
     def with_(**changes: Any) -> LearningConfig:
         network = changes.pop("network", {})
         return ours.model_copy(update=changes | {"network": ours.network.model_copy(update=network)})
 
+    transfer = ours.gdn.model_copy(update={"epochs": ours.gqn.epochs})
     plain = {"displacement_layers": (16, 32, 32), "displacement_blocks": ()}
     assert isinstance(paper, PatchNetworkConfig)
     paper = paper.model_copy(update={"symmetric_views": ours.network.symmetric_views})
@@ -78,6 +79,10 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         "no batch normalisation": with_(gdn=ours.gdn.model_copy(update={"batch_norm": False})),
         "no weight decay": with_(gdn=ours.gdn.model_copy(update={"weight_decay": 0.0})),
         "neither": with_(gdn=ours.gdn.model_copy(update={"batch_norm": False, "weight_decay": 0.0})),
+        "features that learned the quality first": with_(transfer=transfer),
+        "features that learned the quality first, twice the channels": with_(
+            transfer=transfer, network={"displacement_layers": (32, 64, 128)}
+        ),
         "not calibrated": with_(calibrate=False),
         "mixed precision": with_(mixed_precision=True),
     }

@@ -16,7 +16,7 @@ from mskgrasp.learning.grasp_models import Models, build_models
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.sides import Sides
-from mskgrasp.learning.trainer import Reporter, Stage, describe_networks
+from mskgrasp.learning.trainer import Reporter, Stage, describe_networks, stages_of
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import Bar, progress
 from tests.benchmarks.choice import Choice, Looks
@@ -50,8 +50,9 @@ def cost_of(
     models.gqn.to(compute_device(device))
     models.gdn.to(compute_device(device))
     batch, validation, rates, counts, total = {}, {}, {}, {}, 0.0
+    stages = stages_of(models, choice.config)
     for name in choice.stages():
-        stage = Stage(name, models, samples, sides, choice.config)
+        stage = Stage(name, stages[name], samples, sides, choice.config)
         stage.network.train()
         rates[name], counts[name] = rate(stage, stage.learn, seconds), stage.n_samples
         stage.network.eval()
@@ -60,7 +61,7 @@ def cost_of(
         if name == "gdn":
             rows, predict = rows[samples.success[rows]], held_out.predict_grasp_displacement
         began = time.perf_counter()
-        predict(models, samples, rows[:256])
+        predict(stages[name], samples, rows[:256])
         validation[name] = (time.perf_counter() - began) * len(rows) / min(256, len(rows))
         batch[name] = stage.settings.batch_size / rates[name]
         total += stage.settings.epochs * (stage.batches * batch[name] + validation[name])

@@ -133,12 +133,10 @@ def _jobs(missing: Sequence[_Job], looks: Looks, sides: Sides) -> list[Job]:
 def _steps(choice: Choice, samples: Samples, sides: Sides) -> int:
     """Steps of all epochs of a training."""
     n_success = int(samples.success[sides.training].sum())
-    n_samples = {"gqn": 2 * min(n_success, len(sides.training) - n_success), "gdn": n_success}
-    settings = {"gqn": choice.config.gqn, "gdn": choice.config.gdn}
-    return sum(
-        settings[name].epochs * math.ceil(n_samples[name] / settings[name].batch_size)
-        for name in choice.stages()
-    )
+    balanced = 2 * min(n_success, len(sides.training) - n_success)
+    n_samples = {"gqn": balanced, "transfer": balanced, "gdn": n_success}
+    settings = {name: getattr(choice.config, name) for name in choice.stages()}
+    return sum(one.epochs * math.ceil(n_samples[name] / one.batch_size) for name, one in settings.items())
 
 
 def _name(choice: Choice, seed: int) -> str:

@@ -16,7 +16,7 @@ from mskgrasp.learning.grasp_models import ModelCalibration, Models, build_model
 from mskgrasp.learning.held_out import calibrate, predict_grasp_displacement
 from mskgrasp.learning.samples import read_samples
 from mskgrasp.learning.sides import split
-from mskgrasp.learning.trainer import Reporter, Stage, TrainingDiverged, describe_networks
+from mskgrasp.learning.trainer import Reporter, Stage, TrainingDiverged, describe_networks, stages_of
 from mskgrasp.learning.trainer import train as learn
 from tests import synthetic
 from tests.learning.small import HAND, PATCH, SHORT
@@ -68,6 +68,57 @@ def test_a_stopped_run_goes_on_to_the_same_weights(samples, tmp_path, after, bat
             for a, b in zip(one.state_dict().values(), other.state_dict().values(), strict=True)
         )
     assert [one.train_loss for one in again] == [one.train_loss for one in history]
+
+
+TRANSFER = HAND.model_copy(
+    update={
+        "gqn": SHORT.gqn,
+        "transfer": StageConfig(learning_rate=4e-3, epochs=2, batch_size=32),
+        "gdn": StageConfig(learning_rate=1e-30, schedule="constant", epochs=1, batch_size=32),
+    }
+)
+"""The displacement network keeps the features that it starts with."""
+
+
+def test_the_displacement_network_starts_from_features_that_learned_the_quality(dataset, tmp_path):
+    samples = read_samples(dataset, TRANSFER.network)
+    models, history = learn(samples, TRANSFER, checkpoint_path=tmp_path / "whole")
+    assert [one.stage for one in history] == ["gqn", "gqn", "transfer", "transfer", "gdn"]
+    assert history[3].auroc is not None and history[3].validation_loss < history[2].validation_loss
+    sides = split(samples, TRANSFER)
+    stage = Stage("transfer", stages_of(models, TRANSFER)["transfer"], samples, sides, TRANSFER)
+    for number in range(2):
+        stage.epoch(number, Reporter())
+    learned, started = stage.network.features.state_dict(), models.gdn.features.state_dict()
+    for name, values in learned.items():
+        assert torch.allclose(values, started[name], atol=1e-6)
+    without = TRANSFER.model_copy(update={"transfer": None})
+    other, _ = learn(samples, without, checkpoint_path=tmp_path / "without")
+    assert not torch.allclose(other.gdn.features.image[0].weight, models.gdn.features.image[0].weight)
+    for a, b in zip(models.gqn.state_dict().values(), other.gqn.state_dict().values(), strict=True):
+        assert torch.equal(a, b)  # the quality network knows nothing of it
+
+
+@pytest.mark.parametrize("after", [pytest.param(2, marks=pytest.mark.slow), 3, 4])
+def test_a_run_with_transfer_goes_on_to_the_same_weights(dataset, tmp_path, after):
+    samples = read_samples(dataset, TRANSFER.network)
+    config = TRANSFER.model_copy(update={"gdn": SHORT.gdn})
+    whole, history = learn(samples, config, checkpoint_path=tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        learn(samples, config, checkpoint_path=tmp_path / "c", reporter=StopAfter(after))
+    resumed, again = learn(samples, config, checkpoint_path=tmp_path / "c")
+    for a, b in zip(whole.gdn.state_dict().values(), resumed.gdn.state_dict().values(), strict=True):
+        assert torch.equal(a, b)
+    assert [one.train_loss for one in again] == [one.train_loss for one in history]
+
+
+def test_a_checkpoint_of_a_stage_that_is_not_wanted_any_more_is_refused(dataset, tmp_path):
+    samples = read_samples(dataset, TRANSFER.network)
+    with pytest.raises(KeyboardInterrupt):
+        learn(samples, TRANSFER, checkpoint_path=tmp_path / "c", reporter=StopAfter(3))
+    without = TRANSFER.model_copy(update={"transfer": None})
+    with pytest.raises(UsageError, match="made with other settings"):
+        learn(samples, without, checkpoint_path=tmp_path / "c")
 
 
 def test_the_seed_decides_the_weights_and_the_global_generator_is_left_alone(samples, tmp_path):
