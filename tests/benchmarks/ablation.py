@@ -38,7 +38,6 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         network = changes.pop("network", {})
         return ours.model_copy(update=changes | {"network": ours.network.model_copy(update=network)})
 
-    transfer = ours.gdn.model_copy(update={"epochs": ours.gqn.epochs})
     plain = {"displacement_layers": (16, 32, 32), "displacement_blocks": ()}
     assert isinstance(paper, PatchNetworkConfig)
     paper = paper.model_copy(update={"symmetric_views": ours.network.symmetric_views})
@@ -79,9 +78,8 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         "no batch normalisation": with_(gdn=ours.gdn.model_copy(update={"batch_norm": False})),
         "no weight decay": with_(gdn=ours.gdn.model_copy(update={"weight_decay": 0.0})),
         "neither": with_(gdn=ours.gdn.model_copy(update={"batch_norm": False, "weight_decay": 0.0})),
-        "features that learned the quality first": with_(transfer=transfer),
-        "features that learned the quality first, twice the channels": with_(
-            transfer=transfer, network={"displacement_layers": (32, 64, 128)}
+        "features that learned the quality first": with_(
+            transfer=ours.gdn.model_copy(update={"epochs": ours.gqn.epochs})
         ),
         "not calibrated": with_(calibrate=False),
         "mixed precision": with_(mixed_precision=True),
