@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mskgrasp.core.geometry import Pose
+from mskgrasp.core.geometry import Pose, pixel_rays
 
 HIGHEST_TABLE = 0.002
 """Greatest height over its stated one at which a table may be seen, m: less than the hand's clearance."""
@@ -39,9 +39,7 @@ class TablePlane:
 
 def points_in_base(depth: np.ndarray, intrinsics: np.ndarray, T_base_camera: Pose) -> np.ndarray:
     """(h, w, 3) points of a depth image (h, w) in metres, base frame; NaN where invalid."""
-    rows, columns = np.mgrid[0 : depth.shape[0], 0 : depth.shape[1]].astype(np.float64)
-    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(intrinsics).T
-    return T_base_camera.apply(rays * depth[..., None].astype(np.float64))
+    return T_base_camera.apply(pixel_rays(depth.shape, intrinsics) * depth[..., None].astype(np.float64))
 
 
 def fit_table(

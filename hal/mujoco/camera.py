@@ -8,6 +8,7 @@ import numpy as np
 
 from hal.mujoco.world import MujocoWorld
 from hal.simulated import SimulatedCamera
+from mskgrasp.core.geometry import pixel_rays
 
 if TYPE_CHECKING:
     from hal.mujoco.simulation import Simulation
@@ -32,8 +33,7 @@ class MujocoCamera(SimulatedCamera[MujocoWorld]):
 
 def _rays(n_pixels: int, intrinsics: np.ndarray) -> np.ndarray:
     """(n, n, 3) unit vectors through the centres of pixels, camera frame."""
-    rows, columns = np.mgrid[0:n_pixels, 0:n_pixels]
-    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(intrinsics).T
+    rays = pixel_rays((n_pixels, n_pixels), intrinsics)
     return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
 

@@ -244,3 +244,14 @@ def straight_line(start: Pose, goal: Pose, shares: np.ndarray) -> Pose:
         position=start.position + shares[:, None] * (goal.position - start.position),
         quat_wxyz=Slerp([0, 1], ends)(np.clip(shares, 0, 1)).as_quat(scalar_first=True),
     )
+
+
+def pixel_rays(shape: Sequence[int], intrinsics: np.ndarray) -> np.ndarray:
+    """Points (h, w, 3) of the pixels of a depth image (h, w) at depth 1, in the camera's optical frame.
+
+    Args:
+        shape: Rows and columns.
+        intrinsics: (3, 3) pinhole matrix in pixels.
+    """
+    rows, columns = np.mgrid[: shape[0], : shape[1]]
+    return np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(intrinsics).T

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, quat_to_matrix
+from mskgrasp.core.geometry import Pose, pixel_rays, quat_conjugate, quat_multiply, quat_to_matrix
 from mskgrasp.core.grasp import (
     MAX_DISPLACEMENT,
     MAX_OPENING,
@@ -161,9 +161,7 @@ def _depth_problems(attempts: Attempts, info: ShardInfo) -> Iterator[str]:
 
 def _farthest(info: ShardInfo, shape: tuple[int, ...]) -> np.ndarray:
     """Compute the depth (h, w) of the table in every pixel, metres; infinite where a ray misses it."""
-    rows, columns = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
-    pixels = np.stack([columns, rows, np.ones_like(rows)], axis=-1)
-    rays = pixels @ np.linalg.inv(info.intrinsics).T
+    rays = pixel_rays(shape, info.intrinsics)
     down = rays @ quat_to_matrix(np.asarray(info.T_base_camera.quat_wxyz, dtype=np.float64))[2]
     with np.errstate(divide="ignore"):
         depth = (info.table_z - float(info.T_base_camera.position[2])) / down

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from hal.camera import RgbdFrame
-from mskgrasp.core.geometry import quat_rotate, wrap_half_turn
+from mskgrasp.core.geometry import pixel_rays, quat_rotate, wrap_half_turn
 from mskgrasp.parts import Part
 from mskgrasp.perception.part_detection import find_part_pixels
 
@@ -56,9 +56,8 @@ def narrowest_width(points: np.ndarray) -> float:
 def seen_points(frame: RgbdFrame) -> np.ndarray:
     """Compute the points (h * w, 3) of a frame's pixels, base frame, metres; NaN where invalid."""
     depth = np.asarray(frame.depth, dtype=np.float64)
-    rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
-    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(frame.intrinsics).T
-    return frame.T_base_camera.apply((rays * depth[..., None]).reshape(-1, 3))
+    points_camera = pixel_rays(depth.shape, frame.intrinsics) * depth[..., None]
+    return frame.T_base_camera.apply(points_camera.reshape(-1, 3))
 
 
 def pixel_pitch(frame: RgbdFrame) -> float:

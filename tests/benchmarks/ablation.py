@@ -23,6 +23,7 @@ from mskgrasp.learning.sides import Sides, split
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import progress
 from tests.benchmarks.choice import Choice, Looks
+from tests.benchmarks.models import facts
 from tests.benchmarks.paper_choices import CONFIGS, OURS, some_rows
 from tests.benchmarks.report import show
 from tests.benchmarks.score_details import detail_table, details_of
@@ -126,7 +127,7 @@ def main() -> int:
         change_table(relative, f"Change of the error relative to {OURS}"),
     ]
     values = {choice: one.to_json() | details[choice] for choice, one in scores.items()}
-    show(tables, options.out, {"scores": values, "seeds": options.seeds})
+    show(tables, options.out, {"scores": values, "seeds": options.seeds} | facts(samples, share(samples, sides)))
     return 0
 
 

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from mskgrasp.core.geometry import (
     Pose,
+    pixel_rays,
     pose_distance,
     quat_about_z,
     quat_conjugate,
@@ -164,3 +165,12 @@ def test_a_straight_line_moves_and_turns_at_a_constant_rate(start, step, turn):
     for share, quat in zip(shares, line.quat_wxyz, strict=True):
         expected = Rotation.from_rotvec(share * turn) * Rotation.from_quat(start.quat_wxyz, scalar_first=True)
         assert np.allclose(quat_to_matrix(quat), expected.as_matrix(), atol=1e-7)
+
+
+def test_a_point_on_the_ray_of_a_pixel_is_seen_in_that_pixel():
+    intrinsics = np.array([[500.0, 0.0, 3.2], [0.0, 400.0, 1.7], [0.0, 0.0, 1.0]])
+    rays = pixel_rays((4, 6), intrinsics)
+    assert rays.shape == (4, 6, 3) and (rays[..., 2] == 1.0).all()
+    seen = (0.7 * rays) @ intrinsics.T
+    for row, column in np.ndindex(4, 6):
+        assert np.allclose(seen[row, column, :2] / seen[row, column, 2], [column, row])
