@@ -127,7 +127,11 @@ def main() -> int:
         change_table(relative, f"Change of the error relative to {OURS}"),
     ]
     values = {choice: one.to_json() | details[choice] for choice, one in scores.items()}
-    show(tables, options.out, {"scores": values, "seeds": options.seeds} | facts(samples, share(samples, sides)))
+    show(
+        tables,
+        options.out,
+        {"scores": values, "seeds": options.seeds} | facts(samples, share(samples, sides)),
+    )
     return 0
 
 
