@@ -27,7 +27,7 @@ class Checkpoint:
         stage: Network that is being trained.
         epoch: Epochs of that stage that are finished.
         history: Metrics of all epochs so far.
-        weights: Weights of both networks.
+        weights: Weights of all networks.
         best: Weights of the stage's network at its lowest validation loss.
         optimiser: State of the stage's optimiser.
     """

@@ -13,12 +13,12 @@ class EpochMetrics:
     """Losses and validation metrics of one epoch of one network.
 
     Attributes:
-        stage: The network, ``gqn`` or ``gdn``.
+        stage: The network: ``gqn``, ``transfer`` or ``gdn``.
         epoch: Number of the epoch, from 1.
         train_loss: Mean loss of the training batches.
         validation_loss: Loss on the validation parts.
-        auroc: Of the predicted qualities; None for the GDN.
-        translation_rmse: Of the predicted displacements, metres; None for the GQN.
+        auroc: Of the predicted qualities; None for ``gdn``.
+        translation_rmse: Of the predicted displacements, metres; of ``gdn`` alone.
         rotation_rmse: The same, radians.
         seconds: Time taken.
     """

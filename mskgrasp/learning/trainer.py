@@ -183,7 +183,7 @@ class Stage:
         return rate
 
     def epoch(self, number: int, reporter: Reporter) -> EpochMetrics:
-        """Train one epoch (the quality on as many failures as successes) and validate."""
+        """Train one epoch and validate."""
         started = time.perf_counter()
         device = self.models.device
         # Every epoch seeds its own generators, so that a checkpoint needs to store only its number.
@@ -213,7 +213,7 @@ class Stage:
         )
 
     def order(self, generator: torch.Generator) -> Tensor:
-        """Draw the rows of an epoch in random order; to the quality as many failures as successes belong."""
+        """Draw the rows of an epoch in random order: for the quality as many failures as successes."""
         success = self.samples.success[self.training_rows]
         kinds = (self.training_rows[success], self.training_rows[~success])
         if self.of_quality:

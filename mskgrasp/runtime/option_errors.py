@@ -53,7 +53,12 @@ def _explain(event: _errors.ParseErrorEvent, arguments: Sequence[str], legal: Se
             _errors.UnrecognizedArgs(tokens=[first, *_])
             | _errors.MissingArgs(unrecognized_tokens=[first, *_])
         ) if first.startswith("-"):
-            similar = difflib.get_close_matches(first.partition("=")[0], legal)
+            name = first.partition("=")[0]
+            if name in legal:  # with another choice among alternatives
+                return (
+                    f"{name} belongs to settings that are not chosen here; choose them in the --config file"
+                )
+            similar = difflib.get_close_matches(name, legal)
             return f"unknown option {first}" + (f"; similar: {', '.join(similar)}" if similar else "")
         case _errors.UnrecognizedArgs(tokens=[first, *_]):
             return f"unexpected argument {first!r}"

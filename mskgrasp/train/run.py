@@ -79,8 +79,13 @@ def _line(one: EpochMetrics) -> str:
 def run_training(config: TrainConfig) -> int:
     """Train, and write the model, its metrics, the log and the figures into ``config.out``."""
     if config.epochs is not None:
-        gqn, gdn = (stage.model_copy(update={"epochs": config.epochs}) for stage in (config.gqn, config.gdn))
-        config = config.model_copy(update={"epochs": None, "gqn": gqn, "gdn": gdn})
+        stages = {"gqn": config.gqn, "transfer": config.transfer, "gdn": config.gdn}
+        shorter = {
+            name: stage.model_copy(update={"epochs": config.epochs})
+            for name, stage in stages.items()
+            if stage is not None
+        }
+        config = config.model_copy(update=shorter | {"epochs": None})
     if config.data is None or config.out is None:
         missing = "--data" if config.data is None else "--out"
         raise UsageError(f"{missing} is needed: python -m mskgrasp.train --data DATASET --out MODEL")

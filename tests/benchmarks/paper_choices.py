@@ -62,10 +62,12 @@ def paper_choices(
 
 
 def with_stages(config: LearningConfig, **changes: object) -> LearningConfig:
-    """A configuration with changed optimisation of both networks."""
-    stages: dict[str, StageConfig] = {name: getattr(config, name) for name in ("gqn", "gdn")}
+    """A configuration with changed optimisation of all networks."""
+    stages: dict[str, StageConfig | None] = {
+        name: getattr(config, name) for name in ("gqn", "transfer", "gdn")
+    }
     return config.model_copy(
-        update={name: stage.model_copy(update=changes) for name, stage in stages.items()}
+        update={name: stage.model_copy(update=changes) for name, stage in stages.items() if stage is not None}
     )
 
 

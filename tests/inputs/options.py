@@ -107,6 +107,12 @@ ROWS = [
     ),
     Row("train", "epochs below zero", _words("--epochs", "-3"), "--epochs: "),
     Row("train", "a seed of forty digits", _words("--seed", "9" * 40), "--seed: .*less than"),
+    Row(
+        "train",
+        "an option of what is not chosen",
+        _words("--transfer.epochs", "2"),
+        "--transfer.epochs belongs to settings that are not chosen",
+    ),  # fmt: skip
     Row("train", "no data", _words("--out", "model"), "--data is needed"),
     Row("evaluate", "no such part", _words("--parts", "hex_nut_m31"), "hex_nut_m31"),
     Row("evaluate", "an empty name", _words("--parts", ""), "the name of a part is empty"),

@@ -24,16 +24,17 @@ def program(config: LearningConfig, **changes) -> TrainConfig:
 
 
 @pytest.mark.slow
-def test_one_number_of_epochs_stands_for_both_networks_and_is_what_a_stopped_run_needs(dataset, tmp_path):
+def test_one_number_of_epochs_stands_for_all_networks_and_is_what_a_stopped_run_needs(dataset, tmp_path):
     out = tmp_path / "model"
-    assert train.run_training(program(SHORT, data=dataset, out=out, epochs=1)) == 0
+    config = SHORT.model_copy(update={"transfer": SHORT.gqn})
+    assert train.run_training(program(config, data=dataset, out=out, epochs=1)) == 0
     with open(out / "log.csv") as file:
-        assert [row["stage"] for row in csv.DictReader(file)] == ["gqn", "gdn"]
+        assert [row["stage"] for row in csv.DictReader(file)] == ["gqn", "transfer", "gdn"]
     kept = read_config(TrainConfig, out / "config.yaml")
-    assert kept.gqn.epochs == kept.gdn.epochs == 1
-    assert train.run_training(program(SHORT, data=dataset, out=out, epochs=1)) == 0
+    assert kept.gqn.epochs == kept.transfer.epochs == kept.gdn.epochs == 1
+    assert train.run_training(program(config, data=dataset, out=out, epochs=1)) == 0
     with pytest.raises(UsageError, match="gdn"):
-        train.run_training(program(SHORT, data=dataset, out=out))
+        train.run_training(program(config, data=dataset, out=out))
 
 
 def test_a_small_dataset_is_learned_and_every_file_of_a_model_is_written(dataset, tmp_path):
