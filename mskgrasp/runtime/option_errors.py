@@ -55,9 +55,7 @@ def _explain(event: _errors.ParseErrorEvent, arguments: Sequence[str], legal: Se
         ) if first.startswith("-"):
             name = first.partition("=")[0]
             if name in legal:  # with another choice among alternatives
-                return (
-                    f"{name} belongs to settings that are not chosen here; choose them in the --config file"
-                )
+                return f"{name} belongs to settings that are not chosen; choose them in the --config file"
             similar = difflib.get_close_matches(name, legal)
             return f"unknown option {first}" + (f"; similar: {', '.join(similar)}" if similar else "")
         case _errors.UnrecognizedArgs(tokens=[first, *_]):

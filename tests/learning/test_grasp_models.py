@@ -109,7 +109,7 @@ def test_the_shipped_model_is_loaded_as_its_own_architecture():
     network = load_models(PRETRAINED).meta.network
     assert isinstance(network, HandNetworkConfig)
     read = {name: list(v) if isinstance(v, tuple) else v for name, v in network.model_dump().items()}
-    assert read == stored
+    assert read == stored | {"blocks": []}  # a field that is younger than the model
 
 
 def test_descriptions_that_list_both_architectures_are_read(folder):
