@@ -327,7 +327,8 @@ def train(
 
     Raises:
         BadDataset: The data cannot be split, or lack successes or failures.
-        UsageError: The checkpoint was made from other data, or with another version of the samples.
+        UsageError: The checkpoint was made from other data, with another version of the samples, or with a
+            transfer that is not wanted.
         TrainingDiverged: The loss is not finite.
     """
     reporter = reporter or Reporter()
@@ -350,7 +351,6 @@ def train(
             f"{checkpoint_path} was made with version {saved.samples_version} of the samples, this is "
             f"version {SAMPLES_VERSION}; choose another --out or delete it"
         )
-
     if saved is not None and saved.stage not in stages:
         raise UsageError(f"{checkpoint_path} was made with other settings; choose another --out or delete it")
 

@@ -292,8 +292,9 @@ def _collect(stored: StoredReport) -> list[ReadmeRow]:
 def _plan(stored: StoredReport) -> list[ReadmeRow]:
     times, ratios = _report(stored)["tables"]
     ours, paper = (dict(zip(times["header"], row, strict=True)) for row in times["rows"][:2])
+    machine = stored.facts["machine"].partition(",")[0]
     text = (
-        f"{ours['median, ms']} ms on two cores with the shipped model; the paper's network "
+        f"{ours['median, ms']} ms with the shipped model on {machine}; the paper's network "
         f"{paper['median, ms']} ms, {ratios['rows'][0][1]} times as long"
     )
     return [ReadmeRow(name="planning", text=text, interval=f"{ours['interval of the median']} ms")]

@@ -112,7 +112,7 @@ ROWS = [
         "an option of what is not chosen",
         _words("--transfer.epochs", "2"),
         "--transfer.epochs belongs to settings that are not chosen",
-    ),  # fmt: skip
+    ),
     Row("train", "no data", _words("--out", "model"), "--data is needed"),
     Row("evaluate", "no such part", _words("--parts", "hex_nut_m31"), "hex_nut_m31"),
     Row("evaluate", "an empty name", _words("--parts", ""), "the name of a part is empty"),
