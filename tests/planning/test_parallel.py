@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -37,6 +39,32 @@ def test_one_thread_works_in_the_callers():
     with torch_threads(1):
         found = map_batches(lambda _: threading.current_thread(), range(2), CPU)
     assert found == [threading.current_thread()] * 2
+
+
+_PAGE_FAULTS = """
+import resource
+import torch
+from mskgrasp.planning.parallel import map_batches
+
+torch.set_num_threads(2)
+
+def work(batch):
+    held = [torch.ones(2**20) for _ in range(8)]
+
+before = []
+for _ in range(3):
+    before.append(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
+    map_batches(work, range(8), torch.device("cpu"))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before[-1])
+"""
+"""Prints the page faults of 8 batches that hold 8 times 4 MiB each, after the first ones."""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="malloc is another")
+def test_memory_of_one_batch_is_kept_for_the_next():
+    # In a process of its own: what is freed depends on what else was allocated.
+    done = subprocess.run([sys.executable, "-c", _PAGE_FAULTS], capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 2**10  # one batch alone writes to 2^13 pages
 
 
 def test_an_error_reaches_the_caller():
