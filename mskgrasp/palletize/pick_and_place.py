@@ -36,6 +36,7 @@ from mskgrasp.planning.planner import Planner
 from mskgrasp.planning.release import release_opening
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.policies import RepeatedPlanner
+from mskgrasp.trials.trial import reason_of
 
 _NEAR = 0.001
 """Half the side of the region searched for a placed part's tape, m; `find_markers` adds its margin."""
@@ -172,7 +173,7 @@ class PickAndPlace:
             poses = [self._pose(plan, np.zeros(4), target) for target in targets]
             first_reachable(self._cell, poses, tallest=tallest)
         except OutOfWorkspace:
-            return replace(known, reason="OutOfWorkspace"), target, None
+            return replace(known, reason=reason_of(OutOfWorkspace)), target, None
         grasped = engine.grasp(plan, part)
         if grasped.aborted:
             engine.recover(MotionAborted(grasped.aborted))
@@ -209,7 +210,7 @@ class PickAndPlace:
             done = self._measured(frame, after, plan, grasped.before, target, replace(known, placed=True))
             return done, target, after
         engine.put_back(plan)
-        return replace(known, reason="OutOfWorkspace"), target, None
+        return replace(known, reason=reason_of(OutOfWorkspace)), target, None
 
     def _pose(self, plan: GraspPlan, displacement: np.ndarray, target: Target, drop: float = 0.0) -> Grasp:
         lowest, centre = self._cell.workspace.lowest_grasp_z, plan.view.centre_base

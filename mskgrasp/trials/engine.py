@@ -42,7 +42,7 @@ from mskgrasp.perception.tallest import tallest_thing
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import displacement_of_point
 from mskgrasp.reports.grasp_figures import draw_plan
-from mskgrasp.trials.trial import REFUSED
+from mskgrasp.trials.trial import REFUSED, reason_of
 
 _MAX_DEPTH = np.iinfo(np.uint16).max * DEPTH_UNIT
 
@@ -266,7 +266,7 @@ class TrialEngine:
                         "Place the part again? y: yes, n: no, go on without it, q: stop: "
                     ):
                         continue
-                reason = type(error).__name__ if quality is None else REFUSED
+                reason = reason_of(type(error)) if quality is None else REFUSED
                 return PlannedGrasp(
                     frame=frame, plan=None, part=known, reason=reason, no_tape=no_tape, best_quality=quality,
                     refusal="" if quality is None else str(error),
@@ -292,7 +292,7 @@ class TrialEngine:
             load = None if part is None else plan.load_of(part)
             result = execute_grasp(self.cell, plan.grasp, tallest=self._tallest, load=load)
         except OutOfWorkspace as error:
-            return ExecutedGrasp(reason=type(error).__name__, before=before)
+            return ExecutedGrasp(reason=reason_of(type(error)), before=before)
         after = self.part_pose()
         reason = _failure(result, before, after, self.cell.workspace.lift_height)
         if reason or before is None or after is None:

@@ -32,6 +32,7 @@ from mskgrasp.planning.place_pose import (
 from mskgrasp.planning.release import release_opening
 from mskgrasp.trials.engine import PlansGrasps, TrialEngine
 from mskgrasp.trials.placed_trial import PlacedTrial
+from mskgrasp.trials.trial import reason_of
 
 TURNS = float(np.radians(45.0))
 """Greatest turn of a part from where it lies to its target, radians."""
@@ -149,7 +150,7 @@ def _placed(
             return replace(trial, reason="collided")
     else:
         engine.put_back(plan)
-        return replace(trial, reason="OutOfWorkspace")
+        return replace(trial, reason=reason_of(OutOfWorkspace))
     after = engine.part_pose()
     assert after is not None
     if taken_along(lay, after):

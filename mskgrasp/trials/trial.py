@@ -13,7 +13,13 @@ from mskgrasp.planning.grasp_plan import PlannedBy
 Policy = Literal["quality", "low_variance", "recentred", "certified"]
 REFUSED = "refused"
 """Reason of a trial in which no grasp was tried, as the best predicted quality was under the bound."""
+_CAPITAL = re.compile(r"(?<=.)(?=[A-Z])")
 _LEGAL_KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
+
+
+def reason_of(error: type[Exception]) -> str:
+    """Make the reason of a trial that an error ended: ``no part found`` of `NoPartFound`."""
+    return _CAPITAL.sub(" ", error.__name__).lower()
 
 
 @dataclass(frozen=True, kw_only=True)

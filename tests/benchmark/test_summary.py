@@ -47,7 +47,7 @@ def test_the_camera_at_the_hand_has_the_stated_errors_and_the_same_for_all_plann
 def test_precision_rises_as_attempts_of_low_quality_are_refused():
     good = [made(number, quality=0.95) for number in range(5)]
     poor = [failed(number, quality=0.1 + 0.01 * number) for number in range(5, 9)]
-    unseen = [failed(9, quality=None, reason="NoPartFound")]
+    unseen = [failed(9, quality=None, reason="no part found")]
     found = refusals([*good, *poor, *unseen, made(0, "centroid", quality=None)], 0)
     assert {one.planner for one in found} == {"ours"}
     assert [(round(one.refused, 2), one.placed.n, one.placed.of) for one in found][:2] == [
@@ -62,7 +62,7 @@ def test_precision_rises_as_attempts_of_low_quality_are_refused():
 def test_attempts_that_the_planner_refused_itself_are_not_among_those_tried():
     good = [made(number, quality=0.9) for number in range(5)]
     refused = [failed(number, quality=0.1 * number - 0.4, reason="refused") for number in range(5, 9)]
-    unseen = [failed(9, quality=None, reason="NoPartFound")]
+    unseen = [failed(9, quality=None, reason="no part found")]
     found = refusals([*good, *refused, *unseen], 0)
     assert [(round(one.refused, 2), one.bound, one.placed.n, one.placed.of) for one in found] == [
         (0.4, 0.0, 5, 6),

@@ -24,7 +24,7 @@ def trial(**changes: object) -> Trial:
 
 
 NOTHING = dict(
-    success=False, reason="NoPartFound", grasp=None, quality=None, predicted=None, predicted_std=None,
+    success=False, reason="no part found", grasp=None, quality=None, predicted=None, predicted_std=None,
     measured=None, planning_s=None,
 )  # fmt: skip
 

@@ -83,7 +83,7 @@ def test_without_a_success_errors_are_absent_not_zero(tmp_path: Path):
     trials = [trial(**NOTHING)]
     summary = summarise_trials(trials)
     assert summary.overall.translation_rmse is None and summary.overall.median_planning_s is None
-    assert summary.overall.reasons == {"NoPartFound": 1}
+    assert summary.overall.reasons == {"no part found": 1}
     assert "0 of 1" in printed(summary) and " - " in printed(summary) and "nan" not in printed(summary)
     draw_success(summary, tmp_path / "success.png")
     draw_displacements(trials, tmp_path / "errors.png")

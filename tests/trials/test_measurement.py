@@ -60,10 +60,10 @@ def test_after_a_contact_the_arm_is_recovered(box_cell: BoxCell):
 def test_a_trial_without_a_plan_moves_nothing(box_cell: BoxCell):
     engine = box_cell.engine
     joints = engine.cell.arm.state().joints
-    planned = PlannedGrasp(frame=FRAME, plan=None, reason="NoPartFound")
+    planned = PlannedGrasp(frame=FRAME, plan=None, reason="no part found")
     record = run_trial(engine, planned, part="box", number=0, seed=0)
     finish(engine, record)
-    assert record.trial.reason == "NoPartFound" and record.trial.grasp is None and record.plan is None
+    assert record.trial.reason == "no part found" and record.trial.grasp is None and record.plan is None
     np.testing.assert_array_equal(engine.cell.arm.state().joints, joints)
 
 

@@ -212,7 +212,7 @@ def test_a_part_held_beneath_an_overhang_is_not_taken_along(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("n_refused", "reason"), [(1, ""), (2, "OutOfWorkspace")])
+@pytest.mark.parametrize(("n_refused", "reason"), [(1, ""), (2, "out of workspace")])
 def test_a_part_that_no_straight_line_leads_to_its_target_is_turned_less_or_not_placed(
     n_refused: int, reason: str, engine: TrialEngine, monkeypatch: pytest.MonkeyPatch
 ):

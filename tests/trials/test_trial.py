@@ -10,7 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mskgrasp.trials.trial import Prediction, Trial, trial_key
+from hal.errors import OutOfWorkspace
+from mskgrasp.core.errors import NoPartFound
+from mskgrasp.trials.trial import Prediction, Trial, reason_of, trial_key
 from tests.evaluate.made_trials import NOTHING, trial
 
 number = st.floats(-10, 10)
@@ -73,3 +75,7 @@ def test_unknown_deviations_are_null_in_the_file_and_nan_in_the_record():
     assert values["predicted_std"] == [None] * 4 and values["measured"] == [0.1, 0.2, None, 0.3]
     again = Trial.from_json(values)
     assert again.measured is not None and np.isnan(again.measured[2]) and again.measured[3] == 0.3
+
+
+def test_the_reason_of_an_error_is_in_words():
+    assert [reason_of(one) for one in (NoPartFound, OutOfWorkspace)] == ["no part found", "out of workspace"]
