@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from mskgrasp.learning.model_metrics import EpochMetrics, ModelMetrics
     from mskgrasp.learning.samples import Samples, read_samples
     from mskgrasp.learning.sides import Sides, split
-    from mskgrasp.learning.trainer import Reporter, train
+    from mskgrasp.learning.stage import Reporter
+    from mskgrasp.learning.trainer import train
 
 __all__ = [
     "EpochMetrics", "LearningConfig", "ModelMetrics", "Models", "Reporter", "Samples", "Sides", "StageConfig",
@@ -30,6 +31,7 @@ _HOMES = {
     "mskgrasp.learning.model_metrics": ("EpochMetrics", "ModelMetrics"),
     "mskgrasp.learning.samples": ("Samples", "read_samples"),
     "mskgrasp.learning.sides": ("Sides", "split"),
-    "mskgrasp.learning.trainer": ("Reporter", "train"),
+    "mskgrasp.learning.stage": ("Reporter",),
+    "mskgrasp.learning.trainer": ("train",),
 }
 __getattr__, __dir__ = lazy_names(__name__, _HOMES)

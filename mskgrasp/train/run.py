@@ -24,7 +24,8 @@ from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.sides import Sides, split
-from mskgrasp.learning.trainer import Reporter, train
+from mskgrasp.learning.stage import Reporter
+from mskgrasp.learning.trainer import train
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import Bar, advance_to, note, progress
 from mskgrasp.train.config import TrainConfig

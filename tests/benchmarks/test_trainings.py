@@ -14,7 +14,7 @@ from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import exclusive_lock
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.learning.sides import Sides, split
-from mskgrasp.learning.trainer import Reporter
+from mskgrasp.learning.stage import Reporter
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.conftest import Boxes
 from tests.benchmarks.training_cost import cost_of, cost_table

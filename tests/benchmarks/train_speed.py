@@ -23,7 +23,8 @@ from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import build_models
 from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.sides import split
-from mskgrasp.learning.trainer import Stage, describe_networks
+from mskgrasp.learning.stage import Stage
+from mskgrasp.learning.trainer import describe_networks
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import progress
 

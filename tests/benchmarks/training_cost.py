@@ -16,7 +16,8 @@ from mskgrasp.learning.grasp_models import Models, build_models
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.sides import Sides
-from mskgrasp.learning.trainer import Reporter, Stage, describe_networks, stages_of
+from mskgrasp.learning.stage import Reporter, Stage
+from mskgrasp.learning.trainer import describe_networks, stages_of
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import Bar, progress
 from tests.benchmarks.choice import Choice, Looks

@@ -28,7 +28,8 @@ from mskgrasp.learning.config import DeviceName, LearningConfig
 from mskgrasp.learning.grasp_models import DESCRIPTION, ModelMeta, Models, load_models, save_model
 from mskgrasp.learning.samples import SAMPLES_VERSION, Samples
 from mskgrasp.learning.sides import Sides
-from mskgrasp.learning.trainer import Reporter, Stage, describe_networks, train
+from mskgrasp.learning.stage import Reporter, Stage
+from mskgrasp.learning.trainer import describe_networks, train
 from mskgrasp.runtime.progress import progress
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.training_cost import TimeLeft, cost_of

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mskgrasp.core.errors import MskgraspError, one_line
-from mskgrasp.learning.trainer import Reporter
+from mskgrasp.learning.stage import Reporter
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.worker_process import ignore_ctrl_c, leave_with_parent
 

@@ -10,7 +10,8 @@ from mskgrasp.learning.cuda_graphs import GraphedStep
 from mskgrasp.learning.grasp_models import build_models
 from mskgrasp.learning.samples import read_samples
 from mskgrasp.learning.sides import split
-from mskgrasp.learning.trainer import Stage, describe_networks
+from mskgrasp.learning.stage import Stage
+from mskgrasp.learning.trainer import describe_networks
 from tests.learning.small import HAND
 
 pytestmark = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")

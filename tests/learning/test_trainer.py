@@ -12,11 +12,12 @@ from safetensors.torch import save_file
 from mskgrasp.core import metrics
 from mskgrasp.core.errors import BadDataset, BadModel, UsageError
 from mskgrasp.learning.config import StageConfig
-from mskgrasp.learning.grasp_models import ModelCalibration, Models, build_models, load_models, save_model
+from mskgrasp.learning.grasp_models import ModelCalibration, Models, load_models, save_model
 from mskgrasp.learning.held_out import calibrate, predict_grasp_displacement
 from mskgrasp.learning.samples import read_samples
 from mskgrasp.learning.sides import split
-from mskgrasp.learning.trainer import Reporter, Stage, TrainingDiverged, describe_networks, stages_of
+from mskgrasp.learning.stage import Reporter, Stage, TrainingDiverged
+from mskgrasp.learning.trainer import stages_of
 from mskgrasp.learning.trainer import train as learn
 from tests import synthetic
 from tests.learning.small import HAND, PATCH, SHORT
@@ -219,48 +220,11 @@ def test_what_learned_in_mixed_precision_is_as_good_and_predicts_in_float32(data
         assert np.array_equal(one, other)
 
 
-def test_decay_shrinks_weights_of_layers_by_its_share_of_the_rate_and_no_biases(samples, tmp_path):
-    rows = torch.arange(8)
-    after = {}
-    for decay in (0.0, 0.5):
-        stage = StageConfig(
-            learning_rate=0.01, schedule="constant", epochs=1, batch_size=8, weight_decay=decay
-        )
-        config = SHORT.model_copy(update={"gqn": stage})
-        sides = split(samples, config)
-        torch.manual_seed(0)
-        models = build_models(describe_networks(samples, sides.training, config))
-        before = {name: value.clone() for name, value in models.gqn.named_parameters()}
-        Stage("gqn", models, samples, sides, config).learn(rows)
-        after[decay] = models.gqn.state_dict()
-    for name, value in before.items():
-        shrunk = 0.005 * value if value.ndim > 1 else torch.zeros_like(value)
-        assert torch.allclose(after[0.0][name] - after[0.5][name], shrunk, atol=1e-7)
-
-
-def test_the_papers_optimiser_decays_no_weights():
-    with pytest.raises(ValueError, match="weight_decay: 0.1 needs optimiser: adam"):
-        StageConfig(optimiser="rmsprop", weight_decay=0.1)
-
-
 def test_a_loss_that_is_no_number_stops_the_run_in_one_line(samples, tmp_path):
     wild = StageConfig(learning_rate=1e30, schedule="constant", epochs=2, batch_size=32)
     with pytest.raises(TrainingDiverged, match="gqn.learning_rate") as caught:
         learn(samples, SHORT.model_copy(update={"gqn": wild}), checkpoint_path=tmp_path / "c")
     assert "\n" not in str(caught.value)
-
-
-def test_a_picture_of_the_whole_part_is_that_of_the_samples(dataset):
-    network = PATCH.network.model_copy(update={"image": "object"})
-    samples = read_samples(dataset, network)
-    assert samples.object_patches.shape == samples.patches.shape
-    config = SHORT.model_copy(update={"network": network, "symmetric": False})
-    rows = torch.arange(8)
-    sides = split(samples, config)
-    models = build_models(describe_networks(samples, sides.training, config))
-    stage = Stage("gdn", models, samples, sides, config)
-    inputs = stage.batch(rows)[0]
-    assert inputs.shape == (8, 1, 40, 40)
 
 
 @pytest.mark.slow
