@@ -11,7 +11,13 @@ import trimesh
 
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_rotate
 from mskgrasp.parts import Part
-from mskgrasp.perception.part_pose.surface import HeightMap, heights_from, on_plane, sample_surface
+from mskgrasp.perception.part_pose.surface import (
+    HeightMap,
+    ascending,
+    heights_from,
+    on_plane,
+    sample_surface,
+)
 
 MOST_POINTS = 150e3
 """Greatest number of points on a part's surface, about."""
@@ -54,8 +60,8 @@ class Lying:
         resting: Index of the resting pose.
         probability: Of the resting pose.
         turn: The first of those that look alike must be turned by this to look like this one, radians.
-        points: (n, 3) float32 on the surface that a camera above may see, metres; empty where it is not
-            compared with others that look alike.
+        points: (n, 3) float32 on the surface that a camera above may see, `ascending`, metres; empty where
+            it is not compared with others that look alike.
         order: Number of turns that look the same; 0: all.
     """
 
@@ -77,8 +83,8 @@ class Look:
 
     Attributes:
         poses: The most probable first; its frame and points are those of the look.
-        few: (m, 3) some of its points.
-        outline: (k, 2) corners of the convex hull of x, y of one in five of these.
+        few: (m, 3) some of its points, `ascending`.
+        outline: (k, 2) corners of the convex hull of x, y of one in five of them.
         from_above: Heights of it as seen from straight above.
         top: Height of the highest point, metres.
         radius: Greatest distance of a point from the vertical through the part's origin, metres.
@@ -169,7 +175,7 @@ class _Seen:
         points[:, 2] += part.resting.position[index, 2]
         # Stored by coordinate, so that each is contiguous.
         points = np.ascontiguousarray(points.T.astype(np.float32)).T
-        from_above = heights_from(points, None, plane=0.0, cell=cell, margin=3 * cell)
+        from_above = heights_from(ascending(points), None, plane=0.0, cell=cell, margin=3 * cell)
         lower, upper = from_above.bounds(cell)
         rows, columns = np.mgrid[: lower.shape[0], : lower.shape[1]]
         return cls(
@@ -270,39 +276,40 @@ class _Seen:
     def visible(self) -> np.ndarray:
         """The points that a camera above may see, from any side."""
         kept, cell = np.zeros(len(self.points), bool), 1.2 * self.from_above.cell
-        above = self.points[:, 2] > -_BELOW
+        above, sorted_points = self.points[:, 2] > -_BELOW, ascending(self.points)
         for tangent, side in [(0.0, 0.0), *((t, side) for t in _TANGENTS for side in _SIDES)]:
             eye = _FAR * np.array([tangent * np.cos(side), tangent * np.sin(side), 1.0])
-            shown = heights_from(self.points, eye, plane=0.0, cell=cell, margin=2 * cell)
+            shown = heights_from(sorted_points, eye, plane=0.0, cell=cell, margin=2 * cell)
             x, y = on_plane(self.points, eye, 0.0)
             column = np.rint((x - shown.corner[0]) / cell).astype(int)
             row = np.rint((y - shown.corner[1]) / cell).astype(int)
             # A cell on a wall spans this height.
             kept |= self.points[:, 2] >= shown.heights[row, column] - cell / (tangent or 0.5)
-        return np.ascontiguousarray(self.points[kept & above].T).T
+        return self.points[kept & above]
 
 
 def _look(group: list[tuple[_Seen, float]]) -> Look:
     first, poses = group[0][0], []
     compared = len(group) <= MOST_COMPARED
+    visible = first.visible()
     for seen, turn in group:
+        points = visible if seen is first else seen.visible() if compared else seen.points[:0]
         poses.append(
             Lying(
                 resting=seen.resting,
                 probability=seen.probability,
                 turn=turn,
-                points=seen.visible() if compared or seen is first else seen.points[:0],
+                points=ascending(points),
                 order=seen.order(similar=not compared) if compared or seen is first else poses[0].order,
             )
         )
-    points = poses[0].points
-    few = np.ascontiguousarray(points[:: max(1, len(points) // FEW_POINTS)].T).T
+    few = visible[:: max(1, len(visible) // FEW_POINTS)]
     return Look(
         poses=tuple(poses),
-        few=few,
+        few=ascending(few),
         outline=cv2.convexHull(np.ascontiguousarray(few[::5, :2]))[:, 0],
         from_above=first.from_above,
-        top=float(points[:, 2].max()),
-        radius=float(np.linalg.norm(points[:, :2], axis=1).max()),
+        top=float(visible[:, 2].max()),
+        radius=float(np.linalg.norm(visible[:, :2], axis=1).max()),
         rivals=first.rivals(poses[0].order),
     )

@@ -35,6 +35,11 @@ def sample_surface(triangles: np.ndarray, spacing: float) -> np.ndarray:
     return points[kept]
 
 
+def ascending(points: np.ndarray) -> np.ndarray:
+    """Sort points (n, 3) by height, the lowest first; stored by coordinate, so that each is contiguous."""
+    return np.ascontiguousarray(points[np.argsort(points[:, 2], kind="stable")].T).T
+
+
 def _fractions(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Number ``counts[i]`` items of every i from 0 to 1: i, and the fraction, of every item."""
     which = np.repeat(np.arange(len(counts)), counts)
@@ -76,7 +81,7 @@ def heights_from(
     """Compute the heights of a part that an eye sees.
 
     Args:
-        points: (n, 3) float32 on its surface, z from the table, metres.
+        points: (n, 3) float32 on its surface, z from the table, metres, `ascending`.
         eye: (3,) place of the eye in the same frame; None: straight above, infinitely far.
         plane: Height of the plane in which the map lies, metres.
         cell: Edge of a cell, metres, not less than the distance of neighbouring points.
@@ -89,7 +94,8 @@ def heights_from(
     column = (x * scale - (first[0] - np.float32(0.5))).astype(np.int32)
     row = (y * scale - (first[1] - np.float32(0.5))).astype(np.int32)
     heights = np.zeros(width * height, np.float32)
-    np.maximum.at(heights, row * width + column, points[:, 2])
+    # Of several points in a cell the last one stays, which is the highest: 20 times faster than maximum.at.
+    heights[row * width + column] = np.maximum(points[:, 2], 0)
     return HeightMap(
         heights=_without_holes(heights.reshape(height, width)), corner=low, cell=cell, plane=plane
     )

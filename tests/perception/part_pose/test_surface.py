@@ -4,10 +4,10 @@ import trimesh
 from scipy.spatial import KDTree
 from trimesh.transformations import translation_matrix as translation
 
-from mskgrasp.perception.part_pose.surface import heights_from, on_plane, sample_surface
+from mskgrasp.perception.part_pose.surface import ascending, heights_from, on_plane, sample_surface
 
 BOX = trimesh.creation.box((0.06, 0.03, 0.02), transform=translation([0, 0, 0.01]))
-POINTS = sample_surface(np.asarray(BOX.triangles), 0.5e-3).astype(np.float32)
+POINTS = ascending(sample_surface(np.asarray(BOX.triangles), 0.5e-3).astype(np.float32))
 
 
 def test_no_point_of_the_surface_is_farther_than_the_spacing_from_a_sample():
@@ -16,6 +16,15 @@ def test_no_point_of_the_surface_is_farther_than_the_spacing_from_a_sample():
         surface = trimesh.sample.sample_surface(mesh, 5000, seed=0)[0]
         assert KDTree(samples).query(surface)[0].max() < 0.5e-3
         assert len(samples) < 3 * mesh.area / 0.5e-3**2
+
+
+def test_of_the_points_over_a_cell_the_highest_is_seen():
+    middles = 1e-3 * np.stack(np.meshgrid(np.arange(20), np.arange(30)), axis=-1).reshape(-1, 2)
+    heights = np.random.default_rng(0).uniform(0, 0.009, size=(len(middles), 20))
+    heights[:, 7] = 0.01
+    below = np.column_stack([np.repeat(middles, 20, axis=0), heights.ravel()])
+    seen = heights_from(ascending(below.astype(np.float32)), None, plane=0.0, cell=1e-3, margin=0.0)
+    assert seen.heights.shape == (30, 20) and np.all(seen.heights == np.float32(0.01))
 
 
 def test_from_straight_above_a_box_is_as_large_as_its_top():
@@ -61,7 +70,7 @@ def test_a_slit_nearly_two_cells_wide_stays_open(turn):
     ]
     both = trimesh.util.concatenate(halves)
     both.apply_transform(trimesh.transformations.rotation_matrix(turn, [0, 0, 1]))
-    points = sample_surface(np.asarray(both.triangles), 0.5e-3).astype(np.float32)
+    points = ascending(sample_surface(np.asarray(both.triangles), 0.5e-3).astype(np.float32))
     seen = heights_from(points, None, plane=0.0, cell=cell, margin=3e-3)
     low, _ = seen.bounds(cell)
     along = np.linspace(-0.012, 0.012, 25)
