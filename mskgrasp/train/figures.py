@@ -25,6 +25,7 @@ from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples
 from mskgrasp.reports.style import saved_figure
 
+_TITLES = {"gqn": "GQN", "transfer": "GDN's layers on the quality:", "gdn": "GDN"}
 _COLOURS = (BLUE, ORANGE, FAINT, GREEN)
 _BINS = 12
 _MM = 1e3
@@ -114,20 +115,23 @@ def draw_curves(history: list[EpochMetrics], report: dict[str, Any], path: Path)
         report: The final metrics as ``metrics.json`` holds them, with the trivial predictors' errors.
         path: The picture, PNG.
     """
-    with saved_figure(path, 11.5, 6.0) as figure:
-        panels = figure.subplots(2, 3)
-        for line, name in zip(panels, ("gqn", "gdn"), strict=True):
+    stages = [name for name in ("gqn", "transfer", "gdn") if any(one.stage == name for one in history)]
+    with saved_figure(path, 11.5, 3.0 * len(stages)) as figure:
+        panels = figure.subplots(len(stages), 3)
+        for line, name in zip(panels, stages, strict=True):
             rows = [one for one in history if one.stage == name]
             _curve(line[0], rows, "train_loss", "training (with noise and dropout)", FAINT)
             _curve(line[0], rows, "validation_loss", "held-out parts", _COLOURS[0])
-            line[0].set(title=f"{name.upper()} loss", xlabel="epoch")
+            line[0].set(title=f"{_TITLES[name]} loss", xlabel="epoch")
             line[0].legend(fontsize=8)
+            if name != "gdn":
+                _curve(line[1], rows, "auroc", "held-out parts", _COLOURS[0])
+                line[1].axhline(0.5, color=FAINT, lw=1, ls="--", label="chance")
+                line[1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.3, 1.02))
+                line[1].legend(fontsize=8, loc="lower right")
+            if name == "transfer":
+                line[2].set_axis_off()
         gqn, gdn = report["gqn"], report["gdn"]
-        rows = [one for one in history if one.stage == "gqn"]
-        _curve(panels[0, 1], rows, "auroc", "held-out parts", _COLOURS[0])
-        panels[0, 1].axhline(0.5, color=FAINT, lw=1, ls="--", label="chance")
-        panels[0, 1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.3, 1.02))
-        panels[0, 1].legend(fontsize=8, loc="lower right")
         bars = {
             "network": (gqn["brier"], _COLOURS[0]),
             "base rate": (gqn["brier_of_base_rate"], FAINT),
@@ -140,8 +144,8 @@ def draw_curves(history: list[EpochMetrics], report: dict[str, Any], path: Path)
             panels[0, 2].text(place, value, f"{value:.3f}", ha="center", va="bottom")
         rows = [one for one in history if one.stage == "gdn"]
         for axes, key, unit, factor in (
-            (panels[1, 1], "translation_rmse", "mm", _MM),
-            (panels[1, 2], "rotation_rmse", "degrees", float(np.degrees(1.0))),
+            (panels[-1, 1], "translation_rmse", "mm", _MM),
+            (panels[-1, 2], "rotation_rmse", "degrees", float(np.degrees(1.0))),
         ):
             _curve(axes, rows, key, "held-out parts", _COLOURS[0], factor)
             for style, other in (("--", "zero_displacement"), (":", "training_mean")):
