@@ -64,7 +64,7 @@ def _keep_freed_memory() -> None:
     """Let glibc keep the memory of one batch for the next; elsewhere nothing is changed.
 
     Otherwise each batch returns its memory to the system and is given it anew, while the other
-    threads wait: a seventh of the time of a plan on two cores, measured by `tests.benchmarks.plan_speed`.
+    threads wait: a seventh of the time of a plan on two cores of an Intel Xeon.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
     if mallopt is not None:
