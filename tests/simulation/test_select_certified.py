@@ -83,6 +83,16 @@ def test_a_grasp_is_not_certified_whose_part_its_weight_could_turn_between_the_p
     assert not alone.certified and "its weight could turn it between the pads" in alone.reason
     tilted = dataclasses.replace(beside, swing=np.array([0.2, 0.0]))
     assert not select_certified(heavy, 0, [tilted], config).uncertified
+    # Half of what the pads hold is kept where there is no better grasp, a quarter is certified.
+    half, quarter = (
+        dataclasses.replace(beside, mean=np.array([0.025 * slid, 0, 0, 0])) for slid in (0.6, 0.8)
+    )
+    assert [moment_share(heavy, one, config) for one in (half, quarter)] == pytest.approx(
+        [0.5, 0.25], abs=0.03
+    )
+    assert select_certified(heavy, 0, [half, quarter], config) == Selected(certified=(quarter,))
+    kept = select_certified(heavy, 0, [half], config)
+    assert kept.uncertified == (half,) and not kept.certified and kept.reason == alone.reason
     # As little as 95 in 100 simulations have is counted on: half of these products are under 0.5 x 40 N.
     halves = CertifyConfig(
         noise=ExecutionNoise(friction_pad_part=(0.5, 0.5), finger_force=(30.0, 50.0)), least_lifted=0.5
