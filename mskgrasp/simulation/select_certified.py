@@ -16,9 +16,9 @@ SELECT_VERSION = 4
 """Raised by every change after which others of the simulated grasps are certified."""
 GRAVITY = 9.81
 """m/s^2"""
-MOST_MOMENT = 1 / 3
-"""Greatest `moment_share` of a certified grasp: the patch of a pad is not known (0 to 8 mm), and is smaller
-on the lip of a profile than on an even face."""
+PREFERRED_MOMENT = 0.2
+"""Grasps up to this `moment_share` are preferred: pads hold them by a strip of 2 mm, too, such as the lip of
+a profile, which is the least that they are to be relied on to hold."""
 LEAST_UNCERTIFIED = 0.8
 """Least share of its simulations that a grasp lifts which is kept where no grasp is certified."""
 
@@ -60,9 +60,8 @@ class Selected:
     Attributes:
         certified: The certified ones.
         uncertified: Where there is none, the best of those that fail by one criterion: by the share lifted,
-            by the tilt, by a moment of the weight that pads hold by their usual patch, or by a spread of up
-            to twice `CertifyConfig.most_error`. The networks would plan one of these candidates, without
-            knowing which is best.
+            by the tilt, or by a spread of up to twice `CertifyConfig.most_error`. The networks would plan one
+            of these candidates, without knowing which is best.
         reason: Why there is no certified one; empty: there is.
     """
 
@@ -94,12 +93,13 @@ def select_certified(
             uncertified=_steady(firm, errors, config.most_error, config),
             reason=f"it tilts by more than {np.degrees(TILT_LIMIT):g} degrees in every grasp that lifts it",
         )
+    easy, errors = _errors(part, flat, config, most_moment=PREFERRED_MOMENT)
+    steady = _steady(easy, errors, config.most_error, config)
+    if steady:
+        return Selected(certified=steady)
     firm, errors = _errors(part, flat, config)
     if not firm:
-        return Selected(
-            uncertified=_steady(*_errors(part, flat, config, most_moment=1.0), config.most_error, config),
-            reason="its weight could turn it between the pads in every grasp that lifts it",
-        )
+        return Selected(reason="its weight could turn it between the pads in every grasp that lifts it")
     steady = _steady(firm, errors, config.most_error, config)
     if not steady:
         most, least = 1e3 * config.most_error, 1e3 * min(errors)
@@ -116,7 +116,7 @@ def _flat(grasps: Sequence[CertifiedGrasp]) -> list[CertifiedGrasp]:
 
 
 def _errors(
-    part: Part, grasps: Sequence[CertifiedGrasp], config: CertifyConfig, most_moment: float = MOST_MOMENT
+    part: Part, grasps: Sequence[CertifiedGrasp], config: CertifyConfig, most_moment: float = 1.0
 ) -> tuple[list[CertifiedGrasp], list[float]]:
     """The grasps of one resting pose whose pads hold the part's weight, and their expected errors, metres."""
     firm = [one for one in grasps if moment_share(part, one, config) <= most_moment]

@@ -28,7 +28,8 @@ def test_the_best_of_many_grasps_errs_by_as_much_as_is_stated(differences):
                 for count in (24, 6)
             )
             grasps.append(measured(0, radius, GRASP + [0.01 * k, 0, 0, 0], last, before))
-        best = select_certified(PART, 0, grasps, CertifyConfig()).certified[0]
+        light = dataclasses.replace(PART, mass=1e-3)  # the pads hold it however far beside
+        best = select_certified(light, 0, grasps, CertifyConfig()).certified[0]
         seems_best = min(grasps, key=lambda grasp: grasp.spread(radius))
         for row, grasp in ((chosen, best), (least, seems_best)):
             std = stds[round(grasp.grasp[0] / 0.01)]
@@ -83,16 +84,13 @@ def test_a_grasp_is_not_certified_whose_part_its_weight_could_turn_between_the_p
     assert not alone.certified and "its weight could turn it between the pads" in alone.reason
     tilted = dataclasses.replace(beside, swing=np.array([0.2, 0.0]))
     assert not select_certified(heavy, 0, [tilted], config).uncertified
-    # Half of what the pads hold is kept where there is no better grasp, a quarter is certified.
-    half, quarter = (
-        dataclasses.replace(beside, mean=np.array([0.025 * slid, 0, 0, 0])) for slid in (0.6, 0.8)
+    # Where one takes a tenth of what the pads hold, none is certified that takes half of it.
+    half, tenth = (
+        dataclasses.replace(beside, mean=np.array([0.025 * slid, 0, 0, 0])) for slid in (0.6, 0.92)
     )
-    assert [moment_share(heavy, one, config) for one in (half, quarter)] == pytest.approx(
-        [0.5, 0.25], abs=0.03
-    )
-    assert select_certified(heavy, 0, [half, quarter], config) == Selected(certified=(quarter,))
-    kept = select_certified(heavy, 0, [half], config)
-    assert kept.uncertified == (half,) and not kept.certified and kept.reason == alone.reason
+    assert [moment_share(heavy, one, config) for one in (half, tenth)] == pytest.approx([0.5, 0.1], abs=0.01)
+    assert select_certified(heavy, 0, [half, tenth], config).certified == (tenth,)
+    assert select_certified(heavy, 0, [half], config).certified == (half,)
     # As little as 95 in 100 simulations have is counted on: half of these products are under 0.5 x 40 N.
     halves = CertifyConfig(
         noise=ExecutionNoise(friction_pad_part=(0.5, 0.5), finger_force=(30.0, 50.0)), least_lifted=0.5
