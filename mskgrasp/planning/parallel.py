@@ -61,10 +61,10 @@ def _threads(n: int) -> ThreadPoolExecutor:
 
 
 def _keep_freed_memory() -> None:
-    """Let glibc keep the memory of one batch for the next; elsewhere nothing is changed.
+    """Let glibc keep the memory of one batch for the next, in the whole process; nothing changes elsewhere.
 
-    Otherwise each batch returns its memory to the system and is given it anew, while the other
-    threads wait: a seventh of the time of a plan on two cores of an Intel Xeon.
+    Otherwise each batch returns its memory to the system and is given it anew, page by page, while the other
+    threads wait. The bounds are those of each thread's arena (mallopt(3)).
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
     if mallopt is not None:

@@ -17,8 +17,8 @@ SELECT_VERSION = 4
 GRAVITY = 9.81
 """m/s^2"""
 PREFERRED_MOMENT = 0.2
-"""Grasps up to this `moment_share` are preferred: pads hold them by a strip of 2 mm, too, such as the lip of
-a profile, which is the least that they are to be relied on to hold."""
+"""Grasps up to this `moment_share` are preferred: with a patch of 1 mm in place of 5 pads hold them, too. The
+patch of real pads is not known, and rigid ones hold the lip of a profile by its edges alone."""
 LEAST_UNCERTIFIED = 0.8
 """Least share of its simulations that a grasp lifts which is kept where no grasp is certified."""
 

@@ -63,7 +63,7 @@ class PlannedGrasp:
         frame: The part at rest before the grasp.
         plan: None where no grasp was found.
         part: The part, whose mass and centre are stated to the arm; None: an unknown one.
-        reason: Reason where no grasp was found: `REFUSED`, or the error's name; else empty.
+        reason: Reason where no grasp was found: `REFUSED`, or `reason_of` the error; else empty.
         best_quality: Best predicted quality where all grasps were refused; else None.
         refusal: Why they were, in a line; else empty.
         no_tape: Reason why the part carries no tape although tape measures; else empty.

@@ -91,6 +91,8 @@ def test_a_grasp_is_not_certified_whose_part_its_weight_could_turn_between_the_p
     assert [moment_share(heavy, one, config) for one in (half, tenth)] == pytest.approx([0.5, 0.1], abs=0.01)
     assert select_certified(heavy, 0, [half, tenth], config).certified == (tenth,)
     assert select_certified(heavy, 0, [half], config).certified == (half,)
+    spreads = dataclasses.replace(tenth, residual=np.diag(np.square([5e-3, 0.0, 0.0, 0.0])))
+    assert select_certified(heavy, 0, [half, spreads], config).certified == (half,)
     # As little as 95 in 100 simulations have is counted on: half of these products are under 0.5 x 40 N.
     halves = CertifyConfig(
         noise=ExecutionNoise(friction_pad_part=(0.5, 0.5), finger_force=(30.0, 50.0)), least_lifted=0.5

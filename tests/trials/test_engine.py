@@ -116,7 +116,7 @@ def test_a_grasp_out_of_reach_is_refused_before_anything_moves(box_cell: BoxCell
     far = dataclasses.replace(planned.plan, grasp=Grasp.from_vector(np.array([1.0, 0.0, 0.02, 0.0])))
     joints = box_cell.engine.cell.arm.state().joints
     done = box_cell.engine.grasp(far)
-    assert (done.reason, done.result, done.aborted) == ("OutOfWorkspace", None, "")
+    assert (done.reason, done.result, done.aborted) == ("out of workspace", None, "")
     np.testing.assert_array_equal(box_cell.engine.cell.arm.state().joints, joints)
 
 

@@ -71,7 +71,7 @@ def test_a_trial_is_read_back_equal_and_drawn(tmp_path: Path):
 
 
 def test_a_trial_without_a_plan_is_drawn_as_its_frame(tmp_path: Path):
-    one = trial(success=False, reason="NoPartFound", grasp=None, predicted=None, measured=None)
+    one = trial(success=False, reason="no part found", grasp=None, predicted=None, measured=None)
     write_trial(trial_file(tmp_path, one.key), captured(), None, captured())
     frame, plan, after = read_trial(trial_file(tmp_path, one.key))
     assert plan is None and after is not None and after.fine_colour is not None

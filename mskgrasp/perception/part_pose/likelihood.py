@@ -162,6 +162,8 @@ def view(
 ) -> HeightMap:
     """Compute the heights of a part at a pose (3,), in the part's frame, as an eye (3,) in base sees them.
 
+    The points (n, 3) are `ascending`.
+
     The bounds of heights within ``reach``, metres, are those of the table at the map's border, to which what
     lies outside is clipped.
     """

@@ -94,7 +94,8 @@ def heights_from(
     column = (x * scale - (first[0] - np.float32(0.5))).astype(np.int32)
     row = (y * scale - (first[1] - np.float32(0.5))).astype(np.int32)
     heights = np.zeros(width * height, np.float32)
-    # Of several points in a cell the last one stays, which is the highest: 20 times faster than maximum.at.
+    # Assignments are made in the order of the points, so that of several in a cell the highest stays. With
+    # maximum.at, which is slow where neighbouring points lie in one cell, a search took twice as long.
     heights[row * width + column] = np.maximum(points[:, 2], 0)
     return HeightMap(
         heights=_without_holes(heights.reshape(height, width)), corner=low, cell=cell, plane=plane
