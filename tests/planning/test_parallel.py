@@ -43,12 +43,15 @@ def test_one_thread_works_in_the_callers():
 
 _PAGE_FAULTS = """
 import resource
+import threading
 import torch
 from mskgrasp.planning.parallel import map_batches
 
 torch.set_num_threads(2)
+both = threading.Barrier(2)
 
 def work(batch):
+    both.wait()  # both threads work on half of the batches
     held = [torch.ones(2**20) for _ in range(8)]
 
 before = []
@@ -64,7 +67,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before[-1])
 def test_memory_of_one_batch_is_kept_for_the_next():
     # In a process of its own: what is freed depends on what else was allocated.
     done = subprocess.run([sys.executable, "-c", _PAGE_FAULTS], capture_output=True, text=True, check=True)
-    assert int(done.stdout) < 2**10  # one batch alone writes to 2^13 pages
+    assert int(done.stdout) < 2**12  # a single one of the 8 batches writes to 2^13 pages
 
 
 def test_an_error_reaches_the_caller():
