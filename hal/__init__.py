@@ -1,6 +1,7 @@
 """Hardware abstraction: cameras, arms and cells; a YAML file chooses their backends."""
 
-from hal.arm import Arm, ArmState, GraspOutcome
+from hal.arm import Arm
+from hal.arm_state import ArmState, GraspOutcome
 from hal.backends import Backend
 from hal.camera import Camera, RgbdFrame
 from hal.cell import Cell, PartFeeder, PartTracker, Workspace

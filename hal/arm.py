@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import threading
 from abc import abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 
+from hal.arm_state import ArmState, GraspOutcome, Held
 from hal.collisions import check_joints, check_path, line_joints
 from hal.device import Device
-from hal.errors import LoadTooHeavy, MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace, Stopped
+from hal.errors import LoadTooHeavy, MotionAborted, NotConnected, OutOfWorkspace
 from hal.hand import ConfiguredHand, Load, holds
 from hal.limits import (
     ArmLimits,
@@ -23,8 +22,8 @@ from hal.limits import (
     shown,
     touching,
 )
+from hal.motion_gate import MotionGate
 from mskgrasp.core.geometry import Pose, pose_distance
-from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.panda_body import Links
 
 JOINT_TOLERANCE = 5e-3
@@ -35,62 +34,10 @@ ROTATION_TOLERANCE = 1e-2
 """Greatest rotation error of the TCP at the end of a straight motion, radians."""
 WIDTH_TOLERANCE = 2e-3
 """Greatest error of the pads' distance at the end of a motion, metres."""
-HELD_TOLERANCE = 5e-3
-"""Fingers that have moved by more since they closed have lost what they held, metres."""
 MAX_TOUCH_FORCE = 15.0
 """Greatest force at which `Arm.move_until_contact` ends, N."""
 MAX_TOUCH_SPEED = 0.05
 """Greatest speed of that motion, m/s: the arm still moves while the contact is detected."""
-
-STOPPED = "stop() was called; call recover() when it is safe"
-
-
-@dataclass(frozen=True, kw_only=True)
-class ArmState:
-    """State of an arm.
-
-    Attributes:
-        joints: (n,) radians.
-        T_base_tcp: Measured pose of the TCP in the base.
-        gripper_width: Distance between the pads, metres.
-        timestamp_s: Time of the measurement, seconds on the monotonic clock of this machine.
-        grasped: Whether the hand itself reports a grasp; None where it reports nothing. `Arm.holds` decides.
-        max_width: Greatest distance between the pads that this hand reaches, metres; that of its
-            `GripperSpec` where it does not know its own before homing.
-    """
-
-    joints: np.ndarray
-    T_base_tcp: Pose
-    gripper_width: float
-    timestamp_s: float
-    grasped: bool | None = None
-    max_width: float = MAX_OPENING
-
-
-@dataclass(frozen=True, kw_only=True)
-class GraspOutcome:
-    """Outcome of closing the fingers.
-
-    Attributes:
-        width: Distance between the pads, metres.
-        holding: Whether something is between them, by `Arm.holds`.
-    """
-
-    width: float
-    holding: bool
-
-
-@dataclass(frozen=True, kw_only=True)
-class Held:
-    """Something in the hand.
-
-    Attributes:
-        T_base_tcp: Pose of the TCP when the fingers closed on it.
-        width: Distance between the pads then, metres.
-    """
-
-    T_base_tcp: Pose
-    width: float
 
 
 class Arm(Device):
@@ -111,9 +58,8 @@ class Arm(Device):
 
     def __init__(self, limits: ArmLimits):
         self.limits = limits
-        self._fault: str | None = None
-        self._stop = threading.Event()
-        self._busy = threading.Lock()
+        self._gate = MotionGate()
+        self._stop = self._gate.stop
         self._held: Held | None = None
         self._load: Load | None = None
 
@@ -298,8 +244,7 @@ class Arm(Device):
         if held is None:
             return None
         state = self._state()
-        moved = abs(state.gripper_width - held.width) > HELD_TOLERANCE
-        return None if moved or not self.holds(state) else held
+        return None if held.lost(state.gripper_width) or not self.holds(state) else held
 
     def holds(self, state: ArmState) -> bool:
         """Whether the fingers hold something in a state, by the rule `hal.hand.holds`."""
@@ -357,15 +302,7 @@ class Arm(Device):
             NotConnected, CommunicationLost: The arm is not connected or does not answer.
         """
         self._require_connection()
-        with self._busy:
-            # Cleared before, not after: a stop() during the recovery must stay in force.
-            self._stop.clear()
-            try:
-                self._recover()
-            except BaseException as error:
-                self._fault = self._fault or str(error) or type(error).__name__
-                raise
-            self._fault = None
+        self._gate.recover(self._recover)
 
     # ------------------------------------------------------------------ checks
 
@@ -424,26 +361,8 @@ class Arm(Device):
     @contextmanager
     def _motion(self) -> Iterator[None]:
         self._require_connection()
-        with self._busy:
-            if self._fault is not None:
-                raise NeedsRecovery(
-                    f"the arm stopped before ({self._fault}); check the arm, then call recover()"
-                )
-            if self._stop.is_set():
-                raise NeedsRecovery("stop() was called; call recover() before the next motion")
-            try:
-                yield
-                if self._stop.is_set():
-                    raise Stopped(STOPPED)
-            except OutOfWorkspace:
-                raise  # raised before anything moved
-            except BaseException as error:
-                self._fault = str(error) or type(error).__name__
-                self._halt()
-                if self._stop.is_set() and isinstance(error, MotionAborted):
-                    # stop() caused the end, whichever fault the backend reports.
-                    raise Stopped(STOPPED) from error
-                raise
+        with self._gate.motion(self._halt):
+            yield
 
     # ------------------------------------------------------------------ interface of a backend
 

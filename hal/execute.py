@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hal.arm import JOINT_TOLERANCE, Held
+from hal.arm import JOINT_TOLERANCE
+from hal.arm_state import Held
 from hal.camera import RgbdFrame
 from hal.cell import Cell
 from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, Stopped

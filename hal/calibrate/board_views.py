@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hal.arm import ArmState
+from hal.arm_state import ArmState
 from hal.calibrate.board_poses import Sight, candidate_poses, way_is_clear
 from hal.calibrate.hand_eye import MIN_VIEWS, BadCalibrationSet, View
 from hal.camera import RgbdFrame

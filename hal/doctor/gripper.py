@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hal.arm import Arm, ArmState
+from hal.arm import Arm
+from hal.arm_state import ArmState
 from hal.cell import Cell
 from hal.cell_file import number, require_writable, with_values, write_values
 from hal.errors import HalError

@@ -12,15 +12,8 @@ from typing import Any, NoReturn
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from hal.arm import (
-    JOINT_TOLERANCE,
-    POSITION_TOLERANCE,
-    ROTATION_TOLERANCE,
-    STOPPED,
-    Arm,
-    ArmState,
-    GraspOutcome,
-)
+from hal.arm import JOINT_TOLERANCE, POSITION_TOLERANCE, ROTATION_TOLERANCE, Arm
+from hal.arm_state import ArmState, GraspOutcome
 from hal.errors import CommunicationLost, HalError, MotionAborted, NeedsRecovery, OutOfWorkspace, Stopped
 from hal.franka.config import JOINT_SPEED, FrankyArmConfig, PandaPyArmConfig
 from hal.franka.driver import DriverSettings, DriverState
@@ -30,6 +23,7 @@ from hal.franka.link import DriverLink
 from hal.franka.path import JointPath, joint_path, straight_path
 from hal.hand import ConfiguredHand, Load
 from hal.limits import ArmLimits
+from hal.motion_gate import STOPPED
 from mskgrasp.core.geometry import Pose, pose_distance, quat_conjugate, quat_multiply
 from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.panda_body import PANDA_LINKS

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hal.arm import ArmState
+from hal.arm_state import ArmState
 from hal.home.config import HomeConfig
 from hal.open_cell import cell_from_yaml
 from hal.operator import Operator, StoppedByOperator

@@ -7,7 +7,7 @@ import time
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from hal.arm import ArmState, GraspOutcome
+from hal.arm_state import ArmState, GraspOutcome
 from hal.mujoco.world import MujocoWorld
 from hal.simulated import SimulatedArm, contact_fault, joint_motion_s
 from mskgrasp.core.geometry import Pose

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from hal.arm import HELD_TOLERANCE, STOPPED, Arm, ArmState, GraspOutcome, Held
+from hal.arm import Arm
+from hal.arm_state import ArmState, GraspOutcome, Held
 from hal.device import SharingDevice
 from hal.errors import LoadTooHeavy, NeedsRecovery, NotRecorded, OutOfWorkspace, Stopped
 from hal.hand import Load
+from hal.motion_gate import STOPPED
 from hal.replay.config import ReplayArmConfig
 from hal.replay.events import COMMANDS, arm_state, plain, pose
 from hal.replay.playback import Playback
@@ -112,8 +114,7 @@ class ReplayArm(SharingDevice, Arm):
         opened = following is not None and following.call in ("move_gripper", "open_gripper")
         if held is None or values is None or opened:
             return None
-        moved = abs(values["width"] - held.width) > HELD_TOLERANCE
-        return None if moved or not self.holds(arm_state(values, 0.0)) else held
+        return None if held.lost(values["width"]) or not self.holds(arm_state(values, 0.0)) else held
 
     def set_load(self, load: Load | None) -> None:
         """Accept a load as the recorded arm did, or as any arm where the recording has none at this point.
@@ -124,14 +125,13 @@ class ReplayArm(SharingDevice, Arm):
         self._require_connection()
         if load is not None:
             self.check_load(load.mass)
-        if self._fault is not None:
-            raise NeedsRecovery(f"the arm stopped before ({self._fault}); check the arm, then call recover()")
+        self._gate.require_no_fault()
         try:
             self._playback.answer("set_load")
         except (LoadTooHeavy, NeedsRecovery):
             raise  # no fault
         except MskgraspError as error:
-            self._fault = str(error)
+            self._gate.fault = str(error)
             raise
 
     def hand(self) -> None:
@@ -161,11 +161,11 @@ class ReplayArm(SharingDevice, Arm):
         self._require_connection()
         following = self._playback.peek()
         error = following.error[0] if following is not None and following.error is not None else None
-        if self._fault is not None and error != NeedsRecovery.__name__:
-            raise NeedsRecovery(f"the arm stopped before ({self._fault}); check the arm, then call recover()")
+        if error != NeedsRecovery.__name__:
+            self._gate.require_no_fault()
         # A recorded stop ended a recorded motion; one that comes now ends this one.
         if self._stop.is_set() and error is None:
-            self._fault, self._astray = "stop() was called", True
+            self._gate.fault, self._astray = "stop() was called", True
             raise Stopped(STOPPED)
         return self._step(call, {key: plain(value) for key, value in arguments.items()})
 
@@ -175,11 +175,11 @@ class ReplayArm(SharingDevice, Arm):
         except (OutOfWorkspace, NeedsRecovery):
             raise  # no fault: nothing had moved
         except MskgraspError as error:
-            self._fault, self._astray = str(error), isinstance(error, NotRecorded)
+            self._gate.fault, self._astray = str(error), isinstance(error, NotRecorded)
             raise
 
     def _acknowledge(self) -> None:
-        self._fault, self._astray = None, False
+        self._gate.fault, self._astray = None, False
         self._stop.clear()
 
     def _halt(self) -> None:

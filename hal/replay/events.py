@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from hal import errors as hal_errors
-from hal.arm import ArmState, GraspOutcome
+from hal.arm_state import ArmState, GraspOutcome
 from hal.errors import HalError, Stopped
 from hal.gripper import GripperSpec
 from hal.hand import Load

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hal.arm import Arm, ArmState, GraspOutcome, Held
+from hal.arm import Arm
+from hal.arm_state import ArmState, GraspOutcome, Held
 from hal.camera import Camera, RgbdFrame
 from hal.cell import PartFeeder, PartTracker
 from hal.device import Device, SharingDevice

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hal.arm import ArmState, GraspOutcome
+from hal.arm_state import ArmState, GraspOutcome
 from hal.limits import ArmLimits
 from hal.sim.world import SapienWorld
 from hal.simulated import SimulatedArm, contact_fault, joint_motion_s

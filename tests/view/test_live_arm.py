@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from hal import Cell
-from hal.arm import ArmState
+from hal.arm_state import ArmState
 from hal.errors import CommunicationLost
 from hal.mujoco import MujocoCellConfig, mujoco_cell
 from hal.simulated import SimulatedArm
