@@ -1,7 +1,7 @@
 """Pages of results, rendered from stored reports.
 
-    python -m tests.docs.make_results                   render the blocks of every page and the table of the
-                                                        README (`make results`)
+    python -m tests.docs.make_results                   render the blocks of every page and the summaries of
+                                                        README and index (`make results`)
     python -m tests.docs.make_results --record NAME..   run commands of docs/results/runs.yaml anew, store
                                                         their reports in docs/results/reports, then render
 
@@ -57,9 +57,9 @@ from mskgrasp.validate.tables import label_error_section, validation_sections
 from tests.benchmarks.report import markdown_rows
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT
-from tests.docs.readme_rows import ROWS
-from tests.docs.readme_table import README, rendered_readme
 from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored
+from tests.docs.summary_rows import ROWS
+from tests.docs.summary_table import INDEX, README, with_summary
 from tests.docs.uses_of_test_parts import commit, log_use
 from tests.sim_in_the_loop.regression import Row, shipped_weights, stored_figures
 
@@ -257,7 +257,7 @@ def _machine() -> str:
 
 
 def main() -> int:
-    """Records what is asked for, and renders every page and the README."""
+    """Records what is asked for, and renders every page, the index and the README."""
     parser = argparse.ArgumentParser(
         prog="python -m tests.docs.make_results",
         description="Render the pages of results from stored reports.",
@@ -271,7 +271,7 @@ def main() -> int:
         log_test_parts(name)
     for path in (*sorted(RESULTS.glob("*.md")), README):
         before = path.read_text(encoding="utf-8")
-        after = rendered_readme(before) if path == README else rendered(before)
+        after = with_summary(before, path) if path in (INDEX, README) else rendered(before)
         if after != before:
             path.write_text(after, encoding="utf-8")
             print(f"wrote {path.relative_to(ROOT)}")

@@ -14,9 +14,9 @@ from tests.docs import stored_reports
 from tests.docs.make_results import FACTS, rendered
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT, without_code
-from tests.docs.readme_rows import ROWS
-from tests.docs.readme_table import FORMER, HEADER, README, rendered_readme, shown_rows, table
 from tests.docs.stored_reports import REPORTS, RUNS, StoredReport, read_stored
+from tests.docs.summary_rows import IN_README, ROWS
+from tests.docs.summary_table import FORMER, HEADER, INDEX, README, shown_rows, summary, with_summary
 from tests.sim_in_the_loop.regression import shipped_weights
 
 RESULTS = sorted(set((ROOT / "docs/results").glob("*.md")) - {ROOT / "docs/results/README.md"})
@@ -39,7 +39,7 @@ def test_a_page_shows_what_its_stored_reports_say(page: Path):
 
 @pytest.mark.parametrize("page", sorted((ROOT / "docs/results").glob("*.md")), ids=lambda page: page.stem)
 def test_every_figure_of_a_page_comes_from_a_report(page: Path):
-    words = re.sub(r"<!-- run: .*?<!-- end -->", "", page.read_text(encoding="utf-8"), flags=re.S)
+    words = re.sub(r"<!-- (run: |results ).*?<!-- end -->", "", page.read_text(encoding="utf-8"), flags=re.S)
     words = re.sub(r"^#.*$|\]\(.*?\)", "", without_code(words), flags=re.M)
     assert not re.findall(NUMBER, words)
 
@@ -60,10 +60,11 @@ def test_a_table_says_whether_the_model_that_ships_made_it(tmp_path: Path, monke
     assert stored.facts["model"] == words and stored.of_former_model == words.startswith("shipped before")
 
 
-def test_the_readme_marks_the_rows_of_weights_that_ship_no_more():
-    marked = {name for name, _ in shown_rows() if read_stored(name).of_former_model}
-    rows = sum(len(rows(read_stored(name))) for name, rows in shown_rows() if name in marked)
-    assert table().count(FORMER) == rows
+@pytest.mark.parametrize("page", [README, INDEX], ids=lambda page: page.parent.name)
+def test_a_summary_marks_the_rows_of_weights_that_ship_no_more(page: Path):
+    marked = {name for name, _ in shown_rows(page) if read_stored(name).of_former_model}
+    rows = sum(len(rows(read_stored(name))) for name, rows in shown_rows(page) if name in marked)
+    assert summary(page).count(FORMER) == rows
 
 
 def test_every_stored_report_is_on_a_page_and_every_run_has_one():
@@ -105,10 +106,18 @@ def test_the_index_links_every_results_page():
     assert not [page.name for page in RESULTS if f"]({page.name})" not in index]
 
 
-def test_the_readme_shows_what_the_stored_reports_say():
-    text = README.read_text(encoding="utf-8")
-    assert rendered_readme(text) == text, "run make results"
-    assert table() in text
+@pytest.mark.parametrize("page", [README, INDEX], ids=lambda page: page.parent.name)
+def test_a_summary_shows_what_the_stored_reports_say(page: Path):
+    text = page.read_text(encoding="utf-8")
+    assert with_summary(text, page) == text, "run make results"
+    assert summary(page) in text
+
+
+def test_the_rows_of_the_readme_are_rows_of_the_index():
+    assert set(IN_README) < {name for name, _ in ROWS}
+    cells = [{line.split(": ", 1)[1] for line in summary(page).splitlines() if "](" in line}
+             for page in (README, INDEX)]  # fmt: skip
+    assert cells[0] < cells[1]
 
 
 def test_no_figure_beside_the_table_of_the_readme_is_typed_by_hand():
@@ -117,9 +126,9 @@ def test_no_figure_beside_the_table_of_the_readme_is_typed_by_hand():
     assert re.findall(NUMBER, without_code(words)) == ["95"]  # the level of the intervals
 
 
-def test_every_row_of_the_readme_has_split_n_interval_and_command():
-    rows = [line.strip("| ").split(" | ") for line in table().splitlines() if line.startswith("| [")]
-    assert len(rows) >= len(shown_rows()) >= len(ROWS) - 1
+def test_every_row_of_the_summary_has_split_n_interval_and_command():
+    rows = [line.strip("| ").split(" | ") for line in summary(INDEX).splitlines() if line.startswith("| [")]
+    assert len(rows) >= len(shown_rows(INDEX)) >= len(ROWS) - 1
     for row in rows:
         assert len(row) == len(HEADER) and all(row), row
         assert "not printed" not in row[3]

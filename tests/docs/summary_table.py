@@ -1,18 +1,22 @@
-"""The README's table of results, of the rows that the stored reports give.
+"""The summary of results, of the rows that the stored reports give.
 
-`make results` writes it between ``<!-- results -->`` and ``<!-- end -->``.
+`make results` writes it between ``<!-- results -->`` and ``<!-- end -->``: all rows into the index of the
+results, the main ones into the README.
 """
 
 from __future__ import annotations
 
+import posixpath
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 from tests.docs.pages import ROOT
-from tests.docs.readme_rows import ROWS, ReadmeRow
-from tests.docs.stored_reports import REPORTS, StoredReport, page_of, read_stored
+from tests.docs.stored_reports import REPORTS, RESULTS, StoredReport, page_of, read_stored
+from tests.docs.summary_rows import IN_README, ROWS, SummaryRow
 
 README = ROOT / "README.md"
+INDEX = RESULTS / "README.md"
 FORMER = " (with the weights that shipped before)"
 """Mark of a row."""
 SUPERSEDED = "Recorded before "
@@ -21,13 +25,13 @@ HEADER = ("result", "split", "n", "interval", "command")
 _BLOCK = re.compile(r"(<!-- results -->\n).*?(<!-- end -->)", re.S)
 
 
-def rendered_readme(text: str) -> str:
-    """The README with the table that the stored reports give."""
-    return _BLOCK.sub(lambda found: found[1] + table() + found[2], text)
+def with_summary(text: str, page: Path) -> str:
+    """The text of the README or of the index with the rows that the stored reports give."""
+    return _BLOCK.sub(lambda found: found[1] + summary(page) + found[2], text)
 
 
-def table() -> str:
-    """The model and the table, as Markdown."""
+def summary(page: Path) -> str:
+    """The model and the table of the README or of the index, as Markdown."""
     model = read_stored("shipped_model").facts["model"]
     lines = [
         "",
@@ -36,25 +40,28 @@ def table() -> str:
         f"| {' | '.join(HEADER)} |",
         "|" + "---|" * len(HEADER),
     ]
-    for name, rows in shown_rows():
+    for name, rows in shown_rows(page):
         stored = read_stored(name)
-        lines += [_line(row, stored) for row in rows(stored)]
+        to = posixpath.relpath(page_of(name), page.parent.relative_to(ROOT).as_posix())
+        lines += [_line(row, stored, to) for row in rows(stored)]
     return "\n".join(lines) + "\n\n"
 
 
-def shown_rows() -> list[tuple[str, Callable[[StoredReport], list[ReadmeRow]]]]:
-    """The stored reports of `ROWS`, of each the run at full size or else the first that there is."""
+def shown_rows(page: Path) -> list[tuple[str, Callable[[StoredReport], list[SummaryRow]]]]:
+    """The stored reports of a page's rows, of each the run at full size or else the first that there is."""
     known = {path.stem for path in REPORTS.glob("*.json")}
     found = []
     for name, rows in ROWS:
+        if page == README and name not in IN_README:
+            continue
         sizes = (f"{name}_full", name, f"{name}_list", f"{name}_certified", f"{name}_quick")
         found += [(one, rows) for one in sizes if one in known][:1]
     return found
 
 
-def _line(row: ReadmeRow, stored: StoredReport) -> str:
+def _line(row: SummaryRow, stored: StoredReport, page: str) -> str:
     facts = stored.facts
-    first = f"[{row.name}]({page_of(stored.name)}): {row.text}"
+    first = f"[{row.name}]({page}): {row.text}"
     if any(note.startswith(SUPERSEDED) for note in facts.get("notes", [])):
         first += "; recorded before a change that the page names"
     if stored.of_former_model:

@@ -1,4 +1,4 @@
-"""Rows of the README's table of results, each a function of a stored report."""
+"""Rows of the summary of results, each a function of a stored report."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ variance, known and novel objects pooled, m and rad."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReadmeRow:
+class SummaryRow:
     """A row, as Markdown; split and n are those of the stored run unless stated.
 
     Attributes:
@@ -38,16 +38,16 @@ class ReadmeRow:
     n: str = ""
 
 
-def _success(stored: StoredReport) -> list[ReadmeRow]:
+def _success(stored: StoredReport) -> list[SummaryRow]:
     found = _report(stored)["overall"]
     return [
-        ReadmeRow(
+        SummaryRow(
             name="best quality",
             text=f"{found['success_rate']:.1%} lifted, no sensor noise "
             f"(paper in simulation: {_report(stored)['paper']['simulated']:.1%})",
             interval=_between(found["success_interval"], 100, "%"),
         ),
-        ReadmeRow(
+        SummaryRow(
             name="best quality",
             text=f"displacement RMSE {_rmse(found)} about the vertical (predicting zero: "
             f"{_rmse(found, '_of_zero')}); {found['tilted']['value']:.1%} hang tilted by more than 2 degrees",
@@ -61,7 +61,7 @@ def _rmse(statistics: dict[str, Any], of: str = "") -> str:
     return f"{_mm(statistics[f'translation_rmse{of}'])}, {_degrees(statistics[f'rotation_rmse{of}'])}"
 
 
-def _displacement(stored: StoredReport) -> list[ReadmeRow]:
+def _displacement(stored: StoredReport) -> list[SummaryRow]:
     model = next(iter(_report(stored)["models"].values()))
     paper = f"{_mm(PAPER['translation'])}, {_degrees(PAPER['rotation'])}"
     found = []
@@ -71,7 +71,7 @@ def _displacement(stored: StoredReport) -> list[ReadmeRow]:
     ):
         both, novel = model[policy]["all"], model[policy]["novel"]
         found.append(
-            ReadmeRow(
+            SummaryRow(
                 name=name,
                 text=f"displacement RMSE {_rmse(both)} (predicting zero: {_rmse(both, '_of_zero')}{theirs}); "
                 f"novel parts alone: {_rmse(novel)}",
@@ -83,15 +83,15 @@ def _displacement(stored: StoredReport) -> list[ReadmeRow]:
     return found
 
 
-def _certified(parts: str, where: str) -> Callable[[StoredReport], list[ReadmeRow]]:
+def _certified(parts: str, where: str) -> Callable[[StoredReport], list[SummaryRow]]:
     """A row of certified grasps of some parts under some conditions."""
     return lambda stored: [_certified_row(_report(stored)["overall"], f"{parts}, {where}")]
 
 
-def _certified_row(found: dict[str, Any], where: str) -> ReadmeRow:
+def _certified_row(found: dict[str, Any], where: str) -> SummaryRow:
     certified, planned = found["certified"]
     rotation = math.degrees(found["rotation_rmse"])
-    return ReadmeRow(
+    return SummaryRow(
         name="certified grasps, by the CAD",
         text=f"{where}: {found['success_rate']:.1%} lifted, displacement RMSE "
         f"{1e3 * found['translation_rmse']:.2f} mm, {rotation:.2f} degrees; {certified} of {planned} planned "
@@ -101,14 +101,14 @@ def _certified_row(found: dict[str, Any], where: str) -> ReadmeRow:
     )
 
 
-def _assessed(stored: StoredReport) -> list[ReadmeRow]:
+def _assessed(stored: StoredReport) -> list[SummaryRow]:
     whole, agreement, parts = _report(stored)["tables"]
     fresh = dict(zip(whole["header"], whole["rows"][-1], strict=True))
     (agrees,) = (row[-1] for row in agreement["rows"] if row[0] == "1 mm")
     turned = sum(row[-1] == "yes" for row in parts["rows"])
     share, between = fresh["placed within 1 mm"].rstrip("]").split(" [")
     return [
-        ReadmeRow(
+        SummaryRow(
             name="assessed parts in fresh scenes",
             text=f"{share} of all attempts placed within 1 mm, corrected by the prediction of certified "
             f"grasps; for {agrees} parts this lies within the interval that the part's report stated from a "
@@ -119,7 +119,7 @@ def _assessed(stored: StoredReport) -> list[ReadmeRow]:
     ]
 
 
-def _benchmark(stored: StoredReport) -> list[ReadmeRow]:
+def _benchmark(stored: StoredReport) -> list[SummaryRow]:
     rows = {row["planner"]: stored_row(row) for row in _report(stored)["rows"]}
     ours = rows["ours"]
     corrected, plain, simple = ours.first("predicted"), ours.first("none"), rows["centroid"].first("none")
@@ -136,7 +136,7 @@ def _benchmark(stored: StoredReport) -> list[ReadmeRow]:
         )
     cell = ", in MuJoCo" if stored.name == "benchmark_mujoco" else ""
     return [
-        ReadmeRow(
+        SummaryRow(
             name=f"placed within {TOLERANCE}{cell}",
             text=text,
             interval="; ".join(_between(one.interval, 100, "%") for one in shares),
@@ -145,7 +145,7 @@ def _benchmark(stored: StoredReport) -> list[ReadmeRow]:
     ]
 
 
-def _palletize(stored: StoredReport) -> list[ReadmeRow]:
+def _palletize(stored: StoredReport) -> list[SummaryRow]:
     report = _report(stored)
     each = [report["corrections"][name] for name in ("predicted", "none", "truth")]
     gain = report["gain"]["predicted"]
@@ -154,7 +154,7 @@ def _palletize(stored: StoredReport) -> list[ReadmeRow]:
         f"{1e3 * one['median_translation']:.2f} mm, {_degrees(one['median_rotation'])}" for one in each
     )
     return [
-        ReadmeRow(
+        SummaryRow(
             name="placing, grasps of best quality" if stored.name == "palletize_quality" else "placing",
             text=f"median error {corrected} corrected by the prediction; {plain} without; {true} corrected "
             f"by the true displacement; corrected by the prediction it is {gain['translation_ratio']:.2f} of "
@@ -166,18 +166,18 @@ def _palletize(stored: StoredReport) -> list[ReadmeRow]:
     ]
 
 
-def _shipped_model(stored: StoredReport) -> list[ReadmeRow]:
+def _shipped_model(stored: StoredReport) -> list[SummaryRow]:
     report = _report(stored)["metrics"]["test"]
     quality, displacement = report["gqn"], report["gdn"]
     between = displacement["intervals"]
     return [
-        ReadmeRow(
+        SummaryRow(
             name="random grasps",
             text=f"quality accuracy on balanced data {quality['balanced_accuracy']:.1%}",
             interval=_between(quality["intervals"]["balanced_accuracy"], 100, "%"),
             n=f"{quality['n']} grasps",
         ),
-        ReadmeRow(
+        SummaryRow(
             name="random grasps",
             text=f"displacement RMSE {1e3 * displacement['translation_rmse']:.2f} mm, "
             f"{math.degrees(displacement['rotation_rmse']):.2f} degrees",
@@ -188,7 +188,7 @@ def _shipped_model(stored: StoredReport) -> list[ReadmeRow]:
     ]
 
 
-def _equal_recipes(stored: StoredReport) -> list[ReadmeRow]:
+def _equal_recipes(stored: StoredReport) -> list[SummaryRow]:
     found = _report(stored)["scores"]["novel"]
     ours, paper = found[OURS], found[PAPER_AS_OURS]
 
@@ -206,10 +206,10 @@ def _equal_recipes(stored: StoredReport) -> list[ReadmeRow]:
     )
     n = f"{ours['n']} grasps of {ours['parts']} parts, {ours['successes']} successes; three trainings each"
     split = stored.facts["split"].partition(";")[0]
-    return [ReadmeRow(name="random grasps", text=text, interval=interval, split=split, n=n)]
+    return [SummaryRow(name="random grasps", text=text, interval=interval, split=split, n=n)]
 
 
-def _displacement_same_data(stored: StoredReport) -> list[ReadmeRow]:
+def _displacement_same_data(stored: StoredReport) -> list[SummaryRow]:
     models = _report(stored)["models"]
     ours, paper = (models[name]["recentred"]["novel"] for name in ("ours", "gcip_mv"))
 
@@ -221,7 +221,7 @@ def _displacement_same_data(stored: StoredReport) -> list[ReadmeRow]:
         f"{_rmse_intervals(one)}, {_between(one['within'][0]['interval'], 100, '%')}" for one in (ours, paper)
     )
     return [
-        ReadmeRow(
+        SummaryRow(
             name="planned grasps of these two networks",
             text=f"high quality, low variance, recentred: ours {errors(ours)}; the paper's {errors(paper)}",
             interval=interval,
@@ -230,7 +230,7 @@ def _displacement_same_data(stored: StoredReport) -> list[ReadmeRow]:
     ]
 
 
-def _validation(stored: StoredReport) -> list[ReadmeRow]:
+def _validation(stored: StoredReport) -> list[SummaryRow]:
     report = _report(stored)
     finest = "{rate_hz} Hz, {position_iterations} it".format(**report["settings"]["references"][1])
     yardstick = report["yardstick"]
@@ -241,14 +241,14 @@ def _validation(stored: StoredReport) -> list[ReadmeRow]:
     ]
 
 
-def _against(report: dict[str, Any], setting: str, reference: str, name: str) -> ReadmeRow:
+def _against(report: dict[str, Any], setting: str, reference: str, name: str) -> SummaryRow:
     """A row of the errors of one setting against another."""
     pair = (setting, reference)
     (found,) = (one for one in report["errors"] if (one["setting"], one["reference"]) == pair)
     shift, success = found["equivalence"]["displacement"], found["equivalence"]["success"]
     shown = "shown" if found["equivalent"] else "not shown"
     steps = [report.get(one, one).replace(" it", " iterations") for one in pair]
-    return ReadmeRow(
+    return SummaryRow(
         name=name,
         text=f"{' against '.join(steps)}: median displacement {1e3 * shift['estimate']:.2f} mm beyond that "
         f"of starts moved by 10 um, success {100 * success['estimate']:+.1f} points; equivalence within "
@@ -259,13 +259,13 @@ def _against(report: dict[str, Any], setting: str, reference: str, name: str) ->
     )
 
 
-def _engines(stored: StoredReport) -> list[ReadmeRow]:
+def _engines(stored: StoredReport) -> list[SummaryRow]:
     report = _report(stored)
     whole, between = report["engines"]["all"], report["intervals"]
     parts = [name for name in report["engines"] if name != "all" and not name.endswith(SHIFTED)]
     shifts = (_between(between[name], 1e3, "mm", digits=2) for name in ("shift_median", "shift_p90"))
     return [
-        ReadmeRow(
+        SummaryRow(
             name="labels against a second engine, MuJoCo",
             text=f"success agrees in {whole['agreement']:.1%}; where both lift the part, displacement "
             f"differs by {1e3 * whole['shift_median']:.2f} mm (median; 90th percentile "
@@ -277,13 +277,13 @@ def _engines(stored: StoredReport) -> list[ReadmeRow]:
     ]
 
 
-def _collect(stored: StoredReport) -> list[ReadmeRow]:
+def _collect(stored: StoredReport) -> list[SummaryRow]:
     cells = _cells(stored)
     text = f"{cells['grasps/s']} grasps/s, {cells['time']} for the demo dataset"
-    return [ReadmeRow(name="collecting", text=text, interval=stored.facts["intervals"])]
+    return [SummaryRow(name="collecting", text=text, interval=stored.facts["intervals"])]
 
 
-def _plan(stored: StoredReport) -> list[ReadmeRow]:
+def _plan(stored: StoredReport) -> list[SummaryRow]:
     times, ratios = _report(stored)["tables"]
     ours, paper = (dict(zip(times["header"], row, strict=True)) for row in times["rows"][:2])
     machine = stored.facts["machine"].partition(",")[0]
@@ -291,7 +291,7 @@ def _plan(stored: StoredReport) -> list[ReadmeRow]:
         f"{ours['median, ms']} ms with the shipped model on {machine}; the paper's network "
         f"{paper['median, ms']} ms, {ratios['rows'][0][1]} times as long"
     )
-    return [ReadmeRow(name="planning", text=text, interval=f"{ours['interval of the median']} ms")]
+    return [SummaryRow(name="planning", text=text, interval=f"{ours['interval of the median']} ms")]
 
 
 def _cells(stored: StoredReport) -> dict[str, str]:
@@ -323,7 +323,7 @@ def _between(ends: Any, scale: float, unit: str, digits: int = 1) -> str:
     return f"{low} to {high} {unit}" if "-" in low + high else f"{low} - {high} {unit}"
 
 
-ROWS: tuple[tuple[str, Callable[[StoredReport], list[ReadmeRow]]], ...] = (
+ROWS: tuple[tuple[str, Callable[[StoredReport], list[SummaryRow]]], ...] = (
     ("success", _success),
     ("displacement", _displacement),
     ("success_certified", _certified("the catalogue's parts", "exact camera")),
@@ -344,3 +344,19 @@ ROWS: tuple[tuple[str, Callable[[StoredReport], list[ReadmeRow]]], ...] = (
     ("plan_speed", _plan),
 )
 """Name of each report of the table, and its rows; one that is not stored yet has none."""
+
+IN_README = (
+    "success",
+    "displacement",
+    "success_certified",
+    "success_certified_cad_kinect2",
+    "benchmark",
+    "benchmark_mujoco",
+    "palletize",
+    "palletize_quality",
+    "shipped_model",
+    "equal_recipes",
+    "engines",
+    "plan_speed",
+)
+"""Reports of the rows that the README shows, too."""
