@@ -83,7 +83,7 @@ def scene_tasks(part: Part, n_trials: int) -> list[SceneTask]:
 def trial_bench(setup: AssessSetup) -> Iterator[Callable[[SceneTask], Iterator[PlacedTrial]]]:
     """Make the trials of a scene by certified grasps and by the networks alone."""
     part = find_part(setup.source)
-    nothing = replace(setup.certified, grasps=(), uncertified=())
+    nothing = replace(setup.certified, grasps=(), uncertified=(), without={})
     with ExitStack() as stack:
         found: dict[str, tuple[TrialEngine, dict[str, CertifiedPlanner]]] = {}
 

@@ -128,7 +128,7 @@ class CertifiedPlanner:
 
     def _tell(self, found: PartPose, plan: GraspPlan | None) -> None:
         """Report why no certified grasp is planned, unless the networks' was asked for."""
-        if not (self._certified.grasps or self._certified.uncertified):
+        if not (self._certified.grasps or self._certified.uncertified or self._certified.without):
             return
         resting = self._certified.like.get(found.resting, (found.resting, 0.0))[0]
         reason = self._certified.without.get(resting, "the arm reaches none of its certified grasps")

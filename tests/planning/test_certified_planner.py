@@ -127,6 +127,13 @@ def test_without_certified_grasps_the_networks_plan_and_say_why(cell, planner, c
     assert "gets no certified grasp: no grasp lifts it; planned by the networks" in capsys.readouterr().err
     network = planner.plan(frame, np.random.default_rng(0))
     assert np.array_equal(plan.grasp.as_vector(), network.grasp.as_vector())
+    # The same where no pose has a grasp, but not where the networks are asked for (`assess` does).
+    none = dataclasses.replace(others, grasps=())
+    CertifiedPlanner(planner, PART, none).plan(frame, np.random.default_rng(0))
+    assert "gets no certified grasp: no grasp lifts it; planned by the networks" in capsys.readouterr().err
+    asked_for = CertifiedPlanner(planner, PART, dataclasses.replace(none, without={}))
+    asked_for.plan(frame, np.random.default_rng(0))
+    assert "certified" not in capsys.readouterr().err
 
 
 def test_where_the_part_always_tilts_it_is_planned_with_the_tilt(cell, planner, capsys):
