@@ -125,6 +125,8 @@ def unknown_part(name: str, *, builtin_only: bool = False) -> UnknownPart:
             )
         known = f", or name the part {Path(name).stem}" if Path(name).stem in _recipes() else ""
         return UnknownPart(f"there is no file {name}; check the path{known}")
+    if not cad.available() and any(recipe.name == name for recipe in cad.recipes()):
+        return UnknownPart(f"{name} is drawn in CAD, which needs an extra: run EXTRAS=dev,cad .ci/setup")
     known = builtin_names() if builtin_only else (*builtin_names(), *imported_names())
     close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(close)}?" if close else "`python -m mskgrasp.parts list` shows the parts"

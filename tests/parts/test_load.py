@@ -2,7 +2,8 @@ import pytest
 
 from mskgrasp.core.errors import UnknownPart
 from mskgrasp.core.shipped import example_file
-from mskgrasp.parts import find_part, load_part, read_part
+from mskgrasp.parts import builtin, find_part, load_part, read_part
+from mskgrasp.parts.recipes import cad
 
 
 def test_a_cad_file_a_name_and_a_folder_give_the_same_part():
@@ -27,3 +28,14 @@ def test_a_file_that_is_not_there_is_named_as_a_file(tmp_path):
 def test_an_unknown_name_lists_similar_ones():
     with pytest.raises(UnknownPart, match=r"hex_nut_m3.*did you mean .*hex_nut_m30"):
         load_part("hex_nut_m3x")
+
+
+def test_a_part_that_is_drawn_in_cad_names_the_extra_where_it_is_missing(monkeypatch):
+    name = next(recipe.name for recipe in cad.recipes())
+    monkeypatch.setattr(cad, "available", lambda: False)
+    builtin._recipes.cache_clear()
+    try:
+        with pytest.raises(UnknownPart, match=f"{name} is drawn in CAD.*run EXTRAS=dev,cad .ci/setup"):
+            find_part(name)
+    finally:
+        builtin._recipes.cache_clear()
