@@ -15,7 +15,8 @@ class MotionGate:
     """Motions of one arm, commanded by any thread.
 
     Attributes:
-        stop: Set from any thread, it ends the motion in progress with `Stopped`, and forbids the next.
+        stop: Set from any thread; the motion in progress watches it and ends with `Stopped`, and the next is
+            refused.
         fault: Why the last motion ended in an error that was not acknowledged; None without one.
     """
 

@@ -60,8 +60,43 @@ def test_a_cause_that_is_still_there_keeps_the_gate_closed(gate: MotionGate):
 
 def test_a_stop_during_the_recovery_stays_in_force(gate: MotionGate):
     gate.recover(gate.stop.set)
-    with pytest.raises(NeedsRecovery, match="stop"), gate.motion(lambda: None):
+    assert gate.fault is None
+    with pytest.raises(NeedsRecovery, match=r"^stop\(\) was called"), gate.motion(lambda: None):
         pytest.fail("the gate let a motion through")
+
+
+def test_a_motion_that_watched_the_stop_and_ended_quietly_was_stopped(gate: MotionGate, halts: list[bool]):
+    with pytest.raises(Stopped), gate.motion(lambda: halts.append(True)):
+        gate.stop.set()
+    assert halts == [True] and gate.fault is not None
+
+
+def test_ctrl_c_halts_the_arm_and_needs_a_recovery(gate: MotionGate, halts: list[bool]):
+    with pytest.raises(KeyboardInterrupt), gate.motion(lambda: halts.append(True)):
+        raise KeyboardInterrupt
+    assert halts == [True] and gate.fault == "KeyboardInterrupt"
+
+
+def test_the_first_cause_is_kept_where_the_recovery_fails(gate: MotionGate):
+    def pressed() -> None:
+        raise NeedsRecovery("the user stop is pressed")
+
+    with pytest.raises(MotionAborted), gate.motion(lambda: None):
+        raise MotionAborted("contact")
+    with pytest.raises(NeedsRecovery, match="pressed"):
+        gate.recover(pressed)
+    assert gate.fault == "contact"
+
+
+def test_a_recovery_waits_for_the_motion_of_another_thread(gate: MotionGate):
+    done: list[str] = []
+    thread = threading.Thread(target=lambda: gate.recover(lambda: done.append("recovered")))
+    with gate.motion(lambda: None):
+        thread.start()
+        thread.join(0.1)
+        done.append("moved")
+    thread.join(TIMEOUT_S)
+    assert done == ["moved", "recovered"]
 
 
 def test_a_motion_of_another_thread_begins_when_the_first_is_over(gate: MotionGate):
