@@ -58,7 +58,7 @@ from tests.benchmarks.report import markdown_rows
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT
 from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored
-from tests.docs.summary_rows import ROWS
+from tests.docs.summary_rows import rows_of
 from tests.docs.summary_table import INDEX, README, with_summary
 from tests.docs.uses_of_test_parts import commit, log_use
 from tests.sim_in_the_loop.regression import Row, shipped_weights, stored_figures
@@ -195,9 +195,8 @@ def log_test_parts(name: str) -> None:
     logged = isinstance(stored.report, dict) and "test_parts_logged" in stored.report
     if logged or not stored.facts["split"].startswith("test"):
         return
-    rows = dict(ROWS)[name if name in dict(ROWS) else name.partition("_")[0]](stored)
     recorded_by, _, date = stored.facts["recorded"].removeprefix("commit ").partition(", ")
-    figures = "; ".join(row.text for row in rows)
+    figures = "; ".join(row.text for row in rows_of(stored))
     log_use(date, recorded_by, stored.facts["command"].strip("`"), stored.facts["split"], figures)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from mskgrasp.benchmark.report import TOLERANCE
 from mskgrasp.benchmark.summary import stored_row
+from mskgrasp.evaluate.comparison import POLICY_NAMES
 from mskgrasp.palletize.report import GOAL
 from mskgrasp.validate.config import SHIFTED
 from tests.benchmarks.paper_choices import OURS, PAPER_AS_OURS
@@ -40,10 +41,11 @@ class SummaryRow:
 
 def _success(stored: StoredReport) -> list[SummaryRow]:
     found = _report(stored)["overall"]
+    exact = ", no sensor noise" if stored.name in ("success", "success_full") else ""
     return [
         SummaryRow(
             name="best quality",
-            text=f"{found['success_rate']:.1%} lifted, no sensor noise "
+            text=f"{found['success_rate']:.1%} lifted{exact} "
             f"(paper in simulation: {_report(stored)['paper']['simulated']:.1%})",
             interval=_between(found["success_interval"], 100, "%"),
         ),
@@ -87,6 +89,11 @@ def _displacement_row(stored: StoredReport, policy: str, name: str, theirs: str 
         n=f"{both['measured']} trials of {both['measured_parts']} parts, {novel['measured']} of "
         f"{novel['measured_parts']} novel ones",
     )
+
+
+def _certified_compared(stored: StoredReport) -> list[SummaryRow]:
+    found = _report(stored)["policies"][POLICY_NAMES["certified"]]
+    return [_certified_row(found, "the catalogue's parts, exact camera, beside the networks")]
 
 
 def _certified(parts: str, where: str) -> Callable[[StoredReport], list[SummaryRow]]:
@@ -334,7 +341,11 @@ ROWS: tuple[tuple[str, Callable[[StoredReport], list[SummaryRow]]], ...] = (
     ("displacement", _displacement),
     ("displacement_mujoco", _displacement_elsewhere("in MuJoCo")),
     ("displacement_kinect2", _displacement_elsewhere("with the noise of a Kinect v2")),
+    ("certified", _certified_compared),
     ("success_certified", _certified("the catalogue's parts", "exact camera")),
+    ("success_certified_kinect2", _certified("the catalogue's parts", "noise of a Kinect v2")),
+    ("success_certified_mujoco", _certified("the catalogue's parts", "in MuJoCo")),
+    ("success_certified_cad", _certified("imported CAD", "exact camera")),
     ("success_certified_cad_kinect2", _certified("imported CAD", "noise of a Kinect v2")),
     ("success_certified_cad_mujoco", _certified("imported CAD", "in MuJoCo")),
     ("assessed", _assessed),
@@ -353,12 +364,25 @@ ROWS: tuple[tuple[str, Callable[[StoredReport], list[SummaryRow]]], ...] = (
 )
 """Name of each report of the table, and its rows; one that is not stored yet has none."""
 
+
+def rows_of(stored: StoredReport) -> list[SummaryRow]:
+    """Rows of a stored report of any size: its own, or those of the longest beginning of its name.
+
+    Raises:
+        KeyError: There are none.
+    """
+    by_name, name = dict(ROWS), stored.name
+    while name and name not in by_name:
+        name = name.rpartition("_")[0]
+    return by_name[name](stored)
+
+
 IN_README = (
     "success",
     "displacement",
     "displacement_mujoco",
     "displacement_kinect2",
-    "success_certified",
+    "certified",
     "success_certified_cad_kinect2",
     "benchmark",
     "benchmark_mujoco",

@@ -15,7 +15,7 @@ from tests.docs.make_results import FACTS, rendered
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT, without_code
 from tests.docs.stored_reports import REPORTS, RUNS, StoredReport, read_stored
-from tests.docs.summary_rows import IN_README, ROWS
+from tests.docs.summary_rows import IN_README, ROWS, rows_of
 from tests.docs.summary_table import FORMER, HEADER, INDEX, README, shown_rows, summary, with_summary
 from tests.sim_in_the_loop.regression import shipped_weights
 
@@ -102,7 +102,7 @@ def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
 
 
 def test_the_index_links_every_results_page():
-    index = (ROOT / "docs/results/README.md").read_text(encoding="utf-8")
+    index = INDEX.read_text(encoding="utf-8").partition("<!-- results -->")[0]
     assert not [page.name for page in RESULTS if f"]({page.name})" not in index]
 
 
@@ -113,8 +113,19 @@ def test_a_summary_shows_what_the_stored_reports_say(page: Path):
     assert summary(page) in text
 
 
+def test_every_use_of_test_parts_has_figures_for_the_log():
+    for path in REPORTS.glob("*.json"):
+        stored = read_stored(path.stem)
+        if stored.facts["split"].startswith("test"):
+            rows = rows_of(stored)
+            assert rows and all(re.search(r"\d", row.text) for row in rows), path.stem
+    noisy = rows_of(read_stored("success_kinect2_full"))[0].text
+    assert "lifted" in noisy and "no sensor noise" not in noisy
+
+
 def test_the_rows_of_the_readme_are_rows_of_the_index():
     assert set(IN_README) < {name for name, _ in ROWS}
+    assert len(shown_rows(README)) == len(IN_README), "one is not recorded"
     cells = [{line.split(": ", 1)[1] for line in summary(page).splitlines() if "](" in line}
              for page in (README, INDEX)]  # fmt: skip
     assert cells[0] < cells[1]
