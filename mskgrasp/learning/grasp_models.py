@@ -312,7 +312,8 @@ def require_hand(meta: ModelMeta, hand: Mapping[str, float], folder: Path) -> No
                 for name in other
             )
             raise BadModel(
-                f"the model in {folder} was trained for another hand ({sizes}); train on data of this hand"
+                f"the model in {folder} was trained for another hand ({sizes}): no data can be "
+                "simulated with this one yet"
             )
 
 

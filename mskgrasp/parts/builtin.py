@@ -90,7 +90,7 @@ def find_part(name_or_folder: str | Path) -> Part:
     """A part by its name or by its folder; a built-in one is built where it is missing.
 
     Raises:
-        UnknownPart: There is no such part; the message lists similar names.
+        UnknownPart: There is no such part: the message lists similar names, or names the missing extra.
         BadPart: Its folder is damaged, or it cannot be built.
     """
     text = str(name_or_folder)
@@ -115,7 +115,7 @@ def imported_names() -> tuple[str, ...]:
 
 
 def unknown_part(name: str, *, builtin_only: bool = False) -> UnknownPart:
-    """The error for a name that no part has, or for a CAD file in place of one."""
+    """The error for a name that no part has, for a part whose extra is missing, or for a CAD file."""
     from mskgrasp.parts.importing.mesh_files import LOADERS  # needs the names of this package
 
     if Path(name).suffix.lower() in LOADERS:

@@ -25,7 +25,7 @@ def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:
             states none.
 
     Raises:
-        UnknownPart: There is no such part; the message lists similar names.
+        UnknownPart: There is no such part: the message lists similar names, or names the missing extra.
         BadPart: The file or folder cannot be used as a part.
     """
     if Path(source).is_file():
