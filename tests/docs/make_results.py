@@ -183,6 +183,8 @@ def record(name: str) -> None:
         stored = {field.name: known[field.name] for field in fields(LabelError)}
         LABEL_ERROR.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
         values["report"] = {key: report[key] for key in ("settings", "versions", "label_error")}
+    if "experiment" in report:  # a sentence a trial, which the run's folder has and no page shows
+        report.pop("trials")
     REPORTS.mkdir(exist_ok=True)
     (REPORTS / f"{name}.json").write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
     if "page" in facts:
