@@ -1,4 +1,4 @@
-"""What an arm reports: its state, and the outcome of closing its fingers."""
+"""State of an arm, outcome of closing its fingers, and what it holds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What lets a motion begin: one at a time, and none after an error or a stop until it is acknowledged."""
+"""Lock of an arm's motions: one at a time, and none after an error or a stop that was not acknowledged."""
 
 from __future__ import annotations
 

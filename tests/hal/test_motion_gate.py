@@ -12,6 +12,11 @@ from hal.motion_gate import MotionGate
 TIMEOUT_S = 30.0
 
 
+def pressed() -> None:
+    """A recovery that the robot refuses."""
+    raise NeedsRecovery("the user stop is pressed")
+
+
 @pytest.fixture
 def gate() -> MotionGate:
     return MotionGate()
@@ -49,9 +54,6 @@ def test_a_stop_names_itself_whatever_the_backend_reports_then(gate: MotionGate,
 
 
 def test_a_cause_that_is_still_there_keeps_the_gate_closed(gate: MotionGate):
-    def pressed() -> None:
-        raise NeedsRecovery("the user stop is pressed")
-
     with pytest.raises(NeedsRecovery, match="pressed"):
         gate.recover(pressed)
     with pytest.raises(NeedsRecovery, match="user stop"), gate.motion(lambda: None):
@@ -78,9 +80,6 @@ def test_ctrl_c_halts_the_arm_and_needs_a_recovery(gate: MotionGate, halts: list
 
 
 def test_the_first_cause_is_kept_where_the_recovery_fails(gate: MotionGate):
-    def pressed() -> None:
-        raise NeedsRecovery("the user stop is pressed")
-
     with pytest.raises(MotionAborted), gate.motion(lambda: None):
         raise MotionAborted("contact")
     with pytest.raises(NeedsRecovery, match="pressed"):
@@ -88,30 +87,21 @@ def test_the_first_cause_is_kept_where_the_recovery_fails(gate: MotionGate):
     assert gate.fault == "contact"
 
 
-def test_a_recovery_waits_for_the_motion_of_another_thread(gate: MotionGate):
-    done: list[str] = []
-    thread = threading.Thread(target=lambda: gate.recover(lambda: done.append("recovered")))
+@pytest.mark.parametrize("command", ["motion", "recovery"])
+def test_what_another_thread_commands_begins_when_the_motion_is_over(gate: MotionGate, command: str):
+    order: list[str] = []
+
+    def second() -> None:
+        if command == "recovery":
+            gate.recover(lambda: order.append("second"))
+        else:
+            with gate.motion(lambda: None):
+                order.append("second")
+
+    thread = threading.Thread(target=second)
     with gate.motion(lambda: None):
         thread.start()
         thread.join(0.1)
-        done.append("moved")
+        order.append("first")
     thread.join(TIMEOUT_S)
-    assert done == ["moved", "recovered"]
-
-
-def test_a_motion_of_another_thread_begins_when_the_first_is_over(gate: MotionGate):
-    inside, ended = threading.Event(), []
-
-    def second() -> None:
-        inside.wait(TIMEOUT_S)
-        with gate.motion(lambda: None):
-            ended.append("second")
-
-    thread = threading.Thread(target=second)
-    thread.start()
-    with gate.motion(lambda: None):
-        inside.set()
-        thread.join(0.1)
-        ended.append("first")
-    thread.join(TIMEOUT_S)
-    assert ended == ["first", "second"]
+    assert order == ["first", "second"]
