@@ -95,7 +95,10 @@ def report_sections(report: Report, folder: Path) -> list[Section]:
 
 
 def conclusion(summary: SuccessSummary | DisplacementSummary) -> str:
-    """State the result of an evaluation in one sentence."""
+    """State the result of an evaluation in one sentence.
+
+    Of a comparison it is that of the first model by the last policy that was measured, as grasps are planned.
+    """
     if isinstance(summary, SuccessSummary):
         overall = summary.overall
         if overall.success_rate is None:
@@ -111,14 +114,15 @@ def conclusion(summary: SuccessSummary | DisplacementSummary) -> str:
             f"{millimetres(overall.translation_rmse)} and {degrees(overall.rotation_rmse)}."
         )
     label, model = next(iter(summary.models.items()))
-    errors = [
-        f"{millimetres(found.translation_rmse)} and {degrees(found.rotation_rmse)} on {side} parts "
-        f"({POLICY_NAMES[policy]} grasps)"
-        for policy in POLICIES
-        for side in SIDES
-        if (found := model.of(policy, side)) is not None and found.translation_rmse is not None
-    ]
-    return f"RMSE of {label}: {'; '.join(errors)}." if errors else "No displacement was measured."
+    for policy in reversed(POLICIES):
+        errors = [
+            f"{millimetres(found.translation_rmse)} and {degrees(found.rotation_rmse)} on {side} parts"
+            for side in SIDES
+            if (found := model.of(policy, side)) is not None and found.translation_rmse is not None
+        ]
+        if errors:
+            return f"RMSE of {label} ({POLICY_NAMES[policy]}): {', '.join(errors)}."
+    return "No displacement was measured."
 
 
 def print_report(report: Report, folder: Path, console: Console | None = None) -> None:

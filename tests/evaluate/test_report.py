@@ -40,8 +40,11 @@ def test_the_conclusion_of_a_comparison_names_model_parts_and_policy():
     best = [trial(predictions=predictions), trial(part="b", predictions=predictions, measured=[0.0] * 4)]
     text = conclusion(compare_models(best, {"one": Model()}))
     assert text == (
-        "RMSE of one: 3.0 mm and 0.0 deg on known parts (high quality grasps); "
-        "1.0 mm and 5.7 deg on novel parts (high quality grasps)."
+        "RMSE of one (high quality): 3.0 mm and 0.0 deg on known parts, 1.0 mm and 5.7 deg on novel parts."
+    )
+    chosen = trial(policy="recentred", chosen_by="one", measured=[0.0, 0.001, 0.002, -0.1])
+    assert conclusion(compare_models([*best, chosen], {"one": Model()})).startswith(
+        "RMSE of one (low variance, recentred): "
     )
     assert conclusion(compare_models([], {"one": Model()})) == "No displacement was measured."
 
