@@ -34,11 +34,6 @@ MOST_BYTES = 2**24
 """Largest description of a model; the shipped one has 66 kB."""
 WEIGHTS = "model.safetensors"
 DESCRIPTION = "model.json"
-_FORMER_FIELDS = {
-    "patch": ("patch_columns", "quality_stride", "quality_columns", "layers", "displacement_layers"),
-    "hand": ("channels", "image"),
-}
-"""Fields of the other architecture, listed when one class described both."""
 
 
 class ModelCalibration(Config):
@@ -108,17 +103,6 @@ class ModelMeta(Config):
             if name.endswith("_parts") and not listed:
                 raise ValueError(f"training.{name} must be a list of names")
         return values
-
-    @field_validator("network", mode="before")
-    @classmethod
-    def _without_former_fields(cls, values: Any) -> Any:
-        """Drop the other architecture's fields, which older descriptions list without effect."""
-        if not isinstance(values, dict):
-            return values
-        architecture = values.get("architecture", "patch")
-        unused = _FORMER_FIELDS.get(architecture, ())
-        kept = {name: value for name, value in values.items() if name not in unused}
-        return kept | {"architecture": architecture}
 
 
 @dataclass(frozen=True)

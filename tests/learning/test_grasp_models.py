@@ -10,7 +10,7 @@ from mskgrasp.core.errors import BadModel, MissingModel
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.learning.grasp_models import load_models, save_model
 from mskgrasp.learning.network_config import HandNetworkConfig
-from tests.learning.small import SMALL, small_models
+from tests.learning.small import small_models
 
 
 @pytest.fixture
@@ -112,15 +112,13 @@ def test_the_shipped_model_is_loaded_as_its_own_architecture():
     assert read == stored | {"blocks": []}  # a field that is younger than the model
 
 
-def test_descriptions_that_list_both_architectures_are_read(folder):
-    both = {
-        "patch_columns": None, "quality_stride": 1, "quality_columns": None,
-        "layers": [16, 32], "displacement_layers": [16, 32, 32],
-    }  # fmt: skip
-    change_description(folder, lambda values: values["network"].update(both))
-    assert load_models(folder).meta.network == SMALL
+def test_a_description_without_an_architecture_or_with_anothers_field_is_refused(folder):
+    change_description(folder, lambda values: values["network"].update(layers=[16, 32]))
+    with pytest.raises(BadModel, match="'network.patch.layers': extra inputs are not permitted"):
+        load_models(folder)
     change_description(folder, lambda values: values["network"].pop("architecture"))
-    assert load_models(folder).meta.network == SMALL
+    with pytest.raises(BadModel, match="'network': .*'architecture'"):
+        load_models(folder)
 
 
 def test_reading_a_model_does_not_load_what_torch_computes_shapes_with():
