@@ -23,17 +23,9 @@ def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
     Raises:
         BadModel: The model cannot be used, or was made for another hand than the arm's.
     """
-    workspace = cell.workspace
     loaded = load_models(models, compute_device())
     require_hand(loaded.meta, cell.arm.limits.gripper.geometry, models)
-    return Planner(
-        loaded,
-        config,
-        table_z=workspace.table_z,
-        region=workspace.region,
-        min_height=workspace.min_height,
-        lowest_grasp_z=workspace.lowest_grasp_z,
-    )
+    return Planner.of_workspace(loaded, config, cell.workspace)
 
 
 def tell_model(models: Models, cell: Cell) -> None:

@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from hal.camera import RgbdFrame
+from hal.cell import Workspace
 from hal.table import HIGHEST_TABLE
 from mskgrasp.core.displacement_covariance import (
     object_displacement_covariance,
@@ -73,6 +74,22 @@ class Planner:
         self.region = region
         self.min_height = min_height
         self._lowest_grasp_z = lowest_grasp_z
+
+    @classmethod
+    def of_workspace(cls, models: Models, config: PlannerConfig, workspace: Workspace) -> Planner:
+        """Make the planner for a cell's table.
+
+        Raises:
+            BadModel: The policy needs variances and the model predicts none.
+        """
+        return cls(
+            models,
+            config,
+            table_z=workspace.table_z,
+            region=workspace.region,
+            min_height=workspace.min_height,
+            lowest_grasp_z=workspace.lowest_grasp_z,
+        )
 
     def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
         """Plan a grasp of the part in a frame.

@@ -147,15 +147,7 @@ def _work(connection: Connection, settings: PlannerSettings) -> None:
     from mskgrasp.serve.answers import respond
 
     try:
-        workspace = settings.workspace
-        planner = Planner(
-            load_models(settings.models),
-            settings.config,
-            table_z=workspace.table_z,
-            region=workspace.region,
-            min_height=workspace.min_height,
-            lowest_grasp_z=workspace.lowest_grasp_z,
-        )
+        planner = Planner.of_workspace(load_models(settings.models), settings.config, settings.workspace)
     except MskgraspError as error:
         connection.send_bytes(str(error).encode())
         return
