@@ -10,14 +10,16 @@ import pytest
 from mskgrasp.core.settings import ExecutionNoise
 from mskgrasp.planning.certified import radius_about_vertical
 from mskgrasp.simulation.certify import CertifyConfig, measured
+from mskgrasp.simulation.pad_contact import PAD_WIDTH
 from mskgrasp.simulation.select_certified import Selected, moment_share, select_certified
 from tests.planning.test_certified import certified_grasp
 from tests.simulation.test_certify import GRASP, PART, outcomes
+from tests.simulation.test_pad_contact import BAR, UNDER_TOP, bar_grasp, lever_of
 
 
 @pytest.mark.parametrize("differences", [0.0, 0.3, 0.6])
 def test_the_best_of_many_grasps_errs_by_as_much_as_is_stated(differences):
-    rng, radius, n = np.random.default_rng(2), radius_about_vertical(PART, 0), 60
+    rng, radius, n, step = np.random.default_rng(2), radius_about_vertical(PART, 0), 60, 2e-4
     chosen, least = np.zeros((n, 2)), np.zeros((n, 2))  # stated and true, m^2
     for one in range(n):
         stds = 1e-4 * np.exp(differences * rng.normal(size=12))
@@ -27,12 +29,12 @@ def test_the_best_of_many_grasps_errs_by_as_much_as_is_stated(differences):
                 outcomes(rng, count, np.zeros((4, 3)), np.zeros(4), std * np.array([1, 1, 0, 0]))
                 for count in (24, 6)
             )
-            grasps.append(measured(0, radius, GRASP + [0.01 * k, 0, 0, 0], last, before))
-        light = dataclasses.replace(PART, mass=1e-3)  # the pads hold it however far beside
+            grasps.append(measured(0, radius, GRASP + [step * k, 0, 0, 0], last, before))
+        light = dataclasses.replace(PART, mass=1e-3)  # the pads hold it wherever they touch it
         best = select_certified(light, 0, grasps, CertifyConfig()).certified[0]
         seems_best = min(grasps, key=lambda grasp: grasp.spread(radius))
         for row, grasp in ((chosen, best), (least, seems_best)):
-            std = stds[round(grasp.grasp[0] / 0.01)]
+            std = stds[round(grasp.grasp[0] / step)]
             row[one] = grasp.spread(radius), (1 + 4 / 30) * 2 * std**2
     stated, true = np.sqrt(chosen.mean(axis=0))
     measured_alone, true_of_that = np.sqrt(least.mean(axis=0))
@@ -62,45 +64,54 @@ def test_grasps_are_certified_by_lifting_by_hanging_flat_and_by_their_spread():
 
 
 def test_a_grasp_is_not_certified_whose_part_its_weight_could_turn_between_the_pads():
-    """0.6 kg, 25 mm beside the pads, friction 0.4, 30 N: 0.147 N m; 2 x 12 N x 5 mm hold less."""
+    """0.6 kg, 25 mm beside the pads, friction 0.4, 30 N: 0.147 N m; 2 x 12 N hold less over 5.5 mm."""
     noise = ExecutionNoise(friction_pad_part=(0.4, 0.4), finger_force=(30.0, 30.0))
     config = CertifyConfig(noise=noise)
-    heavy = dataclasses.replace(PART, mass=0.6)
+    heavy = dataclasses.replace(BAR, mass=0.6)
     turn = 0.7  # the pads' direction in the rest frame
-    beside = certified_grasp(
-        grasp=np.array([0.025 * np.cos(turn), 0.025 * np.sin(turn), 0.0105, turn]), mean=np.zeros(4)
-    )
+    beside = bar_grasp(0.025, turn)
     carries = np.sqrt(1 - (0.6 * 9.81 / 24) ** 2)
-    assert moment_share(heavy, beside, config) == pytest.approx(0.6 * 9.81 * 0.025 / (0.12 * carries))
-    # Across the pads its centre of mass may lie where it will, and what it slides by counts.
-    across = certified_grasp(
-        grasp=np.array([-0.025 * np.sin(turn), 0.025 * np.cos(turn), 0.0105, turn]), mean=np.zeros(4)
+    lever = lever_of(PAD_WIDTH, UNDER_TOP)
+    expected = 0.6 * 9.81 * 0.025 / (2 * 12 * lever * carries)
+    assert moment_share(heavy, beside, config) == pytest.approx(expected, rel=0.03)
+    # What it slides by counts.
+    slid, half, fifth = (
+        dataclasses.replace(beside, mean=np.array([0.025 * share, 0.0, 0.0, turn])) for share in (1, 0.4, 0.8)
     )
-    assert moment_share(heavy, across, config) == pytest.approx(0.0, abs=1e-9)
-    slid = dataclasses.replace(beside, mean=np.array([0.025, 0.0, 0.0, 0.0]))
-    assert moment_share(heavy, slid, config) == pytest.approx(0.0, abs=1e-9)
-    assert select_certified(heavy, 0, [beside, across], config).certified == (across,)
+    assert [moment_share(heavy, one, config) for one in (slid, half, fifth)] == pytest.approx(
+        [0.0, 0.6 * expected, 0.2 * expected], abs=0.02
+    )
+    assert select_certified(heavy, 0, [beside, slid], config).certified == (slid,)
     alone = select_certified(heavy, 0, [beside], config)
     assert not alone.certified and "its weight could turn it between the pads" in alone.reason
-    tilted = dataclasses.replace(beside, swing=np.array([0.2, 0.0]))
+    tilted = dataclasses.replace(beside, swing=np.array([0.0, 0.2]))
     assert not select_certified(heavy, 0, [tilted], config).uncertified
-    # Where one takes a tenth of what the pads hold, none is certified that takes half of it.
-    half, tenth = (
-        dataclasses.replace(beside, mean=np.array([0.025 * slid, 0, 0, 0])) for slid in (0.6, 0.92)
-    )
-    assert [moment_share(heavy, one, config) for one in (half, tenth)] == pytest.approx([0.5, 0.1], abs=0.01)
-    assert select_certified(heavy, 0, [half, tenth], config).certified == (tenth,)
+    # Where one takes a fifth of what the pads hold, none is certified that takes more than half of it.
+    assert select_certified(heavy, 0, [half, fifth], config).certified == (fifth,)
     assert select_certified(heavy, 0, [half], config).certified == (half,)
-    spreads = dataclasses.replace(tenth, residual=np.diag(np.square([5e-3, 0.0, 0.0, 0.0])))
+    spreads = dataclasses.replace(fifth, residual=np.diag(np.square([5e-3, 0.0, 0.0, 0.0])))
     assert select_certified(heavy, 0, [half, spreads], config).certified == (half,)
-    # As little as 95 in 100 simulations have is counted on: half of these products are under 0.5 x 40 N.
+
+
+def test_the_weights_moment_is_about_where_the_pads_touch():
+    """At the end of a bar they touch 1.9 mm nearer to its middle than they are, and on a smaller face."""
+    noise = ExecutionNoise(friction_pad_part=(0.4, 0.4), finger_force=(30.0, 30.0))
+    config = CertifyConfig(noise=noise)
+    light = dataclasses.replace(BAR, mass=0.01)
+    arm, covered = 0.035 - (PAD_WIDTH / 2 - 0.005) / 2, PAD_WIDTH / 2 + 0.005
+    expected = 0.01 * 9.81 * arm / (2 * 12 * lever_of(covered, UNDER_TOP))
+    assert moment_share(light, bar_grasp(0.035), config) == pytest.approx(expected, rel=0.04)
+    assert moment_share(light, bar_grasp(0.06), config) == np.inf
+
+
+def test_as_little_friction_and_force_as_few_simulations_have_is_counted_on():
+    """Half of the products are under 0.5 x 40 N."""
     halves = CertifyConfig(
         noise=ExecutionNoise(friction_pad_part=(0.5, 0.5), finger_force=(30.0, 50.0)), least_lifted=0.5
     )
-    light = dataclasses.replace(PART, mass=0.01)
-    assert moment_share(light, beside, halves) == pytest.approx(
-        0.01 * 9.81 * 0.025 / (2 * 20 * 0.005), rel=1e-3
-    )
+    light = dataclasses.replace(BAR, mass=0.01)
+    expected = 0.01 * 9.81 * 0.025 / (2 * 20 * lever_of(PAD_WIDTH, UNDER_TOP))
+    assert moment_share(light, bar_grasp(0.025), halves) == pytest.approx(expected, rel=0.03)
 
 
 def test_where_the_part_always_tilts_the_steadiest_of_these_grasps_are_kept():
