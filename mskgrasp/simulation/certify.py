@@ -37,10 +37,11 @@ from mskgrasp.planning.certified import (
 )
 from mskgrasp.planning.planner import Planner, shortlist, variance_score
 from mskgrasp.planning.scoring import Scene, displacements, qualities
+from mskgrasp.simulation.pad_contact import Held, moment_share
 from mskgrasp.simulation.repeats import PoseErrors, Repeat, place_part, repeat_grasp
 from tasks import GraspDisplacementEnv
 
-CERTIFY_VERSION = 2
+CERTIFY_VERSION = 3
 """Raised by every change after which a seed simulates other grasps."""
 FIRST, SECOND = 2, 4
 """Simulations of each candidate in the first round and of each of the best in the second."""
@@ -73,6 +74,18 @@ class CertifyConfig(Config):
     """Errors of the arm, and what a cell does not know."""
     physics: Physics = Physics()
     seed: int = Field(default=0, ge=0, lt=2**63)
+
+    @property
+    def least_friction(self) -> float:
+        """Friction of a pad, N, that as many simulations have as a certified grasp has to lift in."""
+        friction, force = (
+            np.linspace(*(varied or (fixed, fixed)), 101)
+            for varied, fixed in (
+                (self.noise.friction_pad_part, self.physics.friction_pad_part),
+                (self.noise.finger_force, self.physics.finger_force),
+            )
+        )
+        return float(np.quantile(np.outer(friction, force), 1 - self.least_lifted))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +178,9 @@ def run_stream(
             yield
 
     n_first, n_second, n_last, last = round_sizes(stream.simulations)
-    found = [_Candidate(grasp, []) for grasp in _liked(env, planner, stream, rng, n_first)]
+    found = [
+        _Candidate(grasp, []) for grasp in _liked(env, planner, stream, rng, n_first, config.least_friction)
+    ]
     for candidate in found:
         yield from simulate(candidate, 0, FIRST)
     best = sorted(found, key=lambda one: one.score(radius))[: n_second // 2]
@@ -194,9 +209,17 @@ def round_sizes(simulations: int) -> tuple[int, int, int, int]:
 
 
 def _liked(
-    env: GraspDisplacementEnv, planner: Planner, stream: Stream, rng: np.random.Generator, n: int
+    env: GraspDisplacementEnv,
+    planner: Planner,
+    stream: Stream,
+    rng: np.random.Generator,
+    n: int,
+    friction: float,
 ) -> list[np.ndarray]:
-    """Candidates (4,) in the rest frame that the networks like, from images of the part at three turns."""
+    """Candidates (4,) in the rest frame that the networks like, from images of the part at three turns.
+
+    Those whose pads, with so much friction each, N, would not hold the part's weight where it lies come last.
+    """
     x_min, x_max, y_min, y_max = REGION
     middle = np.array([x_min + x_max, y_min + y_max]) / 2
     member = stream.members[0]
@@ -226,8 +249,17 @@ def _liked(
         scores.append(variance_score(mean, variance, best, view))
     if not grasps:
         return []
-    order = np.argsort(np.concatenate(scores), kind="stable")
-    return _distinct(np.concatenate(grasps)[order], n)
+    found = np.concatenate(grasps)
+    shares = [
+        moment_share(
+            env.parts[0],
+            Held(resting=stream.resting, grasp=one, displacement=np.zeros(4), swing=np.zeros(2)),
+            friction,
+        )
+        for one in found
+    ]
+    turns = np.array(shares) > 1
+    return _distinct(found[np.lexsort((np.concatenate(scores), turns))], n)
 
 
 def _distinct(grasps: np.ndarray, n: int) -> list[np.ndarray]:

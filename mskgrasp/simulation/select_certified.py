@@ -11,51 +11,14 @@ from mskgrasp.core.grasp import TILT_LIMIT
 from mskgrasp.parts import Part
 from mskgrasp.planning.certified import CertifiedGrasp, radius_about_vertical, without_selection_bias
 from mskgrasp.simulation.certify import CertifyConfig, spread_out
-from mskgrasp.simulation.pad_contact import pad_contacts
+from mskgrasp.simulation.pad_contact import Held, moment_share
 
 SELECT_VERSION = 5
 """Raised by every change after which others of the simulated grasps are certified."""
-GRAVITY = 9.81
-"""m/s^2"""
 PREFERRED_MOMENT = 0.5
 """Grasps up to this `moment_share` are preferred: the patch of real pads is not known well."""
 LEAST_UNCERTIFIED = 0.8
 """Least share of its simulations that a grasp lifts which is kept where no grasp is certified."""
-
-
-def moment_share(part: Part, one: CertifiedGrasp, config: CertifyConfig) -> float:
-    """Moment of a held part's weight about the closing direction, as a share of what the pads hold.
-
-    PhysX holds a flat contact by its two farthest points, nearly twice as well as even pressure does, and a
-    single point as a disc of 15 mm. So it lifts parts far from their centre of mass that would turn. Here
-    each pad holds by friction where it touches the part (`pad_contacts`), the weight and its moment together
-    as far as the ellipsoid of the limit surface goes (Howe and Cutkosky, Practical force-motion models for
-    sliding manipulation, 1996), with as little friction and force as all but `CertifyConfig.least_lifted` of
-    the simulations had.
-
-    Args:
-        part: The part, whose origin is its centre of mass.
-        one: Its grasp.
-        config: Settings of the certification.
-    """
-    contacts = pad_contacts(part, one)
-    if not contacts:
-        return np.inf
-    along = float(np.mean([contact.along for contact in contacts]))
-    x, y, _, theta = one.grasp
-    beside = -(np.cos(theta) * x + np.sin(theta) * y) + one.mean[0] - along
-    weight = part.mass * GRAVITY
-    friction, force = (
-        np.linspace(*(varied or (fixed, fixed)), 101)
-        for varied, fixed in (
-            (config.noise.friction_pad_part, config.physics.friction_pad_part),
-            (config.noise.finger_force, config.physics.finger_force),
-        )
-    )
-    least = float(np.quantile(np.outer(friction, force), 1 - config.least_lifted))
-    left = 1 - (weight / (2 * least)) ** 2
-    most = least * sum(contact.lever for contact in contacts) * np.sqrt(max(left, 0.0))
-    return float(weight * abs(beside) / most) if most > 0 else np.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +87,7 @@ def _errors(
     part: Part, grasps: Sequence[CertifiedGrasp], config: CertifyConfig, most_moment: float = 1.0
 ) -> tuple[list[CertifiedGrasp], list[float]]:
     """The grasps of one resting pose whose pads hold the part's weight, and their expected errors, metres."""
-    firm = [one for one in grasps if moment_share(part, one, config) <= most_moment]
+    firm = [one for one in grasps if _moment_share(part, one, config) <= most_moment]
     if not firm:
         return [], []
     radius = radius_about_vertical(part, firm[0].resting)
@@ -132,6 +95,11 @@ def _errors(
     pose_cov = np.diag(np.square([errors.position, errors.position, errors.turn]))
     firm = without_selection_bias(firm, radius)
     return firm, [float(np.sqrt(one.score(pose_cov, radius))) for one in firm]
+
+
+def _moment_share(part: Part, one: CertifiedGrasp, config: CertifyConfig) -> float:
+    held = Held(resting=one.resting, grasp=one.grasp, displacement=one.mean, swing=one.swing)
+    return moment_share(part, held, config.least_friction)
 
 
 def _steady(
