@@ -179,7 +179,7 @@ def run_stream(
 
     n_first, n_second, n_last, last = round_sizes(stream.simulations)
     found = [
-        _Candidate(grasp, []) for grasp in _liked(env, planner, stream, rng, n_first, config.least_friction)
+        _Candidate(grasp, []) for grasp in liked(env, planner, stream, rng, n_first, config.least_friction)
     ]
     for candidate in found:
         yield from simulate(candidate, 0, FIRST)
@@ -208,7 +208,7 @@ def round_sizes(simulations: int) -> tuple[int, int, int, int]:
     return n_first, n_second, n_last, last
 
 
-def _liked(
+def liked(
     env: GraspDisplacementEnv,
     planner: Planner,
     stream: Stream,

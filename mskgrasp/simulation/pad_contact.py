@@ -93,7 +93,7 @@ def moment_share(part: Part, held: Held, friction: float) -> float:
     """Moment of a held part's weight about the closing direction, as a share of what the pads hold.
 
     PhysX holds a flat contact by its two farthest points, nearly twice as well as even pressure does, and a
-    single point as a disc of 15 mm. So it lifts parts far from their centre of mass that would turn. Here
+    single point as a disc 15 mm across. So it lifts parts far from their centre of mass that would turn. Here
     each pad holds by friction where it touches the part, the weight and its moment together as far as the
     ellipsoid of the limit surface goes (Howe and Cutkosky, Practical force-motion models for sliding
     manipulation, 1996).

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
+from mskgrasp.core.settings import REGION, TABLE_Z, Overhead
+from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
-from mskgrasp.simulation.certify import measured, round_sizes
+from mskgrasp.planning.config import PlannerConfig
+from mskgrasp.planning.planner import Planner
+from mskgrasp.simulation.certify import CertifyConfig, Member, Stream, liked, measured, round_sizes
 from mskgrasp.simulation.repeats import Repeat
+from mskgrasp.simulation.shard import Simulator
+from tests.boxes import make_box
 
 PART = find_part("hex_nut_m20")
 GRASP = np.array([0.0, 0.0, 0.0105, 0.0])
@@ -66,3 +75,25 @@ def test_a_grasp_that_never_lifts_has_no_outcome():
     grasp = measured(0, 0.01, GRASP, [failed] * 5)
     assert (grasp.lifted, grasp.n) == (0, 5)
     assert np.isfinite(grasp.mean).all() and not grasp.mean.any()
+
+
+def test_candidates_are_first_those_whose_pads_hold_the_parts_weight(tmp_path):
+    """A bar of 0.8 kg: the networks like grasps all along it, but far from its middle it would turn."""
+    config = CertifyConfig()
+    part = make_box(tmp_path, "bar", (0.12, 0.024, 0.02), 0.8)
+    planner = Planner(load_models(PRETRAINED, "cpu"), PlannerConfig(), table_z=TABLE_Z, region=REGION)
+    stream = Stream(
+        part=str(part.folder),
+        resting=0,
+        members=(Member(which=0, turn=0.0, probability=1.0),),
+        number=0,
+        simulations=200,
+    )
+    with closing(Simulator(config.physics, Overhead(), config.noise)) as simulator:
+        env = simulator.load(stream.part)
+        far = {}
+        for friction in (config.least_friction, 1e6):
+            rng = np.random.default_rng(0)
+            grasps = np.array(liked(env, planner, stream, rng, 10, friction))
+            far[friction] = np.hypot(grasps[:, 0], grasps[:, 1])
+    assert far[config.least_friction].max() < 0.02 < far[1e6].max()
