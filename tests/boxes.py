@@ -30,6 +30,25 @@ def make_rail(cache: Path, name: str, *, length: float, flange: float, web: floa
     return _write(cache, name, Solid(mesh=trimesh.boolean.union(boxes), hulls=hulls), density)
 
 
+def make_u(cache: Path, name: str, far_height: float) -> tuple[Part, np.ndarray]:
+    """A U of two legs of 60 mm, 100 mm apart, the near one 20 mm high, the other as stated; and its near leg.
+
+    Returns:
+        The part, and the middle (3,) of the near leg in its frame, metres.
+    """
+    boxes = []
+    near = np.array([0.0, 50.0, 10.0])
+    for size, middle in (
+        ((60.0, 10.0, 20.0), near),
+        ((10.0, 110.0, 6.0), (25.0, 0.0, 3.0)),
+        ((60.0, 10.0, far_height), (0.0, -50.0, far_height / 2)),
+    ):
+        boxes.append(trimesh.creation.box(size).apply_translation(middle))
+    mesh = trimesh.boolean.union(boxes)
+    part = _write(cache, name, Solid(mesh=mesh, hulls=tuple(np.asarray(box.vertices) for box in boxes)), 2700)
+    return part, 1e-3 * (near - mesh.center_mass)
+
+
 def _write(cache: Path, name: str, solid: Solid, density: float) -> Part:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(cache))

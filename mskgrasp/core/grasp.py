@@ -34,6 +34,8 @@ from mskgrasp.core.geometry import (
 
 PAD_REACH = 0.0095
 """Reach of the finger pads below the TCP, metres (collision box of the Panda hand's pads)."""
+PAD_WIDTH, PAD_HEIGHT = 0.0175, 0.0185
+"""Rubber tip of a finger, along and up the pads, metres (franka_description)."""
 TABLE_CLEARANCE = 0.001
 """Least distance between the pads and the table at the grasp, metres."""
 MAX_OPENING = 0.08

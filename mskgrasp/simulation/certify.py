@@ -26,10 +26,12 @@ from mskgrasp.core.grasp import (
     lowest_grasp_z,
     pose_base_grasp,
     to_grasp_displacement,
+    to_object_displacement,
 )
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Physics
 from mskgrasp.planning.certified import (
     CertifiedGrasp,
+    half_turned,
     radius_about_vertical,
     rest_frame,
     to_rest,
@@ -37,11 +39,11 @@ from mskgrasp.planning.certified import (
 )
 from mskgrasp.planning.planner import Planner, shortlist, variance_score
 from mskgrasp.planning.scoring import Scene, displacements, qualities
-from mskgrasp.simulation.pad_contact import Held, moment_share
+from mskgrasp.simulation.pad_contact import HeldPart, moment_share
 from mskgrasp.simulation.repeats import PoseErrors, Repeat, place_part, repeat_grasp
 from tasks import GraspDisplacementEnv
 
-CERTIFY_VERSION = 3
+CERTIFY_VERSION = 4
 """Raised by every change after which a seed simulates other grasps."""
 FIRST, SECOND = 2, 4
 """Simulations of each candidate in the first round and of each of the best in the second."""
@@ -76,8 +78,8 @@ class CertifyConfig(Config):
     seed: int = Field(default=0, ge=0, lt=2**63)
 
     @property
-    def least_friction(self) -> float:
-        """Friction of a pad, N, that as many simulations have as a certified grasp has to lift in."""
+    def least_friction_force(self) -> float:
+        """Greatest friction of a pad, N, that all but 1 - ``least_lifted`` of the simulations exceed."""
         friction, force = (
             np.linspace(*(varied or (fixed, fixed)), 101)
             for varied, fixed in (
@@ -179,7 +181,8 @@ def run_stream(
 
     n_first, n_second, n_last, last = round_sizes(stream.simulations)
     found = [
-        _Candidate(grasp, []) for grasp in liked(env, planner, stream, rng, n_first, config.least_friction)
+        _Candidate(grasp, [])
+        for grasp in candidate_grasps(env, planner, stream, rng, n_first, config.least_friction_force)
     ]
     for candidate in found:
         yield from simulate(candidate, 0, FIRST)
@@ -208,23 +211,24 @@ def round_sizes(simulations: int) -> tuple[int, int, int, int]:
     return n_first, n_second, n_last, last
 
 
-def liked(
+def candidate_grasps(
     env: GraspDisplacementEnv,
     planner: Planner,
     stream: Stream,
     rng: np.random.Generator,
     n: int,
-    friction: float,
+    friction_force: float,
 ) -> list[np.ndarray]:
     """Candidates (4,) in the rest frame that the networks like, from images of the part at three turns.
 
-    Those whose pads, with so much friction each, N, would not hold the part's weight where it lies come last.
+    Those whose pads would not hold the part's weight, as it is predicted to lie in the hand, are taken only
+    where too few others are left. ``friction_force`` is the greatest friction of a pad, N.
     """
     x_min, x_max, y_min, y_max = REGION
     middle = np.array([x_min + x_max, y_min + y_max]) / 2
     member = stream.members[0]
     quat_table_obj = env.parts[0].resting.quat_wxyz[stream.resting]
-    grasps, scores = [], []
+    grasps, scores, shares = [], [], []
     for turn in rng.uniform(-np.pi, np.pi, size=3):
         pose = place_part(env, member.which, middle, float(turn))
         depth = env.capture_depth()[0].cpu().numpy()
@@ -245,21 +249,28 @@ def liked(
         quality = qualities(planner.models, scene, candidates, planner.config.chunk_size)
         best = candidates[shortlist(quality, planner.config.top_fraction)]
         mean, variance = displacements(planner.models, scene, best, planner.config.chunk_size)
-        grasps.append(to_rest(turned(rest_frame(pose, quat_table_obj), member.turn), best, TABLE_Z))
+        T_base_rest = turned(rest_frame(pose, quat_table_obj), member.turn)
+        grasps.append(to_rest(T_base_rest, best, TABLE_Z))
         scores.append(variance_score(mean, variance, best, view))
+        origin = centre_in_grasp_frame(np.asarray(pose.position), best)
+        motion = np.column_stack([to_object_displacement(mean, origin), mean[:, 4:]])
+        for grasp, in_base, moved in zip(grasps[-1], best, motion, strict=True):
+            sign = half_turned(T_base_rest, grasp, in_base)
+            moved[[0, 1, *range(4, len(moved))]] *= sign
+            held = HeldPart(
+                part=env.parts[0],
+                resting=stream.resting,
+                grasp=grasp,
+                displacement=moved[:4],
+                swing=moved[4:] if len(moved) > 4 else np.zeros(2),
+            )
+            shares.append(moment_share(held, friction_force))
     if not grasps:
         return []
-    found = np.concatenate(grasps)
-    shares = [
-        moment_share(
-            env.parts[0],
-            Held(resting=stream.resting, grasp=one, displacement=np.zeros(4), swing=np.zeros(2)),
-            friction,
-        )
-        for one in found
-    ]
-    turns = np.array(shares) > 1
-    return _distinct(found[np.lexsort((np.concatenate(scores), turns))], n)
+    order = np.argsort(np.concatenate(scores), kind="stable")
+    found, hold = np.concatenate(grasps)[order], np.array(shares)[order] <= 1
+    chosen = _distinct(found[hold], n)
+    return chosen + _distinct(found[~hold], n - len(chosen))
 
 
 def _distinct(grasps: np.ndarray, n: int) -> list[np.ndarray]:

@@ -9,111 +9,147 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from mskgrasp.core.geometry import quat_about_z, quat_multiply, quat_rotate
-from mskgrasp.core.grasp import PAD_REACH, centre_in_grasp_frame
+from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, quat_rotate
+from mskgrasp.core.grasp import MAX_OPENING, PAD_HEIGHT, PAD_REACH, PAD_WIDTH, centre_in_grasp_frame
 from mskgrasp.parts import Part
 
-PAD_WIDTH, PAD_HEIGHT = 0.0175, 0.0185
-"""Rubber tip of a finger, along and up the pads, metres (franka_description)."""
 PRESSED = 1e-4
-"""Depth to which a pad yields, metres: what lies no deeper than that behind the first point is touched."""
+"""Depth to which a pad is taken to yield, metres. That of the real rubber is not published."""
 LEAST_LEVER = 1e-3
-"""Lever of the friction at a single point or edge, metres: how far a real pad yields there is not known."""
-_POINTS = 60_000
-"""Points on a part's surface, evenly spread by area."""
+"""Lever of the friction at a single point or edge, metres: the same patch of 1 mm for every part."""
+_POINTS = 400
+"""Points on what a pad touches, over which its lever is a mean."""
 _GRAVITY = 9.81
 """m/s^2"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Held:
+class HeldPart:
     """A part in the closed hand.
 
     Attributes:
-        resting: Index of the resting pose in which the part lay.
+        part: The part, whose origin is its centre of mass.
+        resting: Index of the resting pose in which it lay.
         grasp: (4,) in the rest frame of that pose, metres over the table and radians.
-        displacement: (4,) of the part's origin in the hand, axes of the grasp frame, metres and radians.
-        swing: (2,) of the part in the hand, radians about x and y of the grasp frame.
+        displacement: (4,) of the origin in the hand, axes of the grasp frame, metres and radians.
+        swing: (2,) in the hand, radians about x and y of the grasp frame.
     """
 
+    part: Part
     resting: int
     grasp: np.ndarray
     displacement: np.ndarray
     swing: np.ndarray
 
-    def origin(self, part: Part) -> np.ndarray:
-        """The part's origin, its centre of mass, in the grasp frame (3,), metres."""
-        height = part.resting.position[self.resting, 2]
-        before = centre_in_grasp_frame(np.array([0.0, 0.0, height]), self.grasp)
-        return before + self.displacement[:3]
+    @property
+    def T_grasp_obj_before(self) -> Pose:
+        """Pose of the part in the grasp frame before the fingers closed."""
+        poses, row = self.part.resting, self.resting
+        origin = centre_in_grasp_frame(np.array([0.0, 0.0, poses.position[row, 2]]), self.grasp)
+        turned = quat_about_z(np.asarray(-self.grasp[3]))
+        return Pose(position=origin, quat_wxyz=quat_multiply(turned, poses.quat_wxyz[row]))
 
-    def points(self, part: Part) -> np.ndarray:
-        """Points (n, 3) on the part's mesh, evenly spread, in the grasp frame, metres."""
+    @property
+    def T_grasp_obj(self) -> Pose:
+        """Pose of the part in the grasp frame, in the closed hand."""
+        before = self.T_grasp_obj_before
         angle = np.linalg.norm(self.swing)
         axis = self.swing / angle if angle > 0 else np.zeros(2)
         swung = np.array([np.cos(angle / 2), *(np.sin(angle / 2) * axis), 0.0])
-        turned = quat_about_z(np.asarray(self.displacement[3] - self.grasp[3]))
-        lying = part.resting.quat_wxyz[self.resting]
-        quat_grasp_obj = quat_multiply(swung, quat_multiply(turned, lying))
-        return quat_rotate(quat_grasp_obj, _surface(part.mesh_path)) + self.origin(part)
+        moved = quat_multiply(swung, quat_about_z(np.asarray(self.displacement[3])))
+        return Pose(
+            position=before.position + self.displacement[:3],
+            quat_wxyz=quat_multiply(moved, np.asarray(before.quat_wxyz)),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class PadContact:
-    """Contact of one pad, about evenly pressed.
+    """What both pads touch of a part, evenly pressed.
 
     Attributes:
-        along: Its middle along the pad, x of the grasp frame, metres.
-        lever: Mean distance of its points from that middle, metres: by friction F in all of them it resists
-            turning about the closing direction by F times this.
+        along: Its middle along the pads, x of the grasp frame, metres.
+        lever: Mean distance of its points from the middle, seen along the closing direction, metres. A
+            friction force F of each pad, spread over its points, holds a moment of 2 F times this.
     """
 
     along: float
     lever: float
 
 
-def pad_contacts(part: Part, held: Held) -> list[PadContact]:
-    """Find what the two pads touch of a part; none where it is not between them."""
-    points = held.points(part)
-    low, high = -PAD_REACH, PAD_HEIGHT - PAD_REACH
-    between = points[(abs(points[:, 0]) < PAD_WIDTH / 2) & (points[:, 2] > low) & (points[:, 2] < high)]
-    if not len(between):
-        return []
-    found = []
-    for side in (1, -1):
-        towards = side * between[:, 1]
-        touched = between[towards > towards.max() - PRESSED][:, [0, 2]]
-        middle = touched.mean(axis=0)
-        lever = float(np.linalg.norm(touched - middle, axis=1).mean())
-        found.append(PadContact(along=float(middle[0]), lever=max(lever, LEAST_LEVER)))
-    return found
+def pad_contact(held: HeldPart) -> PadContact | None:
+    """Find what the pads touch; None if nothing of the part is between them.
+
+    What lay outside the open fingers, such as the other leg of a U, is not touched.
+    """
+    after, before = held.T_grasp_obj, held.T_grasp_obj_before
+    width, opening = PAD_WIDTH / 2, MAX_OPENING / 2
+    between = _clipped(
+        _mesh(held.part.mesh_path, held.part.content_hash),
+        [
+            (after, (-1, 0, 0), (width, 0, 0)),
+            (after, (1, 0, 0), (-width, 0, 0)),
+            (after, (0, 0, 1), (0, 0, -PAD_REACH)),
+            (after, (0, 0, -1), (0, 0, PAD_HEIGHT - PAD_REACH)),
+            (before, (0, -1, 0), (0, opening, 0)),
+            (before, (0, 1, 0), (0, -opening, 0)),
+        ],
+    )
+    if not len(between.faces):
+        return None
+    y = after.apply(np.asarray(between.vertices))[:, 1]
+    pads = [
+        _touched(between, after, np.array([0.0, side, 0.0]), (side * y).max() - PRESSED) for side in (1, -1)
+    ]
+    points = np.concatenate(pads)  # as many of each pad
+    middle = points.mean(axis=0)
+    lever = float(np.linalg.norm(points - middle, axis=1).mean())
+    return PadContact(along=float(middle[0]), lever=max(lever, LEAST_LEVER))
 
 
-def moment_share(part: Part, held: Held, friction: float) -> float:
+def moment_share(held: HeldPart, friction_force: float) -> float:
     """Moment of a held part's weight about the closing direction, as a share of what the pads hold.
 
     PhysX holds a flat contact by its two farthest points, nearly twice as well as even pressure does, and a
-    single point as a disc 15 mm across. So it lifts parts far from their centre of mass that would turn. Here
-    each pad holds by friction where it touches the part, the weight and its moment together as far as the
-    ellipsoid of the limit surface goes (Howe and Cutkosky, Practical force-motion models for sliding
-    manipulation, 1996).
+    single point as a disc. So it lifts parts far from their centre of mass that would turn. Here each pad
+    holds by friction where it touches the part, the weight and its moment together as far as the ellipsoid of
+    the limit surface goes (Howe and Cutkosky, Practical force-motion models for sliding manipulation, 1996),
+    of both pads as of one.
 
     Args:
-        part: The part.
-        held: How it lies in the hand.
-        friction: Greatest friction of a pad, N.
+        held: The part in the hand, at the mean of its outcomes.
+        friction_force: Greatest friction of a pad, N.
     """
-    contacts = pad_contacts(part, held)
-    if not contacts:
+    contact = pad_contact(held)
+    weight = held.part.mass * _GRAVITY
+    if contact is None or friction_force <= weight / 2:
         return np.inf
-    weight = part.mass * _GRAVITY
-    arm = abs(held.origin(part)[0] - np.mean([contact.along for contact in contacts]))
-    left = 1 - (weight / (2 * friction)) ** 2
-    most = friction * sum(contact.lever for contact in contacts) * np.sqrt(max(left, 0.0))
-    return float(weight * arm / most) if most > 0 else np.inf
+    left = 1 - (weight / (2 * friction_force)) ** 2
+    arm = abs(float(held.T_grasp_obj.position[0]) - contact.along)
+    return float(weight * arm / (2 * friction_force * contact.lever * np.sqrt(left)))
+
+
+def _touched(mesh: trimesh.Trimesh, T_grasp_obj: Pose, outward: np.ndarray, least: float) -> np.ndarray:
+    """Points (n, 2), x and z of the grasp frame, spread evenly over what lies at least so far outward."""
+    layer = _clipped(mesh, [(T_grasp_obj, outward, least * outward)])
+    facing = abs(quat_rotate(T_grasp_obj.quat_wxyz, layer.face_normals) @ outward)
+    weights = layer.area_faces * facing
+    if weights.sum() > 0:
+        points = trimesh.sample.sample_surface(layer, _POINTS, face_weight=weights, seed=0)[0]
+    else:  # an edge between faces along the closing direction
+        points = np.resize(layer.vertices, (_POINTS, 3))
+    return T_grasp_obj.apply(np.asarray(points))[:, [0, 2]]
+
+
+def _clipped(mesh: trimesh.Trimesh, planes: list) -> trimesh.Trimesh:
+    """What lies on the inner side of planes: each a frame's pose, and in it the normal and a point."""
+    normals = [quat_rotate(pose.inverse().quat_wxyz, np.array(normal, float)) for pose, normal, _ in planes]
+    origins = [pose.inverse().apply(np.array(point, float)) for pose, _, point in planes]
+    clipped = trimesh.intersections.slice_mesh_plane(mesh, np.array(normals), np.array(origins))
+    assert clipped is not None
+    return clipped
 
 
 @lru_cache(maxsize=2)
-def _surface(path: Path) -> np.ndarray:
-    """Points (n, 3) on a part's mesh, obj frame, metres."""
-    return np.asarray(trimesh.sample.sample_surface(trimesh.load_mesh(path), _POINTS, seed=0)[0])
+def _mesh(path: Path, content_hash: str) -> trimesh.Trimesh:  # noqa: ARG001 - the file may be another by then
+    return trimesh.load_mesh(path, process=False)

@@ -11,12 +11,12 @@ from mskgrasp.core.grasp import TILT_LIMIT
 from mskgrasp.parts import Part
 from mskgrasp.planning.certified import CertifiedGrasp, radius_about_vertical, without_selection_bias
 from mskgrasp.simulation.certify import CertifyConfig, spread_out
-from mskgrasp.simulation.pad_contact import Held, moment_share
+from mskgrasp.simulation.pad_contact import HeldPart, moment_share
 
-SELECT_VERSION = 5
+SELECT_VERSION = 6
 """Raised by every change after which others of the simulated grasps are certified."""
 PREFERRED_MOMENT = 0.5
-"""Grasps up to this `moment_share` are preferred: the patch of real pads is not known well."""
+"""Grasps up to this `moment_share` are preferred: half of it is left for pads that press unevenly."""
 LEAST_UNCERTIFIED = 0.8
 """Least share of its simulations that a grasp lifts which is kept where no grasp is certified."""
 
@@ -49,23 +49,23 @@ def select_certified(
         best = max((one.lifted / one.n for one in grasps), default=0.0)
         most = [one for one in _flat(grasps) if one.lifted >= max(best, LEAST_UNCERTIFIED) * one.n]
         return Selected(
-            uncertified=_steady(*_errors(part, most, config), config.most_error, config),
+            uncertified=_steady(*_errors(part, _firm(part, most, config), config), config.most_error, config),
             reason=f"no grasp lifts it in {config.least_lifted:.0%} of the simulations (best {best:.0%})",
         )
     flat = _flat(lifting)
     if not flat:
         # A tilt that is always the same moves no point from where it is expected in the hand.
-        firm, _ = _errors(part, lifting, config)
-        _, errors = _errors(part, [replace(one, swing=np.zeros(2)) for one in lifting], config)
+        firm = _firm(part, lifting, config)
+        _, errors = _errors(part, [replace(one, swing=np.zeros(2)) for one in firm], config)
         return Selected(
-            uncertified=_steady(firm, errors, config.most_error, config),
+            uncertified=_steady(_errors(part, firm, config)[0], errors, config.most_error, config),
             reason=f"it tilts by more than {np.degrees(TILT_LIMIT):g} degrees in every grasp that lifts it",
         )
-    easy, errors = _errors(part, flat, config, most_moment=PREFERRED_MOMENT)
-    steady = _steady(easy, errors, config.most_error, config)
+    easy = _firm(part, flat, config, most_moment=PREFERRED_MOMENT)
+    steady = _steady(*_errors(part, easy, config), config.most_error, config)
     if steady:
         return Selected(certified=steady)
-    firm, errors = _errors(part, flat, config)
+    firm, errors = _errors(part, _firm(part, flat, config), config)
     if not firm:
         return Selected(reason="its weight could turn it between the pads in every grasp that lifts it")
     steady = _steady(firm, errors, config.most_error, config)
@@ -83,23 +83,31 @@ def _flat(grasps: Sequence[CertifiedGrasp]) -> list[CertifiedGrasp]:
     return [one for one in grasps if one.swing @ one.swing + np.trace(one.swing_cov) <= TILT_LIMIT**2]
 
 
-def _errors(
+def _firm(
     part: Part, grasps: Sequence[CertifiedGrasp], config: CertifyConfig, most_moment: float = 1.0
+) -> list[CertifiedGrasp]:
+    """The grasps whose pads hold the part's weight."""
+    found = []
+    for one in grasps:
+        held = HeldPart(
+            part=part, resting=one.resting, grasp=one.grasp, displacement=one.mean, swing=one.swing
+        )
+        if moment_share(held, config.least_friction_force) <= most_moment:
+            found.append(one)
+    return found
+
+
+def _errors(
+    part: Part, grasps: Sequence[CertifiedGrasp], config: CertifyConfig
 ) -> tuple[list[CertifiedGrasp], list[float]]:
-    """The grasps of one resting pose whose pads hold the part's weight, and their expected errors, metres."""
-    firm = [one for one in grasps if _moment_share(part, one, config) <= most_moment]
-    if not firm:
+    """Grasps of one resting pose without the bias of their choice, and their expected errors, metres."""
+    if not grasps:
         return [], []
-    radius = radius_about_vertical(part, firm[0].resting)
+    radius = radius_about_vertical(part, grasps[0].resting)
     errors = config.pose_errors
     pose_cov = np.diag(np.square([errors.position, errors.position, errors.turn]))
-    firm = without_selection_bias(firm, radius)
-    return firm, [float(np.sqrt(one.score(pose_cov, radius))) for one in firm]
-
-
-def _moment_share(part: Part, one: CertifiedGrasp, config: CertifyConfig) -> float:
-    held = Held(resting=one.resting, grasp=one.grasp, displacement=one.mean, swing=one.swing)
-    return moment_share(part, held, config.least_friction)
+    found = without_selection_bias(list(grasps), radius)
+    return found, [float(np.sqrt(one.score(pose_cov, radius))) for one in found]
 
 
 def _steady(

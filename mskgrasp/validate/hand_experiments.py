@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.core.grasp import PAD_HEIGHT, PAD_WIDTH
 from mskgrasp.core.settings import Physics
 from mskgrasp.parts import Part
 from mskgrasp.parts.solids import shape as h
@@ -15,8 +16,6 @@ from mskgrasp.validate.body_scene import BLOCK, GRAVITY, BodyScene, Workshop, tu
 from mskgrasp.validate.check import Check, near, within
 from tasks.attempt.outcome import MAX_PENETRATION
 
-PAD = (0.0175, 0.0185)
-"""Length and height of a finger pad of the Panda, m."""
 PAD_BELOW = 0.009
 """Reach of a pad below the TCP, m."""
 BAR = (0.15, 0.01, 0.01)
@@ -68,8 +67,8 @@ def torsion(scene: BodyScene, workshop: Workshop) -> Iterator[Check]:
     radius = scene.physics.pad_patch_radius
     tip = 15.0 * np.concatenate([np.eye(3), -np.eye(3)])
     cases = [
-        ("a face", workshop.box("face", (0.04, 0.02, 0.04), SLUGGISH), PAD),
-        ("a bar", workshop.box("bar", BAR, SLUGGISH), (PAD[0], BAR[2])),
+        ("a face", workshop.box("face", (0.04, 0.02, 0.04), SLUGGISH), (PAD_WIDTH, PAD_HEIGHT)),
+        ("a bar", workshop.box("bar", BAR, SLUGGISH), (PAD_WIDTH, BAR[2])),
     ]
     if radius > 0:
         point = workshop.part("point", h.convex(tip), SLUGGISH)

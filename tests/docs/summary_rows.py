@@ -382,7 +382,7 @@ IN_README = (
     "displacement",
     "displacement_mujoco",
     "displacement_kinect2",
-    "certified",
+    "success_certified",
     "success_certified_cad_kinect2",
     "benchmark",
     "benchmark_mujoco",

@@ -7,9 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mskgrasp.core.grasp import PAD_REACH
-from mskgrasp.parts import find_part
-from mskgrasp.simulation.pad_contact import LEAST_LEVER, PAD_WIDTH, Held, moment_share, pad_contacts
+from mskgrasp.core.geometry import Pose, quat_about_z, quat_rotate, swing_vector, twist_and_swing
+from mskgrasp.core.grasp import PAD_HEIGHT, PAD_REACH, PAD_WIDTH
+from mskgrasp.parts import Part, find_part
+from mskgrasp.simulation.pad_contact import LEAST_LEVER, HeldPart, PadContact, moment_share, pad_contact
+from tests.boxes import make_box, make_u
 
 BAR = find_part("parallel_key_b20x12x80")
 HEIGHT = 0.0105
@@ -18,17 +20,26 @@ UNDER_TOP = 0.012 - (HEIGHT - PAD_REACH)
 """Height of the bar's faces between the pads."""
 
 
-def held_bar(along: float, angle: float = 0.0, slid: float = 0.0, swing: float = 0.0) -> Held:
+def held(
+    along: float, angle: float = 0.0, slid: float = 0.0, swing: float = 0.0, *, part: Part = BAR, aligned=True
+) -> HeldPart:
     """The bar, grasped so far along it from its middle where it lay turned by minus ``angle``.
 
-    The fingers have aligned it. In the hand it slid along the pads, and swung about them, by so much.
+    Unless stated, the fingers have aligned it. In the hand it slid along the pads, and swung about them.
     """
-    return Held(
+    return HeldPart(
+        part=part,
         resting=0,
         grasp=np.array([along * np.cos(angle), along * np.sin(angle), HEIGHT, angle]),
-        displacement=np.array([slid, 0.0, 0.0, angle]),
+        displacement=np.array([slid, 0.0, 0.0, angle if aligned else 0.0]),
         swing=np.array([swing, 0.0]),
     )
+
+
+def touched(one: HeldPart) -> PadContact:
+    contact = pad_contact(one)
+    assert contact is not None
+    return contact
 
 
 def lever_of(width: float, height: float) -> float:
@@ -38,37 +49,91 @@ def lever_of(width: float, height: float) -> float:
 
 
 def test_pads_in_the_middle_of_a_flat_face_touch_all_of_their_width():
-    for contact in pad_contacts(BAR, held_bar(0.01)):
-        assert contact.along == pytest.approx(0.0, abs=2e-4)
-        assert contact.lever == pytest.approx(lever_of(PAD_WIDTH, UNDER_TOP), rel=0.03)
+    contact = touched(held(0.01))
+    assert contact.along == pytest.approx(0.0, abs=3e-4)
+    assert contact.lever == pytest.approx(lever_of(PAD_WIDTH, UNDER_TOP), rel=0.04)
+
+
+def test_a_face_higher_than_the_pads_is_touched_as_high_as_they_are(tmp_path):
+    box = make_box(tmp_path, "box", (0.08, 0.02, 0.05), 0.1)
+    lying = next(
+        row for row in range(len(box.resting_probability)) if abs(box.resting.position[row, 2] - 0.025) < 1e-3
+    )
+    high = dataclasses.replace(held(0.0, part=box), resting=lying, grasp=np.array([0, 0, 0.025, 0.0]))
+    turn = dataclasses.replace(high, grasp=np.array([0, 0, 0.025, np.pi / 2]))
+    levers = [touched(one).lever for one in (high, turn)]  # across 20 mm, and across 80 mm, 20 mm wide
+    assert max(levers) == pytest.approx(lever_of(PAD_WIDTH, PAD_HEIGHT), rel=0.04)
+    assert min(levers) == pytest.approx(lever_of(PAD_WIDTH, PAD_HEIGHT), rel=0.04)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7])
 def test_at_an_end_only_what_the_pads_cover_counts(angle):
     """The bar ends 5 mm before the middle of the pads, which reach 8.75 mm to either side of it."""
-    contacts = pad_contacts(BAR, held_bar(0.045, angle))
-    assert len(contacts) == 2
-    for contact in contacts:
-        assert contact.along == pytest.approx(-(0.005 + PAD_WIDTH / 2) / 2, abs=3e-4)
-        assert contact.lever == pytest.approx(lever_of(PAD_WIDTH / 2 - 0.005, UNDER_TOP), rel=0.08)
+    contact = touched(held(0.045, angle))
+    assert contact.along == pytest.approx(-(0.005 + PAD_WIDTH / 2) / 2, abs=3e-4)
+    assert contact.lever == pytest.approx(lever_of(PAD_WIDTH / 2 - 0.005, UNDER_TOP), rel=0.08)
 
 
 def test_the_bar_is_where_it_slid_to_in_the_hand():
-    slid = held_bar(0.06, slid=0.015)  # as if it were grasped at 45 mm
-    for contact, expected in zip(pad_contacts(BAR, slid), pad_contacts(BAR, held_bar(0.045)), strict=True):
-        assert (contact.along, contact.lever) == pytest.approx((expected.along, expected.lever), abs=1e-4)
+    slid, expected = touched(held(0.06, slid=0.015)), touched(held(0.045))
+    assert (slid.along, slid.lever) == pytest.approx((expected.along, expected.lever), abs=2e-4)
 
 
-def test_a_bar_that_hangs_askew_touches_by_an_edge():
+def test_a_bar_that_stays_turned_is_touched_at_two_edges_as_far_apart_as_the_pads_are_wide():
+    """Turned by 0.1 rad one pad meets it at its right edge, the other at its left one."""
+    contact = touched(held(0.0, 0.1, aligned=False))
+    assert contact.along == pytest.approx(0.0, abs=3e-4)
+    strip = 1e-4 / np.tan(0.1)
+    assert contact.lever == pytest.approx(np.hypot((PAD_WIDTH - strip) / 2, UNDER_TOP / 4), rel=0.06)
+
+
+def test_a_bar_that_hangs_askew_is_touched_by_an_edge_of_each_pad():
     """Turned about the pads' direction by 2 degrees, of 11 mm of its height the last 3 mm touch."""
-    askew = pad_contacts(BAR, held_bar(0.01, swing=np.radians(2.0)))
-    assert all(one.lever < 0.93 * lever_of(PAD_WIDTH, UNDER_TOP) for one in askew)
-    assert all(one.lever == pytest.approx(PAD_WIDTH / 4, rel=0.1) for one in askew)
+    contact = touched(held(0.01, swing=np.radians(2.0)))
+    strip = 1e-4 / np.tan(np.radians(2.0))
+    # Above on one side and below on the other: about their middle they are as far apart as the face is high.
+    share = (np.arange(1000) + 0.5) / 1000 - 0.5
+    expected = np.hypot(PAD_WIDTH * share[:, None], (UNDER_TOP - strip) / 2 + strip * share).mean()
+    assert contact.lever == pytest.approx(expected, rel=0.06)
+
+
+def test_the_other_leg_of_a_part_outside_the_open_fingers_is_not_touched(tmp_path):
+    part, leg = make_u(tmp_path, "u", far_height=6.0)
+    up = quat_rotate(part.resting.quat_wxyz, np.array([0.0, 0.0, 1.0]))
+    row = int(np.argmax(up[:, 2]))  # as it was drawn
+    x, y, z = quat_rotate(part.resting.quat_wxyz[row], leg) + part.resting.position[row]
+    along = quat_rotate(part.resting.quat_wxyz[row], np.array([1.0, 0.0, 0.0]))
+    grasp = np.array([x, y, z, np.arctan2(along[1], along[0])])
+    one = HeldPart(part=part, resting=row, grasp=grasp, displacement=np.zeros(4), swing=np.zeros(2))
+    assert touched(one).lever == pytest.approx(lever_of(PAD_WIDTH, PAD_HEIGHT), rel=0.04)
 
 
 def test_a_part_that_is_not_between_the_pads_is_not_touched():
-    assert pad_contacts(BAR, held_bar(0.06)) == []
-    assert all(one.lever >= LEAST_LEVER for one in pad_contacts(BAR, held_bar(0.0486)))
+    assert pad_contact(held(0.06)) is None
+    assert touched(held(0.0486)).lever >= LEAST_LEVER
+
+
+def test_the_pose_in_the_hand_is_that_of_displacement_and_swing():
+    rng = np.random.default_rng(0)
+    for theta, dtheta in ((0.4, 0.0), (-1.2, 0.3)):
+        one = dataclasses.replace(
+            held(0.02),
+            grasp=np.array([0.01, -0.02, HEIGHT, theta]),
+            displacement=np.append(1e-3 * rng.normal(size=3), dtheta),
+            swing=np.array([0.02, -0.03]),
+        )
+        before, after = one.T_grasp_obj_before, one.T_grasp_obj
+        T_base_grasp = Pose(position=one.grasp[:3], quat_wxyz=quat_about_z(np.asarray(theta)))
+        assert np.allclose(
+            (T_base_grasp @ before).position[:2], 0, atol=1e-12
+        )  # it lay at the rest frame's z
+        moved = (
+            Pose(position=np.zeros(3), quat_wxyz=after.quat_wxyz)
+            @ Pose(position=np.zeros(3), quat_wxyz=before.quat_wxyz).inverse()
+        )
+        assert float(twist_and_swing(moved.quat_wxyz)[0]) == pytest.approx(dtheta, abs=1e-9)
+        assert swing_vector(moved.quat_wxyz) == pytest.approx(one.swing, abs=1e-9)
+        assert after.position - before.position == pytest.approx(one.displacement[:3])
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7])
@@ -78,10 +143,13 @@ def test_the_weights_moment_is_a_share_of_what_even_pressure_holds(angle):
     carries = np.sqrt(1 - (0.6 * 9.81 / 24) ** 2)
     expected = 0.6 * 9.81 * 0.025 / (2 * 12 * lever_of(PAD_WIDTH, UNDER_TOP) * carries)
     assert expected > 1
-    assert moment_share(heavy, held_bar(0.025, angle), 12.0) == pytest.approx(expected, rel=0.03)
-    slid = held_bar(0.025, angle, slid=0.015)
-    assert moment_share(heavy, slid, 12.0) == pytest.approx(0.4 * expected, rel=0.03)
-    assert moment_share(dataclasses.replace(BAR, mass=2.5), held_bar(0.0), 12.0) == np.inf  # 24.5 N
+    assert moment_share(held(0.025, angle, part=heavy), 12.0) == pytest.approx(expected, rel=0.04)
+    slid = held(0.025, angle, slid=0.015, part=heavy)
+    assert moment_share(slid, 12.0) == pytest.approx(0.4 * expected, rel=0.05)
+    across = dataclasses.replace(held(0.0, part=heavy), grasp=np.array([0.0, 0.008, HEIGHT, 0.0]))
+    assert moment_share(across, 12.0) < 0.03 * expected  # across the pads its centre may lie where it will
+    for friction in (2.9, 0.0):  # not even the weight
+        assert moment_share(held(0.0, part=heavy), friction) == np.inf
 
 
 def test_the_moment_is_about_where_the_pads_touch():
@@ -89,5 +157,5 @@ def test_the_moment_is_about_where_the_pads_touch():
     arm, covered = 0.035 - (PAD_WIDTH / 2 - 0.005) / 2, PAD_WIDTH / 2 + 0.005
     light = dataclasses.replace(BAR, mass=0.01)
     expected = 0.01 * 9.81 * arm / (2 * 12 * lever_of(covered, UNDER_TOP))
-    assert moment_share(light, held_bar(0.035), 12.0) == pytest.approx(expected, rel=0.04)
-    assert moment_share(light, held_bar(0.06), 12.0) == np.inf
+    assert moment_share(held(0.035, part=light), 12.0) == pytest.approx(expected, rel=0.05)
+    assert moment_share(held(0.06, part=light), 12.0) == np.inf
