@@ -24,12 +24,7 @@ def main(cad_file: str) -> None:
     print(f"{part.name}: {part.mass * 1e3:.0f} g, {len(part.resting_probability)} resting poses")
 
     with open_cell(config_file("cells/sapien.yaml")) as cell:
-        planner = Planner(
-            load_models(),
-            PlannerConfig(policy="low_variance"),
-            table_z=cell.workspace.table_z,
-            region=cell.workspace.region,
-        )
+        planner = Planner.of_workspace(load_models(), PlannerConfig(), cell.workspace)
         assert cell.feeder is not None  # the simulated cell has one
         cell.feeder.present(str(part.folder), seed=0)
         plan = planner.plan(cell.camera.capture(), np.random.default_rng(0))

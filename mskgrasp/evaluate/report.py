@@ -97,7 +97,8 @@ def report_sections(report: Report, folder: Path) -> list[Section]:
 def conclusion(summary: SuccessSummary | DisplacementSummary) -> str:
     """State the result of an evaluation in one sentence.
 
-    Of a comparison it is that of the first model by the last policy that was measured, as grasps are planned.
+    Of a comparison it is that of certified grasps, where there are any, else of the first model by the last
+    policy that was measured.
     """
     if isinstance(summary, SuccessSummary):
         overall = summary.overall
@@ -113,6 +114,10 @@ def conclusion(summary: SuccessSummary | DisplacementSummary) -> str:
             f"{text}; RMSE of the predicted displacement in the hand: "
             f"{millimetres(overall.translation_rmse)} and {degrees(overall.rotation_rmse)}."
         )
+    certified = summary.policies.get(POLICY_NAMES["certified"])
+    if certified is not None and certified.translation_rmse is not None:
+        errors = f"{millimetres(certified.translation_rmse)} and {degrees(certified.rotation_rmse)}"
+        return f"RMSE of {POLICY_NAMES['certified']}: {errors}."
     label, model = next(iter(summary.models.items()))
     for policy in reversed(POLICIES):
         errors = [

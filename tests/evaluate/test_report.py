@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mskgrasp.evaluate.comparison import compare_models
+from mskgrasp.evaluate.experiments import CERTIFIED
 from mskgrasp.evaluate.report import Report, conclusion, interval_text, report_sections
 from mskgrasp.evaluate.summary import summarise_trials
 from mskgrasp.reports.section import Section
@@ -46,6 +47,9 @@ def test_the_conclusion_of_a_comparison_names_model_parts_and_policy():
     assert conclusion(compare_models([*best, chosen], {"one": Model()})).startswith(
         "RMSE of one (low variance, recentred): "
     )
+    simulated = trial(policy="certified", chosen_by=CERTIFIED, measured=[0.0, 0.001, 0.0, -0.1])
+    text = conclusion(compare_models([*best, chosen, simulated], {"one": Model()}))
+    assert text.startswith("RMSE of certified grasps: ")
     assert conclusion(compare_models([], {"one": Model()})) == "No displacement was measured."
 
 

@@ -79,12 +79,7 @@ def test_the_same_program_sends_the_same_commands_to_both_arms(tmp_path: Path, m
         for path in (CELLS / "sapien.yaml", write_cell(tmp_path, "franky", robot.host, {"driver": "sapien"})):
             cell = cell_from_yaml(path)
             if planner is None:
-                planner = Planner(
-                    models,
-                    PlannerConfig(n_candidates=200),
-                    table_z=cell.workspace.table_z,
-                    region=cell.workspace.region,
-                )
+                planner = Planner.of_workspace(models, PlannerConfig(n_candidates=200), cell.workspace)
             with cell.connected():
                 if len(commands) == 1:
                     robot.order("part 0.046")  # the nut is 46 mm across its flats
