@@ -383,6 +383,7 @@ IN_README = (
     "displacement_mujoco",
     "displacement_kinect2",
     "success_certified",
+    "success_certified_mujoco",
     "success_certified_cad_kinect2",
     "benchmark",
     "benchmark_mujoco",
