@@ -30,8 +30,8 @@ def make_rail(cache: Path, name: str, *, length: float, flange: float, web: floa
     return _write(cache, name, Solid(mesh=trimesh.boolean.union(boxes), hulls=hulls), density)
 
 
-def make_u(cache: Path, name: str, far_height: float) -> tuple[Part, np.ndarray]:
-    """A U of two legs of 60 mm, 100 mm apart, the near one 20 mm high, the other as stated; and its near leg.
+def make_u(cache: Path, name: str) -> tuple[Part, np.ndarray]:
+    """A U of two legs of 60 mm and, 100 mm away, 30 mm, which reaches to the middle of the near one.
 
     Returns:
         The part, and the middle (3,) of the near leg in its frame, metres.
@@ -41,7 +41,7 @@ def make_u(cache: Path, name: str, far_height: float) -> tuple[Part, np.ndarray]
     for size, middle in (
         ((60.0, 10.0, 20.0), near),
         ((10.0, 110.0, 6.0), (25.0, 0.0, 3.0)),
-        ((60.0, 10.0, far_height), (0.0, -50.0, far_height / 2)),
+        ((30.0, 10.0, 20.0), (15.0, -50.0, 10.0)),
     ):
         boxes.append(trimesh.creation.box(size).apply_translation(middle))
     mesh = trimesh.boolean.union(boxes)

@@ -1,4 +1,4 @@
-"""Where the pads of the closed hand touch a part's mesh, and whether they hold its weight there."""
+"""Contact of the closed hand's pads with a part, and the moment of its weight that this holds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mskgrasp.parts import Part
 PRESSED = 1e-4
 """Depth to which a pad is taken to yield, metres. That of the real rubber is not published."""
 LEAST_LEVER = 1e-3
-"""Lever of the friction at a single point or edge, metres: the same patch of 1 mm for every part."""
+"""Lever of the friction at a single point or edge, metres: a small patch, as of a pad that yields little."""
 _POINTS = 400
 """Points on what a pad touches, over which its lever is a mean."""
 _GRAVITY = 9.81
