@@ -21,7 +21,7 @@ from mskgrasp.planning.planner import Planner
 from mskgrasp.trials.engine import TrialEngine, connected_engine
 from mskgrasp.trials.placed_scenes import SceneTask
 from mskgrasp.trials.placed_trial import PlacedTrial
-from mskgrasp.trials.placing import grasp_and_place
+from mskgrasp.trials.placing import trials_of_scene
 
 Means = Literal["networks", "certified"]
 MEANS: tuple[Means, Means] = ("certified", "networks")
@@ -104,8 +104,8 @@ def trial_bench(setup: AssessSetup) -> Iterator[Callable[[SceneTask], Iterator[P
         def run(task: SceneTask) -> Iterator[PlacedTrial]:
             engine, planners = bench(task.condition)
             seeds = trial_seeds(setup.seed, part.name, task.number, spread=setup.spread)
-            for means in task.means:
-                trial = PlacedTrial(part=part.name, condition=task.condition, number=task.number, means=means)
-                yield grasp_and_place(engine, planners[means], part, seeds, trial, setup.certified.like)
+            yield from trials_of_scene(
+                engine, planners.__getitem__, part, seeds, task.trials(), setup.certified.like
+            )
 
         yield run

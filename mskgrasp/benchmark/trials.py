@@ -14,7 +14,7 @@ from mskgrasp.parts.alike_poses import alike_poses
 from mskgrasp.trials.engine import connected_engine
 from mskgrasp.trials.placed_scenes import SceneTask
 from mskgrasp.trials.placed_trial import PlacedTrial
-from mskgrasp.trials.placing import grasp_and_place
+from mskgrasp.trials.placing import trials_of_scene
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,8 +62,8 @@ def trial_bench(setup: BenchmarkSetup) -> Iterator[Callable[[SceneTask], Iterato
                 alike[task.source] = alike_poses(part)
             like = alike.get(task.source, {})
             seeds = trial_seeds(setup.seed, part.name, task.number)
-            for name in task.means:
-                trial = PlacedTrial(part=part.name, condition=task.condition, number=task.number, means=name)
-                yield grasp_and_place(engine, planners.of(name, part), part, seeds, trial, like)
+            yield from trials_of_scene(
+                engine, lambda name: planners.of(name, part), part, seeds, task.trials(), like
+            )
 
         yield run

@@ -37,6 +37,13 @@ class SceneTask:
         """Keys of its trials: `PlacedTrial.key`."""
         return [(self.part, self.condition, self.number, one) for one in self.means]
 
+    def trials(self) -> list[PlacedTrial]:
+        """Its trials before they are made."""
+        return [
+            PlacedTrial(part=part, condition=condition, number=number, means=means)
+            for part, condition, number, means in self.keys()
+        ]
+
     def without(self, found: Container[Key]) -> SceneTask | None:
         """The task less the trials that are found; None where nothing is left."""
         means = tuple(one for one, key in zip(self.means, self.keys(), strict=True) if key not in found)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import trimesh
+from numpy.typing import ArrayLike
 
 from hal.errors import LoadTooHeavy, MotionAborted, OutOfWorkspace
 from mskgrasp.core.geometry import (
@@ -30,7 +31,7 @@ from mskgrasp.planning.place_pose import (
     taken_along,
 )
 from mskgrasp.planning.release import release_opening
-from mskgrasp.trials.engine import PlansGrasps, TrialEngine
+from mskgrasp.trials.engine import PlannedGrasp, PlansGrasps, TrialEngine
 from mskgrasp.trials.placed_trial import PlacedTrial
 from mskgrasp.trials.trial import reason_of
 
@@ -59,13 +60,84 @@ def grasp_and_place(
     Raises:
         HalError: The cell was lost.
     """
-    try:
-        planned = engine.present(str(part.folder), seeds[0], planner)
-    except LoadTooHeavy:
-        return replace(trial, reason=f"too heavy for the arm ({part.mass:.1f} kg)")
-    plan = planned.plan
-    if plan is None:
-        return replace(trial, reason=planned.reason, quality=planned.best_quality)
+    return next(trials_of_scene(engine, lambda _: planner, part, seeds, [trial], like))
+
+
+def trials_of_scene(
+    engine: TrialEngine,
+    planner_of: Callable[[str], PlansGrasps],
+    part: Part,
+    seeds: tuple[int, int],
+    trials: Sequence[PlacedTrial],
+    like: Mapping[int, tuple[int, float]],
+) -> Iterator[PlacedTrial]:
+    """Make trials in one scene, each as `grasp_and_place`, one after the other.
+
+    A plan that equals that of an earlier trial is not tried again: a scene is simulated anew from its seed
+    for each, so that its outcome would be the same.
+
+    Args:
+        engine: See `grasp_and_place`, as for the others.
+        planner_of: The planner of a trial's means.
+        part: The part.
+        seeds: Of the scene.
+        trials: Name the trials.
+        like: Resting poses that equal another one.
+
+    Raises:
+        HalError: The cell was lost.
+    """
+    tried: list[tuple[GraspPlan, PlacedTrial]] = []
+    for trial in trials:
+        try:
+            planned = engine.present(str(part.folder), seeds[0], planner_of(trial.means))
+        except LoadTooHeavy:
+            yield replace(trial, reason=f"too heavy for the arm ({part.mass:.1f} kg)")
+            continue
+        plan = planned.plan
+        if plan is None:
+            yield replace(trial, reason=planned.reason, quality=planned.best_quality)
+            continue
+        same = next((outcome for other, outcome in tried if _equal(plan, other)), None)
+        if same is None:
+            done = _carried_out(engine, planned, plan, part, seeds[1], trial, like)
+        else:
+            done = replace(same, means=trial.means)
+        tried.append((plan, done))
+        yield done
+
+
+def _equal(plan: GraspPlan, other: GraspPlan) -> bool:
+    """Whether two plans in one scene differ in nothing that is carried out or recorded."""
+    pairs = zip(_what_counts(plan), _what_counts(other), strict=True)
+    return all(np.array_equal(one, two, equal_nan=not isinstance(one, str)) for one, two in pairs)
+
+
+def _what_counts(plan: GraspPlan) -> tuple[ArrayLike, ...]:
+    pose = plan.pose
+    found = (-1, np.zeros((4, 4))) if pose is None else (pose.resting, pose.T_base_obj.as_matrix())
+    return (
+        plan.planned_by,
+        plan.grasp.as_vector(),
+        plan.quality,
+        plan.grasp_displacement,
+        plan.swing,
+        plan.view.centre_base,
+        plan.view.size,
+        *found,
+    )
+
+
+def _carried_out(
+    engine: TrialEngine,
+    planned: PlannedGrasp,
+    plan: GraspPlan,
+    part: Part,
+    target_seed: int,
+    trial: PlacedTrial,
+    like: Mapping[int, tuple[int, float]],
+) -> PlacedTrial:
+    """Grasp and place the presented part as planned."""
     trial = replace(
         trial,
         planned_by=plan.planned_by,
@@ -106,7 +178,7 @@ def grasp_and_place(
         tilt=done.tilt,
     )
     opening = release_opening(planned.frame, plan, done.result.width)
-    return _placed(engine, plan, lay, seen, point, in_hand, expected, opening, seeds[1], trial)
+    return _placed(engine, plan, lay, seen, point, in_hand, expected, opening, target_seed, trial)
 
 
 def _placed(

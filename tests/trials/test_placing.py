@@ -15,7 +15,7 @@ from hal.errors import OutOfWorkspace
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply, twist_and_swing
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, object_displacement
 from mskgrasp.core.shipped import PRETRAINED, config_file
-from mskgrasp.parts import find_part
+from mskgrasp.parts import Part, find_part
 from mskgrasp.parts.alike_poses import alike_poses
 from mskgrasp.perception.part_pose import PartPose
 from mskgrasp.planning.config import PlannerConfig
@@ -23,9 +23,9 @@ from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import Target, displacement_of_point, place, place_pose
 from mskgrasp.trials import placing
-from mskgrasp.trials.engine import TrialEngine, connected_engine
+from mskgrasp.trials.engine import ExecutedGrasp, TrialEngine, connected_engine
 from mskgrasp.trials.placed_trial import CORRECTIONS, PlacedTrial
-from mskgrasp.trials.placing import _moved, _off, _pose_error, as_turned, grasp_and_place
+from mskgrasp.trials.placing import _moved, _off, _pose_error, as_turned, grasp_and_place, trials_of_scene
 from tests.boxes import make_rail
 from tests.planning.hand_made import planner
 from tests.planning.workspaces import WORKSPACE
@@ -163,6 +163,29 @@ def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(engine: Tri
     lies = engine.part_pose()
     assert lies is not None
     assert np.hypot(*(lies.position[:2] - engine.cell.workspace.centre)) < 0.02
+
+
+@pytest.mark.slow
+def test_a_plan_is_tried_once_in_a_scene_and_would_end_the_same_again(
+    engine: TrialEngine, monkeypatch: pytest.MonkeyPatch
+):
+    part, grasps = find_part("t_nut_m16x18"), []
+    planners = {
+        "networks": make_planner(PRETRAINED, PlannerConfig(n_candidates=200), engine.cell),
+        "sure": make_planner(PRETRAINED, PlannerConfig(n_candidates=200, min_quality=0.01), engine.cell),
+        "best": make_planner(PRETRAINED, PlannerConfig(n_candidates=200, policy="quality"), engine.cell),
+    }
+
+    def grasp(plan: GraspPlan, part: Part | None = None) -> ExecutedGrasp:
+        grasps.append(plan.grasp)
+        return TrialEngine.grasp(engine, plan, part)
+
+    monkeypatch.setattr(engine, "grasp", grasp)
+    named = [PlacedTrial(part=part.name, condition="any", number=0, means=means) for means in planners]
+    made = list(trials_of_scene(engine, planners.__getitem__, part, (3, 4), named, {}))
+    assert [trial.means for trial in made] == list(planners) and len(grasps) == 2
+    assert made[1] == replace(made[0], means="sure") and made[2].grasp != made[0].grasp
+    assert grasp_and_place(engine, planners["sure"], part, (3, 4), named[1], {}) == made[1]
 
 
 @dataclass(frozen=True)
