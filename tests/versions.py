@@ -17,6 +17,8 @@ from pathlib import Path
 
 from mskgrasp.parts.recipes import cad, families
 from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION
+from mskgrasp.simulation.certify import CERTIFY_VERSION
+from mskgrasp.simulation.select_certified import SELECT_VERSION
 from mskgrasp.simulation.versions import SIMULATION_VERSION
 
 ROOT = Path(__file__).parents[1]
@@ -48,6 +50,8 @@ IMPORT = (
     *(f"mskgrasp/parts/solids/{name}.py" for name in ("simplify", "surface", "layers", "mesh_pieces")),
     "mskgrasp/parts/importing/formats/*.py",
 )
+CERTIFY = tuple(f"mskgrasp/simulation/{name}.py" for name in ("certify", "pad_contact", "repeats"))
+SELECT = ("mskgrasp/simulation/select_certified.py", "mskgrasp/simulation/pad_contact.py")
 
 
 def current() -> dict[str, dict[str, object]]:
@@ -56,6 +60,8 @@ def current() -> dict[str, dict[str, object]]:
         "simulation": _entry(SIMULATION_VERSION, _files(SIMULATION)),
         "part": _entry(PART_VERSION, _files(PART)),
         "import": _entry(IMPORT_VERSION, _files(IMPORT)),
+        "certify": _entry(CERTIFY_VERSION, _files(CERTIFY)),
+        "select": _entry(SELECT_VERSION, _files(SELECT)),
     }
     modules: dict[str, set[int]] = {}
     for recipe in (*families.recipes().values(), *cad.recipes()):

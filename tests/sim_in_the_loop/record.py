@@ -10,9 +10,8 @@ import torch
 from hal import open_cell
 from hal.operator import Operator
 from mskgrasp.core.shipped import PRETRAINED
-from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.planning.config import PlannerConfig
-from mskgrasp.planning.planner import Planner
+from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.measurement import finish, run_trial
 from mskgrasp.trials.trial import Trial
@@ -35,16 +34,10 @@ SEEDS = (11, 12)
 
 def run_scenario() -> list[Trial]:
     """Plans and executes the fixed trials through the cell alone."""
-    models = load_models(PRETRAINED)
     torch.manual_seed(0)
     trials = []
     with open_cell(CELL) as cell:
-        planner = Planner(
-            models,
-            PlannerConfig(n_candidates=N_CANDIDATES),
-            table_z=cell.workspace.table_z,
-            region=cell.workspace.region,
-        )
+        planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=N_CANDIDATES), cell)
         engine = TrialEngine(cell, Operator(cell))
         for part in PARTS:
             for number, seed in enumerate(SEEDS):
