@@ -228,7 +228,9 @@ def candidate_grasps(
     middle = np.array([x_min + x_max, y_min + y_max]) / 2
     member = stream.members[0]
     quat_table_obj = env.parts[0].resting.quat_wxyz[stream.resting]
-    grasps, scores, shares = [], [], []
+    grasps: list[np.ndarray] = []
+    scores: list[np.ndarray] = []
+    held: list[HeldPart] = []
     for turn in rng.uniform(-np.pi, np.pi, size=3):
         pose = place_part(env, member.which, middle, float(turn))
         depth = env.capture_depth()[0].cpu().numpy()
@@ -257,23 +259,44 @@ def candidate_grasps(
         for grasp, in_base, moved in zip(grasps[-1], best, motion, strict=True):
             sign = half_turned(T_base_rest, grasp, in_base)
             moved[[0, 1, *range(4, len(moved))]] *= sign
-            held = HeldPart(
-                part=env.parts[0],
-                resting=stream.resting,
-                grasp=grasp,
-                displacement=moved[:4],
-                swing=moved[4:] if len(moved) > 4 else np.zeros(2),
+            swing = moved[4:] if len(moved) > 4 else np.zeros(2)
+            held.append(
+                HeldPart(
+                    part=env.parts[0],
+                    resting=stream.resting,
+                    grasp=grasp,
+                    displacement=moved[:4],
+                    swing=swing,
+                )
             )
-            shares.append(moment_share(held, friction_force))
     if not grasps:
         return []
     order = np.argsort(np.concatenate(scores), kind="stable")
-    found, hold = np.concatenate(grasps)[order], np.array(shares)[order] <= 1
-    chosen = _distinct(found[hold], n)
-    return chosen + _distinct(found[~hold], n - len(chosen))
+    return _first_held([held[row] for row in order], n, friction_force)
 
 
-def _distinct(grasps: np.ndarray, n: int) -> list[np.ndarray]:
+def _first_held(parts: Sequence[HeldPart], n: int, friction_force: float) -> list[np.ndarray]:
+    """The first n grasps of parts whose weight the pads hold, apart from those before them.
+
+    Filled up with others that hold, then with those that do not. What pads touch takes time to find, and is
+    found no further than needed.
+    """
+    apart: list[np.ndarray] = []
+    near: list[np.ndarray] = []
+    lost: list[np.ndarray] = []
+    for held in parts:
+        if moment_share(held, friction_force) <= 1:
+            new = all(_apart(held.grasp, other) for other in apart)
+            (apart if new else near).append(held.grasp)
+        else:
+            lost.append(held.grasp)
+        if len(apart) == n:
+            return apart
+    chosen = (apart + near)[:n]
+    return chosen + _distinct(lost, n - len(chosen))
+
+
+def _distinct(grasps: Sequence[np.ndarray], n: int) -> list[np.ndarray]:
     """The first n grasps that are apart from those before them, filled up with the others in their order."""
     chosen: list[int] = []
     for row in range(len(grasps)):
@@ -287,7 +310,7 @@ def spread_out(ranked: Sequence[_Ranked], n: int) -> list[_Ranked]:
     """The first n grasps that are apart from each other, filled up with others, in the order given."""
     if not ranked:
         return []
-    chosen = {grasp.tobytes() for grasp in _distinct(np.stack([one.grasp for one in ranked]), n)}
+    chosen = {grasp.tobytes() for grasp in _distinct([one.grasp for one in ranked], n)}
     return [one for one in ranked if one.grasp.tobytes() in chosen][:n]
 
 
