@@ -13,7 +13,16 @@ from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
-from mskgrasp.simulation.certify import CertifyConfig, Member, Stream, candidate_grasps, measured, round_sizes
+from mskgrasp.simulation.certify import (
+    CertifyConfig,
+    Member,
+    Stream,
+    _first_held,
+    candidate_grasps,
+    measured,
+    round_sizes,
+)
+from mskgrasp.simulation.pad_contact import HeldPart, moment_share
 from mskgrasp.simulation.repeats import Repeat
 from mskgrasp.simulation.shard import Simulator
 from tests.boxes import make_box
@@ -101,3 +110,16 @@ def test_candidates_are_first_those_whose_pads_hold_the_parts_weight(tmp_path):
             grasps = np.array(candidate_grasps(env, planner, stream, rng, 10, friction))
             far[friction] = np.hypot(grasps[:, 0], grasps[:, 1])
     assert far[LITTLE].max() < 0.02 < far[1e6].max()
+
+
+def test_grasps_that_hold_come_before_others_and_those_apart_before_those_near(tmp_path):
+    bar = make_box(tmp_path, "bar", (0.12, 0.024, 0.02), 0.8)
+
+    def at(x: float) -> HeldPart:
+        grasp = np.array([x, 0.0, 0.01, 0.0])
+        return HeldPart(part=bar, resting=0, grasp=grasp, displacement=np.zeros(4), swing=np.zeros(2))
+
+    liked = [at(x) for x in (0.05, 0.0, 0.001, -0.05, 0.008)]
+    assert [held.grasp[0] for held in liked if moment_share(held, LITTLE) > 1] == [0.05, -0.05]
+    for n, places in ((2, [0.0, 0.008]), (3, [0.0, 0.008, 0.001]), (5, [0.0, 0.008, 0.001, 0.05, -0.05])):
+        assert [grasp[0] for grasp in _first_held(liked, n, LITTLE)] == places
