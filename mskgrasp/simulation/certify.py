@@ -43,7 +43,7 @@ from mskgrasp.simulation.pad_contact import HeldPart, moment_share
 from mskgrasp.simulation.repeats import PoseErrors, Repeat, place_part, repeat_grasp
 from tasks import GraspDisplacementEnv
 
-CERTIFY_VERSION = 4
+CERTIFY_VERSION = 5
 """Raised by every change after which a seed simulates other grasps."""
 FIRST, SECOND = 2, 4
 """Simulations of each candidate in the first round and of each of the best in the second."""

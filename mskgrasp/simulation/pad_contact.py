@@ -18,7 +18,7 @@ PRESSED = 1e-4
 LEAST_LEVER = 1e-3
 """Lever of the friction at a single point or edge, metres: a small patch, as of a pad that yields little."""
 _POINTS = 400
-"""Points on what a pad touches, over which its lever is a mean."""
+"""Points, spread evenly over what a pad touches, over which its lever is a mean."""
 _GRAVITY = 9.81
 """m/s^2"""
 
@@ -67,10 +67,14 @@ class HeldPart:
 class PadContact:
     """What both pads touch of a part, evenly pressed.
 
+    The axis is the line through the middles of what each pad touches: no force at the middles has a moment
+    about it. Of a part that jams between opposite corners of the pads it is aslant.
+
     Attributes:
-        along: Its middle along the pads, x of the grasp frame, metres.
-        lever: Mean distance of its points from the middle, seen along the closing direction, metres. A
-            friction force F of each pad, spread over its points, holds a moment of 2 F times this.
+        along: Where the axis passes the part's centre of mass, x of the grasp frame, metres.
+        lever: Mean distance of what a pad touches from its middle, mean of both pads, seen along the closing
+            direction, metres. A friction force F of each pad, spread over its points, holds a moment of 2 F
+            times this about the axis.
     """
 
     along: float
@@ -98,17 +102,16 @@ def pad_contact(held: HeldPart) -> PadContact | None:
     if not len(between.faces):
         return None
     y = after.apply(np.asarray(between.vertices))[:, 1]
-    pads = [
-        _touched(between, after, np.array([0.0, side, 0.0]), (side * y).max() - PRESSED) for side in (1, -1)
-    ]
-    points = np.concatenate(pads)  # as many of each pad
-    middle = points.mean(axis=0)
-    lever = float(np.linalg.norm(points - middle, axis=1).mean())
-    return PadContact(along=float(middle[0]), lever=max(lever, LEAST_LEVER))
+    (left, left_lever), (right, right_lever) = (
+        _touched(between, after, np.array([0.0, side, 0.0]), (side * y).max() - PRESSED) for side in (-1, 1)
+    )
+    share = (float(after.position[1]) - y.min()) / np.ptp(y)
+    along = (1 - share) * left + share * right
+    return PadContact(along=along, lever=max((left_lever + right_lever) / 2, LEAST_LEVER))
 
 
 def moment_share(held: HeldPart, friction_force: float) -> float:
-    """Moment of a held part's weight about the closing direction, as a share of what the pads hold.
+    """Moment of a held part's weight about the line through the pads' contacts, as a share of what they hold.
 
     PhysX holds a flat contact by its two farthest points, nearly twice as well as even pressure does, and a
     single point as a disc. So it lifts parts far from their centre of mass that would turn. Here each pad
@@ -129,16 +132,21 @@ def moment_share(held: HeldPart, friction_force: float) -> float:
     return float(weight * arm / (2 * friction_force * contact.lever * np.sqrt(left)))
 
 
-def _touched(mesh: trimesh.Trimesh, T_grasp_obj: Pose, outward: np.ndarray, least: float) -> np.ndarray:
-    """Points (n, 2), x and z of the grasp frame, spread evenly over what lies at least so far outward."""
+def _touched(
+    mesh: trimesh.Trimesh, T_grasp_obj: Pose, outward: np.ndarray, least: float
+) -> tuple[float, float]:
+    """Middle, x of the grasp frame, of what lies so far outward, and mean distance from it, metres."""
     layer = _clipped(mesh, [(T_grasp_obj, outward, least * outward)])
     facing = abs(quat_rotate(T_grasp_obj.quat_wxyz, layer.face_normals) @ outward)
     weights = layer.area_faces * facing
     if weights.sum() > 0:
+        middle = np.average(layer.triangles_center, axis=0, weights=weights)
         points = trimesh.sample.sample_surface(layer, _POINTS, face_weight=weights, seed=0)[0]
     else:  # an edge between faces along the closing direction
-        points = np.resize(layer.vertices, (_POINTS, 3))
-    return T_grasp_obj.apply(np.asarray(points))[:, [0, 2]]
+        points = np.asarray(layer.vertices)
+        middle = points.mean(axis=0)
+    x, _, z = T_grasp_obj.apply(np.vstack([middle, points])).T
+    return float(x[0]), float(np.hypot(x[1:] - x[0], z[1:] - z[0]).mean())
 
 
 def _clipped(mesh: trimesh.Trimesh, planes: list) -> trimesh.Trimesh:

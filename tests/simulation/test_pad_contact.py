@@ -76,22 +76,20 @@ def test_the_bar_is_where_it_slid_to_in_the_hand():
     assert (slid.along, slid.lever) == pytest.approx((expected.along, expected.lever), abs=2e-4)
 
 
-def test_a_bar_that_stays_turned_is_touched_at_two_edges_as_far_apart_as_the_pads_are_wide():
+def test_a_bar_that_stays_turned_is_touched_at_an_edge_by_each_pad():
     """Turned by 0.1 rad one pad meets it at its right edge, the other at its left one."""
     contact = touched(held(0.0, 0.1, aligned=False))
     assert contact.along == pytest.approx(0.0, abs=3e-4)
     strip = 1e-4 / np.tan(0.1)
-    assert contact.lever == pytest.approx(np.hypot((PAD_WIDTH - strip) / 2, UNDER_TOP / 4), rel=0.06)
+    # Friction at opposite edges has no moment about the line from one to the other.
+    assert contact.lever == pytest.approx(lever_of(strip, UNDER_TOP), rel=0.06)
 
 
 def test_a_bar_that_hangs_askew_is_touched_by_an_edge_of_each_pad():
     """Turned about the pads' direction by 2 degrees, of 11 mm of its height the last 3 mm touch."""
     contact = touched(held(0.01, swing=np.radians(2.0)))
     strip = 1e-4 / np.tan(np.radians(2.0))
-    # Above on one side and below on the other: about their middle they are as far apart as the face is high.
-    share = (np.arange(1000) + 0.5) / 1000 - 0.5
-    expected = np.hypot(PAD_WIDTH * share[:, None], (UNDER_TOP - strip) / 2 + strip * share).mean()
-    assert contact.lever == pytest.approx(expected, rel=0.06)
+    assert contact.lever == pytest.approx(lever_of(PAD_WIDTH, strip), rel=0.06)
 
 
 def test_the_other_leg_of_a_part_outside_the_open_fingers_is_not_touched(tmp_path):
@@ -104,6 +102,23 @@ def test_the_other_leg_of_a_part_outside_the_open_fingers_is_not_touched(tmp_pat
     one = HeldPart(part=part, resting=row, grasp=grasp, displacement=np.zeros(4), swing=np.zeros(2))
     assert touched(one).lever == pytest.approx(lever_of(PAD_WIDTH, PAD_HEIGHT), rel=0.04)
     assert touched(one).along == pytest.approx(0.0, abs=4e-4)  # 2 mm beside it if the far leg counted
+
+
+def test_the_axis_of_a_leg_jammed_between_corners_passes_its_part_aslant(tmp_path):
+    """Turned by 0.1 rad, the leg, 10 mm thick, is touched at opposite corners of the pads."""
+    part, leg = make_u(tmp_path, "u")
+    up = quat_rotate(part.resting.quat_wxyz, np.array([0.0, 0.0, 1.0]))
+    row = int(np.argmax(up[:, 2]))
+    x, y, z = quat_rotate(part.resting.quat_wxyz[row], leg) + part.resting.position[row]
+    along = quat_rotate(part.resting.quat_wxyz[row], np.array([1.0, 0.0, 0.0]))
+    grasp = np.array([x, y, z, np.arctan2(along[1], along[0]) + 0.1])
+    one = HeldPart(part=part, resting=row, grasp=grasp, displacement=np.zeros(4), swing=np.zeros(2))
+    strip = 1e-4 / np.tan(0.1)
+    apart = PAD_WIDTH - strip
+    thickness = 0.01 * np.cos(0.1) + PAD_WIDTH * np.sin(0.1)
+    beside = -one.T_grasp_obj.position[1]
+    assert 0.03 < beside < 0.06  # the part's centre of mass is on the other side of the corner
+    assert touched(one).along == pytest.approx(beside / thickness * apart, rel=0.05)
 
 
 def test_a_part_that_is_not_between_the_pads_is_not_touched():
