@@ -13,7 +13,7 @@ from mskgrasp.planning.certified import CertifiedGrasp, radius_about_vertical, w
 from mskgrasp.simulation.certify import CertifyConfig, spread_out
 from mskgrasp.simulation.pad_contact import HeldPart, moment_share
 
-SELECT_VERSION = 7
+SELECT_VERSION = 8
 """Raised by every change after which others of the simulated grasps are certified."""
 PREFERRED_MOMENT = 0.5
 """Grasps up to this `moment_share` are preferred: half of it is left for pads that press unevenly."""
@@ -28,8 +28,9 @@ class Selected:
     Attributes:
         certified: The certified ones.
         uncertified: Where there is none, the best of those that fail by one criterion: by the share lifted,
-            by the tilt, or by a spread of up to twice `CertifyConfig.most_error`. The networks would plan one
-            of these candidates, without knowing which is best.
+            by the tilt, by a moment of the weight of up to twice what the pads hold, or by a spread of up to
+            twice `CertifyConfig.most_error`. The networks would plan one of these candidates, without knowing
+            which is best.
         reason: Why there is no certified one; empty: there is.
     """
 
@@ -67,7 +68,11 @@ def select_certified(
         return Selected(certified=steady)
     firm, errors = _errors(part, _firm(part, flat, config), config)
     if not firm:
-        return Selected(reason="its weight could turn it between the pads in every grasp that lifts it")
+        nearly = _firm(part, flat, config, most_moment=2.0)
+        return Selected(
+            uncertified=_steady(*_errors(part, nearly, config), config.most_error, config),
+            reason="its weight could turn it between the pads in every grasp that lifts it",
+        )
     steady = _steady(firm, errors, config.most_error, config)
     if not steady:
         most, least = 1e3 * config.most_error, 1e3 * min(errors)
