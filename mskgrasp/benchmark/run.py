@@ -52,6 +52,8 @@ def benchmark(config: BenchmarkConfig) -> None:
         MskgraspError: A part, a model or a planner cannot be used.
     """
     check_planners(config)
+    if not config.cell_file.is_file():
+        raise UsageError(f"--cell is {config.cell!r}; legal: sapien, mujoco, or a cell's YAML file")
     cell = read_cell(config.cell_file, noise=config.noise, measure="truth", tape=None)
     if not cell.simulated:
         raise UsageError(
