@@ -203,7 +203,8 @@ class PickAndPlace:
                 engine.recover(error)
                 return replace(known, reason="collided"), target, None
             lies = engine.part_pose()
-            engine.home()
+            if not engine.leave():
+                return replace(known, reason="not released"), target, None
             if lies is not None and grasped.before is not None and taken_along(grasped.before, lies):
                 return replace(known, reason="not released"), target, None
             after = engine.capture()

@@ -207,12 +207,9 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
                     continue
                 where = f"slot {number} of {len(pallet.tasks)}" if pallet.name else f"trial {task.number + 1}"
                 yield worker.run(task, f"{where}, correction {task.correction}")
-            if pallet.name:
-                engine.home()
+            if engine.leave() and pallet.name:
                 image = worker.picture(chosen_slots(config))
                 _, png = cv2.imencode(".png", image[..., ::-1])
                 write_whole(config.out / "placements" / f"{pallet.name}.png", png.tobytes())
-            else:
-                engine.leave()
 
         yield fill
