@@ -345,6 +345,7 @@ ROWS: tuple[tuple[str, Callable[[StoredReport], list[SummaryRow]]], ...] = (
     ("success_certified", _certified("the catalogue's parts", "exact camera")),
     ("success_certified_kinect2", _certified("the catalogue's parts", "noise of a Kinect v2")),
     ("success_certified_mujoco", _certified("the catalogue's parts", "in MuJoCo")),
+    ("success_certified_mujoco_validation", _certified("validation parts", "in MuJoCo")),
     ("success_certified_cad", _certified("imported CAD", "exact camera")),
     ("success_certified_cad_kinect2", _certified("imported CAD", "noise of a Kinect v2")),
     ("success_certified_cad_mujoco", _certified("imported CAD", "in MuJoCo")),
