@@ -112,8 +112,13 @@ class Arm(Device):
         with self._motion():
             legs = self._legs(T_base_tcp)
             self._check_line(self.limits, *legs)
-            for leg in legs:
-                self._move_to_pose(leg, speed)
+            for number, leg in enumerate(legs):
+                try:
+                    self._move_to_pose(leg, speed)
+                except OutOfWorkspace as error:
+                    if number == 0:
+                        raise
+                    raise MotionAborted(f"the arm stopped part of the way: {error}") from error
             self._check_arrival(T_base_tcp)
 
     def move_until_contact(self, T_base_tcp: Pose, *, force: float = 5.0, speed: float = 0.01) -> Pose | None:

@@ -106,7 +106,7 @@ class Cell:
         board_holder: Attaches a calibration board to the hand; None if an operator does.
         simulated: The cell is a simulation of its own, so that several may run at once.
         draws_tape: The file may ask for tape on parts (``tape``) and fine colour (``colour_scale``).
-        physics: Settings of a simulation; None: of a real cell, or not told.
+        physics: Settings of a simulation; None: of a real cell, or unknown.
         recorded: Its calls are recorded or replayed: a program asks it nothing that a run does not need.
     """
 

@@ -178,7 +178,7 @@ class SimulatedCellConfig(Config):
     keep_out: tuple[KeepOutConfig, ...] = ()
     """Spheres, capsules and boxes that no link enters; the camera makes its own."""
     table_error: TableError = TableError()
-    """Error of the table that programs are not told; none by default."""
+    """Error of the table unknown to programs; none by default."""
     camera: Overhead = Overhead()
     """The overhead depth camera."""
     noise: SensorNoise = SensorNoise()
@@ -189,6 +189,8 @@ class SimulatedCellConfig(Config):
         corners = [(x, y) for x in self.region[:2] for y in self.region[2:]]
         grasps = np.array([[x, y, z, t] for x, y in corners for z in (0.0105, 0.3) for t in (-1.57, 1.57)])
         if not top_down(grasps)[1].all():
-            raise ValueError(f"region {list(self.region)} reaches beyond the arm")
+            raise ValueError(
+                f"region {list(self.region)} reaches beyond the arm; the default is {list(REGION)}"
+            )
         self.camera.check_sees(self.region)
         return self

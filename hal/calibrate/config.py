@@ -58,6 +58,8 @@ class CalibrateConfig(Config):
 
     @model_validator(mode="after")
     def _check(self) -> CalibrateConfig:
+        if self.print_board is not None and self.source is not None:
+            raise ValueError("--print-board and --from exclude each other; omit one")
         if self.camera_at is None:
             if self.camera_towards is not None or self.camera_turn_deg:
                 raise ValueError(

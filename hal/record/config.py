@@ -21,7 +21,8 @@ class RecordConfig(Config):
     interval: float = Field(default=0.5, ge=0, le=3600)
     """Time from one frame to the next, s."""
     run: str | None = None
-    """Record a program and its options instead, without --cell: "mskgrasp.evaluate --models models/demo"."""
+    """Record a run of this program instead of frames, as in "mskgrasp.evaluate --models models/demo". It runs
+    on the recorded cell: leave its own --cell out."""
 
     @model_validator(mode="after")
     def _frames_or_program(self) -> RecordConfig:

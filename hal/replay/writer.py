@@ -22,6 +22,7 @@ from hal.camera import RgbdFrame
 from hal.cell import Workspace
 from hal.replay.events import KIND, SCHEMA, Event, plain
 from mskgrasp.core.errors import UsageError
+from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
 T = TypeVar("T")
 LEAST_FREE = 2**26
@@ -176,7 +177,8 @@ class RecordingWriter:
                         **(packed if array.ndim > 1 else {}),
                     )
             index = group["depth"].shape[0]  # pyright: ignore[reportAttributeAccessIssue]
-            with self._named_in_errors():
+            # A frame without all of its images would make the whole recording unreadable.
+            with self._named_in_errors(), ctrl_c_deferred():
                 for key, value in values.items():
                     dataset: Any = group[key]
                     dataset.resize(index + 1, axis=0)
@@ -204,7 +206,7 @@ class RecordingWriter:
         with self._lock:
             if self._file is None:
                 return
-            with self._named_in_errors():
+            with self._named_in_errors(), ctrl_c_deferred():
                 events: Any = self._file["events"]
                 events.resize(len(events) + 1, axis=0)
                 events[-1] = json.dumps(asdict(event))

@@ -17,6 +17,8 @@ from mskgrasp.core.units import Unit
 _TOLERANCE = re.compile(r"\s*([0-9.]+)\s*(mm|m)\s*,\s*([0-9.]+)\s*(deg|rad)\s*")
 SIMULATIONS, QUICK_SIMULATIONS = 1200, 400
 """Simulated grasps that certify a part's grasps."""
+LEAST_SIMULATIONS = 20
+"""Fewest of which any grasp comes, as in `mskgrasp.simulation.certify.CertifyConfig`."""
 TRIALS, QUICK_TRIALS = 24, 8
 """Trials of each policy with an exact camera; half as many with noise, a quarter with each friction."""
 
@@ -38,8 +40,8 @@ class AssessConfig(Config):
     parts: tyro.conf.Positional[tuple[str, ...]] = ()
     """Names of parts, part folders, CAD files, or folders of CAD files."""
     tolerance: str = "1mm,2deg"
-    """Greatest distance of a placed part from its target, and greatest error of its turn about the
-    vertical."""
+    """Greatest distance of a placed part from its target, mm or m, and greatest error of its turn about the
+    vertical, deg or rad."""
     out: Path = Path("out/assess")
     """Folder for report.html, grasps.json, grasps.isaac.yaml and trials.jsonl; with several parts, of a
     folder for each, and index.html."""
@@ -50,13 +52,20 @@ class AssessConfig(Config):
     models: Path = PRETRAINED
     """Folder with model.safetensors and model.json; by default the shipped one."""
     simulations: int = Field(default=0, ge=0, le=1_000_000)
-    """Simulated grasps that certify a part's grasps; 0: 1200, or 400 with --quick."""
+    """Simulated grasps that certify a part's grasps, at least 20; 0: 1200, or 400 with --quick."""
     trials: int = Field(default=0, ge=0, le=100_000)
     """Trials of each policy with an exact camera; 0: 24, or 8 with --quick."""
     workers: int = Field(default=0, ge=0)
     """Processes; 0: one per core. The results do not depend on their number."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines simulations and trials."""
+
+    @field_validator("simulations")
+    @classmethod
+    def _enough(cls, simulations: int) -> int:
+        if 0 < simulations < LEAST_SIMULATIONS:
+            raise ValueError(f"at least {LEAST_SIMULATIONS}, or 0 for the default")
+        return simulations
 
     @field_validator("tolerance")
     @classmethod
@@ -79,7 +88,7 @@ def parse_tolerance(text: str) -> Tolerance:
     """The tolerance that a user writes as ``1mm,2deg``.
 
     Raises:
-        ValueError: It is not a distance and an angle, both positive.
+        ValueError: It is not a distance and an angle, or too large.
     """
     found = _TOLERANCE.fullmatch(text)
     try:
@@ -90,5 +99,8 @@ def parse_tolerance(text: str) -> Tolerance:
     except ValueError:
         distance = angle = 0.0
     if not (0 < distance <= 0.1 and 0 < angle <= np.pi):
-        raise ValueError("a tolerance is a distance and an angle, such as 1mm,2deg")
+        raise ValueError(
+            "a tolerance is a distance in mm or m and an angle in deg or rad, such as 1mm,2deg, each over 0 "
+            "and at most 100 mm and 180 deg"
+        )
     return Tolerance(distance=distance, angle=float(angle))

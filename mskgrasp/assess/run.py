@@ -89,7 +89,9 @@ def _sources(config: AssessConfig) -> list[str]:
         if path.is_dir() and not (path / "part.json").exists():
             files = sorted(str(file) for file in path.iterdir() if file.suffix.lower() in LOADERS)
             if not files:
-                raise UsageError(f"{text} holds no CAD file ({' '.join(sorted(LOADERS))})")
+                raise UsageError(
+                    f"{text} holds no CAD file ({' '.join(sorted(LOADERS))}); name one, or another folder"
+                )
             sources += files
         else:
             sources.append(text)
@@ -140,7 +142,7 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
 def begin_trials(out: Path, certified: CertifiedGrasps) -> None:
     """Write ``grasps.json``, and remove stored trials that were planned by other certified grasps.
 
-    More simulations give other grasps: a report of both would be of neither.
+    More simulations give other grasps: a report must not mix trials of two sets of grasps.
     """
     path = out / FILE
     if path.exists() and path.read_bytes() == certified.contents():

@@ -14,6 +14,7 @@ Writes report.html and report.json: shares within 0.25 to 5 mm and 1 to 5 degree
 share refused, and what the error is made of. Some hours on two cores; a stopped run goes on where it was.
 
 python -m mskgrasp.benchmark --quick
+
 python -m mskgrasp.benchmark --cell mujoco --planners ours centroid
 
 Your own planner takes part as a Python package or as a program, and grasps in the isaac_grasp format are

@@ -20,6 +20,7 @@ from mskgrasp.planning.image_planners import AntipodalPlanner, CentroidPlanner
 from mskgrasp.planning.planner import Planner
 from mskgrasp.planning.program_planner import ProgramPlanner
 from mskgrasp.planning.proposal import GROUP, OtherPlanner, installed_planner
+from mskgrasp.planning.run_inputs import kept_certified
 from mskgrasp.trials.engine import PlansGrasps
 
 _KNOWN = (*BUILT_IN, PROGRAM)
@@ -35,11 +36,13 @@ class PlannerSettings:
         models: Folder of our networks.
         paper_models: Folder of the paper's; None: there are none.
         program: Command of the program that plans; empty: none.
+        out: Folder of the run, which keeps the certified grasps; None: those of the cache are used.
     """
 
     models: Path
     paper_models: Path | None = None
     program: str = ""
+    out: Path | None = None
 
 
 def check_planners(config: BenchmarkConfig) -> None:
@@ -125,4 +128,5 @@ class Planners:
     def _certified_planner(self, part: Part) -> CertifiedPlanner:
         networks = self._once("ours-min-quality", lambda: self._make("ours-min-quality"))
         assert isinstance(networks, Planner)
-        return CertifiedPlanner(networks, part, read_certified(part), reachable_by(self.cell))
+        kept = None if self.settings.out is None else kept_certified(self.settings.out, part)
+        return CertifiedPlanner(networks, part, read_certified(part, kept), reachable_by(self.cell))

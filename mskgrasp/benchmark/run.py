@@ -16,10 +16,10 @@ from mskgrasp.parts import find_part
 from mskgrasp.parts.builtin import builtin_names, recipe_of
 from mskgrasp.parts.catalogue import read_index
 from mskgrasp.parts.select_parts import part_names
-from mskgrasp.planning.run_inputs import BY_CONTENT, certified_digests, model_digests, part_digests
+from mskgrasp.planning.run_inputs import BY_CONTENT, keep_certified, model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import opened_run, record_inputs
+from mskgrasp.runtime.run_folder import opened_run
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import CellFile, read_cell
 from mskgrasp.trials.placed_scenes import placed_trials
@@ -52,6 +52,8 @@ def benchmark(config: BenchmarkConfig) -> None:
         MskgraspError: A part, a model or a planner cannot be used.
     """
     check_planners(config)
+    if not config.cell_file.is_file():
+        raise UsageError(f"--cell is {config.cell!r}; legal: sapien, mujoco, or a cell's YAML file")
     cell = read_cell(config.cell_file, noise=config.noise, measure="truth", tape=None)
     if not cell.simulated:
         raise UsageError(
@@ -72,7 +74,7 @@ def benchmark(config: BenchmarkConfig) -> None:
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         if "certified" in config.rows:
             certify_missing(sources, config.models, workers)
-            record_inputs(config.out, certified_digests(sources))
+            keep_certified(config.out, sources)
         trials = _trials(config, cell, sources, workers)
         facts = RunFacts(
             cell=config.cell,
@@ -150,7 +152,10 @@ def _trials(
     setup = BenchmarkSetup(
         cell=cell.write(config.out),
         planners=PlannerSettings(
-            models=config.models, paper_models=config.paper_models, program=config.program
+            models=config.models,
+            paper_models=config.paper_models,
+            program=config.program,
+            out=config.out,
         ),
         out=config.out,
         seed=config.seed,

@@ -9,6 +9,7 @@ from typing import Any, TypeVar, get_args
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
 
 from mskgrasp.core.errors import BadConfig, one_line, shown
 from mskgrasp.core.files import read_bounded, write_whole
@@ -109,13 +110,29 @@ def _explain(
     problems = []
     # Unknown keys first: a misspelt key is why another is missing.
     found = sorted(error.errors(), key=lambda detail: detail["type"] != "extra_forbidden")
-    for detail in found[:_MOST_PROBLEMS]:
+    # Of values that a list lacks the last one tells how many are needed.
+    lacking = {detail["loc"][:-1]: detail for detail in found if _lacks_an_item(detail)}
+    found = [one for one in found if not _lacks_an_item(one) or one is lacking[one["loc"][:-1]]]
+    shown_of = found[:_MOST_PROBLEMS]
+    for number, detail in enumerate(shown_of):
         key = name(detail["loc"]) + ": " if detail["loc"] else ""
         if detail["type"] == "extra_forbidden":
-            legal = ", ".join(sorted(_fields_at(model, detail["loc"][:-1])))
             key = name(detail["loc"])
             key = key if len(key) <= _LONGEST_KEY else f"{key[:_LONGEST_KEY]}..."
-            problems.append(f"unknown key {key}" + (f"; legal keys here: {legal}" if legal else ""))
+            place = detail["loc"][:-1]
+            legal = ", ".join(sorted(_fields_at(model, place)))
+            # Once for all keys of a place.
+            later = any(
+                (one["type"], one["loc"][:-1]) == (detail["type"], place) for one in shown_of[number + 1 :]
+            )
+            problems.append(
+                f"unknown key {key}" + (f"; legal keys here: {legal}" if legal and not later else "")
+            )
+        elif _lacks_an_item(detail):
+            *place, last = detail["loc"]
+            problems.append(
+                f"{name(tuple(place))}: {int(last) + 1} values are needed, got {len(detail['input'])}"
+            )
         elif detail["type"] in ("union_tag_invalid", "union_tag_not_found"):
             context = detail.get("ctx", {})
             tag = context.get("discriminator", "'type'").strip("'")
@@ -130,6 +147,10 @@ def _explain(
     if len(found) > _MOST_PROBLEMS:
         problems.append(f"and {len(found) - _MOST_PROBLEMS} more")
     return one_line("; ".join(problems))
+
+
+def _lacks_an_item(detail: ErrorDetails) -> bool:
+    return detail["type"] == "missing" and bool(detail["loc"]) and isinstance(detail["loc"][-1], int)
 
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> set[str]:

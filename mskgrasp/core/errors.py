@@ -81,7 +81,7 @@ class MissingModel(BadModel, UsageError):
 
 
 class BadPlanner(MskgraspError):
-    """A planner of another package or program cannot be used, or answers what is no grasp."""
+    """A planner of another package or program cannot be used, or answers with what is not a grasp."""
 
 
 class NoPartFound(MskgraspError):
@@ -108,7 +108,7 @@ class GraspRefused(NoGraspFound):
     """The best candidate is not worth trying: its predicted quality is under the bound.
 
     Attributes:
-        quality: The best predicted quality; None: not told.
+        quality: The best predicted quality; None: unknown.
     """
 
     def __init__(self, message: str, quality: float | None = None):

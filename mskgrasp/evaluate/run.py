@@ -35,7 +35,7 @@ from mskgrasp.learning.grasp_models import load_models, require_model
 from mskgrasp.parts import find_part, starter_names
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import tell_model
-from mskgrasp.planning.run_inputs import BY_CONTENT, certified_digests, model_digests, part_digests
+from mskgrasp.planning.run_inputs import BY_CONTENT, keep_certified, model_digests, part_digests
 from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import note, progress
@@ -44,7 +44,6 @@ from mskgrasp.runtime.run_folder import (
     append_trial,
     opened_run,
     read_trials,
-    record_inputs,
     resume_trials,
     rewrite_trials,
 )
@@ -150,7 +149,7 @@ def evaluate(config: EvaluateConfig) -> Report:
     with opened_run(config, config.out, one.inputs, scene_version=SCENE_VERSION, may_change=MAY_CHANGE):
         if config.planner.policy == "certified":
             certify_missing(one.sources, config.models, config.workers)
-            record_inputs(config.out, certified_digests(one.sources))
+            keep_certified(config.out, one.sources)
         trials = _make_trials(one)
         if compared is not None:
             trials = _with_predictions(config, trials, compared)

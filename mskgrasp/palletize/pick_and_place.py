@@ -34,6 +34,7 @@ from mskgrasp.planning.place_pose import (
 )
 from mskgrasp.planning.planner import Planner
 from mskgrasp.planning.release import release_opening
+from mskgrasp.planning.run_inputs import kept_certified
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.trials.policies import RepeatedPlanner
 from mskgrasp.trials.trial import reason_of
@@ -77,14 +78,16 @@ class PickAndPlace:
         engine: Engine of a connected cell.
         planner: Planner for that cell.
         pictures: Folder for the picture and the height maps of every placement.
+        out: Folder of the run, which keeps the certified grasps; None: those of the cache are used.
     """
 
-    def __init__(self, engine: TrialEngine, planner: Planner, pictures: Path):
+    def __init__(self, engine: TrialEngine, planner: Planner, pictures: Path, out: Path | None = None):
         self._engine = engine
         self._cell = engine.cell
         self._planner = planner
         self._planners: dict[str, RepeatedPlanner] = {}
         self._pictures = pictures
+        self._out = out
         self._tops: dict[int, float] = {}
 
     def run(self, task: PlacementTask, name: str = "") -> Placement:
@@ -144,7 +147,9 @@ class PickAndPlace:
 
     def _planner_of(self, part: str) -> RepeatedPlanner:
         if part not in self._planners:
-            own = planner_of_part(self._planner, self._cell, find_part(part))
+            found = find_part(part)
+            kept = None if self._out is None else kept_certified(self._out, found)
+            own = planner_of_part(self._planner, self._cell, found, kept)
             self._planners = {part: RepeatedPlanner(own)}
         return self._planners[part]
 
@@ -203,7 +208,8 @@ class PickAndPlace:
                 engine.recover(error)
                 return replace(known, reason="collided"), target, None
             lies = engine.part_pose()
-            engine.home()
+            if not engine.leave():
+                return replace(known, reason="not released"), target, None
             if lies is not None and grasped.before is not None and taken_along(grasped.before, lies):
                 return replace(known, reason="not released"), target, None
             after = engine.capture()

@@ -25,7 +25,7 @@ from mskgrasp.palletize.summary import PlacementSummary
 from mskgrasp.parts import find_part
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import make_planner, tell_model
-from mskgrasp.planning.run_inputs import BY_CONTENT, certified_digests, inputs_of
+from mskgrasp.planning.run_inputs import BY_CONTENT, inputs_of, keep_certified
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import (
@@ -33,7 +33,6 @@ from mskgrasp.runtime.run_folder import (
     append_trial,
     file_digest,
     opened_run,
-    record_inputs,
     resume_trials,
 )
 from mskgrasp.runtime.worker_pool import Work, results
@@ -102,7 +101,7 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
         if config.planner.policy == "certified":
             certify_missing(names, config.models, config.workers)
-            record_inputs(config.out, certified_digests(names))
+            keep_certified(config.out, names)
         make_folder(config.out / "placements")
         for leftover in (config.out / "placements").glob("*.tmp"):
             leftover.unlink()
@@ -195,7 +194,7 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
     ) as engine:
         check_slots_in_reach(engine.cell, chosen_slots(config))
         planner = make_planner(config.models, config.planner, engine.cell)
-        worker = PickAndPlace(engine, planner, config.out / "placements")
+        worker = PickAndPlace(engine, planner, config.out / "placements", config.out)
 
         def fill(pallet: TaskGroup) -> Iterator[Placement]:
             for number, task in enumerate(pallet.tasks, 1):
@@ -207,12 +206,9 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
                     continue
                 where = f"slot {number} of {len(pallet.tasks)}" if pallet.name else f"trial {task.number + 1}"
                 yield worker.run(task, f"{where}, correction {task.correction}")
-            if pallet.name:
-                engine.home()
+            if engine.leave() and pallet.name:
                 image = worker.picture(chosen_slots(config))
                 _, png = cv2.imencode(".png", image[..., ::-1])
                 write_whole(config.out / "placements" / f"{pallet.name}.png", png.tobytes())
-            else:
-                engine.leave()
 
         yield fill

@@ -120,9 +120,12 @@ def unknown_part(name: str, *, builtin_only: bool = False) -> UnknownPart:
 
     if Path(name).suffix.lower() in LOADERS:
         if Path(name).is_file():
-            return UnknownPart(
-                f"{name} is a CAD file: import it, python -m mskgrasp.parts import {shlex.quote(name)}"
-            )
+            stem, command = Path(name).stem, f"python -m mskgrasp.parts import {shlex.quote(name)}"
+            if stem in imported_names():
+                return UnknownPart(
+                    f"{name} is a CAD file: name the part {stem}, or import the file, {command}"
+                )
+            return UnknownPart(f"{name} is a CAD file: import it, {command}, and name the part")
         known = f", or name the part {Path(name).stem}" if Path(name).stem in _recipes() else ""
         return UnknownPart(f"there is no file {name}; check the path{known}")
     if not cad.available() and any(recipe.name == name for recipe in cad.recipes()):

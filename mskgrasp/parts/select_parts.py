@@ -62,9 +62,7 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
     for source in names:
         name = find_part(source).name
         if name in sources:
-            raise UsageError(
-                f"--parts: {sources[name]} and {source} are both called {name!r}; leave one away"
-            )
+            raise UsageError(f"--parts: {sources[name]} and {source} are both called {name!r}; leave one out")
         sources[name] = source
     return names
 
@@ -74,7 +72,10 @@ def _listed(path: Path) -> list[str]:
         lines = read_bounded(path, _MOST_BYTES).decode().splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"--parts: cannot read the names in {path} ({error}); name a text file") from error
-    return [name for line in lines if (name := line.strip())]
+    names = [name for line in lines if (name := line.strip())]
+    if not names:
+        raise UsageError(f"--parts: {path} holds no name; write one a line")
+    return names
 
 
 def evenly(names: Sequence[str], n: int) -> list[str]:

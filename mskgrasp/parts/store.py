@@ -205,7 +205,10 @@ def _read(folder: Path, name: str) -> bytes:
     path = folder / name
     if not path.is_file():
         kind = BadPart if (folder / "part.json").is_file() else UnknownPart
-        raise kind(f"{folder} is not a part folder: {name} is missing; a part has {', '.join(FILES)}")
+        raise kind(
+            f"{folder} is not a part folder: {name} is missing; name a part (python -m mskgrasp.parts list), "
+            f"a CAD file, or a folder with {', '.join(FILES)}"
+        )
     if not path.resolve().is_relative_to(folder.resolve()):
         raise BadPart(f"{path} leads out of its folder to {path.resolve()}: {_REMEDY}")
     return path.read_bytes()

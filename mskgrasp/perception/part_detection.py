@@ -100,7 +100,8 @@ def find_part_pixels(
         if abs(table_offset) > min_height:
             raise NoPartFound(
                 f"the table is seen {1e3 * table_offset:+.1f} mm from table_z {table_z:g}, at most "
-                f"{min_height * 1e3:g} mm are forgiven: the camera's pose or table_z is wrong; calibrate anew"
+                f"{min_height * 1e3:g} mm are forgiven: the camera's pose or table_z is wrong; calibrate "
+                "again"
             )
         tops = tops - table_offset
         heights = _mean(heights - table_offset, 2 * min_height)
@@ -110,7 +111,7 @@ def find_part_pixels(
         raise NoPartFound(
             f"{raised.sum() / near.sum():.0%} of the region rise more than {min_height * 1e3:g} mm above the "
             f"table (median {np.median(tops[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
-            f"{table_z:g} or the camera's pose is wrong; calibrate the camera anew"
+            f"{table_z:g} or the camera's pose is wrong; calibrate the camera again"
         )
     mask, n_other = _largest_group(raised, near & (heights > link_height), reach)
     if mask is None:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property, partial
+from pathlib import Path
 
 import numpy as np
 
@@ -193,15 +194,18 @@ class CertifiedPlanner:
         )
 
 
-def planner_of_part(planner: Planner, cell: Cell, part: Part) -> Planner | CertifiedPlanner:
+def planner_of_part(
+    planner: Planner, cell: Cell, part: Part, folder: Path | None = None
+) -> Planner | CertifiedPlanner:
     """The planner for a part: with policy ``certified`` that of its certified grasps, if it has any.
 
-    A part without certified grasps is named on standard error, with the remedy.
+    They are read from the cache unless another folder is given. A part without certified grasps is named on
+    standard error, with the remedy.
     """
     if planner.config.policy != "certified":
         return planner
     try:
-        certified = read_certified(part)
+        certified = read_certified(part, folder)
     except BadPart as error:
         note(f"planned by the networks: {error}")
         return planner

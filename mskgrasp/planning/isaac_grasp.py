@@ -127,7 +127,7 @@ def read_isaac_grasp(path: Path) -> IsaacGrasps:
             # Not "> 0.01", which NaN is not either.
             if not np.isfinite(position).all() or not abs(np.linalg.norm(quat) - 1) <= 0.01:
                 raise ValueError("position or orientation is not finite, or no rotation")
-        except (LookupError, TypeError, ValueError) as error:
+        except (LookupError, TypeError, ValueError, OverflowError) as error:
             raise BadConfig(f"{path}: grasp {name!r} has no pose: {' '.join(str(error).split())}") from error
         found[str(name)] = Pose(position=position, quat_wxyz=quat / np.linalg.norm(quat)) @ T_link_tcp
     return IsaacGrasps(values=values, T_mesh_tcp=found)

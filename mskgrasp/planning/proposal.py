@@ -76,7 +76,7 @@ class OtherPlanner:
         Raises:
             NoPartFound: No part is detected.
             NoGraspFound: The other planner finds none.
-            BadPlanner: It fails, or answers what is no grasp.
+            BadPlanner: It fails, or answers with something that is not a grasp.
         """
         started = time.perf_counter()
         view = view_of(frame, self._workspace)

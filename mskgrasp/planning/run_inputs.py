@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from mskgrasp.parts import find_part
+from mskgrasp.core.files import write_whole
+from mskgrasp.parts import Part, find_part
 from mskgrasp.planning.certified import FILE, certified_folder
-from mskgrasp.runtime.run_folder import file_digest
+from mskgrasp.runtime.run_folder import file_digest, record_inputs
 
 BY_CONTENT = ("models", "cell")
 """Settings that name files: a run goes on with equal files in another place, so that only digests count."""
@@ -39,3 +40,21 @@ def certified_digests(parts: Iterable[str]) -> dict[str, str]:
     """
     found = [find_part(part) for part in parts]
     return {f"certified grasps of {part.name}": file_digest(certified_folder(part) / FILE) for part in found}
+
+
+def keep_certified(out: Path, parts: Sequence[str]) -> None:
+    """Copy the certified grasps of parts from the cache, which may change, to the folder of a run.
+
+    Raises:
+        UsageError: The run was begun with others.
+    """
+    record_inputs(out, certified_digests(parts))
+    for part in map(find_part, parts):
+        kept = kept_certified(out, part)
+        kept.mkdir(parents=True, exist_ok=True)
+        write_whole(kept / FILE, (certified_folder(part) / FILE).read_bytes())
+
+
+def kept_certified(out: Path, part: Part) -> Path:
+    """Folder in a run's folder for the certified grasps of a part, as `keep_certified` writes it."""
+    return out / "certified" / part.name

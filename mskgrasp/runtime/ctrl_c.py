@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -35,6 +37,12 @@ def ctrl_c_deferred() -> Iterator[None]:
 def repeat_dropped_ctrl_c(unraisable: Any, report: Callable[[Any], None] = sys.unraisablehook) -> None:
     """Hook for exceptions that Python only reports: a Ctrl-C while it cleans up an object is sent again."""
     if unraisable.exc_type is KeyboardInterrupt:
-        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
+        # Not by threading, which waits until its thread runs: here the signal would be lost again.
+        _thread.start_new_thread(_send_ctrl_c, ())
     else:
         report(unraisable)
+
+
+def _send_ctrl_c() -> None:
+    time.sleep(0.05)  # the hook has returned by then
+    os.kill(os.getpid(), signal.SIGINT)

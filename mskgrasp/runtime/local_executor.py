@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
+import sys
 import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,6 +21,9 @@ from mskgrasp.runtime.worker_process import (
     out_of_reach_of_ctrl_c,
     use_one_core,
 )
+
+_LEAVE_S = 5.0
+"""Time for an idle process to end by itself, s."""
 
 
 @dataclass
@@ -117,7 +122,13 @@ def _receive(worker: _Worker) -> tuple[str, Any]:
 
 
 def _end(workers: Sequence[_Worker]) -> None:
+    """End processes: those without a job by themselves, so that they put away what they use."""
     for worker in workers:
+        if worker.number is None:
+            worker.connection.close()
+    for worker in workers:
+        if worker.number is None:
+            worker.process.join(timeout=_LEAVE_S)
         worker.process.terminate()
     for worker in workers:
         worker.process.join(timeout=5)
@@ -136,6 +147,7 @@ def _serve(
     """Serve in a worker process: receive jobs one by one and send their results."""
     ignore_ctrl_c()
     leave_with_parent()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # contexts end what they have started
     try:
         use_one_core()
         with context(settings) as do:

@@ -7,7 +7,7 @@ import functools
 import itertools
 import operator
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -121,7 +121,16 @@ def _without_validation(info: StructTypeInfo) -> StructConstructorSpec | None:
         return info.type.model_construct(**values)
 
     fill.__doc__ = info.type.__doc__  # for --help
-    return replace(spec, instantiate=fill)
+    fields = tuple(
+        replace(field, helptext=functools.partial(_unbroken, field.helptext)) for field in spec.fields
+    )
+    return replace(spec, instantiate=fill, fields=fields)
+
+
+def _unbroken(text: str | Callable[[], str | None] | None) -> str | None:
+    """The text of an option without the line breaks of the source: tyro keeps those and adds its own."""
+    found = text() if callable(text) else text
+    return None if found is None else " ".join(found.split())
 
 
 def _option(location: tuple[int | str, ...]) -> str:

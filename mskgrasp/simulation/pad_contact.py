@@ -19,6 +19,8 @@ LEAST_LEVER = 1e-3
 """Lever of the friction at a single point or edge, metres: a small patch, as of a pad that yields little."""
 _POINTS = 400
 """Points, spread evenly over what a pad touches, over which its lever is a mean."""
+_LEAST_THICKNESS = 1e-6
+"""Least distance of what one pad touches from what the other does, metres."""
 _GRAVITY = 9.81
 """m/s^2"""
 
@@ -68,7 +70,7 @@ class PadContact:
     """What both pads touch of a part, evenly pressed.
 
     The axis is the line through the middles of what each pad touches: no force at the middles has a moment
-    about it. Of a part that jams between opposite corners of the pads it is aslant.
+    about it. It is at an angle where a part jams between opposite corners of the pads.
 
     Attributes:
         along: Where the axis passes the part's centre of mass, x of the grasp frame, metres.
@@ -105,7 +107,7 @@ def pad_contact(held: HeldPart) -> PadContact | None:
     (left, left_lever), (right, right_lever) = (
         _touched(between, after, np.array([0.0, side, 0.0]), (side * y).max() - PRESSED) for side in (-1, 1)
     )
-    share = (float(after.position[1]) - y.min()) / np.ptp(y)
+    share = (float(after.position[1]) - y.min()) / max(np.ptp(y), _LEAST_THICKNESS)
     along = (1 - share) * left + share * right
     return PadContact(along=along, lever=max((left_lever + right_lever) / 2, LEAST_LEVER))
 

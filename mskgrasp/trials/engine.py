@@ -153,10 +153,11 @@ class TrialEngine:
             self.recover(error)
             go_home(self.cell, tallest=self._tallest, take=self._operator.take)
 
-    def leave(self) -> None:
-        """Move the arm home, and put down what it holds, before a new scene that keeps parts, or at the end.
+    def leave(self) -> bool:
+        """Move the arm home as `home` does; a part that hooks on a finger is left to the feeder, if any.
 
-        A part that hooks on a finger is taken away by the feeder, if the cell has one.
+        Returns:
+            Whether the arm is at home.
 
         Raises:
             MotionAborted: A second contact, and the cell has no feeder.
@@ -167,6 +168,8 @@ class TrialEngine:
             if self.cell.feeder is None:
                 raise
             self.recover(error)
+            return False
+        return True
 
     @property
     def _feeder_resets(self) -> bool:

@@ -124,7 +124,8 @@ def _measure_by_tape(
         except MotionAborted as error:
             engine.recover(error)
             raise MarkersNotFound("touched: the hand met something as it retracted") from error
-        engine.home()
+        if not engine.leave():
+            raise MarkersNotFound("touched: the hand met something on its way home")
         after = engine.capture()
         moved = planar_displacement(before, engine.find_tape(after), plan.grasp, plan.view.centre_base)
         centre_grasp = plan.grasp.T_base_grasp.inverse().apply(plan.view.centre_base)

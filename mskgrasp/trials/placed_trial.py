@@ -72,7 +72,7 @@ class PlacedTrial:
         return self.part, self.condition, self.number, self.means
 
     def off(self, correction: Correction) -> np.ndarray | None:
-        """x, y and turn (3,) by which the part misses its target; None where it cannot be told.
+        """x, y and turn (3,) by which the part misses its target; None where it is unknown.
 
         That is where the part was not placed, or lay in another resting pose than was found.
 

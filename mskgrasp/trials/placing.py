@@ -238,7 +238,7 @@ def _placed(
 def as_turned(part: Part, found: PartPose, true: Pose, like: Mapping[int, tuple[int, float]]) -> Pose | None:
     """The found pose with the orientation that differs least from the true one by symmetries of the part.
 
-    A hexagon nut found with a turn of 60 degrees too much is found rightly.
+    A hexagon nut found 60 degrees off counts as right, by its symmetry.
 
     Args:
         part: The part.

@@ -17,6 +17,7 @@ from mskgrasp.parts import find_part
 from mskgrasp.planning.certified_planner import planner_of_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
+from mskgrasp.planning.run_inputs import kept_certified
 from mskgrasp.runtime.worker_pool import Work, results
 from mskgrasp.trials.engine import PlansGrasps, TrialEngine, connected_engine
 from mskgrasp.trials.lowess import Lowess
@@ -147,7 +148,8 @@ class TrialRunner:
         if task.policy == "certified":
             if task.source not in self._known:
                 part = find_part(task.source)
-                self._known = {task.source: planner_of_part(planner, self._engine.cell, part)}
+                kept = kept_certified(self._setup.out, part)
+                self._known = {task.source: planner_of_part(planner, self._engine.cell, part, kept)}
             return self._known[task.source]
         if not self._setup.compared:
             return planner

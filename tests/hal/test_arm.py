@@ -150,6 +150,26 @@ def test_a_contact_is_no_fault_and_where_it_was_is_known(arm: ToyArm):
     assert arm.move_until_contact(at(0.4, 0.0, 0.06)) is None
 
 
+def test_a_refusal_of_the_second_leg_of_a_motion_is_a_fault_for_the_arm_has_moved(arm: ToyArm, monkeypatch):
+    moved: list[Pose] = []
+
+    def move(pose: Pose, speed: float) -> None:
+        if len(moved) == n_moved:
+            raise OutOfWorkspace("no straight line from here")
+        moved.append(pose)
+
+    monkeypatch.setattr(arm, "_legs", lambda pose: [at(0.4, 0.0, 0.4), pose])
+    monkeypatch.setattr(arm, "_move_to_pose", move)
+    n_moved = 0
+    with pytest.raises(OutOfWorkspace):
+        arm.move_to_pose(at(0.4, 0.0, 0.3))
+    n_moved = 1
+    with pytest.raises(MotionAborted, match="part of the way: no straight line"):
+        arm.move_to_pose(at(0.4, 0.0, 0.3))
+    with pytest.raises(NeedsRecovery):
+        arm.move_gripper(0.05)
+
+
 def test_a_search_that_ends_short_of_its_pose_without_a_contact_is_a_fault(arm: ToyArm, monkeypatch):
     arm.move_to_pose(at(0.4, 0.0, 0.1))
     monkeypatch.setattr(arm, "_move_until_contact", lambda *_: None)

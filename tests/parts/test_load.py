@@ -2,7 +2,7 @@ import pytest
 
 from mskgrasp.core.errors import UnknownPart
 from mskgrasp.core.shipped import example_file
-from mskgrasp.parts import builtin, find_part, load_part, read_part
+from mskgrasp.parts import builtin, find_part, load_part, read_part, store
 from mskgrasp.parts.recipes import cad
 
 
@@ -14,14 +14,18 @@ def test_a_cad_file_a_name_and_a_folder_give_the_same_part():
     assert read_part(from_file.folder).mass == from_file.mass
 
 
-def test_a_file_that_is_not_there_is_named_as_a_file(tmp_path):
+def test_a_file_that_is_not_there_is_named_as_a_file(tmp_path, monkeypatch):
     with pytest.raises(UnknownPart, match=r"there is no file .*bracket\.STL; check the path"):
         load_part(tmp_path / "bracket.STL")
     with pytest.raises(UnknownPart, match="check the path, or name the part hex_nut_m30"):
         find_part("hex_nut_m30.stl")
     file = example_file("bracket.stl")
     assert file is not None
-    with pytest.raises(UnknownPart, match=r"bracket\.stl is a CAD file: import it"):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(UnknownPart, match=r"bracket\.stl is a CAD file: import it, .*, and name the part"):
+        find_part(file)
+    (store.parts_folder() / "bracket").mkdir(parents=True)
+    with pytest.raises(UnknownPart, match=r"bracket\.stl is a CAD file: name the part bracket, or import"):
         find_part(file)
 
 

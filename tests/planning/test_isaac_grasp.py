@@ -112,6 +112,10 @@ def test_grasps_that_are_numbered_are_scored_too(tmp_path):
         (dict(grasps={}), "holds no grasps"),
         (dict(grasps={"one": dict(position=[0, 0])}), "grasp 'one' has no pose"),
         (
+            dict(grasps={"one": dict(position=[0, 0, 10**400], orientation=dict(w=1.0, xyz=[0, 0, 0]))}),
+            "grasp 'one' has no pose",
+        ),
+        (
             dict(grasps={"one": dict(position=[0, 0, 0], orientation=dict(w=2.0, xyz=[0, 0, 0]))}),
             "grasp 'one' has no pose",
         ),

@@ -1,8 +1,16 @@
+from dataclasses import replace
+
 import pytest
 
 from mskgrasp.core.errors import UsageError
-from mskgrasp.planning.certified import certified_folder
-from mskgrasp.planning.run_inputs import certified_digests, inputs_of, part_digests
+from mskgrasp.planning.certified import certified_folder, read_certified
+from mskgrasp.planning.run_inputs import (
+    certified_digests,
+    inputs_of,
+    keep_certified,
+    kept_certified,
+    part_digests,
+)
 from tests.boxes import make_box
 from tests.planning.test_certified import certified, certified_grasp
 
@@ -44,3 +52,26 @@ def test_other_certified_grasps_of_a_part_are_another_input(tmp_path, monkeypatc
         certified(certified_grasp(lifted=lifted)).write(certified_folder(box))
         found.append(certified_digests([str(box.folder)]))
     assert set(found[0]) == {"certified grasps of block"} and found[0] == found[1] != found[2]
+
+
+def test_a_run_keeps_the_certified_grasps_with_which_it_was_begun(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    box = make_box(tmp_path, "block", (0.05, 0.03, 0.02), 0.1)
+    certified_folder(box).mkdir(parents=True)
+
+    def write(lifted: int) -> None:
+        own = replace(certified(certified_grasp(lifted=lifted)), part="block", part_hash=box.content_hash)
+        replace(own, stands=(True,) * len(box.resting_probability)).write(certified_folder(box))
+
+    out, source = tmp_path / "run", str(box.folder)
+    out.mkdir()
+    (out / "inputs.json").write_text("{}")  # of a run that has begun
+    write(23)
+    keep_certified(out, [source])
+    write(24)  # by another program, while the run goes on
+    assert read_certified(box).grasps[0].lifted == 24
+    assert read_certified(box, kept_certified(out, box)).grasps[0].lifted == 23
+    with pytest.raises(UsageError, match="certified grasps of block"):
+        keep_certified(out, [source])
+    write(23)
+    keep_certified(out, [source])

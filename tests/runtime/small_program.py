@@ -28,7 +28,8 @@ class ProgramConfig(Config):
     parts: tuple[str, ...] = ()
     """Names."""
     low: float = 0.0
-    """Lower bound."""
+    """Lower bound,
+    included."""
     high: float = 1.0
     """Upper bound."""
     kind: Literal["apple", "pear"] = "apple"

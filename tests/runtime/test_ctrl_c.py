@@ -24,9 +24,14 @@ def python_hears_ctrl_c() -> Iterator[None]:
 
 
 def test_ctrl_c_while_python_cleans_up_is_not_lost():
+    """However busy other threads are."""
     code = """
-import os, signal, time
+import os, signal, threading, time
 from mskgrasp.runtime.cli import run
+
+def spin():
+    while True:
+        pass
 
 class Scene:
     def __del__(self):
@@ -34,6 +39,8 @@ class Scene:
         time.sleep(0.1)
 
 def main():
+    for _ in range(8):
+        threading.Thread(target=spin, daemon=True).start()
     Scene()
     time.sleep(60)
 

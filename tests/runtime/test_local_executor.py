@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -43,6 +44,33 @@ def test_a_process_that_died_after_its_last_result_has_done_its_job(tmp_path: Pa
     executor = LocalExecutor(counting, tmp_path, 1)
     events = list(run_jobs(jobs, executor, rest=lambda job, n: job[n:] or None))
     assert events[0] == JobResult((1,), 1) and isinstance(events[1], JobDone) and len(events) == 2
+
+
+@contextmanager
+def tidying(folder: Path) -> Iterator[Callable[[int], Iterator[int]]]:
+    """Leaves a file while it works, and takes one second for a job."""
+    mine = folder / str(os.getpid())
+    mine.touch()
+    try:
+
+        def work(job: int) -> Iterator[int]:
+            time.sleep(1.0)
+            yield job
+
+        yield work
+    finally:
+        mine.unlink()
+
+
+def test_workers_put_away_what_they_use(tmp_path: Path):
+    executor = LocalExecutor(tidying, tmp_path, 2)
+    assert len([one for one in run_jobs([1, 2], executor) if isinstance(one, JobResult)]) == 2
+    executor.close()
+    assert not list(tmp_path.iterdir())
+    with closing(results(Work(tidying, tmp_path), list(range(9)), 2)) as found:
+        next(found)
+        assert len(list(tmp_path.iterdir())) == 2
+    assert not list(tmp_path.iterdir())  # although they were at work
 
 
 def test_closing_the_iterator_ends_the_workers():

@@ -55,6 +55,12 @@ def test_help_shows_the_models_docstrings(capsys):
     assert "--camera.n-pixels" in shown and "Along an edge." in shown and "The camera." in shown
 
 
+def test_help_is_not_broken_where_the_source_is(capsys):
+    with pytest.raises(SystemExit):
+        parse_program("--help")
+    assert "Lower bound, included." in capsys.readouterr().out
+
+
 def test_help_of_a_program_ends_its_description_with_the_page_about_it(capsys):
     with pytest.raises(SystemExit):
         parse(ProgramConfig, prog="python -m mskgrasp.assess", description="Says.", argv=["--help"])

@@ -104,7 +104,7 @@ def test_the_other_leg_of_a_part_outside_the_open_fingers_is_not_touched(tmp_pat
     assert touched(one).along == pytest.approx(0.0, abs=4e-4)  # 2 mm beside it if the far leg counted
 
 
-def test_the_axis_of_a_leg_jammed_between_corners_passes_its_part_aslant(tmp_path):
+def test_the_axis_of_a_leg_jammed_between_corners_is_at_an_angle(tmp_path):
     """Turned by 0.1 rad, the leg, 10 mm thick, is touched at opposite corners of the pads."""
     part, leg = make_u(tmp_path, "u")
     up = quat_rotate(part.resting.quat_wxyz, np.array([0.0, 0.0, 1.0]))

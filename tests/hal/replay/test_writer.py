@@ -70,6 +70,29 @@ def test_a_full_disk_ends_the_recording_with_its_name_and_keeps_it(tmp_path: Pat
     assert list(tmp_path.iterdir()) == [out]
 
 
+def test_ctrl_c_while_a_frame_is_written_leaves_it_whole(tmp_path: Path, monkeypatch, request):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
+    resize = h5py.Dataset.resize
+
+    def interrupted(dataset: h5py.Dataset, *arguments: int, **settings: int) -> None:
+        resize(dataset, *arguments, **settings)
+        if dataset.name in when:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(h5py.Dataset, "resize", interrupted)
+    out = tmp_path / "run.h5"
+    with recorded_cell(toy_cell(), out).connected() as cell:
+        for when in ([], ["/frames/colour"], ["/events"]):
+            if not when:
+                cell.camera.capture()
+                continue
+            with pytest.raises(KeyboardInterrupt):
+                cell.camera.capture()
+    found = read_recording(out)
+    assert found.n_frames == 3 and [event.result for event in found.events if not event.error] == [0, 2]
+
+
 def test_a_recording_is_not_overwritten(recording: Path):
     with pytest.raises(UsageError, match="exists already"):
         recorded_cell(toy_cell(), recording)

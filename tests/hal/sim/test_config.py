@@ -19,7 +19,7 @@ from mskgrasp.core.errors import BadConfig
         ({"camera": {"height": 0.4}}, "the camera sees 0.18 m of the table"),  # 160 px * 0.4 m / 365.5 px
         ({"colour_scale": 7}, "'colour_scale': input should be less than or equal to 6"),
         ({"lift_height": 0.4}, "'lift_height': input should be less than or equal to 0.3"),
-        ({"home": [0.0] * 6}, "'home.6': field required"),
+        ({"home": [0.0] * 6}, "'home': 7 values are needed, got 6"),
     ],
 )
 def test_a_wrong_value_is_one_line_that_names_it(values: dict[str, Any], message: str):
