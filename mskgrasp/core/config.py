@@ -113,8 +113,8 @@ def _explain(
     # Of values that a list lacks the last one tells how many are needed.
     lacking = {detail["loc"][:-1]: detail for detail in found if _lacks_an_item(detail)}
     found = [one for one in found if not _lacks_an_item(one) or one is lacking[one["loc"][:-1]]]
-    shown_of = found[:_MOST_PROBLEMS]
-    for number, detail in enumerate(shown_of):
+    listed = found[:_MOST_PROBLEMS]
+    for number, detail in enumerate(listed):
         key = name(detail["loc"]) + ": " if detail["loc"] else ""
         if detail["type"] == "extra_forbidden":
             key = name(detail["loc"])
@@ -123,7 +123,7 @@ def _explain(
             legal = ", ".join(sorted(_fields_at(model, place)))
             # Once for all keys of a place.
             later = any(
-                (one["type"], one["loc"][:-1]) == (detail["type"], place) for one in shown_of[number + 1 :]
+                (one["type"], one["loc"][:-1]) == (detail["type"], place) for one in listed[number + 1 :]
             )
             problems.append(
                 f"unknown key {key}" + (f"; legal keys here: {legal}" if legal and not later else "")

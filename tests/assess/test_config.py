@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
-from mskgrasp.assess.config import AssessConfig, parse_tolerance
+from mskgrasp.assess.config import LEAST_SIMULATIONS, AssessConfig, parse_tolerance
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.runtime.options import parse
+from mskgrasp.simulation.certify import CertifyConfig
 
 
 @pytest.mark.parametrize(
@@ -29,6 +31,12 @@ def test_a_tolerance_reads_as_a_user_would_say_it():
 def test_another_text_is_refused_with_an_example(text):
     with pytest.raises(BadConfig, match="such as 1mm,2deg"):
         parse(AssessConfig, prog="assess", description="", argv=["bracket.stl", "--tolerance", text])
+
+
+def test_as_few_simulations_are_asked_for_as_a_certification_takes():
+    assert CertifyConfig(simulations=LEAST_SIMULATIONS).simulations == LEAST_SIMULATIONS
+    with pytest.raises(ValidationError):
+        CertifyConfig(simulations=LEAST_SIMULATIONS - 1)
 
 
 def test_parts_come_first_and_quick_makes_less():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -92,29 +93,27 @@ def test_a_bar_that_hangs_askew_is_touched_by_an_edge_of_each_pad():
     assert contact.lever == pytest.approx(lever_of(PAD_WIDTH, strip), rel=0.06)
 
 
-def test_the_other_leg_of_a_part_outside_the_open_fingers_is_not_touched(tmp_path):
-    part, leg = make_u(tmp_path, "u")
+def held_by_a_leg(cache: Path, turn: float = 0.0) -> HeldPart:
+    """A U, grasped at the middle of its near leg, across it or turned from that."""
+    part, leg = make_u(cache, "u")
     up = quat_rotate(part.resting.quat_wxyz, np.array([0.0, 0.0, 1.0]))
     row = int(np.argmax(up[:, 2]))  # as it was drawn
     x, y, z = quat_rotate(part.resting.quat_wxyz[row], leg) + part.resting.position[row]
     along = quat_rotate(part.resting.quat_wxyz[row], np.array([1.0, 0.0, 0.0]))
-    grasp = np.array([x, y, z, np.arctan2(along[1], along[0])])
-    one = HeldPart(part=part, resting=row, grasp=grasp, displacement=np.zeros(4), swing=np.zeros(2))
-    assert touched(one).lever == pytest.approx(lever_of(PAD_WIDTH, PAD_HEIGHT), rel=0.04)
-    assert touched(one).along == pytest.approx(0.0, abs=4e-4)  # 2 mm beside it if the far leg counted
+    grasp = np.array([x, y, z, np.arctan2(along[1], along[0]) + turn])
+    return HeldPart(part=part, resting=row, grasp=grasp, displacement=np.zeros(4), swing=np.zeros(2))
+
+
+def test_the_other_leg_of_a_part_outside_the_open_fingers_is_not_touched(tmp_path):
+    contact = touched(held_by_a_leg(tmp_path))
+    assert contact.lever == pytest.approx(lever_of(PAD_WIDTH, PAD_HEIGHT), rel=0.04)
+    assert contact.along == pytest.approx(0.0, abs=4e-4)  # 2 mm beside it if the far leg counted
 
 
 def test_the_axis_of_a_leg_jammed_between_corners_is_at_an_angle(tmp_path):
     """Turned by 0.1 rad, the leg, 10 mm thick, is touched at opposite corners of the pads."""
-    part, leg = make_u(tmp_path, "u")
-    up = quat_rotate(part.resting.quat_wxyz, np.array([0.0, 0.0, 1.0]))
-    row = int(np.argmax(up[:, 2]))
-    x, y, z = quat_rotate(part.resting.quat_wxyz[row], leg) + part.resting.position[row]
-    along = quat_rotate(part.resting.quat_wxyz[row], np.array([1.0, 0.0, 0.0]))
-    grasp = np.array([x, y, z, np.arctan2(along[1], along[0]) + 0.1])
-    one = HeldPart(part=part, resting=row, grasp=grasp, displacement=np.zeros(4), swing=np.zeros(2))
-    strip = 1e-4 / np.tan(0.1)
-    apart = PAD_WIDTH - strip
+    one = held_by_a_leg(tmp_path, 0.1)
+    apart = PAD_WIDTH - 1e-4 / np.tan(0.1)
     thickness = 0.01 * np.cos(0.1) + PAD_WIDTH * np.sin(0.1)
     beside = -one.T_grasp_obj.position[1]
     assert 0.03 < beside < 0.06  # the part's centre of mass is on the other side of the corner
