@@ -41,8 +41,8 @@ def draw_shares(trials: Sequence[PlacedTrial], rows: Sequence[Row], distance: fl
     with saved_figure(path, 3.4 * len(conditions), 3.2) as figure:
         axes = np.atleast_1d(figure.subplots(1, len(conditions), sharey=True))
         for axis, condition in zip(axes, conditions, strict=True):
-            for means, style in (("certified", "-"), ("networks", ":")):
-                found = [one for one in trials if (one.condition, one.means) == (condition, means)]
+            for planner, style in (("certified", "-"), ("networks", ":")):
+                found = [one for one in trials if (one.condition, one.planner) == (condition, planner)]
                 for correction in CORRECTIONS:
                     errors = [error[0] for one in found if (error := one.error(correction)) is not None]
                     if found:

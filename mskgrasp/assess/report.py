@@ -125,7 +125,7 @@ def conclusion(
 
 
 def trials_section(rows: Sequence[Row], tolerance: Tolerance, figure: Path) -> Section:
-    """Shares lifted and within the tolerance, by condition and means."""
+    """Shares lifted and within the tolerance, by condition and planner."""
     table = [
         (
             row.condition,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,12 +21,13 @@ from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import note
 from mskgrasp.runtime.run_folder import TRIALS, opened_run, resume_trials, rewrite_trials
+from mskgrasp.runtime.worker_pool import process_count
 from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.simulation.certify_parts import certify
 from mskgrasp.trials.placed_scenes import placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 
-SCENE_VERSION = 5
+SCENE_VERSION = 6
 """Raised by every change after which a seed makes other trials."""
 _MAY_CHANGE = ("parts", "out", "tolerance", "trials", "workers", "quick", "simulations", *BY_CONTENT)
 
@@ -122,7 +122,7 @@ def _sources(config: AssessConfig) -> list[str]:
 def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Tolerance) -> Assessed:
     # A part outside the cache is known by its folder alone.
     place = str(part.folder)
-    workers = config.workers or os.cpu_count() or 1
+    workers = process_count(config.workers)
     inputs = model_digests(config.models) | part_digests([place])
     with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         settings = CertifyConfig(simulations=config.n_simulations, seed=config.seed)
@@ -148,7 +148,7 @@ def begin_trials(out: Path, certified: CertifiedGrasps) -> None:
     if path.exists() and path.read_bytes() == certified.contents():
         return
     stored = resume_trials(out / TRIALS, PlacedTrial.from_json)
-    kept = [trial for trial in stored if trial.means != "certified"]
+    kept = [trial for trial in stored if trial.planner != "certified"]
     if len(kept) < len(stored):
         note(
             f"{len(stored) - len(kept)} trials are made again: '{certified.part}' has other certified grasps"

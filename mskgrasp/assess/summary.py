@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mskgrasp.assess.config import Tolerance
-from mskgrasp.assess.trials import MEANS, Means
+from mskgrasp.assess.trials import PLANNERS, PlannerName
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.share import Share
 from mskgrasp.trials.placed_trial import CORRECTIONS, Correction, PlacedTrial
@@ -30,11 +30,11 @@ OTHERWISE = "use a fixture or another pose"
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """Trials of one condition by one means.
+    """Trials of one condition by one planner.
 
     Attributes:
         condition: Name of the condition.
-        means: What planned the grasps.
+        planner: Name of what planned the grasps.
         certified: Share planned by a certified grasp.
         uncertified: Number planned by a simulated grasp that is not certified.
         lifted: Share lifted.
@@ -47,7 +47,7 @@ class Row:
     """
 
     condition: str
-    means: Means
+    planner: PlannerName
     certified: Share
     uncertified: int
     lifted: Share
@@ -63,7 +63,7 @@ class Row:
         """What planned the grasps, in words: where a part has no certified grasp others did."""
         n, of = self.certified.n, self.certified.of
         others = of - n - self.uncertified
-        if self.means == "networks":
+        if self.planner == "networks":
             return "the networks"
         if others == of:
             return "the networks (no certified grasp)"
@@ -83,7 +83,7 @@ class Row:
         """Plain values."""
         return dict(
             condition=self.condition,
-            means=self.means,
+            planner=self.planner,
             certified=self.certified.to_json(),
             uncertified=self.uncertified,
             lifted=self.lifted.to_json(),
@@ -99,18 +99,22 @@ class Row:
 
 
 def summarise(trials: Sequence[PlacedTrial], tolerance: Tolerance, tilt_limit: float) -> list[Row]:
-    """Summarise trials by condition and means, in the order in which they first occur."""
-    groups: dict[tuple[str, Means], list[PlacedTrial]] = {}
+    """Summarise trials by condition and planner, in the order in which they first occur."""
+    groups: dict[tuple[str, PlannerName], list[PlacedTrial]] = {}
     for condition in dict.fromkeys(trial.condition for trial in trials):
-        for means in MEANS:
-            found = [trial for trial in trials if (trial.condition, trial.means) == (condition, means)]
+        for planner in PLANNERS:
+            found = [trial for trial in trials if (trial.condition, trial.planner) == (condition, planner)]
             if found:
-                groups[condition, means] = found
+                groups[condition, planner] = found
     return [_row(*key, found, tolerance, tilt_limit) for key, found in groups.items()]
 
 
 def _row(
-    condition: str, means: Means, trials: Sequence[PlacedTrial], tolerance: Tolerance, tilt_limit: float
+    condition: str,
+    planner: PlannerName,
+    trials: Sequence[PlacedTrial],
+    tolerance: Tolerance,
+    tilt_limit: float,
 ) -> Row:
     parts = [trial.part for trial in trials]
     errors = {one: [trial.error(one) for trial in trials] for one in CORRECTIONS}
@@ -131,7 +135,7 @@ def _row(
     ).reshape(-1, 4)
     return Row(
         condition=condition,
-        means=means,
+        planner=planner,
         certified=Share.count([trial.planned_by == "certified" for trial in trials], parts),
         uncertified=sum(trial.planned_by == "uncertified" for trial in trials),
         lifted=Share.count([trial.lifted for trial in trials], parts),
@@ -147,7 +151,7 @@ def _row(
 
 
 def verdict(rows: Sequence[Row], condition: str, tolerance: Tolerance) -> str:
-    """The verdict for a condition in one sentence, by the means whose advice needs the least effort."""
+    """The verdict for a condition in one sentence, by the planner whose advice needs the least effort."""
     found = [row for row in rows if row.condition == condition]
     if not found:
         return "no trial was made"

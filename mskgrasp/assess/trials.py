@@ -23,8 +23,8 @@ from mskgrasp.trials.placed_scenes import SceneTask
 from mskgrasp.trials.placed_trial import PlacedTrial
 from mskgrasp.trials.placing import trials_of_scene
 
-Means = Literal["networks", "certified"]
-MEANS: tuple[Means, Means] = ("certified", "networks")
+PlannerName = Literal["networks", "certified"]
+PLANNERS: tuple[PlannerName, PlannerName] = ("certified", "networks")
 EXACT, NOISY = "exact camera", "Kinect v2 noise"
 CONDITIONS: dict[str, tuple[float, dict[str, Any]]] = {
     EXACT: (1.0, {}),
@@ -73,7 +73,7 @@ def scene_tasks(part: Part, n_trials: int) -> list[SceneTask]:
     # A part outside the cache is known by its folder alone.
     source = str(part.folder)
     return [
-        SceneTask(source=source, part=part.name, condition=condition, number=number, means=MEANS)
+        SceneTask(source=source, part=part.name, condition=condition, number=number, planners=PLANNERS)
         for condition, (share, _) in CONDITIONS.items()
         for number in range(max(1, round(share * n_trials)))
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 
 from mskgrasp.benchmark.config import QUICK_PARTS, BenchmarkConfig
@@ -20,12 +19,13 @@ from mskgrasp.planning.run_inputs import BY_CONTENT, keep_certified, model_diges
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.progress import progress
 from mskgrasp.runtime.run_folder import opened_run
+from mskgrasp.runtime.worker_pool import process_count
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import CellFile, read_cell
 from mskgrasp.trials.placed_scenes import placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 
-SCENE_VERSION = 4
+SCENE_VERSION = 5
 """Raised by every change after which a seed makes other trials."""
 _MAY_CHANGE = (
     "planners",
@@ -64,7 +64,7 @@ def benchmark(config: BenchmarkConfig) -> None:
     if config.paper_models is not None:
         training["paper"] = load_models(config.paper_models).meta.training
     sources, parts = _parts(config, training[""])
-    workers = config.workers or os.cpu_count() or 1
+    workers = process_count(config.workers)
     inputs = {"cell": cell.digest} | model_digests(config.models) | part_digests(sources)
     if config.paper_models is not None:
         inputs |= model_digests(config.paper_models, "paper")
@@ -163,4 +163,4 @@ def _trials(
     tasks = scene_tasks(sources, cell.values["type"], config.n_trials, config.rows)
     made = placed_trials(trial_bench, setup, tasks, config.out, workers)
     # Planner by planner, as the report lists them.
-    return sorted(made, key=lambda trial: config.rows.index(trial.means))
+    return sorted(made, key=lambda trial: config.rows.index(trial.planner))

@@ -134,7 +134,7 @@ def by_planner(trials: Sequence[PlacedTrial]) -> dict[str, list[PlacedTrial]]:
     """Trials of each planner."""
     found: dict[str, list[PlacedTrial]] = {}
     for trial in trials:
-        found.setdefault(trial.means, []).append(trial)
+        found.setdefault(trial.planner, []).append(trial)
     return found
 
 

@@ -40,7 +40,7 @@ def scene_tasks(
     """Scenes of all parts, part by part."""
     names = {source: find_part(source).name for source in sources}
     return [
-        SceneTask(source=source, part=names[source], condition=condition, number=number, means=planners)
+        SceneTask(source=source, part=names[source], condition=condition, number=number, planners=planners)
         for source in sources
         for number in range(n_trials)
     ]
@@ -58,7 +58,7 @@ def trial_bench(setup: BenchmarkSetup) -> Iterator[Callable[[SceneTask], Iterato
 
         def run(task: SceneTask) -> Iterator[PlacedTrial]:
             part = find_part(task.source)
-            if task.source not in alike and not set(task.means) <= set(WITHOUT_POSE):
+            if task.source not in alike and not set(task.planners) <= set(WITHOUT_POSE):
                 alike[task.source] = alike_poses(part)
             like = alike.get(task.source, {})
             seeds = trial_seeds(setup.seed, part.name, task.number)

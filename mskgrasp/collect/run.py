@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import sys
 import time
 from collections import Counter
@@ -32,7 +31,7 @@ from mskgrasp.parts.catalogue import read_index, representative_entries
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 from mskgrasp.runtime.progress import note, progress
-from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult
+from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult, process_count
 from mskgrasp.simulation.shard_task import ShardTask
 from mskgrasp.simulation.versions import SIMULATION_VERSION, other_versions
 
@@ -175,7 +174,7 @@ def _worker_summary(config: CollectConfig, missing: list[ShardTask]) -> str:
 
 
 def _n_workers(config: CollectConfig, missing: list[ShardTask]) -> int:
-    return min(config.workers or os.cpu_count() or 1, len(missing))
+    return min(process_count(config.workers), len(missing))
 
 
 def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:

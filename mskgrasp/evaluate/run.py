@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Sequence
 from contextlib import closing
@@ -47,6 +46,7 @@ from mskgrasp.runtime.run_folder import (
     resume_trials,
     rewrite_trials,
 )
+from mskgrasp.runtime.worker_pool import process_count
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.simulation.versions import versions
 from mskgrasp.trials.cell_file import CellFile, check_loads, read_cell
@@ -180,7 +180,7 @@ def estimate(config: EvaluateConfig) -> float:
             if trial.key != sample[0][0].key:  # the first one waits for the cell
                 seconds[bool(trial.chosen_by)].append(now - before)
             before = now
-    n_workers = config.workers or os.cpu_count() or 1
+    n_workers = process_count(config.workers)
     total = 0.0
     for chosen, what in ((False, "of the run's policy"), (True, "chosen by a model's variances")):
         n = sum(bool(task.chosen_by) == chosen for task in missing)
@@ -245,7 +245,7 @@ def _make_trials(one: Prepared) -> dict[str, Trial]:
     done = sum(map(len, tasks)) - n
     bar = progress(total=n + done, done=done, unit="trial", keep=True)
     n_lifted = sum(trials[task.key].success for scene in tasks for task in scene if task.key in trials)
-    n_workers = min(config.workers or os.cpu_count() or 1, len(missing)) if cell.simulated else 1
+    n_workers = min(process_count(config.workers), len(missing)) if cell.simulated else 1
     with closing(run_trials(_setup(one, config.out), missing, n_workers)) as made, bar:
         for k, trial in enumerate(made, done + 1):
             append_trial(config.out / TRIALS, trial.to_json())

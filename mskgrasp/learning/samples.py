@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -32,7 +31,7 @@ from mskgrasp.learning.network_config import NetworkConfig
 from mskgrasp.parts.catalogue import Split, read_index
 from mskgrasp.perception.height_patches import crop_patches, height_image
 from mskgrasp.perception.part_detection import view_part
-from mskgrasp.runtime.worker_pool import Work, results
+from mskgrasp.runtime.worker_pool import Work, process_count, results
 
 SAMPLES_VERSION = 3
 """Raised by every change after which a dataset gives other samples: training does not resume with them."""
@@ -171,7 +170,7 @@ def read_samples(
     """
     paths = list_shards(folder)
     if workers is None:
-        workers = min(os.cpu_count() or 1, max(1, len(paths) // SHARDS_A_WORKER))
+        workers = min(process_count(), max(1, len(paths) // SHARDS_A_WORKER))
     work = Work(_reader, network, name=lambda job: f"reading {job[1]}")
     pieces: dict[int, _Piece] = {}
     advance(0, len(paths))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -35,7 +34,7 @@ from mskgrasp.runtime.run_folder import (
     opened_run,
     resume_trials,
 )
-from mskgrasp.runtime.worker_pool import Work, results
+from mskgrasp.runtime.worker_pool import Work, process_count, results
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import check_loads
 from mskgrasp.trials.engine import connected_engine
@@ -174,7 +173,7 @@ def _place_all(config: PalletizeConfig, pallets: list[list[PlacementTask]], asks
     left = sum(key not in found for key in keys)
     if missing:
         work = Work(placement_bench, config, name=lambda one: one.title, rest=TaskGroup.after)
-        workers = (config.workers or os.cpu_count() or 1) if cell_from_yaml(config.cell).simulated else 1
+        workers = process_count(config.workers) if cell_from_yaml(config.cell).simulated else 1
         placed = results(work, missing, min(workers, len(missing)))
         bar = progress(total=len(keys), done=len(keys) - left, unit="placement", keep=True, hidden=asks)
         with contextlib.closing(placed), bar:

@@ -6,6 +6,7 @@ A worker that dies takes nothing with it: the results it has not delivered are c
 from __future__ import annotations
 
 import contextlib
+import os
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
@@ -26,6 +27,14 @@ from mskgrasp.runtime.local_executor import LocalExecutor
 from mskgrasp.runtime.progress import note
 
 REMEDY = "run the same command again, with fewer --workers if memory was short"
+
+
+def process_count(asked: int = 0) -> int:
+    """The number of processes asked for, or, for 0, one for each core that this process may use."""
+    if asked:
+        return asked
+    # macOS does not bind processes to cores.
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def whole(job: Job, n_results: int) -> Job:

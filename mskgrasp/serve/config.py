@@ -25,8 +25,8 @@ class ServeConfig(Config):
     """Port to listen on; 0: a free one, which is printed."""
     token_file: Path | None = None
     """File with the token, one word of 16 characters or more, that every client has to send; null: none."""
-    workers: int | None = Field(default=None, ge=1, le=256)
-    """Processes that plan, each on one core; null: one for each core."""
+    workers: int = Field(default=0, ge=0, le=256)
+    """Processes that plan, each on one core; 0: one per core."""
     queue: int = Field(default=4, ge=0, le=100)
     """Requests that may wait for each worker; one more is answered 503."""
     timeout_s: float = Field(default=30.0, gt=0, le=600)

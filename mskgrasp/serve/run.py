@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import socket
 import sys
@@ -23,6 +22,7 @@ from mskgrasp.learning.grasp_models import DESCRIPTION, read_meta, require_hand,
 from mskgrasp.planning.run_inputs import model_digests
 from mskgrasp.runtime.address import is_local, listening
 from mskgrasp.runtime.progress import note
+from mskgrasp.runtime.worker_pool import process_count
 from mskgrasp.serve.config import ServeConfig
 from mskgrasp.serve.dispatcher import Dispatcher
 from mskgrasp.serve.guard import Guard
@@ -56,7 +56,7 @@ def serve(config: ServeConfig) -> None:
 
     token = read_token(config)
     settings = planner_settings(config)
-    n = config.workers or len(os.sched_getaffinity(0))
+    n = process_count(config.workers)
     processes = [PlannerProcess(settings) for _ in range(n)]
     with listening(config.host, config.port) as listener, ended_by_sigterm():
         try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -28,7 +27,7 @@ from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
 from mskgrasp.planning.run_inputs import model_digests
 from mskgrasp.runtime.progress import note, progress
-from mskgrasp.runtime.worker_pool import Work, results, whole
+from mskgrasp.runtime.worker_pool import Work, process_count, results, whole
 from mskgrasp.simulation.certify import (
     CERTIFY_VERSION,
     CertifyConfig,
@@ -130,7 +129,7 @@ def certify_missing(parts: Sequence[str], models: Path, workers: int) -> None:
     missing = [name for name in parts if not _of_today(find_part(name))]
     if missing:
         note(f"certifying grasps of {len(missing)} of {len(parts)} parts, some minutes each")
-        certify(missing, CertifyConfig(), models, workers or os.cpu_count() or 1)
+        certify(missing, CertifyConfig(), models, process_count(workers))
 
 
 def _of_today(part: Part) -> bool:

@@ -1,4 +1,4 @@
-"""Scenes of the whole loop, each with a trial by every means, made by several processes and stored."""
+"""Scenes of the whole loop, each with a trial by every planner, made by several processes and stored."""
 
 from __future__ import annotations
 
@@ -17,37 +17,37 @@ from mskgrasp.trials.placed_trial import Key, PlacedTrial
 
 @dataclass(frozen=True, kw_only=True)
 class SceneTask:
-    """Trials in one scene, one by each of some means.
+    """Trials in one scene, one by each planner.
 
     Attributes:
         source: Name or folder of the part.
         part: Its name.
         condition: Name of the cell's condition.
         number: Index of the scene among those of the part with this condition.
-        means: What plans the grasps.
+        planners: Names of what plans the grasps.
     """
 
     source: str
     part: str
     condition: str
     number: int
-    means: tuple[str, ...]
+    planners: tuple[str, ...]
 
     def keys(self) -> list[Key]:
         """Keys of its trials: `PlacedTrial.key`."""
-        return [(self.part, self.condition, self.number, one) for one in self.means]
+        return [(self.part, self.condition, self.number, one) for one in self.planners]
 
     def trials(self) -> list[PlacedTrial]:
         """Its trials before they are made."""
         return [
-            PlacedTrial(part=part, condition=condition, number=number, means=means)
-            for part, condition, number, means in self.keys()
+            PlacedTrial(part=part, condition=condition, number=number, planner=planner)
+            for part, condition, number, planner in self.keys()
         ]
 
     def without(self, found: Container[Key]) -> SceneTask | None:
         """The task less the trials that are found; None where nothing is left."""
-        means = tuple(one for one, key in zip(self.means, self.keys(), strict=True) if key not in found)
-        return replace(self, means=means) if means else None
+        planners = tuple(one for one, key in zip(self.planners, self.keys(), strict=True) if key not in found)
+        return replace(self, planners=planners) if planners else None
 
 
 def placed_trials(
@@ -82,7 +82,7 @@ def placed_trials(
         context,
         setup,
         name=lambda task: f"trial {task.number} of part '{task.part}' with {task.condition}",
-        rest=lambda task, n: replace(task, means=task.means[n:]) if n < len(task.means) else None,
+        rest=lambda task, n: replace(task, planners=task.planners[n:]) if n < len(task.planners) else None,
         lost_by=(HalError,),
     )
     bar = progress(

@@ -11,7 +11,7 @@ from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.planning.grasp_plan import PlannedBy
 
 Key = tuple[str, str, int, str]
-"""Part, condition, number and means of a trial."""
+"""Part, condition, number and planner of a trial."""
 Correction = Literal["none", "predicted", "seen"]
 CORRECTIONS: tuple[Correction, ...] = ("none", "predicted", "seen")
 
@@ -23,8 +23,8 @@ class PlacedTrial:
     Attributes:
         part: Name of the part.
         condition: Name of the cell's condition.
-        number: Index of the trial; all means share its scene.
-        means: What planned the grasp, or was to plan it.
+        number: Index of the trial; all planners share its scene.
+        planner: Name of what planned the grasp, or was to plan it.
         planned_by: What the grasp comes from; the networks where none was found.
         lifted: The part was lifted and held.
         reason: Reason why it was not lifted or not placed; empty where it was placed.
@@ -49,7 +49,7 @@ class PlacedTrial:
     part: str
     condition: str
     number: int
-    means: str
+    planner: str
     planned_by: PlannedBy = "networks"
     lifted: bool = False
     reason: str = ""
@@ -69,7 +69,7 @@ class PlacedTrial:
     @property
     def key(self) -> Key:
         """Identifier of the trial in its run."""
-        return self.part, self.condition, self.number, self.means
+        return self.part, self.condition, self.number, self.planner
 
     def off(self, correction: Correction) -> np.ndarray | None:
         """x, y and turn (3,) by which the part misses its target; None where it is unknown.

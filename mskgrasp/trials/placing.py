@@ -78,7 +78,7 @@ def trials_of_scene(
 
     Args:
         engine: See `grasp_and_place`, as for the others.
-        planner_of: The planner of a trial's means.
+        planner_of: The planner of this name.
         part: The part.
         seeds: Of the scene.
         trials: Name the trials.
@@ -90,7 +90,7 @@ def trials_of_scene(
     tried: list[tuple[GraspPlan, PlacedTrial]] = []
     for trial in trials:
         try:
-            planned = engine.present(str(part.folder), seeds[0], planner_of(trial.means))
+            planned = engine.present(str(part.folder), seeds[0], planner_of(trial.planner))
         except LoadTooHeavy:
             yield replace(trial, reason=f"too heavy for the arm ({part.mass:.1f} kg)")
             continue
@@ -102,7 +102,7 @@ def trials_of_scene(
         if same is None:
             done = _carried_out(engine, planned, plan, part, seeds[1], trial, like)
         else:
-            done = replace(same, means=trial.means)
+            done = replace(same, planner=trial.planner)
         tried.append((plan, done))
         yield done
 

@@ -6,7 +6,6 @@ import importlib.metadata
 import importlib.util
 import json
 import math
-import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -20,6 +19,7 @@ from mskgrasp.parts import Part
 from mskgrasp.reports.console import print_sections
 from mskgrasp.reports.section import Section, Table
 from mskgrasp.runtime.progress import Bar, progress
+from mskgrasp.runtime.worker_pool import process_count
 from mskgrasp.simulation.versions import versions
 from mskgrasp.validate.compare import Comparison, compare_outcomes, distances
 from mskgrasp.validate.config import SHIFTED, ValidateConfig
@@ -41,7 +41,7 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
     """
     if importlib.util.find_spec("mujoco") is None:
         raise DriverMissing("--engine mujoco needs the package mujoco; run: EXTRAS=dev,mujoco .ci/setup")
-    workers = config.workers or os.cpu_count() or 1
+    workers = process_count(config.workers)
     n = len(parts) * config.grasps_per_part
     folders = [part.folder for part in parts]
     with progress(total=n, title="drawing grasps", unit="grasp") as bar:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from mskgrasp.parts.hulls import hull_corners
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.cli import check_folder, make_folder
 from mskgrasp.runtime.progress import Bar, note, progress
+from mskgrasp.runtime.worker_pool import process_count
 from mskgrasp.simulation.versions import versions
 from mskgrasp.validate.altered_part import altered_part
 from mskgrasp.validate.body_scene import BodyScene
@@ -82,7 +82,7 @@ def _fidelity(config: ValidateConfig, parts: list[Part]) -> list[Fidelity]:
 
 
 def _simulate(config: ValidateConfig, parts: list[Part]) -> dict[str, Outcomes]:
-    workers = config.workers or os.cpu_count() or 1
+    workers = process_count(config.workers)
     folders = [part.folder for part in parts]
     settings = config.settings()
     n = len(parts) * config.grasps_per_part

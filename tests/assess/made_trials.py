@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from mskgrasp.assess.trials import EXACT, Means
+from mskgrasp.assess.trials import EXACT, PlannerName
 from mskgrasp.trials.placed_trial import PlacedTrial
 
 
-def made(number: int, *, means: Means = "certified", condition: str = EXACT, **changes) -> PlacedTrial:
+def made(
+    number: int, *, planner: PlannerName = "certified", condition: str = EXACT, **changes
+) -> PlacedTrial:
     """A trial that ends 0.3 mm from its target, with a part that moved by 4 mm and 3 degrees in the hand."""
     values = dict(
         part="bracket",
         condition=condition,
         number=number,
-        means=means,
-        planned_by=means,
+        planner=planner,
+        planned_by=planner,
         lifted=True,
         resting=0,
         quality=0.96,

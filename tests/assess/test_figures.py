@@ -21,7 +21,7 @@ def blue(image: np.ndarray) -> int:
 
 
 def test_shares_are_drawn_for_each_condition(tmp_path):
-    trials = [made(0), made(1, means="networks"), made(0, condition=NOISY), failed(1, condition=NOISY)]
+    trials = [made(0), made(1, planner="networks"), made(0, condition=NOISY), failed(1, condition=NOISY)]
     one, two = (trials[:2], trials)
     widths = []
     for number, some in enumerate((one, two)):

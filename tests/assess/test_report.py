@@ -36,8 +36,8 @@ def written(tmp_path_factory):
     out = tmp_path_factory.mktemp("report")
     trials = [
         *(made(number) for number in range(20)),
-        *(made(number, means="networks", placed=[0.002, 0, 0.01]) for number in range(19)),
-        failed(19, means="networks"),
+        *(made(number, planner="networks", placed=[0.002, 0, 0.01]) for number in range(19)),
+        failed(19, planner="networks"),
         *(made(number, condition=NOISY) for number in range(10)),
     ]
     headline, _ = write_report(

@@ -11,7 +11,7 @@ import trimesh
 from mskgrasp.assess.__main__ import main
 from mskgrasp.assess.config import AssessConfig
 from mskgrasp.assess.run import _sources, begin_trials
-from mskgrasp.assess.trials import CONDITIONS, EXACT, MEANS, NOISY
+from mskgrasp.assess.trials import CONDITIONS, EXACT, NOISY, PLANNERS
 from mskgrasp.core.errors import BadPart, MissingModel, UsageError
 from mskgrasp.planning.certified import FILE
 from mskgrasp.runtime.run_folder import TRIALS, read_trials, rewrite_trials
@@ -47,7 +47,7 @@ def test_a_bar_is_assessed_and_placed_within_a_millimetre(cad, tmp_path, monkeyp
     assert values["headline"] in said and values["headline"].startswith("With an exact camera: ")
     trials = read_trials(out / TRIALS, PlacedTrial.from_json)
     assert len(trials) == 2 * len(CONDITIONS)
-    (own,) = (one for one in trials if one.condition == EXACT and one.means == "certified")
+    (own,) = (one for one in trials if one.condition == EXACT and one.planner == "certified")
     # A bar between parallel pads: nothing is easier.
     assert own.lifted and own.planned_by == "certified" and not own.wrong_pose
     error = own.error("predicted")
@@ -78,7 +78,7 @@ def test_a_block_too_wide_and_too_heavy_gets_a_report_that_says_so(cad, tmp_path
 def test_trials_planned_by_other_certified_grasps_are_made_again(tmp_path, capsys):
     few, more = certified(certified_grasp(n=10, lifted=10)), certified(certified_grasp())
     begin_trials(tmp_path, few)
-    lines = [made(number, means=means).to_json() for number in range(2) for means in MEANS]
+    lines = [made(number, planner=planner).to_json() for number in range(2) for planner in PLANNERS]
     rewrite_trials(tmp_path / TRIALS, lines)
     begin_trials(tmp_path, few)
     assert len(read_trials(tmp_path / TRIALS, PlacedTrial.from_json)) == 4

@@ -24,8 +24,8 @@ def test_shares_are_of_all_attempts():
 
 
 def test_conditions_and_means_are_kept_apart():
-    found = rows([made(0), made(0, means="networks"), made(0, condition="friction 0.3")])
-    assert [(row.condition, row.means) for row in found] == [
+    found = rows([made(0), made(0, planner="networks"), made(0, condition="friction 0.3")])
+    assert [(row.condition, row.planner) for row in found] == [
         (EXACT, "certified"), (EXACT, "networks"), ("friction 0.3", "certified"),
     ]  # fmt: skip
 
@@ -52,8 +52,8 @@ def test_one_failure_in_twenty_is_enough_and_two_are_not():
 
 
 def test_the_better_means_counts():
-    poor = [made(number, means="certified", placed=[0.01, 0, 0]) for number in range(10)]
-    good = [made(number, means="networks") for number in range(10)]
+    poor = [made(number, planner="certified", placed=[0.01, 0, 0]) for number in range(10)]
+    good = [made(number, planner="networks") for number in range(10)]
     assert "by the networks" in verdict(rows([*poor, *good]), EXACT, TOLERANCE)
 
 

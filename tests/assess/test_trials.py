@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hal.open_cell import cell_from_yaml
-from mskgrasp.assess.trials import CONDITIONS, EXACT, MEANS, NOISY, scene_tasks, write_cells
+from mskgrasp.assess.trials import CONDITIONS, EXACT, NOISY, PLANNERS, scene_tasks, write_cells
 from mskgrasp.parts import find_part
 
 
@@ -13,7 +13,7 @@ def test_the_exact_camera_has_most_scenes_and_every_condition_some():
         counts = [sum(task.condition == name for task in scene_tasks(part, n)) for name in CONDITIONS]
         assert counts[0] == n and min(counts) >= 1 and counts == sorted(counts, reverse=True)
     first, *_ = many = scene_tasks(part, 24)
-    assert first.keys() == [("hex_nut_m20", EXACT, 0, means) for means in MEANS]
+    assert first.keys() == [("hex_nut_m20", EXACT, 0, planner) for planner in PLANNERS]
     assert [task for task in many if task in scene_tasks(part, 8)] == scene_tasks(part, 8)
 
 

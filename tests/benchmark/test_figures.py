@@ -37,4 +37,4 @@ def test_a_planner_has_one_colour_in_both_figures(tmp_path, monkeypatch):
     draw_shares(trials, 0, tmp_path / "shares.png")
     draw_refusals(refusals(trials, 0), by_planner(trials), tmp_path / "refusals.png")
     shares, refused = ({line.get_label(): line.get_color() for line in one.axes[0].lines} for one in kept)
-    assert refused == {GOOD[0].means: shares[GOOD[0].means]} != {GOOD[0].means: shares[NONE[0].means]}
+    assert refused == {GOOD[0].planner: shares[GOOD[0].planner]} != {GOOD[0].planner: shares[NONE[0].planner]}

@@ -64,7 +64,7 @@ def test_planners_are_compared_in_the_same_scene_and_stored_trials_are_kept(tmp_
     done = run(out, *planners[:-2], "antipodal", *planners[-2:])  # one more row
     assert done.returncode == 0, done.stderr
     assert (out / TRIALS).read_bytes().startswith(stored)
-    assert [one.means for one in read_trials(out / TRIALS, PlacedTrial.from_json)][3:] == ["antipodal"]
+    assert [one.planner for one in read_trials(out / TRIALS, PlacedTrial.from_json)][3:] == ["antipodal"]
     other = run(out, "--seed", 1)
     assert other.returncode == 2 and "seed differ" in other.stderr
 

@@ -39,7 +39,7 @@ def test_the_camera_at_the_hand_has_the_stated_errors_and_the_same_for_all_plann
     errors = np.array([placing_error(made(number, **here), "camera", 0) for number in range(400)])
     assert np.sqrt((errors[:, 0] ** 2).mean() / 2) == pytest.approx(CAMERA_POSITION, rel=0.1)
     assert np.sqrt((errors[:, 1] ** 2).mean()) == pytest.approx(CAMERA_TURN, rel=0.1)
-    ours, other = (placing_error(made(0, means, **here), "camera", 0) for means in ("ours", "centroid"))
+    ours, other = (placing_error(made(0, planner, **here), "camera", 0) for planner in ("ours", "centroid"))
     assert ours == other != placing_error(made(0, **here), "camera", 1)
     assert placing_error(failed(0), "camera", 0) is None
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import hashlib
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from hal.hand import HAND_MASS, PAYLOAD
 from mskgrasp.assess.config import AssessConfig, parse_tolerance
 from mskgrasp.assess.run import assess, begin_trials
 from mskgrasp.assess.summary import DISTANCES, Row, summarise
-from mskgrasp.assess.trials import CONDITIONS, EXACT, MEANS, AssessSetup, trial_bench, write_cells
+from mskgrasp.assess.trials import CONDITIONS, EXACT, PLANNERS, AssessSetup, trial_bench, write_cells
 from mskgrasp.core.errors import BadPart
 from mskgrasp.core.grasp import MAX_OPENING, TILT_LIMIT
 from mskgrasp.core.metrics import clustered_wilson_interval, rms_interval
@@ -37,6 +36,7 @@ from mskgrasp.runtime import cli
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import note
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
+from mskgrasp.runtime.worker_pool import process_count
 from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.simulation.certify_parts import certify
 from mskgrasp.trials.placed_scenes import SceneTask, placed_trials
@@ -73,7 +73,7 @@ def main() -> int:
     )
     options = parser.parse_args()
     parts = chosen_parts(options.parts, options.n_parts)
-    workers = os.cpu_count() or 1
+    workers = process_count()
     config = AssessConfig(
         parts=tuple(str(part.folder) for part in parts), quick=options.quick, tolerance=options.tolerance,
         out=options.out / "reports",
@@ -148,7 +148,9 @@ def fresh_trials(part: Part, out: Path, n: int, workers: int) -> list[PlacedTria
         seed=FRESH_SEED, spread=False,
     )  # fmt: skip
     tasks = [
-        SceneTask(source=setup.source, part=part.name, condition=EXACT, number=number, means=("certified",))
+        SceneTask(
+            source=setup.source, part=part.name, condition=EXACT, number=number, planners=("certified",)
+        )
         for number in range(n)
     ]
     return placed_trials(trial_bench, setup, tasks, out, workers)
@@ -158,13 +160,13 @@ def pooled(reported: Trials, fresh: Trials) -> Table:
     """Trials of all parts together; shares are of all attempts, intervals by parts."""
     rows = []
     for condition in CONDITIONS:
-        for means in MEANS:
+        for planner in PLANNERS:
             chosen = {
-                part: [trial for trial in trials if (trial.condition, trial.means) == (condition, means)]
+                part: [trial for trial in trials if (trial.condition, trial.planner) == (condition, planner)]
                 for part, trials in reported.items()
             }
             if any(chosen.values()):
-                rows.append((condition, means, *_figures(chosen)))
+                rows.append((condition, planner, *_figures(chosen)))
     rows.append((FRESH, "certified", *_figures(fresh)))
     header = (
         "condition", "planned by", "trials", "lifted", "RMSE, mm", "RMSE, deg", "predicted within 1 mm",
@@ -223,7 +225,7 @@ def _errors(trials: Sequence[PlacedTrial]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _row(trials: Sequence[PlacedTrial], tolerance: str) -> Row:
-    chosen = [one for one in trials if (one.condition, one.means) == (EXACT, "certified")]
+    chosen = [one for one in trials if (one.condition, one.planner) == (EXACT, "certified")]
     return summarise(chosen, parse_tolerance(tolerance), TILT_LIMIT)[0]
 
 

@@ -11,7 +11,9 @@ from tests.benchmarks.assessed_parts import agreement, by_part, pooled
 
 def trial(part: str, number: int, *, off: float, tilt: float = 0.0, lifted: bool = True) -> PlacedTrial:
     """A trial whose part is ``off`` metres from its prediction and from its target, or was not lifted."""
-    known = PlacedTrial(part=part, condition=EXACT, number=number, means="certified", planned_by="certified")
+    known = PlacedTrial(
+        part=part, condition=EXACT, number=number, planner="certified", planned_by="certified"
+    )
     if not lifted:
         return PlacedTrial.from_json(known.to_json() | dict(reason="missed"))
     return PlacedTrial.from_json(

@@ -69,13 +69,13 @@ def _assess_options(folder: Path) -> list[str]:
 
 
 def _trials(out: Path) -> dict[str, Any]:
-    """Trials by part, condition, number and means; a line that a kill has cut is none."""
+    """Trials by part, condition, number and planner; a line that a kill has cut is none."""
     path = out / TRIALS
     lines = path.read_bytes().split(b"\n")[:-1] if path.exists() else []
     found = {}
     for line in lines:
         values = _without_times(json.loads(line))
-        key = "-".join(str(values.get(name)) for name in ("part", "condition", "number", "means"))
+        key = "-".join(str(values.get(name)) for name in ("part", "condition", "number", "planner"))
         assert key not in found, f"{key} is there twice"
         found[key] = values
     return found

@@ -11,7 +11,7 @@ import pytest
 
 from mskgrasp.core.errors import UsageError
 from mskgrasp.runtime.executor import MAX_NODES, MAX_TRIES, Completed, Delivered, Died, Loss, WorkerFailed
-from mskgrasp.runtime.worker_pool import Work, results, run_jobs
+from mskgrasp.runtime.worker_pool import Work, process_count, results, run_jobs
 from tests.runtime.interrupted import interrupted
 
 
@@ -28,6 +28,17 @@ def bench(factor: int) -> Iterator[Callable[[int], Iterator[int]]]:
         yield os.getpid()
 
     yield work
+
+
+def test_one_process_for_each_core_that_this_one_may_use():
+    assert process_count(3) == 3
+    cores = os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, {min(cores)})
+        assert process_count() == 1
+    finally:
+        os.sched_setaffinity(0, cores)
+    assert process_count() == len(cores)
 
 
 def test_all_jobs_are_done_once_wherever():

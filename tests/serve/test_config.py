@@ -25,7 +25,7 @@ def test_a_policy_that_needs_the_parts_cad_is_refused():
 
 
 @pytest.mark.parametrize(
-    "arguments", [("--port", "65536"), ("--workers", "0"), ("--timeout-s", "0"), ("--max-body-mb", "-1")]
+    "arguments", [("--port", "65536"), ("--workers", "-1"), ("--timeout-s", "0"), ("--max-body-mb", "-1")]
 )
 def test_what_cannot_be_is_refused(arguments: tuple[str, ...]):
     with pytest.raises(UsageError, match=f"{arguments[0]}: input should be"):

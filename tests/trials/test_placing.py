@@ -133,7 +133,7 @@ def test_the_columns_that_follow_from_one_placement_are_what_placing_so_would_gi
         return _off(hand, seen, point, hand.T_base_tcp @ in_hand, target)
 
     trial = PlacedTrial(
-        part="any", condition="any", number=0, means="any", placed=placed(expected).tolist(),
+        part="any", condition="any", number=0, planner="any", placed=placed(expected).tolist(),
         held=held.tolist(), expected=expected.tolist(),
     )  # fmt: skip
     for correction, displacement in zip(CORRECTIONS, (np.zeros(4), expected, held), strict=True):
@@ -146,7 +146,7 @@ def test_the_columns_that_follow_from_one_placement_are_what_placing_so_would_gi
 def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(engine: TrialEngine):
     part = find_part("t_nut_m16x18")
     planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=800), engine.cell)
-    trial = PlacedTrial(part=part.name, condition="any", number=0, means="networks")
+    trial = PlacedTrial(part=part.name, condition="any", number=0, planner="networks")
     done = grasp_and_place(engine, planner, part, (3, 4), trial, {})
     assert done.lifted and done.planned_by == "networks" and done.resting is None
     assert done.placed is not None and done.held is not None and done.expected is not None
@@ -181,10 +181,10 @@ def test_a_plan_is_tried_once_in_a_scene_and_would_end_the_same_again(
         return TrialEngine.grasp(engine, plan, part)
 
     monkeypatch.setattr(engine, "grasp", grasp)
-    named = [PlacedTrial(part=part.name, condition="any", number=0, means=means) for means in planners]
+    named = [PlacedTrial(part=part.name, condition="any", number=0, planner=planner) for planner in planners]
     made = list(trials_of_scene(engine, planners.__getitem__, part, (3, 4), named, {}))
-    assert [trial.means for trial in made] == list(planners) and len(grasps) == 2
-    assert made[1] == replace(made[0], means="sure") and made[2].grasp != made[0].grasp
+    assert [trial.planner for trial in made] == list(planners) and len(grasps) == 2
+    assert made[1] == replace(made[0], planner="sure") and made[2].grasp != made[0].grasp
     assert grasp_and_place(engine, planners["sure"], part, (3, 4), named[1], {}) == made[1]
 
 
@@ -225,7 +225,7 @@ def test_a_part_held_beneath_an_overhang_is_not_taken_along(
         raise AssertionError("it never stands on its thicker flange")
     if usual:  # as far as fingers in the open: that it is taken along is seen
         monkeypatch.setattr(placing, "release_opening", lambda *_: None)
-    trial = PlacedTrial(part="rail", condition="any", number=0, means="networks")
+    trial = PlacedTrial(part="rail", condition="any", number=0, planner="networks")
     done = grasp_and_place(engine, AcrossTheWeb(engine), rail, (seed, 4), trial, {})
     if usual:
         assert done.lifted and done.reason == "not released" and done.placed is None
@@ -250,7 +250,7 @@ def test_a_part_that_no_straight_line_leads_to_its_target_is_turned_less_or_not_
 
     monkeypatch.setattr(placing, "place", refusing)
     planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=200), engine.cell)
-    trial = PlacedTrial(part=part.name, condition="any", number=0, means="networks")
+    trial = PlacedTrial(part=part.name, condition="any", number=0, planner="networks")
     done = grasp_and_place(engine, planner, part, (3, 4), trial, {})
     assert done.lifted and done.reason == reason and (done.placed is not None) == (reason == "")
     assert len(targets) == 2 and abs(targets[0] - targets[1]) > 0.01

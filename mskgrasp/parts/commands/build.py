@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from dataclasses import dataclass
 
@@ -15,6 +14,7 @@ from mskgrasp.parts.catalogue import Index, make_index, read_index, write_index
 from mskgrasp.parts.commands.build_parts import BuildResult, build_parts
 from mskgrasp.parts.recipes import cad
 from mskgrasp.runtime.progress import progress
+from mskgrasp.runtime.worker_pool import process_count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,7 @@ def run_build(command: Build) -> int:
     found: dict[str, BuildResult] = {}
     started = time.monotonic()
     try:
-        _build(names, before, command.workers or os.cpu_count() or 1, found)
+        _build(names, before, process_count(command.workers), found)
     finally:
         if command.catalogue and found:
             write_index(_catalogue(names, found, before))

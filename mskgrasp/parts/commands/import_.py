@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Generator, Sequence
 from contextlib import closing
@@ -22,6 +21,7 @@ from mskgrasp.parts.commands.import_files import FileResult, ImportOptions, impo
 from mskgrasp.parts.part import Part
 from mskgrasp.runtime.console_table import Table, print_table, report_console
 from mskgrasp.runtime.progress import note, progress
+from mskgrasp.runtime.worker_pool import process_count
 
 _FLAG = tyro.conf.FlagCreatePairsOff
 
@@ -128,7 +128,7 @@ def _import_all(command: Import, files: Sequence[Path]) -> Generator[FileResult]
         licence=command.licence,
         bodies="split" if command.split else "union" if command.union else "one",
     )
-    events = import_files(files, options, command.workers or os.cpu_count() or 1)
+    events = import_files(files, options, process_count(command.workers))
     with progress(total=len(files), unit="file") as bar, closing(events):
         for result in events:
             bar.set_description(result.path.name, refresh=False)
