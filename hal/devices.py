@@ -135,16 +135,21 @@ def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
             f"{path}: workspace.home puts joint {i + 1} at {workspace.home[i]:.3f} rad, outside "
             f"{arm.limits.joint_lower[i]:.3f} .. {arm.limits.joint_upper[i]:.3f} rad"
         )
+    if (reason := out_of_reach(arm, workspace)) is not None:
+        raise BadConfig(
+            f"{path}: workspace.region {list(workspace.region)} cannot be grasped everywhere, {reason}"
+        )
+
+
+def out_of_reach(arm: Arm, workspace: Workspace) -> str | None:
+    """Reason why a corner of the region cannot be grasped, lifted or approached; None if all can be."""
     x_min, x_max, y_min, y_max = workspace.region
     for x, y in ((x_min, y_min), (x_min, y_max), (x_max, y_min), (x_max, y_max)):
         lowest = float(workspace.lowest_grasp_z(np.array([x, y])))
         for z in (lowest, lowest + workspace.lift_height, workspace.table_z + APPROACH):
-            for theta in (-np.pi / 2, np.pi / 2):
-                pose = pose_base_tcp(np.array([x, y, z, theta]))
+            for theta in (-np.pi / 2, 0.0, np.pi / 2):
                 try:
-                    arm.check_pose(pose)
+                    arm.check_pose(pose_base_tcp(np.array([x, y, z, theta])))
                 except OutOfWorkspace as error:
-                    raise BadConfig(
-                        f"{path}: workspace.region {list(workspace.region)} cannot be grasped everywhere, "
-                        f"hand turned by {theta:.2f} rad: {error}"
-                    ) from error
+                    return f"hand turned by {theta:.2f} rad: {error}"
+    return None

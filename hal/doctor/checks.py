@@ -18,12 +18,11 @@ from hal.camera import Camera, RgbdFrame
 from hal.camera_calibration import Calibration, calibration_path, read_calibration
 from hal.cell import Workspace
 from hal.charuco import project
-from hal.errors import HalError, OutOfWorkspace
-from hal.execute import APPROACH
+from hal.devices import out_of_reach
+from hal.errors import HalError
 from hal.table import HIGHEST_TABLE, fit_table
 from mskgrasp.core.errors import BadConfig, MskgraspError
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import pose_base_tcp
 
 Level = Literal["ok", "warn", "fail"]
 
@@ -222,17 +221,8 @@ def check_arm(arm: Arm, connect_s: float) -> Iterator[Finding]:
 
 def check_reach(arm: Arm, workspace: Workspace) -> Finding:
     """Whether every corner of the region can be grasped, lifted and approached."""
-    x_min, x_max, y_min, y_max = workspace.region
-    for x, y in ((x_min, y_min), (x_min, y_max), (x_max, y_min), (x_max, y_max)):
-        lowest = float(workspace.lowest_grasp_z(np.array([x, y])))
-        for z in (lowest, lowest + workspace.lift_height, workspace.table_z + APPROACH):
-            for theta in (-np.pi / 2, 0.0, np.pi / 2):
-                try:
-                    arm.check_pose(pose_base_tcp(np.array([x, y, z, theta])))
-                except OutOfWorkspace as error:
-                    return Finding(
-                        level="fail", subject="workspace", text=f"{error}; make workspace.region smaller"
-                    )
+    if (reason := out_of_reach(arm, workspace)) is not None:
+        return Finding(level="fail", subject="workspace", text=f"{reason}; make workspace.region smaller")
     return Finding(
         level="ok", subject="workspace", text=f"region {list(workspace.region)} m: all of it within reach"
     )
