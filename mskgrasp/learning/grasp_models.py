@@ -162,9 +162,8 @@ class Models:
         mean, variance = self.gdn(torch.cat(seen), torch.cat(centres), height.repeat(N_VIEWS))
         each = mean.unflatten(0, (N_VIEWS, -1)) * torch.stack(signs)[:, None, : mean.shape[1]]
         mean = each.mean(0)
-        if variance is None:
-            return mean, None
-        variance = variance.unflatten(0, (N_VIEWS, -1)).mean(0) + (each - mean).square().mean(0)
+        if variance is not None:
+            variance = variance.unflatten(0, (N_VIEWS, -1)).mean(0) + (each - mean).square().mean(0)
         return self._calibrated(mean, variance)
 
     def _probability(self, logits: Tensor) -> Tensor:

@@ -77,6 +77,16 @@ def test_weights_that_are_not_finite_are_reported_and_never_saved(folder):
     assert not (folder / "new").exists()
 
 
+@pytest.mark.parametrize("views", [False, True])
+@pytest.mark.parametrize("variance", [False, True])
+def test_a_prediction_that_is_not_finite_is_refused(views, variance):
+    models = small_models(symmetric_views=views, variance=variance)
+    with torch.no_grad():
+        models.gdn.mean_head[0].bias.fill_(torch.inf)
+    with pytest.raises(BadModel):
+        models.grasp_displacement(torch.rand(3, 1, 32, 32), torch.rand(3, 3) * 0.01, torch.full((3,), 0.02))
+
+
 def test_a_description_of_another_patch_or_network_is_reported(folder):
     change_description(folder, lambda values: values["network"].update(patch_pixels=64))
     assert "patches of 64 pixels" in complaint(folder)
