@@ -63,10 +63,10 @@ def compare_outcomes(outcomes: Outcomes, reference: Outcomes) -> Comparison:
     return Comparison(
         success_rate=_mean(outcomes.success[settled]),
         agreement=_mean((outcomes.success == reference.success)[settled]),
-        shift_median=_percentile(shift, 50),
-        shift_p90=_percentile(shift, 90),
-        turn_median=_percentile(turn, 50),
-        turn_p90=_percentile(turn, 90),
+        shift_median=percentile(shift, 50),
+        shift_p90=percentile(shift, 90),
+        turn_median=percentile(turn, 50),
+        turn_p90=percentile(turn, 90),
         bias=float(np.abs(stats.trim_mean(difference[:, :3], 0.1, axis=0)).max()) if len(shift) else np.nan,
         cpu_ms=1e3 * _mean(outcomes.cpu_seconds),
         n=int(settled.sum()),
@@ -83,5 +83,6 @@ def _mean(values: np.ndarray) -> float:
     return float(values.mean()) if len(values) else float("nan")
 
 
-def _percentile(values: np.ndarray, share: float) -> float:
+def percentile(values: np.ndarray, share: float) -> float:
+    """Percentile of values (n,); NaN without any."""
     return float(np.percentile(values, share)) if len(values) else float("nan")

@@ -74,7 +74,8 @@ def _draw_sensitivity(axes: Any, record: dict[str, Any]) -> None:
         axes.plot([max(low, 1e-3), max(high, 1e-3)], [row, row], color=INK, lw=1)
         axes.plot(max(low, 1e-3), row, "o", ms=5, color=INK)
     own = record["size"]
-    axes.axvline(1e3 * own["shift_median"], color=GREEN, lw=1, ls="--")
+    if own["shift_median"] is not None:
+        axes.axvline(1e3 * own["shift_median"], color=GREEN, lw=1, ls="--")
     axes.set_yticks(range(len(found)), [f"{one['group']}: {one['label']}" for one in found], fontsize=7)
     axes.set(
         ylim=(len(found) - 0.5, -0.5), xscale="log", xlabel="difference to production, median to 90 %, mm"

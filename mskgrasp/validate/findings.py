@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mskgrasp.validate.compare import Comparison, compare_outcomes, distances
+from mskgrasp.validate.compare import Comparison, compare_outcomes, distances, percentile
 from mskgrasp.validate.config import (
     DRAWN,
     MOVED,
@@ -258,26 +258,22 @@ class DisplacementSize:
     turn_p90: float
 
     def to_json(self) -> dict[str, Any]:
-        """Convert to plain values."""
-        return asdict(self)
+        """Convert to plain values; NaN, which JSON does not have, becomes None."""
+        return {key: value if np.isfinite(value) else None for key, value in asdict(self).items()}
 
 
 def size(outcomes: Outcomes) -> DisplacementSize:
-    """Measure the displacements of the successes; without any they are 0."""
+    """Measure the displacements of the successes; without any they are NaN."""
     held = outcomes.displacement[outcomes.success & outcomes.settled]
     shift, turn = np.linalg.norm(held[:, :3], axis=1), np.abs(held[:, 3])
     return DisplacementSize(
         n=len(outcomes.success),
         success_rate=float(outcomes.success[outcomes.settled].mean()),
-        shift_median=_percentile(shift, 50),
-        shift_p90=_percentile(shift, 90),
-        turn_median=_percentile(turn, 50),
-        turn_p90=_percentile(turn, 90),
+        shift_median=percentile(shift, 50),
+        shift_p90=percentile(shift, 90),
+        turn_median=percentile(turn, 50),
+        turn_p90=percentile(turn, 90),
     )
-
-
-def _percentile(values: np.ndarray, share: float) -> float:
-    return float(np.percentile(values, share)) if len(values) else 0.0
 
 
 def _bare(outcomes: Mapping[str, Outcomes], setting: str, reference: str, origin: str) -> SettingComparison:

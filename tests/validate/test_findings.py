@@ -101,3 +101,4 @@ def test_without_successes_in_common_nothing_can_be_said():
         "no grasps to compare" in said or "parts were compared" in said for said in result.complaints()
     )
     assert result.to_json()["shift_median"] is None and not result.passed
+    assert size(nothing).to_json()["shift_median"] is None
