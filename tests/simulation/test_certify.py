@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from contextlib import closing
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from mskgrasp.core.geometry import wrap_half_turn
+from mskgrasp.core.grasp import pose_base_grasp
 from mskgrasp.core.settings import REGION, TABLE_Z, Overhead
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import find_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
+from mskgrasp.simulation import certify
 from mskgrasp.simulation.certify import (
     CertifyConfig,
     Member,
     Stream,
+    _Candidate,
     _first_held,
+    _without_motion,
     candidate_grasps,
     measured,
     round_sizes,
+    run_stream,
 )
 from mskgrasp.simulation.pad_contact import HeldPart, moment_share
 from mskgrasp.simulation.repeats import Repeat
@@ -84,6 +91,75 @@ def test_a_grasp_that_never_lifts_has_no_outcome():
     grasp = measured(0, 0.01, GRASP, [failed] * 5)
     assert (grasp.lifted, grasp.n) == (0, 5)
     assert np.isfinite(grasp.mean).all() and not grasp.mean.any()
+
+
+def lifted(*displacement: float, swing: float = 0.0) -> Repeat:
+    return Repeat(
+        reason="", error=np.zeros(4), displacement=np.array(displacement), swing=np.array([swing, 0.0])
+    )
+
+
+DROPPED = Repeat(
+    reason="slipped", error=np.zeros(4), displacement=np.full(4, np.nan), swing=np.full(2, np.nan)
+)
+
+
+def test_candidates_are_ranked_by_spread_swing_and_failures():
+    known = [lifted(0, 0, 0, 0), lifted(2e-3, 0, 0, 0.1, swing=0.1)]
+    steady = _Candidate(GRASP, known)
+    # By hand: variances 2e-6 m^2 and 0.005, mean squared swing 0.005, radius 20 mm.
+    assert steady.score(0.02) == pytest.approx(2e-6 + 0.02**2 * (0.005 + 0.005))
+    failing = _Candidate(GRASP, [*known, DROPPED])
+    assert failing.score(0.02) == pytest.approx(steady.score(0.02) + certify.FAILED**2 / 3)
+    assert _Candidate(GRASP, [known[0], DROPPED]).score(0.02) > failing.score(0.02)
+
+
+@pytest.mark.parametrize("grasp", [[0.0, 0.0, 0.0105, 0.0], [0.004, -0.003, 0.0105, 1.2]])
+def test_a_part_grasped_where_it_came_to_lie_would_not_have_moved(grasp):
+    """It lies at the origin of its rest frame, and is to have the pose in the hand that it took before."""
+    grasp = np.array(grasp)
+    moved = np.array([3e-3, -1e-3, 0.0, 0.2])
+    again = _without_motion(_Candidate(grasp, [lifted(*moved), lifted(*moved), DROPPED]), 0.01)
+    assert again is not None
+    part = np.array([0.0, 0.0, 0.01])
+    came_to = pose_base_grasp(grasp).inverse().apply(part) + moved[:3]
+    assert pose_base_grasp(again).inverse().apply(part)[:2] == pytest.approx(came_to[:2], abs=1e-9)
+    assert wrap_half_turn(np.asarray(-again[3] - (-grasp[3] + moved[3]))) == pytest.approx(0, abs=1e-9)
+
+
+def test_a_grasp_that_lifts_nothing_or_lets_the_part_swing_is_not_moved():
+    assert _without_motion(_Candidate(GRASP, [DROPPED]), 0.01) is None
+    assert _without_motion(_Candidate(GRASP, [lifted(1e-3, 0, 0, 0, swing=0.2)]), 0.01) is None
+
+
+def test_candidates_meet_the_same_scenes_and_the_steadiest_is_kept(monkeypatch):
+    """Outcomes by a formula: the farther from the middle, the more they spread."""
+    met: dict[float, list[tuple[int, ...]]] = {}
+
+    def repeat_by_formula(env, which, grasp, errors, seed, *, offset):
+        met.setdefault(float(grasp[0]), []).append(seed)
+        noise = np.random.default_rng(seed).normal(size=4) * [1, 1, 1, 0]
+        return lifted(*((1e-4 + abs(grasp[0])) * noise * 0.1))
+
+    places = np.linspace(-0.05, 0.04, 10)
+    grasps = [np.array([x, 0.0, 0.0105, 0.0]) for x in places]
+    monkeypatch.setattr(certify, "repeat_grasp", repeat_by_formula)
+    monkeypatch.setattr(certify, "candidate_grasps", lambda *_: grasps)
+    stream = Stream(
+        part="any", resting=0, members=(Member(which=0, turn=0.0, probability=1.0),), number=0, simulations=60
+    )
+    standing = SimpleNamespace(poses=SimpleNamespace(position=np.array([[0.0, 0.0, 0.01]])))
+    run = run_stream(SimpleNamespace(parts=[PART], standing=[standing]), None, stream, CertifyConfig())  # pyright: ignore
+    while True:
+        try:
+            next(run)
+        except StopIteration as end:
+            kept = end.value
+            break
+    first = [tuple(seeds[: certify.FIRST]) for x, seeds in met.items() if x in places]
+    assert len(first) == 10 and len(set(first)) == 1 and len(set(first[0])) == certify.FIRST
+    assert {one.n for one in kept} == {round_sizes(60)[3]}
+    assert abs(kept[0].grasp[0]) == min(abs(places))
 
 
 LITTLE = 7.0
