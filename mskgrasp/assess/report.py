@@ -151,7 +151,8 @@ def trials_section(rows: Sequence[Row], tolerance: Tolerance, figure: Path) -> S
                 header=header,
                 rows=table,
                 caption="Shares of all attempts with 95 % intervals (Wilson); RMSE of the predicted "
-                "displacement in the hand; tilted: by more than 2 degrees in the hand",
+                "displacement in the hand; tilted: in the hand, by more than "
+                f"{np.degrees(TILT_LIMIT):g} degrees",
             )
         ],
         figures=[Figure(path=figure, caption="Share of attempts that end within a distance of the target")],
@@ -180,7 +181,11 @@ def _distances_section(rows: Sequence[Row]) -> Section:
 def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Section:
     """Resting poses with their certified grasps."""
     conditions = certified.conditions
-    errors = conditions["pose_errors"]
+    errors, noise, physics = (conditions[name] for name in ("pose_errors", "noise", "physics"))
+    friction, force = (
+        "{:g} to {:g}".format(*(noise[name] or 2 * [physics[name]]))
+        for name in ("friction_pad_part", "finger_force")
+    )
     pose_cov = np.diag(np.square([errors["position"], errors["position"], errors["turn"]]))
     rows = []
     simulated = "; planned with the best that was simulated"
@@ -209,9 +214,9 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
             f"by at most {np.degrees(TILT_LIMIT):g} degrees (RMS), expected error at most "
             f"{1e3 * conditions['most_error']:g} mm. The expected error is the root of the mean squared "
             "distance by which the part's points miss their predicted places, with errors of the seen pose "
-            f"of {1e3 * errors['position']:g} mm and {np.degrees(errors['turn']):.2g} degrees, friction 0.3 "
-            "to 0.8, force 30 to 70 N a pad, and the arm's 0.1 mm. The least of several is rather "
-            "too small; the trials are made afresh."
+            f"of {1e3 * errors['position']:g} mm and {np.degrees(errors['turn']):.2g} degrees, friction "
+            f"{friction}, force {force} N a pad, and the arm's {1e3 * noise['arm_position_std']:g} mm. "
+            "The least of several is rather too small; the trials are made afresh."
         ],
         tables=[
             Table(

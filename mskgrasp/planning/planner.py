@@ -299,17 +299,6 @@ def variance_score(mean: np.ndarray, variance: np.ndarray, grasps: np.ndarray, v
 
 
 def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> int:
-    """Select one of the shortlisted grasps, which are sorted by quality.
-
-    Raises:
-        GraspRefused: None has the required quality.
-    """
+    """Select one of the shortlisted grasps, which are sorted by quality; the first has the least quality."""
     good = np.flatnonzero(qualities >= config.least_quality)
-    if not len(good):
-        best = float(qualities.max())
-        raise GraspRefused(
-            f"no grasp found (best quality {best:.2f}): min_quality is {config.least_quality:g}; move the "
-            "part, or lower it",
-            best,
-        )
     return int(good[0] if config.policy == "quality" else good[np.argmin(scores[good])])

@@ -33,8 +33,7 @@ def plan_text(plan: GraspPlan) -> str:
         [
             *pose,
             f"grasp         x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, theta {np.degrees(theta):.1f} deg (base)",
-            f"quality       {plan.quality:.3f} ({of})"
-            + ("" if plan.quality >= MIN_QUALITY else f"; under {MIN_QUALITY:g}, not worth trying"),
+            f"quality       {plan.quality:.3f} ({of})",
             f"verdict       {verdict(plan.quality)}",
             f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
             *([] if np.isnan(plan.swing).any() else [f"tilt          {tilted}"]),

@@ -21,6 +21,8 @@ CONDITIONS = dict(
     least_lifted=0.95,
     most_error=0.002,
     pose_errors=dict(position=3e-4, height=2e-4, turn=5e-3),
+    noise=dict(arm_position_std=2e-4, friction_pad_part=[0.2, 0.6], finger_force=None),
+    physics=dict(finger_force=40.0),
 )
 
 
@@ -92,6 +94,8 @@ def test_a_pose_in_which_the_part_always_tilts_is_told_with_its_grasps():
     known = certified(
         certified_grasp(), uncertified=(tilting,), without={2: "it tilts"}, like={}, conditions=CONDITIONS
     )
-    (table,) = poses_section(PART, known, Path("grasps.png")).tables
+    section = poses_section(PART, known, Path("grasps.png"))
+    assert "friction 0.2 to 0.6, force 40 to 40 N a pad, and the arm's 0.2 mm" in section.text[0]
+    (table,) = section.tables
     (row,) = (row for row in table.rows if row[0] == "2")
     assert row[2] == 0 and row[4] == "it tilts; planned with the best that was simulated"
