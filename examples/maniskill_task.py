@@ -23,7 +23,7 @@ def main(part: str, n: int) -> None:
 
         # One action is one grasp: x, y, z, theta; one step is the whole attempt.
         grasp = np.array([x, y, 0.012, 0.0]) + rng.normal(0, [0.004, 0.004, 0, 0.5])
-        _, reward, _, _, info = env.step(grasp.astype(np.float32))
+        *_, info = env.step(grasp.astype(np.float32))
         if info["success"].item():
             dx, dy, dz, dtheta = np.asarray(info["displacement"])[0]
             shifts.append(np.linalg.norm([dx, dy, dz]))

@@ -133,7 +133,7 @@ class PandaPyDriver:
         self._raise_error()
         return met
 
-    def _settle(self, controller, goal: np.ndarray) -> None:  # noqa: ANN001 (the package is imported late)
+    def _settle(self, controller, goal: np.ndarray) -> None:
         correction, still = np.zeros(7), np.zeros(7)
         begin = last = time.monotonic()
         while (now := time.monotonic()) - begin < self._settings.settle_s:

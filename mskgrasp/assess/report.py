@@ -93,7 +93,7 @@ def write_report(
             ],
             page_only=True,
         ),
-        _grasps_section(part, certified),
+        _grasps_section(certified),
         settings_section(settings),
     ]
     write_html(out / "report.html", title=f"Precision of {part.name}", conclusion=headline, sections=sections)
@@ -228,7 +228,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
     )
 
 
-def _grasps_section(part: Part, certified: CertifiedGrasps) -> Section:
+def _grasps_section(certified: CertifiedGrasps) -> Section:
     rows = []
     for grasp in (*certified.grasps, *certified.uncertified):
         x, y, z, theta = grasp.grasp

@@ -36,13 +36,13 @@ class PlannerSettings:
         models: Folder of our networks.
         paper_models: Folder of the paper's; None: there are none.
         program: Command of the program that plans; empty: none.
-        out: Folder of the run, which keeps the certified grasps; None: those of the cache are used.
+        out: Folder of the run, which keeps the certified grasps.
     """
 
     models: Path
+    out: Path
     paper_models: Path | None = None
     program: str = ""
-    out: Path | None = None
 
 
 def check_planners(config: BenchmarkConfig) -> None:
@@ -128,5 +128,5 @@ class Planners:
     def _certified_planner(self, part: Part) -> CertifiedPlanner:
         networks = self._once("ours-min-quality", lambda: self._make("ours-min-quality"))
         assert isinstance(networks, Planner)
-        kept = None if self.settings.out is None else kept_certified(self.settings.out, part)
-        return CertifiedPlanner(networks, part, read_certified(part, kept), reachable_by(self.cell))
+        grasps = read_certified(part, kept_certified(self.settings.out, part))
+        return CertifiedPlanner(networks, part, grasps, reachable_by(self.cell))

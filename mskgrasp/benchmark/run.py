@@ -157,7 +157,6 @@ def _trials(
             program=config.program,
             out=config.out,
         ),
-        out=config.out,
         seed=config.seed,
     )
     tasks = scene_tasks(sources, cell.values["type"], config.n_trials, config.rows)

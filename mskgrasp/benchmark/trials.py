@@ -24,13 +24,11 @@ class BenchmarkSetup:
     Attributes:
         cell: File of the simulated cell.
         planners: What the planners are made of.
-        out: Folder of the run.
         seed: Seed of the run.
     """
 
     cell: Path
     planners: PlannerSettings
-    out: Path
     seed: int
 
 
@@ -51,7 +49,7 @@ def trial_bench(setup: BenchmarkSetup) -> Iterator[Callable[[SceneTask], Iterato
     """Make the trials of a scene by every planner."""
     with ExitStack() as stack:
         engine = stack.enter_context(
-            connected_engine(setup.cell, yes=True, picture=setup.out / "next.png", tape=None)
+            connected_engine(setup.cell, yes=True, picture=setup.planners.out / "next.png", tape=None)
         )
         planners = Planners(engine.cell, setup.planners, stack)
         alike: dict[str, dict[int, tuple[int, float]]] = {}

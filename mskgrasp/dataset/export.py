@@ -169,7 +169,7 @@ def _comparable(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-class renamed_at_the_end:  # noqa: N801 (reads as a verb where it is used)
+class renamed_at_the_end:
     """Temporary folder whose files are moved beside it when all of them are written."""
 
     def __init__(self, folder: Path, files: list[Path]):

@@ -32,7 +32,8 @@ def main() -> int:
         from mskgrasp.evaluate.report import print_report
         from mskgrasp.evaluate.run import estimate, evaluate, replay
     if config.replay is not None:
-        return replay(*config.replay)
+        replay(*config.replay)
+        return 0
     if config.estimate:
         estimate(config)
         return 0

@@ -66,14 +66,13 @@ MAY_CHANGE = (
 )  # fmt: skip
 
 
-def replay(out: Path, key: str) -> int:
+def replay(out: Path, key: str) -> None:
     """Draw a stored trial of a run and print its outcome."""
     trial = find_trial(out, key)
     picture = out / "replay" / f"{trial.key}.png"
     draw_trial(out, trial, picture)
     print(describe_trial(trial))
     print(f"wrote {picture}")
-    return 0
 
 
 @dataclass(frozen=True, kw_only=True)

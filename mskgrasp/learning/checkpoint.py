@@ -68,7 +68,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         with safe_open(path, framework="pt") as file:
             progress: dict[str, Any] = {"samples_version": 1} | json.loads(file.metadata()["progress"])
             groups: dict[str, dict[str, Tensor]] = {group: {} for group in _GROUPS}
-            for key in file.keys():  # noqa: SIM118 - not a dict
+            for key in file.keys():
                 group, name = key.split("/", 1)
                 groups[group][name] = file.get_tensor(key)
         history = [EpochMetrics(**one) for one in progress["history"]]

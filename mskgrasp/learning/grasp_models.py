@@ -226,7 +226,7 @@ def load_models(folder: Path = PRETRAINED, device: torch.device | str = "cpu") -
     try:
         # What the description needs is compared before any of it takes memory.
         with safe_open(path, framework="pt") as file:
-            stored = {name: file.get_slice(name) for name in file.keys()}  # noqa: SIM118 - not a dict
+            stored = {name: file.get_slice(name) for name in file.keys()}
             _check_weights(path, stored, meta)
         weights = load_file(path)
     except (SafetensorError, OSError) as error:

@@ -63,11 +63,11 @@ class PatchFeatures(nn.Module):
         scale = (*normalisation.action_scale, torch.pi / 2)
         self.register_buffer("action_scale", torch.tensor(scale[:n_action]), persistent=False)
 
-    def prepare(self, patches: Tensor, height: Tensor) -> Tensor:  # noqa: ARG002
+    def prepare(self, patches: Tensor, height: Tensor) -> Tensor:
         """Standardise patches (n, 1, p, p) in metres above the table; the grasp's height is not used."""
         return standardise(patches)
 
-    def forward(self, prepared: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:  # noqa: ARG002
+    def forward(self, prepared: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:
         """Compute features (n, f) of prepared patches (n, 1, p, p) and object centres (n, 3), metres."""
         with image_autocast(self):
             image = self.image(self.convolutions(prepared))

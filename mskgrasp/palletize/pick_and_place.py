@@ -77,16 +77,16 @@ class PickAndPlace:
     Args:
         engine: Engine of a connected cell.
         planner: Planner for that cell.
-        pictures: Folder for the picture and the height maps of every placement.
-        out: Folder of the run, which keeps the certified grasps; None: those of the cache are used.
+        out: Folder of the run: gets the picture and the height maps of every placement, keeps the certified
+            grasps.
     """
 
-    def __init__(self, engine: TrialEngine, planner: Planner, pictures: Path, out: Path | None = None):
+    def __init__(self, engine: TrialEngine, planner: Planner, out: Path):
         self._engine = engine
         self._cell = engine.cell
         self._planner = planner
         self._planners: dict[str, RepeatedPlanner] = {}
-        self._pictures = pictures
+        self._pictures = out / "placements"
         self._out = out
         self._tops: dict[int, float] = {}
 
@@ -148,7 +148,7 @@ class PickAndPlace:
     def _planner_of(self, part: str) -> RepeatedPlanner:
         if part not in self._planners:
             found = find_part(part)
-            kept = None if self._out is None else kept_certified(self._out, found)
+            kept = kept_certified(self._out, found)
             own = planner_of_part(self._planner, self._cell, found, kept)
             self._planners = {part: RepeatedPlanner(own)}
         return self._planners[part]

@@ -193,7 +193,7 @@ def placement_bench(config: PalletizeConfig) -> Iterator[Callable[[TaskGroup], I
     ) as engine:
         check_slots_in_reach(engine.cell, chosen_slots(config))
         planner = make_planner(config.models, config.planner, engine.cell)
-        worker = PickAndPlace(engine, planner, config.out / "placements", config.out)
+        worker = PickAndPlace(engine, planner, config.out)
 
         def fill(pallet: TaskGroup) -> Iterator[Placement]:
             for number, task in enumerate(pallet.tasks, 1):

@@ -167,9 +167,8 @@ def carry_height(cell: Cell, pose: Grasp, tallest: float = 0.0) -> float:
         pose: Pose of the hand at which the part stands on the table; it reaches as far below the TCP.
         tallest: Height of the tallest other thing over the table, metres.
     """
-    x, y, z = pose.position
-    below = float(z) - cell.workspace.table_z
-    return max(clear_height(cell, tallest, below=below), float(z) + 0.02)
+    z = float(pose.position[2])
+    return max(clear_height(cell, tallest, below=z - cell.workspace.table_z), z + 0.02)
 
 
 def check_place(cell: Cell, pose: Grasp, *, tallest: float = 0.0) -> None:

@@ -25,7 +25,7 @@ from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.grasp_plan import GraspPlan, Shortlist
-from mskgrasp.planning.refine import fingers_free, where_held
+from mskgrasp.planning.refine import hand_room, where_held
 from mskgrasp.planning.refusal import refusal_reason
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 
@@ -162,7 +162,7 @@ class Planner:
         n = len(shortlist(found, self.config.top_fraction))
         order, free = shortlist(found, 1.0), np.zeros(0, dtype=np.int64)
         for rows in np.array_split(order, max(1, len(order) // (4 * n))):
-            free = np.append(free, rows[fingers_free(scene, candidates[rows])])
+            free = np.append(free, rows[hand_room(scene, candidates[rows])[0]])
             if len(free) >= n:
                 break
         if not len(free):
@@ -191,7 +191,7 @@ class Planner:
         best = np.argsort(scores, kind="stable")[:RECENTRED]
         moved = self.cleared(where_held(candidates[rows[best]], mean[best]))
         if self.config.check_fingers:
-            moved = moved[fingers_free(scene, moved)]
+            moved = moved[hand_room(scene, moved)[0]]
         quality = qualities(self.models, scene, moved, self.config.chunk_size)
         good = quality >= min(SURE, float(found[rows].min()))
         more = Shortlist(len(candidates) + np.arange(int(good.sum())), *predict(moved[good]))

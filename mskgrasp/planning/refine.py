@@ -19,11 +19,6 @@ from mskgrasp.planning.scoring import Scene
 _STEP = 0.002
 
 
-def fingers_free(scene: Scene, grasps: np.ndarray) -> np.ndarray:
-    """Check (n,) whether the open fingers of grasps (n, 4) are free of collisions: `hand_room`."""
-    return hand_room(scene, grasps)[0]
-
-
 def hand_room(scene: Scene, grasps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Check where open hands have room, and something to close on.
 

@@ -265,7 +265,7 @@ def _merged(plan: _Plan, config: CertifyConfig, conditions: dict[str, Any], dige
             if stream.resting == resting
             for grasp in _read_stream(plan.part, stream, digest) or ()
         ]
-        selected = select_certified(plan.part, resting, found, config)
+        selected = select_certified(plan.part, found, config)
         grasps += selected.certified
         uncertified += selected.uncertified
         if selected.reason:

@@ -161,5 +161,5 @@ def _clipped(mesh: trimesh.Trimesh, planes: list) -> trimesh.Trimesh:
 
 
 @lru_cache(maxsize=2)
-def _mesh(path: Path, content_hash: str) -> trimesh.Trimesh:  # noqa: ARG001 - the file may be another by then
+def _mesh(path: Path, content_hash: str) -> trimesh.Trimesh:
     return trimesh.load_mesh(path, process=False)

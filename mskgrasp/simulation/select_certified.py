@@ -39,10 +39,8 @@ class Selected:
     reason: str = ""
 
 
-def select_certified(
-    part: Part, resting: int, grasps: Sequence[CertifiedGrasp], config: CertifyConfig
-) -> Selected:
-    """Select the certified grasps of a resting pose."""
+def select_certified(part: Part, grasps: Sequence[CertifiedGrasp], config: CertifyConfig) -> Selected:
+    """Select the certified ones of the grasps of a resting pose."""
     if not grasps:
         return Selected(reason="the camera does not see it over the table")
     lifting = [one for one in grasps if one.lifted >= config.least_lifted * one.n and one.lifted >= 3]

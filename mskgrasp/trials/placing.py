@@ -39,30 +39,6 @@ TURNS = float(np.radians(45.0))
 """Greatest turn of a part from where it lies to its target, radians."""
 
 
-def grasp_and_place(
-    engine: TrialEngine,
-    planner: PlansGrasps,
-    part: Part,
-    seeds: tuple[int, int],
-    trial: PlacedTrial,
-    like: Mapping[int, tuple[int, float]],
-) -> PlacedTrial:
-    """Grasp a part as planned and place it in the middle of the region, corrected by the prediction.
-
-    Args:
-        engine: Engine of a cell with a feeder and a tracker.
-        planner: Plans the grasp.
-        part: The part.
-        seeds: Of the scene and of the target's turn: `mskgrasp.core.seeds.trial_seeds`.
-        trial: Names the trial; the outcome is filled in.
-        like: Resting poses that equal another one, as in `mskgrasp.planning.certified.CertifiedGrasps`.
-
-    Raises:
-        HalError: The cell was lost.
-    """
-    return next(trials_of_scene(engine, lambda _: planner, part, seeds, [trial], like))
-
-
 def trials_of_scene(
     engine: TrialEngine,
     planner_of: Callable[[str], PlansGrasps],
@@ -71,18 +47,19 @@ def trials_of_scene(
     trials: Sequence[PlacedTrial],
     like: Mapping[int, tuple[int, float]],
 ) -> Iterator[PlacedTrial]:
-    """Make trials in one scene, each as `grasp_and_place`, one after the other.
+    """Make trials in one scene, one after the other.
 
-    A plan that equals that of an earlier trial is not tried again: a scene is simulated anew from its seed
-    for each, so that its outcome would be the same.
+    In each the part is grasped as planned, and placed in the middle of the region, corrected by the
+    prediction. A plan that equals that of an earlier trial is not tried again: a scene is simulated anew from
+    its seed for each, so that its outcome would be the same.
 
     Args:
-        engine: See `grasp_and_place`, as for the others.
+        engine: Engine of a cell with a feeder and a tracker.
         planner_of: The planner of this name.
         part: The part.
-        seeds: Of the scene.
-        trials: Name the trials.
-        like: Resting poses that equal another one.
+        seeds: Of the scene and of the target's turn: `mskgrasp.core.seeds.trial_seeds`.
+        trials: Name the trials; their outcomes are filled in.
+        like: Resting poses that equal another one, as in `mskgrasp.planning.certified.CertifiedGrasps`.
 
     Raises:
         HalError: The cell was lost.
@@ -244,7 +221,7 @@ def as_turned(part: Part, found: PartPose, true: Pose, like: Mapping[int, tuple[
         part: The part.
         found: Its pose as found.
         true: Its true pose, ``T_base_obj``.
-        like: As in `grasp_and_place`.
+        like: As in `trials_of_scene`.
 
     Returns:
         ``T_base_obj``, or None where another resting pose was found.

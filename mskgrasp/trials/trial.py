@@ -124,7 +124,7 @@ class Trial:
         return trial
 
 
-def trial_key(part: str, number: int, chosen_by: str = "", policy: Policy = "quality") -> str:
+def trial_key(part: str, number: int, chosen_by: str, policy: Policy) -> str:
     """``<part>-<number>``; ``-<model>`` where a model's variances chose the grasp, and ``-recentred``."""
     parts = [f"{part}-{number:03d}", *([chosen_by] if chosen_by else [])]
     return "-".join([*parts, *(["recentred"] if policy == "recentred" else [])])

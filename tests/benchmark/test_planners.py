@@ -23,10 +23,10 @@ FRAME = synthetic.frame([Box(x=0.45, y=0.02, yaw=0.4, size=(0.06, 0.02, 0.03))])
 
 
 @pytest.fixture
-def planners():
+def planners(tmp_path):
     with ExitStack() as stack:
         cell = cell_from_yaml(config_file("cells/sapien.yaml"))
-        yield Planners(cell, PlannerSettings(models=PRETRAINED, paper_models=PRETRAINED), stack)
+        yield Planners(cell, PlannerSettings(models=PRETRAINED, out=tmp_path, paper_models=PRETRAINED), stack)
 
 
 @pytest.mark.parametrize("name", ["centroid", "antipodal"])

@@ -63,7 +63,7 @@ def test_the_numbers_are_stored(written):
 
 
 def test_the_tables_say_which_parts_can_be_bought_and_what_was_known(written):
-    _, headline, sections = written
+    *_, sections = written
     (table,) = sections["Parts"].tables
     assert table.rows[0] == ("nut", "nut", "ISO 4032", "test", "5 of 5", "0 of 5")
     assert table.rows[1][2] == "-"

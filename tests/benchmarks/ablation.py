@@ -135,7 +135,7 @@ def main() -> int:
     return 0
 
 
-def _some(samples: Samples, sides: Sides, *, share: float) -> Sides:  # noqa: ARG001
+def _some(samples: Samples, sides: Sides, *, share: float) -> Sides:
     return replace(sides, training=some_rows(sides.training, share))
 
 

@@ -60,7 +60,7 @@ def bca(squares: np.ndarray, rng: np.random.Generator) -> Interval:
     return _quantiles(drawn, *ends)
 
 
-def jackknife(squares: np.ndarray, rng: np.random.Generator) -> Interval:  # noqa: ARG001
+def jackknife(squares: np.ndarray, rng: np.random.Generator) -> Interval:
     """The interval that the programs report."""
     return rms_interval([np.full(TRIALS, np.sqrt(one)) for one in squares])
 

@@ -56,7 +56,7 @@ class SuccessLooks(Looks):
         self._network = network
         self._reduced: Samples | None = None
 
-    def of(self, network: NetworkConfig) -> Samples:  # noqa: ARG002
+    def of(self, network: NetworkConfig) -> Samples:
         """Read the samples, the same for all networks."""
         if self._reduced is None:
             whole = super().of(self._network)

@@ -76,7 +76,7 @@ def quick(choice: Choice) -> Choice:
     return replace(choice, config=with_stages(choice.config, epochs=2), sides=_few)
 
 
-def _few(samples: Samples, sides: Sides) -> Sides:  # noqa: ARG001
+def _few(samples: Samples, sides: Sides) -> Sides:
     training, validation = (
         rows[:: max(1, len(rows) // _QUICK_ATTEMPTS)] for rows in (sides.training, sides.validation)
     )

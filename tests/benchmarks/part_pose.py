@@ -184,7 +184,7 @@ def error_of(named: PartPose | PossiblePose, shown: Shown, known: KnownPart) -> 
     return np.array([*(named.T_base_obj.position - shown.T_base_obj.position)[:2], turn])
 
 
-def resting_of(T_base_obj: Pose, known: KnownPart) -> tuple[int, float]:  # noqa: N803 (a pose's name)
+def resting_of(T_base_obj: Pose, known: KnownPart) -> tuple[int, float]:
     """The resting pose nearest to a pose, and the turn from it about the vertical."""
     between = quat_multiply(T_base_obj.quat_wxyz, quat_conjugate(known.part.resting.quat_wxyz))
     twist, swing = twist_and_swing(between)
@@ -251,7 +251,7 @@ def leaning(cell: Cell, shown: Shown, degrees: float, known: KnownPart) -> Shown
     return show_at(cell, shown, Pose(position=pose.position + [0, 0, lift], quat_wxyz=pose.quat_wxyz))
 
 
-def show_at(cell: Cell, shown: Shown, T_base_obj: Pose) -> Shown:  # noqa: N803 (a pose's name)
+def show_at(cell: Cell, shown: Shown, T_base_obj: Pose) -> Shown:
     """The part at any pose, held by nothing (the MuJoCo cell: its camera simulates no physics)."""
     feeder: Any = cell.feeder
     feeder.present(shown.part, shown.seed)

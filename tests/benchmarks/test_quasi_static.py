@@ -34,7 +34,7 @@ def test_without_friction_at_the_contact_two_points_turn_about_the_one_that_rest
     # the middle; else the bar turns about the farther point.
     bar = _even(np.array([[0.04, 0.0], [-0.04, 0.0]]), mu=0.0)
     way = 1e-5
-    x, y, turn = bar.run(np.zeros(3), 0.01, way)
+    _, y, turn = bar.run(np.zeros(3), 0.01, way)
     assert turn == pytest.approx(-way / 0.05, rel=0.01)
     assert y == pytest.approx(0.04 * turn, rel=0.01)
 

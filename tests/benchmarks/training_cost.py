@@ -76,14 +76,14 @@ class TimeLeft(Reporter):
         self._bar, self._cost = bar, cost
         self._start, self._done, self._name = bar.n, 0.0, ""
 
-    def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:  # noqa: ARG002
+    def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:
         self._name = name
         self._advance(done * self._cost.batch_s[name])
 
-    def batch(self, loss: float) -> None:  # noqa: ARG002
+    def batch(self, loss: float) -> None:
         self._advance(self._cost.batch_s[self._name])
 
-    def epoch(self, history: list[EpochMetrics]) -> None:  # noqa: ARG002
+    def epoch(self, history: list[EpochMetrics]) -> None:
         self._advance(self._cost.validation_s[self._name])
 
     def close(self) -> None:

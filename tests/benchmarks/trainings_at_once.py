@@ -100,8 +100,8 @@ class _Counted(Reporter):
     def __init__(self, done: Any, number: int):
         self._done, self._number = done, number
 
-    def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:  # noqa: ARG002
+    def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:
         self._done[self._number] += done
 
-    def batch(self, loss: float) -> None:  # noqa: ARG002
+    def batch(self, loss: float) -> None:
         self._done[self._number] += 1

@@ -46,7 +46,7 @@ def tuned(samples: Samples, config: LearningConfig, attempts: int) -> Models:
     sides = _sides(samples, attempts)
     shipped = load_models(PRETRAINED)
 
-    def start(meta: ModelMeta) -> Models:  # noqa: ARG001
+    def start(meta: ModelMeta) -> Models:
         return load_models(PRETRAINED)
 
     cost = cost_of(Choice(name="tuned", config=config, build=start), samples, sides, 2.0)

@@ -142,7 +142,7 @@ def stopped(samples, folder):
 def contents(path):
     """Tensors and metadata of a file."""
     with safe_open(path, framework="pt") as file:
-        return {key: file.get_tensor(key) for key in file.keys()}, file.metadata()  # noqa: SIM118 - not a dict
+        return {key: file.get_tensor(key) for key in file.keys()}, file.metadata()
 
 
 def test_a_checkpoint_of_other_data_is_refused(samples, tmp_path):

@@ -60,9 +60,9 @@ def test_without_feeder_and_tracker_an_operator_places_parts_and_tape_measures(t
         planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=100), cell)
         picture = tmp_path / "next.png"
         taped = TrialEngine(cell, operator, picture=picture, tape=tape)
-        placed = PickAndPlace(taped, planner, tmp_path / "placements").run(task)
+        placed = PickAndPlace(taped, planner, tmp_path).run(task)
         true = tracker.part_pose()
-        bare = PickAndPlace(TrialEngine(cell, operator, picture=picture), planner, tmp_path / "placements")
+        bare = PickAndPlace(TrialEngine(cell, operator, picture=picture), planner, tmp_path)
         unknown = bare.run(task)
         with pytest.raises(StoppedByOperator):
             bare.run(task)
@@ -86,11 +86,11 @@ def test_the_picture_of_a_pallet_whose_first_part_failed_uses_no_heights_of_the_
     with cell.connected():
         planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=100), cell)
         engine = TrialEngine(cell, Operator(cell, yes=True), picture=tmp_path / "next.png")
-        worker = PickAndPlace(engine, planner, tmp_path / "placements")
+        worker = PickAndPlace(engine, planner, tmp_path)
         assert worker.run(placed).placed
         flat = pallet_image(cell.camera.capture(), slots, cell.workspace.table_z, {})
         assert not np.array_equal(worker.picture(slots), flat)
-        resumed = PickAndPlace(engine, planner, tmp_path / "placements")
+        resumed = PickAndPlace(engine, planner, tmp_path)
         resumed.skip(placed)
         np.testing.assert_array_equal(resumed.picture(slots), worker.picture(slots))
         maps = tmp_path / "placements" / f"{placement_name(placed.key)}.npz"

@@ -16,7 +16,7 @@ from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.planner import PROMISING, RECENTRED, SURE, Planner, select, shortlist, variance_score
-from mskgrasp.planning.refine import fingers_free
+from mskgrasp.planning.refine import hand_room
 from mskgrasp.planning.scoring import Scene, displacements
 from tests import synthetic
 from tests.planning.hand_made import BOX, FRAME, hand_made_models, planner
@@ -188,23 +188,14 @@ def test_a_grasp_beside_which_something_stands_is_left_out():
         x=BOX.x - 0.055 * np.sin(0.4), y=BOX.y + 0.055 * np.cos(0.4), yaw=0.4, size=(0.02, 0.01, 0.03)
     )
     frame = synthetic.frame([BOX, other])
-    grasps = np.array(
-        [
-            [BOX.x, BOX.y, 0.015, 0.4],  # its second finger would stand on the other box
-            [BOX.x, BOX.y, 0.045, 0.4],  # the same above it
-            [BOX.x, BOX.y, 0.015, 0.4 - np.pi / 2],  # along the box: 70 mm fit between the fingers
-            [BOX.x + 0.02 * np.cos(0.4), BOX.y + 0.02 * np.sin(0.4), 0.015, 0.4 - np.pi / 2],
-        ]
-    )
     view = view_part(frame.depth, frame.intrinsics, frame.T_base_camera, table_z=0.0, region=REGION)
     scene = Scene.of(frame, view, 0.0, torch.device("cpu"))
-    assert fingers_free(scene, grasps).tolist() == [False, True, True, False]
     checked = planner(PlannerConfig(n_candidates=400, check_fingers=True))
     plan = checked.plan(frame, np.random.default_rng(0))
-    assert fingers_free(scene, plan.candidates[plan.shortlist].as_vector()).all()
+    assert hand_room(scene, plan.candidates[plan.shortlist].as_vector())[0].all()
     assert 12 <= len(plan.shortlist) < 24 and (plan.shortlist >= 400).any()  # recentred ones, too
     free = planner(PlannerConfig(n_candidates=400)).plan(frame, np.random.default_rng(0))
-    assert not fingers_free(scene, free.candidates[free.shortlist].as_vector()).all()
+    assert not hand_room(scene, free.candidates[free.shortlist].as_vector())[0].all()
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ import torch
 
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.perception.part_detection import view_part
-from mskgrasp.planning.refine import fingers_free, where_held
+from mskgrasp.planning.refine import hand_room, where_held
 from mskgrasp.planning.scoring import Scene
 from tests import synthetic
 from tests.planning.hand_made import BOX
@@ -18,8 +18,15 @@ def test_fingers_that_would_stand_on_another_box_are_not_free():
     frame = synthetic.frame([BOX, other])
     view = view_part(frame.depth, frame.intrinsics, frame.T_base_camera, table_z=0.0, region=REGION)
     scene = Scene.of(frame, view, 0.0, torch.device("cpu"))
-    on_the_other, above_it = [BOX.x, BOX.y, 0.015, 0.4], [BOX.x, BOX.y, 0.045, 0.4]
-    assert fingers_free(scene, np.array([on_the_other, above_it])).tolist() == [False, True]
+    grasps = np.array(
+        [
+            [BOX.x, BOX.y, 0.015, 0.4],  # its second finger would stand on the other box
+            [BOX.x, BOX.y, 0.045, 0.4],  # the same above it
+            [BOX.x, BOX.y, 0.015, 0.4 - np.pi / 2],  # along the box: 70 mm fit between the fingers
+            [BOX.x + 0.02 * np.cos(0.4), BOX.y + 0.02 * np.sin(0.4), 0.015, 0.4 - np.pi / 2],
+        ]
+    )
+    assert hand_room(scene, grasps)[0].tolist() == [False, True, True, False]
 
 
 def test_a_grasp_at_the_place_where_the_part_is_held_moves_it_no_more():

@@ -30,7 +30,7 @@ def test_the_best_of_many_grasps_errs_by_as_much_as_is_stated(differences):
             )
             grasps.append(measured(0, radius, GRASP + [step * k, 0, 0, 0], last, before))
         light = dataclasses.replace(PART, mass=1e-3)  # the pads hold it wherever they touch it
-        best = select_certified(light, 0, grasps, CertifyConfig()).certified[0]
+        best = select_certified(light, grasps, CertifyConfig()).certified[0]
         seems_best = min(grasps, key=lambda grasp: grasp.spread(radius))
         for row, grasp in ((chosen, best), (least, seems_best)):
             std = stds[round(grasp.grasp[0] / step)]
@@ -51,12 +51,12 @@ def test_grasps_are_certified_by_lifting_by_hanging_flat_and_by_their_spread():
         ("spreads", dict(residual=np.diag(np.square([5e-3, 0.0, 0.0, 0.0])))),
     ):
         bad = dataclasses.replace(good, **changes)
-        assert select_certified(PART, 0, [bad, good], config) == Selected(certified=(good,))
-        alone = select_certified(PART, 0, [bad], config)
+        assert select_certified(PART, [bad, good], config) == Selected(certified=(good,))
+        alone = select_certified(PART, [bad], config)
         kept = () if name == "spreads" else (bad,)  # by 5 mm, of 2 that are allowed
         assert not alone.certified and alone.uncertified == kept
         reasons[name] = alone.reason
-    assert select_certified(PART, 0, [], config).reason == "the camera does not see it over the table"
+    assert select_certified(PART, [], config).reason == "the camera does not see it over the table"
     assert "no grasp lifts it in 95%" in reasons["lifts"] and "83%" in reasons["lifts"]
     assert "2 degrees" in reasons["tilts"]
     assert "spreads by more than 2 mm" in reasons["spreads"]
@@ -76,25 +76,25 @@ def test_a_grasp_is_not_certified_whose_part_its_weight_could_turn_between_the_p
         )
         for share in (0.0, 0.4, 0.8)
     )
-    assert select_certified(heavy, 0, [beside, fifth], config).certified == (fifth,)
-    alone = select_certified(heavy, 0, [beside], config)
+    assert select_certified(heavy, [beside, fifth], config).certified == (fifth,)
+    alone = select_certified(heavy, [beside], config)
     assert not alone.certified and "its weight could turn it between the pads" in alone.reason
     # It is kept, where no better one is, up to twice of what they hold.
     assert len(alone.uncertified) == 1
-    assert not select_certified(dataclasses.replace(BAR, mass=1.2), 0, [beside], config).uncertified
+    assert not select_certified(dataclasses.replace(BAR, mass=1.2), [beside], config).uncertified
     # Where all tilt, those are kept that the pads hold, with their own errors.
     tilted = [dataclasses.replace(one, swing=np.array([0.2, 0.0])) for one in (beside, half, fifth)]
-    kept = select_certified(heavy, 0, tilted, config).uncertified
+    kept = select_certified(heavy, tilted, config).uncertified
     assert len(kept) == 2 and all(one.mean[0] > 0 for one in kept)
     # The tilt shrinks what is touched: a lighter bar is held where it hangs flat, and not as it tilts.
     lighter = dataclasses.replace(BAR, mass=0.5)
-    assert len(select_certified(lighter, 0, [beside], config).certified) == 1
-    assert len(select_certified(lighter, 0, tilted, config).uncertified) == 2
+    assert len(select_certified(lighter, [beside], config).certified) == 1
+    assert len(select_certified(lighter, tilted, config).uncertified) == 2
     # Where one takes a fifth of what the pads hold, none is certified that takes more than half of it.
-    assert select_certified(heavy, 0, [half, fifth], config).certified == (fifth,)
-    assert select_certified(heavy, 0, [half], config).certified == (half,)
+    assert select_certified(heavy, [half, fifth], config).certified == (fifth,)
+    assert select_certified(heavy, [half], config).certified == (half,)
     spreads = dataclasses.replace(fifth, residual=np.diag(np.square([5e-3, 0.0, 0.0, 0.0])))
-    assert select_certified(heavy, 0, [half, spreads], config).certified == (half,)
+    assert select_certified(heavy, [half, spreads], config).certified == (half,)
 
 
 def test_the_least_friction_force_is_a_quantile_of_what_the_simulations_have():
@@ -108,7 +108,7 @@ def test_the_least_friction_force_is_a_quantile_of_what_the_simulations_have():
 def test_where_the_part_always_tilts_the_steadiest_of_these_grasps_are_kept():
     tilts = certified_grasp(swing=np.array([0.2, 0.0]))
     wavers = dataclasses.replace(tilts, grasp=GRASP + [0.01, 0, 0, 0], swing_cov=np.diag([0.04, 0.0]))
-    found = select_certified(PART, 0, [wavers, tilts], CertifyConfig())
+    found = select_certified(PART, [wavers, tilts], CertifyConfig())
     # 0.2 rad over 15 mm are 3 mm: too much for a flat part, but the same every time.
     assert found.uncertified == (tilts,) and not found.certified and "it tilts" in found.reason
 
@@ -118,16 +118,16 @@ def test_where_no_grasp_lifts_often_enough_those_that_lift_most_often_are_kept()
     seldom = dataclasses.replace(often, grasp=GRASP + [0.01, 0, 0, 0], lifted=20)
     tilts = dataclasses.replace(often, grasp=GRASP + [0.02, 0, 0, 0], swing=np.array([0.2, 0.0]))
     spreads = certified_grasp(lifted=22, residual=np.diag(np.square([5e-3, 0.0, 0.0, 0.0])))
-    found = select_certified(PART, 0, [seldom, tilts, often, spreads], CertifyConfig())
+    found = select_certified(PART, [seldom, tilts, often, spreads], CertifyConfig())
     assert found.uncertified == (often,) and "best 92%" in found.reason
     # Four in five at least.
-    assert not select_certified(PART, 0, [certified_grasp(lifted=19)], CertifyConfig()).uncertified
+    assert not select_certified(PART, [certified_grasp(lifted=19)], CertifyConfig()).uncertified
 
 
 def test_where_every_outcome_spreads_those_that_do_so_by_twice_as_much_at_most_are_kept():
     wide, wider = (certified_grasp(residual=np.diag(np.square([std, 0.0, 0.0, 0.0]))) for std in (3e-3, 5e-3))
-    assert select_certified(PART, 0, [wide], CertifyConfig()).uncertified == (wide,)
-    assert not select_certified(PART, 0, [wider], CertifyConfig()).uncertified
+    assert select_certified(PART, [wide], CertifyConfig()).uncertified == (wide,)
+    assert not select_certified(PART, [wider], CertifyConfig()).uncertified
 
 
 def test_certified_grasps_are_spread_over_the_part():
@@ -139,4 +139,4 @@ def test_certified_grasps_are_spread_over_the_part():
         for k in range(3)
     ]
     far = certified_grasp(grasp=GRASP + [0.01, 0, 0, 0], residual=np.diag([(3e-4) ** 2, 0, 0, 0]))
-    assert select_certified(PART, 0, [*near, far], config) == Selected(certified=(near[0], far))
+    assert select_certified(PART, [*near, far], config) == Selected(certified=(near[0], far))

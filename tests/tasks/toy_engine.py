@@ -82,7 +82,7 @@ class ToyScene:
 
 
 class _Robot:
-    links_map = {name: name for name in HAND_LINKS}  # noqa: RUF012 (ManiSkill's is an attribute, too)
+    links_map = {name: name for name in HAND_LINKS}
 
     def __init__(self, scene: ToyScene):
         self._scene = scene

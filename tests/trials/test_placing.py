@@ -23,9 +23,9 @@ from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import Target, displacement_of_point, place, place_pose
 from mskgrasp.trials import placing
-from mskgrasp.trials.engine import ExecutedGrasp, TrialEngine, connected_engine
+from mskgrasp.trials.engine import ExecutedGrasp, PlansGrasps, TrialEngine, connected_engine
 from mskgrasp.trials.placed_trial import CORRECTIONS, PlacedTrial
-from mskgrasp.trials.placing import _moved, _off, _pose_error, as_turned, grasp_and_place, trials_of_scene
+from mskgrasp.trials.placing import _moved, _off, _pose_error, as_turned, trials_of_scene
 from tests.boxes import make_rail
 from tests.planning.hand_made import planner
 from tests.planning.workspaces import WORKSPACE
@@ -38,6 +38,13 @@ def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TrialEngine]:
     picture = tmp_path_factory.mktemp("engine") / "next.png"
     with connected_engine(config_file("cells/sapien.yaml"), yes=True, picture=picture, tape=None) as one:
         yield one
+
+
+def tried(
+    engine: TrialEngine, planner: PlansGrasps, part: Part, seed: int, trial: PlacedTrial
+) -> PlacedTrial:
+    (done,) = trials_of_scene(engine, lambda _: planner, part, (seed, 4), [trial], {})
+    return done
 
 
 def pose(resting: int, turn: float, *, off: float = 0.0) -> Pose:
@@ -147,7 +154,7 @@ def test_a_part_whose_pose_is_not_known_is_placed_by_its_seen_centre(engine: Tri
     part = find_part("t_nut_m16x18")
     planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=800), engine.cell)
     trial = PlacedTrial(part=part.name, condition="any", number=0, planner="networks")
-    done = grasp_and_place(engine, planner, part, (3, 4), trial, {})
+    done = tried(engine, planner, part, 3, trial)
     assert done.lifted and done.planned_by == "networks" and done.resting is None
     assert done.placed is not None and done.held is not None and done.expected is not None
     # In the hand it is off by what was not predicted; the release adds little.
@@ -185,7 +192,7 @@ def test_a_plan_is_tried_once_in_a_scene_and_would_end_the_same_again(
     made = list(trials_of_scene(engine, planners.__getitem__, part, (3, 4), named, {}))
     assert [trial.planner for trial in made] == list(planners) and len(grasps) == 2
     assert made[1] == replace(made[0], planner="sure") and made[2].grasp != made[0].grasp
-    assert grasp_and_place(engine, planners["sure"], part, (3, 4), named[1], {}) == made[1]
+    assert tried(engine, planners["sure"], part, 3, named[1]) == made[1]
 
 
 @dataclass(frozen=True)
@@ -226,7 +233,7 @@ def test_a_part_held_beneath_an_overhang_is_not_taken_along(
     if usual:  # as far as fingers in the open: that it is taken along is seen
         monkeypatch.setattr(placing, "release_opening", lambda *_: None)
     trial = PlacedTrial(part="rail", condition="any", number=0, planner="networks")
-    done = grasp_and_place(engine, AcrossTheWeb(engine), rail, (seed, 4), trial, {})
+    done = tried(engine, AcrossTheWeb(engine), rail, seed, trial)
     if usual:
         assert done.lifted and done.reason == "not released" and done.placed is None
         return
@@ -251,8 +258,8 @@ def test_a_part_that_no_straight_line_leads_to_its_target_is_turned_less_or_not_
     monkeypatch.setattr(placing, "place", refusing)
     planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=200), engine.cell)
     trial = PlacedTrial(part=part.name, condition="any", number=0, planner="networks")
-    done = grasp_and_place(engine, planner, part, (3, 4), trial, {})
+    done = tried(engine, planner, part, 3, trial)
     assert done.lifted and done.reason == reason and (done.placed is not None) == (reason == "")
     assert len(targets) == 2 and abs(targets[0] - targets[1]) > 0.01
-    again = grasp_and_place(engine, planner, part, (3, 4), trial, {})  # the hand is emptied
+    again = tried(engine, planner, part, 3, trial)  # the hand is emptied
     assert again.reason == "" and again.placed is not None

@@ -40,9 +40,9 @@ def test_a_trial_without_a_grasp_keeps_its_gaps():
 
 
 def test_the_name_counts_the_trial_and_tells_who_chose_its_grasp():
-    assert trial_key("nut", 7) == "nut-007" and trial_key("nut", 1234, "gcip_mv") == "nut-1234-gcip_mv"
+    assert trial_key("nut", 1234, "gcip_mv", "recentred") == "nut-1234-gcip_mv-recentred"
     assert trial(number=7, chosen_by="net").key == "a-007-net"
-    assert trial().key == trial_key("a", 0)
+    assert trial().key == trial_key("a", 0, "", "quality") == "a-000"
 
 
 @pytest.mark.parametrize("part", ["", "../x", "a/b", ".hidden", "-x", "a b", "a\n", "ü"])

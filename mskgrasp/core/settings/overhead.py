@@ -39,7 +39,7 @@ class Overhead(Config):
                 f"the camera sees {seen:.2f} m of the table, less than the region {list(region)}"
             )
 
-    def T_base_camera(self, centre_xy: tuple[float, float]) -> Pose:  # noqa: N802 (a pose's name)
+    def T_base_camera(self, centre_xy: tuple[float, float]) -> Pose:
         """The optical frame over ``centre_xy`` (base frame, m): the image's top is away from the base."""
         matrix = np.eye(4)
         matrix[:3, :3] = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])

@@ -22,7 +22,7 @@ from mskgrasp.parts import store
 from mskgrasp.parts.builtin import LEGAL_NAME, builtin_names
 from mskgrasp.parts.catalogue import SETS
 from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
-from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, MeshFile, read_content, read_mesh
+from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, read_content, read_mesh
 from mskgrasp.parts.part import Part
 from mskgrasp.parts.solids.mesh_pieces import mesh_pieces
 from mskgrasp.parts.solids.one_thread import hold_manifold_to_one_thread
@@ -120,7 +120,7 @@ def import_file(
         known = _known(each, recipe_hash)
         if known is None:
             unchanged = False
-            known = _make(mesh, path, file, each, family, density, licence, recipe_hash)
+            known = _make(mesh, path, each, family, density, licence, recipe_hash)
         parts.append(known)
     return Imported(
         parts=tuple(parts), unchanged=unchanged, unit=file.unit, notes=(*file.notes, *repaired.notes)
@@ -219,7 +219,6 @@ def _known(name: str, recipe_hash: str) -> Part | None:
 def _make(
     mesh: trimesh.Trimesh,
     path: Path,
-    file: MeshFile,
     name: str,
     family: str,
     density: float,

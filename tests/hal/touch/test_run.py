@@ -110,7 +110,7 @@ def test_a_driver_that_dies_in_the_middle_of_a_touch_leaves_nothing_half_written
 def test_touches_that_fit_no_plane_write_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     touched = touches._touch
 
-    def on_a_chip(arm, xy, *rest):  # noqa: ANN001, ANN202
+    def on_a_chip(arm, xy, *rest):
         point = touched(arm, xy, *rest)
         return point + [0, 0, 0.002] if xy[0] > 0.5 and xy[1] > 0 else point
 

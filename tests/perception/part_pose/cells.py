@@ -38,7 +38,7 @@ def resting_at(name: str, resting: int, x: float, y: float, turn: float) -> Pose
     return place @ Pose(position=poses.position[resting], quat_wxyz=poses.quat_wxyz[resting])
 
 
-def posed(cell: Cell, name: str, T_base_obj: Pose) -> RgbdFrame:  # noqa: N803 (a pose's name)
+def posed(cell: Cell, name: str, T_base_obj: Pose) -> RgbdFrame:
     """A frame of a part at any pose in the MuJoCo cell, whose camera simulates no physics."""
     feeder: Any = cell.feeder
     feeder.present(name, 0)
