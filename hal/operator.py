@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import sys
+import termios
 from pathlib import Path
 from typing import TextIO
 
@@ -39,7 +41,8 @@ class Operator:
         self, cell: Cell, *, yes: bool = False, answers: TextIO | None = None, prompts: TextIO | None = None
     ):
         self.asks = not (yes or cell.arm.simulated)
-        if self.asks and answers is None and not sys.stdin.isatty():
+        # It is None where the program was started with it closed.
+        if self.asks and answers is None and (sys.stdin is None or not sys.stdin.isatty()):
             raise UsageError(
                 "this cell asks its operator before the arm moves, and standard input is no terminal; start "
                 "it in one, or give --yes if the arm may move by itself"
@@ -164,6 +167,7 @@ class Operator:
             self.inform(f"{word!r} is no valid answer.")
 
     def _line(self, question: str) -> str:
+        forget_typed(self._answers)
         print(question, end="", file=self._prompts, flush=True)
         line = self._answers.readline()
         word = line.strip().lower()
@@ -171,3 +175,10 @@ class Operator:
             why = "stopped by the operator" if line else "no answer (standard input ended)"
             raise StoppedByOperator(f"{why}; what was finished is kept, the same command goes on")
         return word
+
+
+def forget_typed(answers: TextIO) -> None:
+    """Drop what was typed into a terminal before a question: it answers another one, or none."""
+    if answers.isatty():
+        with contextlib.suppress(termios.error, OSError):  # it is gone, which the answer will tell
+            termios.tcflush(answers, termios.TCIFLUSH)

@@ -7,6 +7,8 @@ import os
 import pty
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -72,6 +74,9 @@ def test_a_real_arm_needs_a_terminal_or_a_yes(real, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n" * 10))
     with pytest.raises(UsageError, match="standard input is no terminal.*--yes"):
         Operator(cell_from_yaml(real))
+    monkeypatch.setattr("sys.stdin", None)  # closed
+    with pytest.raises(UsageError, match="standard input is no terminal.*--yes"):
+        Operator(cell_from_yaml(real))
     assert not Operator(cell_from_yaml(real), yes=True).asks
     assert not Operator(cell_from_yaml(SIMULATED)).asks
 
@@ -88,11 +93,39 @@ def test_it_is_asked_in_a_terminal(real):
         [sys.executable, "-c", code, str(real)], stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     os.close(theirs)
+    assert process.stderr is not None
+    asked = b""
+    while b"May the arm move? y: yes" not in asked:
+        asked += os.read(process.stderr.fileno(), 1000)
     os.write(ours, b"y\n")
     out, err = process.communicate(timeout=60)
     os.close(ours)
     assert out == b"True\n", err
-    assert b"May the arm move? y: yes" in err
+
+
+def test_what_was_typed_before_a_question_does_not_answer_it(real):
+    """A second Enter, pressed while the arm moved: it must not recover an arm that has collided since."""
+    cell = cell_from_yaml(real)
+    recovered: list[bool] = []
+    cell.arm.recover = lambda: recovered.append(True)  # type: ignore[method-assign]
+    ours, theirs = pty.openpty()
+    prompts = io.StringIO()
+
+    def leave() -> None:
+        while "Check it" not in prompts.getvalue():
+            time.sleep(0.01)
+        os.write(ours, b"q\n")
+
+    with open(theirs) as answers:
+        asked = Operator(cell, answers=answers, prompts=prompts)
+        os.write(ours, b"\n")
+        leaving = threading.Thread(target=leave)
+        leaving.start()
+        with pytest.raises(StoppedByOperator):
+            asked.recover(cell, "contact force over 20 N")
+        leaving.join()
+    os.close(ours)
+    assert not recovered
 
 
 def test_a_question_is_answered_by_yes_or_no_and_not_asked_on_a_simulated_cell(real):
