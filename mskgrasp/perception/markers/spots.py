@@ -72,6 +72,8 @@ def _measured(grey: np.ndarray, labels: np.ndarray, number: int, box: np.ndarray
     larger = cv2.resize(values, None, fx=_ZOOM, fy=_ZOOM, interpolation=cv2.INTER_LINEAR)
     mask = (larger > level).astype(np.uint8)
     moments = cv2.moments(mask, binaryImage=True)
+    if moments["m00"] == 0:  # a line so thin and so little over the level that nothing of it is left
+        return _large(box)
     centre = np.array([moments["m10"], moments["m01"]]) / moments["m00"]
     second_moments = np.array([[moments["mu20"], moments["mu11"]], [moments["mu11"], moments["mu02"]]])
     # A rectangle's side is the square root of twelve times the variance along it.

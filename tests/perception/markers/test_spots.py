@@ -40,6 +40,13 @@ def test_a_spot_that_is_too_long_is_its_bounding_box():
     assert spot.fill == 0 and len(spot.inside) == 0
 
 
+def test_a_line_of_a_pixel_a_little_over_the_level_is_no_square():
+    image = np.full((60, 80), 50, np.uint8)
+    image[20, 10:40] = 151
+    (spot,) = find_spots(image, 150, least=20, most=40)
+    assert spot.fill == 0 and spot.centre == pytest.approx([24.5, 20.0])
+
+
 def test_a_neighbour_does_not_shift_a_square():
     alone = find_spots(_grey((30, 30, 10, 0)), 150, least=20, most=40)[0]
     both = find_spots(_grey((30, 30, 10, 0), (43, 30, 12, 0)), 150, least=20, most=40)
