@@ -25,7 +25,7 @@ from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.core.files import LOCK, exclusive_lock
 from mskgrasp.dataset import ShardInfo, read_shard, read_success, shard_path
 from mskgrasp.dataset.labels import ShardLabels, read_labels
-from mskgrasp.dataset.shards import success_rate
+from mskgrasp.dataset.shards import require_own_name, success_rate
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.catalogue import read_index, representative_entries
 from mskgrasp.runtime.cli import make_folder
@@ -270,9 +270,17 @@ def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
     if not path.exists():
         return False
     try:
-        _, info = read_shard(path)
+        attempts, info = read_shard(path)
+        require_own_name(path, info)
     except BadDataset as error:
         print(f"making again: {error}", file=sys.stderr)
+        return False
+    made = len(attempts) + sum(info.discarded.values())
+    if (info.seed, made) != (task.seed, task.n):
+        print(
+            f"making again: {path} holds {made} attempts of seed {info.seed}, not {task.n} of {task.seed}",
+            file=sys.stderr,
+        )
         return False
     if info.part_hash != part_hash:
         raise BadDataset(

@@ -201,8 +201,11 @@ def bootstrap_interval(
         level: Confidence level.
         repeats: Number of draws.
         seed: Seed of the draws.
+
+    Returns:
+        The interval; NaN, NaN of fewer than two objects, which do not show how objects differ.
     """
-    if not values:
+    if len(values) < 2:
         return float("nan"), float("nan")
     rng = np.random.default_rng(seed)
     found = [

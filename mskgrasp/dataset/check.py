@@ -19,6 +19,8 @@ from mskgrasp.dataset.ranges import range_problems
 from mskgrasp.dataset.shards import read_unchecked, shard_path, success_rate
 from mskgrasp.parts import store
 
+_MOST_MISSING = 100
+"""Missing shards of a part that are named one by one."""
 SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise", "fidelity")
 """Properties that all shards of a dataset share."""
 
@@ -269,13 +271,19 @@ def _missing(
     for part in sorted({*highest, *asked}):
         n = -(-plan[0] // plan[1]) if plan else highest.get(part, 0) + 1
         n = 1 if part in one_is_enough else n
+        missing = 0
         for index in range(n):
             try:
                 path = shard_path(folder, part, index)
             except BadDataset:
                 break  # an illegal name of a part is reported with its shard
-            if path.name not in names:
-                yield Fault(path=path, reason="is missing; run the collection again to make it")
+            if path.name in names:
+                continue
+            missing += 1
+            if missing > _MOST_MISSING:  # settings may ask for absurdly many
+                yield Fault(path=path, reason=f"is missing, of {n} of '{part}'; others are not named")
+                break
+            yield Fault(path=path, reason="is missing; run the collection again to make it")
 
 
 def _kept(rate: float, settings: dict[str, Any]) -> bool:

@@ -157,7 +157,8 @@ def _table(rows: list[tuple[str, ...]]) -> list[str]:
 
 
 def _range(ends: Any, factor: float = 1.0, unit: str = "") -> str:
-    return f"({factor * ends[0]:.3g} - {factor * ends[1]:.3g}{unit})" if ends else ""
+    known = ends and None not in ends and not np.isnan(ends).any()
+    return f"({factor * ends[0]:.3g} - {factor * ends[1]:.3g}{unit})" if known else ""
 
 
 def _words(value: Any) -> str:

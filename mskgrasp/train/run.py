@@ -37,16 +37,20 @@ FEW_ATTEMPTS, FEW_PARTS = 1000, 10
 
 
 class _ProgressBar(Reporter):
-    """Progress bar with the loss and the time left; each epoch adds a line and a row of the log."""
+    """Progress bar with the loss and the time left; each epoch adds a line and a row of the log.
 
-    def __init__(self, log: Path):
-        self._log = log
+    The run's settings are stored once it begins: a checkpoint that they do not fit keeps its own.
+    """
+
+    def __init__(self, config: TrainConfig, out: Path):
+        self._config, self._out = config, out
         self._bar: Bar | None = None
         self._name, self._epochs = "", 0
 
     def stage(self, name: str, *, epochs: int, batches: int, done: int) -> None:
         self._name, self._epochs = name, epochs
         self.close()
+        write_config(self._config, self._out / "config.yaml")
         self._bar = progress(
             title=f"train {name.upper()}", unit="batch", total=epochs * batches, done=done, keep=True
         )
@@ -58,7 +62,7 @@ class _ProgressBar(Reporter):
 
     def epoch(self, history: list[EpochMetrics]) -> None:
         last = history[-1]
-        _write(self._log, _table(history))
+        _write(self._out / "log.csv", _table(history))
         note(f"{self._name} {last.epoch:3d}/{self._epochs}  {_line(last)}", sys.stdout)
 
     def close(self) -> None:
@@ -119,8 +123,7 @@ def run_training(config: TrainConfig) -> int:
 
 def _train_into(out: Path, config: TrainConfig, samples: Samples, sides: Sides, device: torch.device) -> None:
     """Train, and write every file of the run; nobody else writes into the folder."""
-    write_config(config, out / "config.yaml")
-    with closing(_ProgressBar(out / "log.csv")) as bar:
+    with closing(_ProgressBar(config, out)) as bar:
         models, history = train(
             samples, config, checkpoint_path=out / CHECKPOINT, device=device, reporter=bar, sides=sides
         )

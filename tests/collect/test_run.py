@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -191,8 +192,12 @@ def test_shards_of_other_software_are_not_added_to(collected, tmp_path):
     info = read_shard(path)[1]
     task = ShardTask(part=info.part, folder="", index=info.index, first=0, n=3, seed=info.seed)
     assert is_done(collected, task, info.part_hash)
+    assert not is_done(collected, replace(task, n=4), info.part_hash)
+    assert not is_done(collected, replace(task, seed=1), info.part_hash)
     out = tmp_path / "data"
     shutil.copytree(collected, out)
+    shutil.copy(path, shard_path(out, info.part, 9))
+    assert not is_done(out, replace(task, index=9), info.part_hash)  # another's copy
     with h5py.File(out / "shards" / path.name, "r+") as file:
         file.attrs["versions"] = json.dumps(info.versions | {"simulation": "0123456789abcdef"})
     with pytest.raises(BadDataset, match="other software: simulation 0123456789abcdef"):

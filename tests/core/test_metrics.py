@@ -161,6 +161,10 @@ def test_bootstrap_draws_whole_objects():
     assert 0.5 < high - low < 1.1 and low < np.mean(objects) < high
 
 
+def test_one_object_does_not_tell_how_objects_differ():
+    assert np.isnan(metrics.bootstrap_interval([np.arange(9.0)], np.mean)).all()
+
+
 def test_the_mean_of_few_objects_is_in_its_interval_nearly_as_often_as_stated():
     rng = np.random.default_rng(0)
     drawn = rng.normal(size=(300, 5, 1))  # plain percentiles cover four in five

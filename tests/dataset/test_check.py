@@ -254,6 +254,14 @@ def test_missing_shards_and_parts_are_named(data):
     assert list(faults(data)) == [f"{NUT}-0000.h5", f"{NUT}-0001.h5"]
 
 
+def test_settings_that_ask_for_absurdly_many_shards_are_answered_at_once(data):
+    settings = yaml.safe_load((data / "config.yaml").read_text())
+    settings |= {"attempts_per_part": 10**12, "shard_size": 1}
+    (data / "config.yaml").write_text(yaml.safe_dump(settings))
+    missing = [fault.reason for fault in check_dataset(data).faults if "is missing" in fault.reason]
+    assert 100 < len(missing) < 1000 and any("others are not named" in reason for reason in missing)
+
+
 def test_a_shard_with_too_few_attempts_is_named(data):
     with h5py.File(shard(data), "r+") as file:
         for column in list(file):

@@ -1,5 +1,7 @@
 import re
 
+import numpy as np
+
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.learning.model_card import model_card
@@ -21,6 +23,15 @@ def test_the_card_reports_test_parts_where_there_are_some_and_validation_parts_o
     without = {name: value for name, value in meta.metrics.items() if name not in ("test", "new_sizes")}
     card = model_card(meta.model_copy(update={"metrics": without}))
     assert "## On held-out validation parts" in card and f"| AUROC | {on_validation:.3f} |" in card
+
+
+def test_an_interval_that_is_not_known_is_left_out():
+    meta = load_models(PRETRAINED).meta
+    quality = meta.metrics["test"]["gqn"]
+    for unknown in (np.nan, None):
+        gqn = quality | {"intervals": {name: [unknown, unknown] for name in quality["intervals"]}}
+        card = model_card(meta.model_copy(update={"metrics": meta.metrics["test"] | {"gqn": gqn}}))
+        assert f"| AUROC | {quality['auroc']:.3f} |  |" in card
 
 
 def test_tables_are_well_formed_with_and_without_variances():

@@ -93,6 +93,23 @@ def test_a_finished_training_is_not_taken_for_that_of_other_data(dataset, tmp_pa
         train.run_training(few.model_copy(update={"data": other}))
 
 
+def test_a_checkpoint_of_other_data_keeps_the_settings_that_go_on_with_it(dataset, tmp_path, monkeypatch):
+    out, other = tmp_path / "model", tmp_path / "other"
+    few = program(SHORT, data=dataset, out=out, epochs=1)
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(train._ProgressBar, "epoch", interrupted)
+        train.run_training(few)
+    before = (out / "config.yaml").read_bytes()
+    synthetic.write_dataset(other, n_parts=8, n_attempts=80, seed=2)
+    with pytest.raises(UsageError, match="made from other data"):
+        train.run_training(few.model_copy(update={"data": other}))
+    assert (out / "config.yaml").read_bytes() == before
+
+
 @pytest.mark.slow
 def test_a_training_that_was_killed_as_it_began_begins_again(dataset, tmp_path):
     out = tmp_path / "model"
