@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +32,14 @@ from hal.camera_calibration import Calibration, calibration_path, write_calibrat
 from hal.cell import Cell, Workspace
 from hal.charuco import Board
 from hal.open_cell import cell_from_values, cell_from_yaml
+from hal.operator import forget_typed
 from hal.table import fit_table
-from mskgrasp.core.config import read_config, read_yaml, write_config
+from mskgrasp.core.config import check_config, read_config, read_yaml, write_config
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.options import parse
+from mskgrasp.runtime.progress import note
 
 DESCRIPTION = """Estimates the pose of the camera over the table with a ChArUco board held by the gripper.
 
@@ -216,9 +219,24 @@ def _give_board_back(cell: Cell) -> None:
 
 def _ask(prompt: str) -> None:
     try:
+        if sys.stdin is not None:
+            forget_typed(sys.stdin)
         input(prompt + " ")
-    except EOFError:
+    except (EOFError, RuntimeError):  # at its end, or closed
         raise UsageError("an operator must put the board into the hand; run this in a terminal") from None
+
+
+def _stored_board(path: Path, given: Board) -> Board:
+    """The board that pictures were taken of; what options state takes precedence.
+
+    Raises:
+        BadConfig: The file is not valid, or not with these options.
+    """
+    stored, usual = read_config(Board, path).model_dump(), Board().model_dump()
+    changed = {key: value for key, value in given.model_dump().items() if value != usual[key]}
+    if any(stored[key] != value for key, value in changed.items()):
+        note(f"board: {', '.join(f'{key} {value}' for key, value in changed.items())}, else as in {path}")
+    return check_config(Board, stored | changed, f"{path} with --board")
 
 
 def _now() -> str:
@@ -244,7 +262,7 @@ def main() -> int:
     if config.source is not None:
         folder = config.source
         if (folder / "board.yaml").is_file():
-            board = read_config(Board, folder / "board.yaml")
+            board = _stored_board(folder / "board.yaml", board)
         workspace = None if config.cell is None else cell_from_yaml(config.cell).workspace
     else:
         assert config.cell is not None

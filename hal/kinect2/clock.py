@@ -19,21 +19,27 @@ class ExposureClock:
     def __init__(self, latency_s: float):
         self._latency_s = latency_s
         self._last_ticks: int | None = None
+        self._last_arrived_s = 0.0
         self._elapsed_s = 0.0
         self._offset_s = 0.0
         self._offset_at_s = 0.0
 
-    def advance_s(self, ticks: int) -> float:
-        """Time from the exposure of the last dated frame to that of this one, s; 0 or less: it is stale."""
+    def advance_s(self, ticks: int, arrived_s: float) -> float:
+        """Time from the exposure of the last dated frame to that of this one, s; 0 or less: it is stale.
+
+        Ticks wrap after six days: of the times that they may mean, that nearest to the time between arrivals.
+        """
         if self._last_ticks is None:
             return float("inf")
-        return (((ticks - self._last_ticks + _WRAP // 2) % _WRAP) - _WRAP // 2) * TICK_S
+        expected = round((arrived_s - self._last_arrived_s) / TICK_S)
+        off = (ticks - self._last_ticks - expected + _WRAP // 2) % _WRAP - _WRAP // 2
+        return (expected + off) * TICK_S
 
     def date(self, ticks: int, arrived_s: float) -> tuple[float, float]:
         """Date a frame.
 
         Args:
-            ticks: Its timestamp, which wraps after six days.
+            ticks: Its timestamp.
             arrived_s: Its arrival, monotonic clock, s.
 
         Returns:
@@ -43,11 +49,11 @@ class ExposureClock:
         if self._last_ticks is None:
             self._offset_s, self._offset_at_s = arrived_s, arrived_s
         else:
-            self._elapsed_s += self.advance_s(ticks)
+            self._elapsed_s += self.advance_s(ticks, arrived_s)
             # A device clock that runs slow must not appear as growing delays.
             self._offset_s += DRIFT * (arrived_s - self._offset_at_s)
             self._offset_at_s = arrived_s
             self._offset_s = min(self._offset_s, arrived_s - self._elapsed_s)
-        self._last_ticks = ticks
+        self._last_ticks, self._last_arrived_s = ticks, arrived_s
         quickest_s = self._elapsed_s + self._offset_s
         return quickest_s - self._latency_s, arrived_s - quickest_s

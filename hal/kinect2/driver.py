@@ -133,7 +133,7 @@ class Kinect2Driver:
         """The frame, or why it is refused; empty if it was exposed before the request."""
         arrived_s = time.monotonic()
         depth, infrared, colour = frames["depth"], frames["ir"], frames["color"]
-        if not self._clock.advance_s(depth.timestamp) > 0:
+        if not self._clock.advance_s(depth.timestamp, arrived_s) > 0:
             return "stale (the camera's clock stands still)"
         exposed_s, late_s = self._clock.date(depth.timestamp, arrived_s)
         if late_s > self._settings.latency_s:

@@ -81,7 +81,7 @@ def read_recording(path: Path) -> Recording:
             if schema != SCHEMA:
                 raise BadRecording(f"{path} has schema {schema}, this version reads {SCHEMA}; record again")
             return _read(path, file)
-    except (OSError, KeyError, ValueError, TypeError, AttributeError) as error:
+    except (OSError, LookupError, ValueError, TypeError, AttributeError, RecursionError) as error:
         raise BadRecording(f"{path} is damaged or no recording ({error}); record again") from error
 
 
@@ -118,6 +118,8 @@ def _read(path: Path, file: Any) -> Recording:
 def _event(text: str) -> Event:
     values = json.loads(text)
     error = values["error"]
+    if not isinstance(values["arguments"], dict):
+        raise ValueError(f"the arguments of {values['call']} are {values['arguments']!r}")
     return Event(**{**values, "error": None if error is None else (str(error[0]), str(error[1]))})
 
 

@@ -13,10 +13,11 @@ import pytest
 from hal.calibrate.board_views import Picture, picture_paths, read_picture, take_pictures, write_picture
 from hal.calibrate.config import CalibrateConfig
 from hal.calibrate.hand_eye import BadCalibrationSet, HandEye, solve_hand_eye
-from hal.calibrate.run import capture, solve
+from hal.calibrate.run import _stored_board, capture, solve
 from hal.camera_calibration import read_calibration
 from hal.charuco import Board
-from mskgrasp.core.errors import UsageError
+from mskgrasp.core.config import write_config
+from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.core.geometry import pose_distance
 from tests.hal.calibrate.toy_bench import BOARD as TOY_BOARD
 from tests.hal.calibrate.toy_bench import HELD, bench
@@ -74,6 +75,17 @@ def test_the_pictures_can_be_solved_again_into_a_file_that_can_be_read(folder: P
     assert calibration.n_poses >= 15 and not calibration.by_hand
     assert (tmp_path / "corners.png").stat().st_size > 10_000
     assert (tmp_path / "residuals.png").stat().st_size > 10_000
+
+
+def test_the_board_of_stored_pictures_is_theirs_but_for_what_options_state(tmp_path: Path, capsys):
+    path = tmp_path / "board.yaml"
+    write_config(Board(columns=7, square=0.05, marker=0.04), path)
+    assert _stored_board(path, Board()) == Board(columns=7, square=0.05, marker=0.04)
+    assert capsys.readouterr().err == ""
+    assert _stored_board(path, Board(square=0.049)) == Board(columns=7, square=0.049, marker=0.04)
+    assert "board: square 0.049, else as in" in capsys.readouterr().err
+    with pytest.raises(BadConfig, match="marker 0.04 m must be"):
+        _stored_board(path, Board(square=0.041, marker=0.03).model_copy(update={"marker": 0.03}))
 
 
 def test_a_folder_with_pictures_is_not_written_over(folder: Path):

@@ -24,9 +24,20 @@ def test_a_frame_held_up_on_its_way_is_late():
 def test_the_counter_wraps_round():
     clock = ExposureClock(0.1)
     clock.date(2**32 - 100, 100.0)
-    assert clock.advance_s(166) == pytest.approx(266 * TICK_S)
+    assert clock.advance_s(166, 100.0 + 266 * TICK_S) == pytest.approx(266 * TICK_S)
     assert clock.date(166, 100.0 + 266 * TICK_S)[1] == pytest.approx(0, abs=1e-4)
-    assert clock.advance_s(166) == 0 and clock.advance_s(165) < 0
+    now_s = 100.0 + 266 * TICK_S
+    assert clock.advance_s(166, now_s) == 0 and clock.advance_s(165, now_s) < 0
+
+
+@pytest.mark.parametrize("days", [1.0, 3.2, 6.5, 40.0])
+def test_a_camera_that_was_open_and_idle_for_days_goes_on(days):
+    clock = ExposureClock(0.1)
+    clock.date(123, 100.0)
+    idle_s = 86400 * days
+    ticks = (123 + round(idle_s / TICK_S)) % 2**32
+    assert clock.advance_s(ticks, 100.0 + idle_s) == pytest.approx(idle_s)
+    assert clock.date(ticks, 100.0 + idle_s)[1] == pytest.approx(0, abs=1e-3)
 
 
 def test_a_clock_that_runs_slow_does_not_make_frames_late():

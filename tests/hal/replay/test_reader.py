@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 from pathlib import Path
 
@@ -25,6 +26,9 @@ from tests.hal.replay.toy import ToyCamera, toy_cell
         (lambda path: change(path, lambda f: f.attrs.update(schema=7)), "has schema 7, this version reads 1"),
         (lambda path: change(path, lambda f: f.__delitem__("frames")), "frame 0 is missing"),
         (lambda path: change(path, lambda f: f["frames/depth"].resize(2, 0)), "expected"),
+        (lambda path: change_event(path, error=[]), "damaged or no recording"),
+        (lambda path: change_event(path, arguments=None), "the arguments of capture are None"),
+        (lambda path: change_event(path, result=[[]]), "damaged or no recording"),
     ],
 )
 def test_a_wrong_file_is_one_line(recording: Path, tmp_path: Path, spoil, message: str):
@@ -34,6 +38,16 @@ def test_a_wrong_file_is_one_line(recording: Path, tmp_path: Path, spoil, messag
     with pytest.raises(BadRecording) as caught:
         read_recording(path)
     assert message in str(caught.value) and str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def change_event(path: Path, **changes) -> None:
+    def spoil(file: h5py.File) -> None:
+        events = [json.loads(text) for text in file["events"].asstr()[:]]
+        capture = next(one for one in events if one["call"] == "capture")
+        capture.update(changes)
+        file["events"][:] = [json.dumps(one) for one in events]
+
+    change(path, spoil)
 
 
 def change(path: Path, how) -> None:
