@@ -61,7 +61,9 @@ class Arm(Device):
         self._gate = MotionGate()
         self._stop = self._gate.stop
         self._held: Held | None = None
+        self._moved_fingers = False
         self._load: Load | None = None
+        self._pace = 1.0
 
     # ------------------------------------------------------------------ commands
 
@@ -73,6 +75,15 @@ class Arm(Device):
         """
         self._require_connection()
         return self._state()
+
+    def slow_down(self, pace: float) -> None:
+        """Move the arm from now on at a share of the speeds at which it would move otherwise; 1 ends that.
+
+        The fingers are as fast as ever.
+        """
+        if not 0 < pace <= 1:
+            raise ValueError(f"pace {pace:g} is outside 0 .. 1")
+        self._pace = pace
 
     def move_to_joints(self, joints: np.ndarray, *, speed: float = 0.3) -> None:
         """Move all joints to (n,) radians at a fraction ``speed`` of their greatest speeds.
@@ -92,7 +103,7 @@ class Arm(Device):
             check_joint_path(self.limits, self._forward_all, here, target)
             if self.links is not None:
                 check_path(self.links, self.limits, np.stack([here, target]), "the way to these joints")
-            self._move_to_joints(target, speed)
+            self._move_to_joints(target, self._pace * speed)
             error = np.abs(self._state().joints - target).max()
             if error > JOINT_TOLERANCE:
                 raise MotionAborted(f"the arm stopped {error:.4f} rad short of its joint target")
@@ -114,7 +125,7 @@ class Arm(Device):
             self._check_line(self.limits, *legs)
             for number, leg in enumerate(legs):
                 try:
-                    self._move_to_pose(leg, speed)
+                    self._move_to_pose(leg, self._pace * speed)
                 except OutOfWorkspace as error:
                     if number == 0:
                         raise
@@ -150,7 +161,7 @@ class Arm(Device):
         self._check_pose(limits, T_base_tcp)
         with self._motion():
             self._check_line(limits, T_base_tcp)
-            contact = self._move_until_contact(T_base_tcp, force, speed)
+            contact = self._move_until_contact(T_base_tcp, force, self._pace * speed)
             if contact is None:
                 self._check_arrival(T_base_tcp)
             return contact
@@ -200,11 +211,13 @@ class Arm(Device):
         with self._motion():
             self._home()
             self._held = None
+            self._moved_fingers = True
             self._clear_load()
 
     def _move_pads(self, width: float) -> None:
         self._move_gripper(width)
         self._held = None
+        self._moved_fingers = True
         reached = self._state().gripper_width
         if self._stop.is_set():
             return
@@ -236,20 +249,28 @@ class Arm(Device):
             outcome = self._grasp(force)
             at = self._state().T_base_tcp
             self._held = Held(T_base_tcp=at, width=outcome.width) if outcome.holding else None
+            self._moved_fingers = True
             return outcome
 
     def in_hand(self) -> Held | None:
         """What `grasp` closed on, if the fingers still hold it by `holds` where they closed; None if not.
 
+        Until this program moves the fingers, what the hand itself reports: an earlier one may have been ended
+        with a part in the hand.
+
         Raises:
             NotConnected, CommunicationLost: The arm is not connected or does not answer.
         """
         self._require_connection()
-        held = self._held
-        if held is None:
+        if self._moved_fingers and self._held is None:
             return None
         state = self._state()
-        return None if held.lost(state.gripper_width) or not self.holds(state) else held
+        if not self.holds(state):
+            return None
+        if self._held is not None:
+            return None if self._held.lost(state.gripper_width) else self._held
+        open_ = state.gripper_width > state.max_width - WIDTH_TOLERANCE
+        return None if open_ or not state.grasped else Held(T_base_tcp=None, width=state.gripper_width)
 
     def holds(self, state: ArmState) -> bool:
         """Whether the fingers hold something in a state, by the rule `hal.hand.holds`."""
@@ -394,7 +415,8 @@ class Arm(Device):
         """Whether joints within their limits reach the pose."""
 
     @abstractmethod
-    def _move_to_joints(self, joints: np.ndarray, speed: float) -> None: ...
+    def _move_to_joints(self, joints: np.ndarray, speed: float) -> None:
+        """Move; ``speed`` is slowed down already, a greatest speed of the backend's own is not: ``_pace``."""
 
     def _legs(self, T_base_tcp: Pose) -> list[Pose]:
         """Ends of the straight motions that lead to a pose, which is the last of them."""

@@ -53,11 +53,11 @@ class Held:
     """Something in the hand.
 
     Attributes:
-        T_base_tcp: Pose of the TCP when the fingers closed on it.
+        T_base_tcp: Pose of the TCP when the fingers closed on it; None: an earlier program closed them.
         width: Distance between the pads then, metres.
     """
 
-    T_base_tcp: Pose
+    T_base_tcp: Pose | None
     width: float
 
     def lost(self, width: float) -> bool:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hal.arm import JOINT_TOLERANCE
-from hal.arm_state import Held
 from hal.camera import RgbdFrame
 from hal.cell import Cell
 from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, Stopped
@@ -217,7 +216,7 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
     """Open the fingers, retreat upward and move the arm out of the camera's sight.
 
     What the hand holds is not dropped: a person takes it, or the hand puts it down straight below, as high as
-    it was grasped.
+    it was grasped. What it has held since an earlier program, a person must take.
 
     Args:
         cell: Connected.
@@ -226,7 +225,7 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
             (`hal.operator.Operator.take`). Without it a simulated arm puts down, and a real one refuses.
 
     Raises:
-        HandFull: The hand holds something, and nobody was asked; nothing moved.
+        HandFull: The hand holds something that nobody took; nothing moved.
         MotionAborted: The hand touched something.
     """
     arm = cell.arm
@@ -237,8 +236,14 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
                 "the hand holds something, which would fall: put it down (hal.put_down), or take it and open "
                 "the fingers (arm.open_gripper), then go home"
             )
-        if arm.simulated or take is None or not take():
-            _put_down_below(cell, held)
+        if held.T_base_tcp is None:
+            if take is None or not take():
+                raise HandFull(
+                    "the hand has held something since an earlier program, which would fall from an unknown "
+                    "height: hold it, run python -m hal.home, which opens the fingers, then start again"
+                )
+        elif arm.simulated or take is None or not take():
+            _put_down_below(cell, float(held.T_base_tcp.position[2]))
     arm.open_gripper()
     state = arm.state()
     if np.abs(state.joints - cell.workspace.home).max() < JOINT_TOLERANCE:
@@ -250,9 +255,9 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
     arm.move_to_joints(cell.workspace.home)
 
 
-def _put_down_below(cell: Cell, held: Held) -> None:
+def _put_down_below(cell: Cell, grasped: float) -> None:
     """Lower the hand until what it holds stands as high as it was grasped, or on something else."""
-    here, height = cell.arm.state().T_base_tcp, float(held.T_base_tcp.position[2]) + PUT_DOWN
+    here, height = cell.arm.state().T_base_tcp, grasped + PUT_DOWN
     if here.position[2] <= height:
         return
     try:

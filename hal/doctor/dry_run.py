@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -12,31 +10,12 @@ from hal.cell import Cell
 from hal.doctor.checks import Finding
 from hal.errors import HalError
 from hal.execute import execute_grasp, go_home
-from hal.franka.config import FrankaArmConfig
 from mskgrasp.core.grasp import Grasp
 
-SLOWNESS = 0.1
-"""Share of the speeds in the cell's file at which the dry run moves."""
+PACE = 0.1
+"""Share of its speeds at which a real arm moves in the dry run."""
 IN_THE_AIR = 0.05
 """Height of the dry run over the lowest grasp, metres."""
-_SPEEDS = ("max_speed", "max_joint_speed")
-_FRANKA = ("panda_py", "franky")
-
-
-def slowed(values: dict[str, Any]) -> dict[str, Any]:
-    """A cell's values with a tenth of the speeds of its arm; a simulated arm has none.
-
-    A speed that the file of a Franka arm leaves out is a tenth of its default.
-    """
-    slow = copy.deepcopy(values)
-    arm = slow.get("arm")
-    if isinstance(arm, dict):
-        for name in _SPEEDS:
-            if name not in arm and arm.get("driver") in _FRANKA:
-                arm[name] = FrankaArmConfig.model_fields[name].default
-            if isinstance(arm.get(name), (int, float)):
-                arm[name] *= SLOWNESS
-    return slow
 
 
 def check_dry_run(cell: Cell) -> Iterator[Finding]:

@@ -27,7 +27,7 @@ from hal.doctor.checks import (
     check_view,
 )
 from hal.doctor.config import DoctorConfig
-from hal.doctor.dry_run import check_dry_run, slowed
+from hal.doctor.dry_run import PACE, check_dry_run
 from hal.doctor.gripper import measure_gripper
 from hal.doctor.hand_checks import check_grip, check_hand
 from hal.errors import BadBackend
@@ -68,10 +68,12 @@ def examine(path: Path, *, move: bool, dry_run: bool = False) -> Iterator[Findin
     yield from check_drivers(values)
     yield check_disk(Path.cwd())
     try:
-        cell = cell_from_values(slowed(values) if dry_run else values, path)
+        cell = cell_from_values(values, path)
     except (BadConfig, BadBackend) as error:
         yield Finding(level="fail", subject="cell file", text=str(error))
         return
+    if dry_run and not cell.arm.simulated:
+        cell.arm.slow_down(PACE)
     if cell.camera.rendered:
         yield check_renderer()
     yield Finding(level="ok", subject="cell file", text=f"{path}, type {values['type']}")

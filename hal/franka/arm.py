@@ -63,6 +63,7 @@ class FrankaArm(Arm):
         super().__init__(limits)
         self._config = config
         self._link: DriverLink | None = None
+        self._was_idle = False
 
     # ------------------------------------------------------------------ connection
 
@@ -77,6 +78,7 @@ class FrankaArm(Arm):
         if self._link is None:
             self._link = self._new_link()
             self._load = None
+            self._was_idle = False
 
     def _new_link(self) -> DriverLink:
         config = self._config
@@ -150,7 +152,7 @@ class FrankaArm(Arm):
             lambda here: joint_path(
                 here,
                 joints,
-                speed=min(speed, config.max_joint_speed) * JOINT_SPEED,
+                speed=min(speed, self._pace * config.max_joint_speed) * JOINT_SPEED,
                 acceleration=np.full(7, config.joint_acceleration),
             )
         )
@@ -198,11 +200,11 @@ class FrankaArm(Arm):
             lambda here: straight_path(
                 here,
                 T_base_tcp,
-                speed=min(speed, config.max_speed),
-                turn_speed=TURN_SPEED,
+                speed=min(speed, self._pace * config.max_speed),
+                turn_speed=self._pace * TURN_SPEED,
                 acceleration=config.acceleration,
                 turn_acceleration=config.joint_acceleration,
-                joint_speed=config.max_joint_speed * JOINT_SPEED,
+                joint_speed=self._pace * config.max_joint_speed * JOINT_SPEED,
                 lower=self.limits.joint_lower,
                 upper=self.limits.joint_upper,
             ),
@@ -305,7 +307,11 @@ class FrankaArm(Arm):
     def _ready(self) -> DriverState:
         """Current state, refused unless the robot is idle: the drivers themselves would recover silently."""
         state = self._measure()
+        if self._was_idle and state.mode == "reflex":
+            # Between two motions: what it met is a result of theirs, not an error of an earlier program.
+            raise MotionAborted("the robot stopped by its reflex: free the arm, then call recover()")
         self._refuse_unless_idle(state)
+        self._was_idle = True
         return state
 
     def _refuse_unless_idle(self, state: DriverState) -> None:

@@ -92,6 +92,10 @@ class RecordingArm(SharingDevice, Arm):
         """See `Arm.state`."""
         return self._writer.call("state", {}, self._arm.state)
 
+    def slow_down(self, pace: float) -> None:
+        """See `Arm.slow_down`; not recorded: it changes no call's outcome."""
+        self._arm.slow_down(pace)
+
     def move_to_joints(self, joints: np.ndarray, *, speed: float = 0.3) -> None:
         """See `Arm.move_to_joints`."""
         self._record("move_to_joints", joints=joints, speed=speed)

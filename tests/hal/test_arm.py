@@ -190,3 +190,24 @@ def test_a_search_that_ends_short_of_its_pose_without_a_contact_is_a_fault(arm: 
 def test_a_contact_is_sought_slowly_and_softly(arm: ToyArm, settings: dict[str, float], message: str):
     with pytest.raises(OutOfWorkspace, match=message):
         arm.move_until_contact(at(0.4, 0.0, 0.06), **settings)
+
+
+def test_a_slowed_arm_moves_at_a_share_of_all_speeds(arm: ToyArm, monkeypatch):
+    speeds: list[float] = []
+    for name in ("_move_to_joints", "_move_to_pose", "_move_until_contact"):
+        move = getattr(arm, name)
+
+        def noted(*given, move=move):
+            speeds.append(given[-1])
+            return move(*given)
+
+        monkeypatch.setattr(arm, name, noted)
+    for pace in (0.1, 1.0):
+        arm.slow_down(pace)
+        arm.move_to_pose(at(0.4, 0.0, 0.3), speed=0.5)
+        arm.move_until_contact(at(0.4, 0.0, 0.2), speed=0.02)
+        arm.move_to_joints(arm.state().joints, speed=0.3)
+    assert speeds == pytest.approx([0.05, 0.002, 0.03, 0.5, 0.02, 0.3])
+    for pace in (0.0, 1.5):
+        with pytest.raises(ValueError):
+            arm.slow_down(pace)

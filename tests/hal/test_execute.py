@@ -156,6 +156,30 @@ def test_fingers_that_moved_since_they_closed_hold_nothing(cell: Cell, arm: Writ
     go_home(cell)
 
 
+def test_what_an_earlier_program_left_in_the_hand_is_not_dropped(cell: Cell, arm: WritingArm, monkeypatch):
+    state = arm._state
+    monkeypatch.setattr(arm, "_state", lambda: dataclasses.replace(state(), grasped=True))
+    arm._width = 0.03
+    held = arm.in_hand()
+    assert held is not None and held.T_base_tcp is None and held.width == 0.03
+    for take in (None, lambda: False):
+        with pytest.raises(HandFull) as caught:
+            go_home(cell, take=take)
+        assert arm.log == [] and "\n" not in str(caught.value)
+    assert "python -m hal.home" in str(caught.value)
+    go_home(cell, take=lambda: True)
+    assert arm.log[0] == ("gripper", 0.08) and arm.in_hand() is None
+    arm._width = 0.03  # from here on this program knows what its fingers did, whatever the hand says
+    assert arm.in_hand() is None
+
+
+def test_a_hand_that_is_open_holds_nothing_whatever_it_reports(cell: Cell, arm: WritingArm, monkeypatch):
+    state = arm._state
+    monkeypatch.setattr(arm, "_state", lambda: dataclasses.replace(state(), grasped=True))
+    assert arm.in_hand() is None
+    go_home(cell)
+
+
 def test_a_frame_is_taken_for_a_plan_at_home_only(cell: Cell, arm: WritingArm):
     arm.move_to_joints(cell.workspace.home)
     assert capture_at_home(cell).serial == "toy"

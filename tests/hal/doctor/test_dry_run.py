@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hal import Cell, open_cell
 from hal.doctor import dry_run
-from hal.doctor.dry_run import check_dry_run, slowed
-from hal.errors import OutOfWorkspace
+from hal.doctor.dry_run import PACE, check_dry_run
+from hal.doctor.run import examine
+from hal.errors import NotConnected, OutOfWorkspace
+from hal.franka import FrankaArm
 from mskgrasp.core.shipped import config_file
+from tests.hal.real_cell import measured_cell
 
 
 @pytest.fixture(scope="module")
@@ -49,15 +53,19 @@ def test_what_stops_the_arm_is_the_finding(cell: Cell, monkeypatch):
     assert finding.level == "fail" and finding.text == "a post is in the way"
 
 
-def test_the_speeds_of_the_file_are_divided_by_ten_and_the_file_is_left_alone():
-    values = {"arm": {"max_speed": 0.1, "max_joint_speed": 0.15, "host": "h"}, "type": "devices"}
-    slow = slowed(values)["arm"]
-    assert slow == {"max_speed": pytest.approx(0.01), "max_joint_speed": pytest.approx(0.015), "host": "h"}
-    assert values["arm"]["max_speed"] == 0.1
-    assert slowed({"type": "sapien"}) == {"type": "sapien"}
+def test_a_real_arm_is_slowed_before_it_is_connected_also_where_it_is_recorded(tmp_path: Path, monkeypatch):
+    real, recorded = measured_cell(tmp_path), tmp_path / "recorded.yaml"
+    recorded.write_text(f"{{type: recorded, cell: {real}, out: {tmp_path / 'run.h5'}}}")
+    done: list[object] = []
 
+    def refused(_: object):
+        done.append("connected")
+        raise NotConnected("no robot here")
 
-@pytest.mark.parametrize("driver", ["panda_py", "franky"])
-def test_speeds_that_the_file_leaves_out_are_a_tenth_of_the_defaults(driver):
-    slow = slowed({"type": "devices", "arm": {"driver": driver, "host": "h"}})["arm"]
-    assert slow["max_speed"] == pytest.approx(0.01) and slow["max_joint_speed"] == pytest.approx(0.015)
+    monkeypatch.setattr(FrankaArm, "slow_down", lambda _, pace: done.append(pace))
+    monkeypatch.setattr(FrankaArm, "connect", refused)
+    for path in (real, recorded):
+        for dry in (True, False):
+            done.clear()
+            list(examine(path, move=False, dry_run=dry))
+            assert done[0] == (PACE if dry else "connected"), path

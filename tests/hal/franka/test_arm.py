@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 
 from hal import Load
 from hal.arm import JOINT_TOLERANCE
+from hal.config import READY
 from hal.errors import LoadTooHeavy, MotionAborted, NeedsRecovery, NotConnected, OutOfWorkspace
 from hal.franka.driver import DriverName
 from hal.franka.path import JointPath, joint_path
@@ -171,3 +173,24 @@ def test_a_motion_that_the_solver_gives_up_is_planned_again(tmp_path: Path, monk
         with pytest.raises(MotionAborted, match="planner failed with error code"):
             arm.move_to_joints(goal - 0.1, speed=0.5)
         assert impossible[0] == 0 and arm.state().joints == pytest.approx(stood, abs=JOINT_TOLERANCE)
+
+
+def test_a_slowed_arm_keeps_a_share_of_the_speeds_of_its_file(tmp_path: Path, monkeypatch):
+    """By the paths that the driver would get; a request may be faster or slower than the file."""
+    arm = arm_at(tmp_path, "panda_py", "127.0.0.250", max_speed=0.2, max_joint_speed=0.2)
+    here, paths = np.array(READY), []
+    monkeypatch.setattr(arm, "_ready", lambda: SimpleNamespace(joints=here))
+    monkeypatch.setattr(arm, "_follow", lambda path, *_: paths.append(path))
+    start = arm._forward(here)
+    down = Pose(position=start.position - np.array([0, 0, 0.2]), quat_wxyz=start.quat_wxyz)
+
+    def fastest(pace: float, asked: float) -> tuple[float, float]:
+        paths.clear()
+        arm.slow_down(pace)
+        arm._move_to_joints(here + 0.5, pace * asked)
+        arm._move_to_pose(down, pace * asked)
+        joints, line = (path.curve().derivative()(np.linspace(0, path.duration_s, 2000)) for path in paths)
+        return float(np.abs(joints).max()), float(np.abs(line).max())
+
+    for asked in (0.05, 1.0):
+        assert fastest(0.1, asked) == pytest.approx(np.multiply(0.1, fastest(1.0, asked)), rel=0.02)

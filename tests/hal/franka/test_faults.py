@@ -117,6 +117,20 @@ def test_a_reflex_between_motions_is_not_recovered_silently(
         nudge(arm)
 
 
+def test_a_reflex_after_a_motion_of_this_program_is_a_result_as_one_in_a_motion(
+    driver: DriverName, robot: FakeRobot, tmp_path: Path
+):
+    with arm_at(tmp_path, driver, robot.host) as arm:
+        nudge(arm)
+        robot.order("reflex")
+        with pytest.raises(MotionAborted, match=r"reflex: .*recover\(\)"):
+            arm.wait(0.1)
+        with pytest.raises(NeedsRecovery):
+            nudge(arm)
+        arm.recover()
+        nudge(arm)
+
+
 def test_the_user_stop_is_reported_and_recover_waits_for_its_release(
     driver: DriverName, robot: FakeRobot, tmp_path: Path
 ):

@@ -78,3 +78,9 @@ def test_a_device_that_fails_to_close_still_closes_the_recording(
     with pytest.raises(CommunicationLost), cell.connected() as connected:
         connected.arm.move_gripper(0.05)
     assert [event.call for event in read_recording(tmp_path / "run.h5").events] == ["move_gripper"]
+
+
+def test_a_recorded_arm_is_slowed_by_its_own_speeds(tmp_path: Path):
+    bare = toy_cell()
+    recorded_cell(bare, tmp_path / "run.h5").arm.slow_down(0.1)
+    assert bare.arm._pace == 0.1
