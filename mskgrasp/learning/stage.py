@@ -108,6 +108,38 @@ class Stage:
             rate *= min(1.0, (step + 1) / warm) * 0.5 * (1 + math.cos(math.pi * step / total))
         return rate
 
+    def run(
+        self,
+        history: list[EpochMetrics],
+        reporter: Reporter,
+        *,
+        done: int = 0,
+        best: dict[str, Tensor] | None = None,
+        save: Callable[[int, dict[str, Tensor]], None] = lambda *_: None,
+    ) -> None:
+        """Train all epochs that are left, and give the network the weights of the best, or of the last.
+
+        Args:
+            history: Metrics of the epochs so far, of other networks', too; those of this one are added.
+            reporter: Receives the progress.
+            done: Epochs that are finished.
+            best: Weights at the lowest validation loss of these.
+            save: Called after every epoch with the number of those that are finished, and the best weights.
+        """
+        best = best or {}
+        reporter.stage(self.name, epochs=self.settings.epochs, batches=self.batches, done=done * self.batches)
+        for number in range(done, self.settings.epochs):
+            earlier = [one.validation_loss for one in history if one.stage == self.name]
+            if self.settings.patience is not None and _epochs_since_best(earlier) >= self.settings.patience:
+                break
+            found = self.epoch(number, reporter)
+            history.append(found)
+            if not self.config.keep_best or found.validation_loss <= min(earlier, default=math.inf):
+                best = {key: value.detach().clone() for key, value in self.network.state_dict().items()}
+            save(number + 1, best)
+            reporter.epoch(history)
+        self.finish(best)
+
     def epoch(self, number: int, reporter: Reporter) -> EpochMetrics:
         """Train one epoch and validate."""
         started = time.perf_counter()
@@ -220,3 +252,8 @@ class Stage:
             "translation_rmse": errors.translation_rmse,
             "rotation_rmse": errors.rotation_rmse,
         }
+
+
+def _epochs_since_best(losses: list[float]) -> int:
+    """Epochs after that of the lowest validation loss; the first of equal ones counts."""
+    return len(losses) - 1 - losses.index(min(losses)) if losses else 0

@@ -5,7 +5,6 @@ In between, if asked for, the layers of the GDN learn the quality, from attempts
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -92,11 +91,6 @@ def stages_of(models: Models, config: LearningConfig) -> dict[str, Models]:
     return {"gqn": models, "transfer": before, "gdn": models}
 
 
-def _epochs_since_best(losses: list[float]) -> int:
-    """Epochs after that of the lowest validation loss; the first of equal ones counts."""
-    return len(losses) - 1 - losses.index(min(losses)) if losses else 0
-
-
 def train(
     samples: Samples,
     config: LearningConfig,
@@ -139,17 +133,7 @@ def train(
     networks: dict[str, nn.Module] = {
         name: one.gdn if name == "gdn" else one.gqn for name, one in stages.items()
     }
-    saved = read_checkpoint(checkpoint_path) if checkpoint_path.exists() else None
-    if saved is not None and saved.fingerprint != samples.fingerprint:
-        raise UsageError(f"{checkpoint_path} was made from other data; choose another --out or delete it")
-    if saved is not None and saved.samples_version != SAMPLES_VERSION:
-        raise UsageError(
-            f"{checkpoint_path} was made with version {saved.samples_version} of the samples, this is "
-            f"version {SAMPLES_VERSION}; choose another --out or delete it"
-        )
-    if saved is not None and saved.stage not in stages:
-        raise UsageError(f"{checkpoint_path} was made with other settings; choose another --out or delete it")
-
+    saved = _resumable(checkpoint_path, samples, list(stages))
     history: list[EpochMetrics] = list(saved.history) if saved else []
     for name in list(stages)[list(stages).index(saved.stage) if saved else 0 :]:
         network = networks[name]
@@ -166,32 +150,21 @@ def train(
         if saved is not None and saved.stage == name:
             restore_checkpoint(saved, networks, stage.optimiser)
             best, done = saved.best, saved.epoch
-        reporter.stage(name, epochs=stage.settings.epochs, batches=stage.batches, done=done * stage.batches)
-        for number in range(done, stage.settings.epochs):
-            earlier = [one.validation_loss for one in history if one.stage == name]
-            if stage.settings.patience is not None and _epochs_since_best(earlier) >= stage.settings.patience:
-                break
-            found = stage.epoch(number, reporter)
-            history.append(found)
-            if not config.keep_best or found.validation_loss <= min(earlier, default=math.inf):
-                best = {key: value.detach().clone() for key, value in network.state_dict().items()}
-            write_checkpoint(
-                checkpoint_path,
-                Checkpoint(
-                    fingerprint=samples.fingerprint,
-                    samples_version=SAMPLES_VERSION,
-                    stage=name,
-                    epoch=number + 1,
-                    history=history,
-                    weights={
-                        f"{n}.{k}": v for n, net in networks.items() for k, v in net.state_dict().items()
-                    },
-                    best=best,
-                    optimiser=optimiser_tensors(stage.optimiser),
-                ),
+
+        def save(finished: int, best: dict[str, Tensor], stage: Stage = stage) -> None:
+            checkpoint = Checkpoint(
+                fingerprint=samples.fingerprint,
+                samples_version=SAMPLES_VERSION,
+                stage=stage.name,
+                epoch=finished,
+                history=history,
+                weights={f"{n}.{k}": v for n, net in networks.items() for k, v in net.state_dict().items()},
+                best=best,
+                optimiser=optimiser_tensors(stage.optimiser),
             )
-            reporter.epoch(history)
-        stage.finish(best)
+            write_checkpoint(checkpoint_path, checkpoint)
+
+        stage.run(history, reporter, done=done, best=best, save=save)
 
     if config.calibrate:
         found = held_out.calibrate(models, samples, sides.validation)
@@ -201,3 +174,25 @@ def train(
         if len(rows):
             stored[side] = held_out.measure_models(models, samples, sides.training, rows).to_json()
     return replace(models, meta=models.meta.model_copy(update={"metrics": stored})), history
+
+
+def _resumable(path: Path, samples: Samples, stages: list[str]) -> Checkpoint | None:
+    """The checkpoint that the training goes on with; None where there is none.
+
+    Raises:
+        UsageError: It was made from other data, with another version of the samples, or other settings.
+    """
+    if not path.exists():
+        return None
+    saved = read_checkpoint(path)
+    remedy = "choose another --out or delete it"
+    if saved.fingerprint != samples.fingerprint:
+        raise UsageError(f"{path} was made from other data; {remedy}")
+    if saved.samples_version != SAMPLES_VERSION:
+        raise UsageError(
+            f"{path} was made with version {saved.samples_version} of the samples, this is version "
+            f"{SAMPLES_VERSION}; {remedy}"
+        )
+    if saved.stage not in stages:
+        raise UsageError(f"{path} was made with other settings; {remedy}")
+    return saved

@@ -227,22 +227,13 @@ def displacement_trained(
     reporter: Reporter,
     device: torch.device | str = "cpu",
 ) -> Models:
-    """A displacement network at the epoch of its lowest validation loss."""
+    """A displacement network, trained as in `mskgrasp.learning.trainer.train`."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         models = build(describe_networks(samples, sides.training, config))
     models.gqn.to(device)
     models.gdn.to(device)
-    stage = Stage("gdn", models, samples, sides, config)
-    reporter.stage("gdn", epochs=config.gdn.epochs, batches=stage.batches, done=0)
-    least, best = math.inf, {}
-    for number in range(config.gdn.epochs):
-        found = stage.epoch(number, reporter)
-        reporter.epoch([found])
-        if found.validation_loss <= least:
-            least = found.validation_loss
-            best = {key: value.detach().clone() for key, value in models.gdn.state_dict().items()}
-    stage.finish(best)
+    Stage("gdn", models, samples, sides, config).run([], reporter)
     return models
 
 
