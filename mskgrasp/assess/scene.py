@@ -44,14 +44,11 @@ def scene_page(part: Part, certified: CertifiedGrasps, n_poses: int = 4) -> str:
     step = 1.3 * float(np.linalg.norm(part.extents)) + 0.05
     for column, number in enumerate(numbers):
         aside = np.array([column * step, 0.0, 0.0])
-        lying = Pose(
-            position=aside + [0.0, 0.0, part.resting.position[number, 2]],
-            quat_wxyz=part.resting.quat_wxyz[number],
-        )
+        at = Pose.translation(aside)
+        lying = at @ part.resting[number]
         scene.add_geometry(_painted(mesh, _PART), transform=lying.as_matrix())
         grasps, _ = certified.of(number)
         if grasps:
-            at = Pose(position=aside, quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
             hand = at @ pose_base_grasp(grasps[0].grasp)
             for box in hand_boxes():
                 scene.add_geometry(_painted(box, _HAND), transform=hand.as_matrix())

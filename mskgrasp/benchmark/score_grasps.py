@@ -10,7 +10,11 @@ import numpy as np
 
 from hal.camera import RgbdFrame
 from mskgrasp.benchmark.config import BenchmarkConfig
-from mskgrasp.core.displacement_covariance import displacement_jacobian
+from mskgrasp.core.displacement_covariance import (
+    half_turned_covariance,
+    half_turned_displacement,
+    object_displacement_covariance,
+)
 from mskgrasp.core.errors import NoPartFound, UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
@@ -32,7 +36,7 @@ from mskgrasp.planning.isaac_grasp import (
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import note
-from mskgrasp.simulation.repeats import place_part
+from mskgrasp.simulation.repeats import captured_frame, place_part
 from mskgrasp.simulation.resting import resting_of
 
 
@@ -114,13 +118,8 @@ def score(part: Part, models: Models, grasps: Mapping[str, TopDownGrasp]) -> dic
             which = list(env.standing[0].numbers).index(resting)
             middle = np.array([REGION[0] + REGION[1], REGION[2] + REGION[3]]) / 2
             lying = place_part(env, which, middle, 0.0)
-            depth = env.capture_depth()[0].cpu().numpy()
-            frame = RgbdFrame(
-                colour=np.zeros((*depth.shape, 3), np.uint8), depth=depth, intrinsics=env.intrinsics,
-                T_base_camera=env.T_base_camera, timestamp_s=0.0, serial="simulated",
-            )  # fmt: skip
             try:
-                scores |= _scored(part, models, frame, lying, some)
+                scores |= _scored(part, models, captured_frame(env), lying, some)
             except NoPartFound:  # too flat or thin
                 note(f"left out: {', '.join(some)}: in pose {resting} the camera does not see the part")
     finally:
@@ -144,14 +143,12 @@ def _scored(
     scores = {}
     for row, (name, one) in enumerate(grasps.items()):
         sign = one.sign * half_turned(T_base_rest, one.grasp, vectors[row])
-        signs = np.array([sign, sign, 1.0, 1.0])
         origin = centre_in_grasp_frame(np.asarray(lying.position), vectors[row])
-        moved = signs * to_object_displacement(mean[row, :4], origin)
+        moved = half_turned_displacement(to_object_displacement(mean[row, :4], origin), sign)
         scores[name] = dict(
             confidence=round(float(quality[row]), 4), displacement=moved.tolist(), resting=resting
         )
         if np.isfinite(variance[row, :4]).all():
-            jacobian = displacement_jacobian(mean[row, :4], origin)
-            covariance = jacobian @ np.diag(variance[row, :4]) @ jacobian.T * signs * signs[:, None]
-            scores[name]["displacement_cov"] = covariance.tolist()
+            covariance = object_displacement_covariance(mean[row, :4], variance[row, :4], origin)
+            scores[name]["displacement_cov"] = half_turned_covariance(covariance, sign).tolist()
     return scores

@@ -24,6 +24,33 @@ def object_displacement_covariance(
     return jacobian * variance[..., None, :] @ np.swapaxes(jacobian, -1, -2)
 
 
+def grasp_displacement_covariance(
+    grasp_displacement: np.ndarray, covariance: np.ndarray, centre_grasp: np.ndarray
+) -> np.ndarray:
+    """Compute the covariance (4, 4) of a grasp displacement (4,) from that of a point's displacement.
+
+    The inverse of `object_displacement_covariance`, to first order.
+
+    Args:
+        grasp_displacement: (4,) mean.
+        covariance: (4, 4) of the point's displacement.
+        centre_grasp: (3,) the point in the grasp frame before the grasp, metres.
+    """
+    inverse = np.linalg.inv(displacement_jacobian(grasp_displacement, centre_grasp))
+    return inverse @ covariance @ inverse.T
+
+
+def half_turned_displacement(displacement: np.ndarray, sign: float) -> np.ndarray:
+    """A displacement (..., 4) in the axes of a grasp turned by half a turn (sign -1), or not (1)."""
+    return displacement * np.array([sign, sign, 1.0, 1.0])
+
+
+def half_turned_covariance(covariance: np.ndarray, sign: float) -> np.ndarray:
+    """Its covariance (4, 4)."""
+    signs = np.array([sign, sign, 1.0, 1.0])
+    return covariance * signs * signs[:, None]
+
+
 def displacement_jacobian(grasp_displacement: np.ndarray, centre_grasp: np.ndarray) -> np.ndarray:
     """Derivative (..., 4, 4) of `grasp.to_object_displacement` by the grasp displacement (..., 4).
 

@@ -112,6 +112,11 @@ def twist_and_swing(quat_wxyz: Array) -> tuple[Array, Array]:
     return twist, swing
 
 
+def twist_and_swing_between(before: Pose, after: Pose) -> tuple[Array, Array]:
+    """`twist_and_swing` of the rotation that turns one pose into another, in the axes of their frame."""
+    return twist_and_swing(quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz)))
+
+
 def swing_vector(quat_wxyz: Array) -> Array:
     """Rotation vectors (..., 2), radians about x and y, of what remains when the twist about z is removed.
 
@@ -183,6 +188,15 @@ class Pose:
     def from_vector(cls, vector: Array) -> Pose:
         """Poses of vectors (..., 7): x y z qw qx qy qz."""
         return cls(position=vector[..., :3], quat_wxyz=vector[..., 3:])
+
+    @classmethod
+    def translation(cls, position: Array) -> Pose:
+        """The pose at a position (3,) in the axes of its frame."""
+        return cls(position=position, quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
+
+    def __getitem__(self, index: int) -> Pose:
+        """One of several poses."""
+        return Pose(position=self.position[index], quat_wxyz=self.quat_wxyz[index])
 
     def as_vector(self) -> Array:
         """(..., 7): x y z qw qx qy qz."""

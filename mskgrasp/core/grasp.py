@@ -28,7 +28,7 @@ from mskgrasp.core.geometry import (
     quat_multiply,
     quat_rotate,
     swing_vector,
-    twist_and_swing,
+    twist_and_swing_between,
     wrap_angle,
 )
 
@@ -159,7 +159,7 @@ def object_displacement(T_tcp_obj_before: Pose, T_tcp_obj_after: Pose) -> tuple[
     """
     before, after = (_tcp_to_grasp_frame(pose) for pose in (T_tcp_obj_before, T_tcp_obj_after))
     xp = array_namespace(before.position)
-    dtheta, tilt = twist_and_swing(quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz)))
+    dtheta, tilt = twist_and_swing_between(before, after)
     moved = after.position - before.position
     return xp.concat([moved, dtheta[..., None]], axis=-1), tilt
 

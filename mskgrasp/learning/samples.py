@@ -129,22 +129,9 @@ class Samples:
                 f"no part's success lies in {low:g}..{high:g} (found {found}); widen success_range"
             )
         rows = torch.isin(self.part, torch.tensor(kept, device=self.part.device))
-        return replace(
-            self,
-            patches=self.patches[rows],
-            object_patches=None if self.object_patches is None else self.object_patches[rows],
-            theta=self.theta[rows],
-            centre_grasp=self.centre_grasp[rows],
-            origin_grasp=self.origin_grasp[rows],
-            quat_grasp_obj=self.quat_grasp_obj[rows],
-            height=self.height[rows],
-            success=self.success[rows],
-            displacement=self.displacement[rows],
-            grasp_displacement=self.grasp_displacement[rows],
-            swing=self.swing[rows],
-            part=torch.searchsorted(torch.tensor(kept, device=self.part.device), self.part[rows]),
-            parts=tuple(self.parts[i] for i in kept),
-        )
+        chosen = {name: values[rows] for name, values in vars(self).items() if isinstance(values, Tensor)}
+        chosen["part"] = torch.searchsorted(torch.tensor(kept, device=self.part.device), chosen["part"])
+        return replace(self, **chosen, parts=tuple(self.parts[i] for i in kept))
 
 
 def read_samples(

@@ -14,7 +14,11 @@ import numpy as np
 from hal.camera import RgbdFrame
 from hal.cell import Cell
 from hal.errors import OutOfWorkspace
-from mskgrasp.core.displacement_covariance import displacement_jacobian
+from mskgrasp.core.displacement_covariance import (
+    grasp_displacement_covariance,
+    half_turned_covariance,
+    half_turned_displacement,
+)
 from mskgrasp.core.errors import BadPart, PartNotRecognised
 from mskgrasp.core.geometry import twist_and_swing
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, to_grasp_displacement
@@ -161,25 +165,22 @@ class CertifiedPlanner:
         scores = np.array(
             [one.score(_turned_covariance(found.covariance, facing + one.grasp[3]), radius) for one in grasps]
         )
-        for row in np.argsort(scores, kind="stable"):
-            grasp = Grasp.from_vector(vectors[row])
-            if self._reachable(grasp):
-                break
-        else:
+        order = np.argsort(scores, kind="stable")
+        row = next((row for row in order if self._reachable(Grasp.from_vector(vectors[row]))), None)
+        if row is None:
             return None
         chosen = grasps[row]
         sign = half_turned(T_base_rest, chosen.grasp, vectors[row])
         covariance = chosen.covariance(_turned_covariance(found.covariance, facing + chosen.grasp[3]))
-        mean, covariance = chosen.mean * [sign, sign, 1, 1], _flipped(covariance, sign) + SIMULATED_ALIKE
+        mean = half_turned_displacement(chosen.mean, sign)
+        covariance = half_turned_covariance(covariance, sign) + SIMULATED_ALIKE
         origin = centre_in_grasp_frame(np.asarray(found.T_base_obj.position), vectors[row])
         motion = to_grasp_displacement(mean, origin)
-        inverse = np.linalg.inv(displacement_jacobian(motion, origin))
-        order = np.argsort(scores, kind="stable")
         return GraspPlan(
-            grasp=grasp,
+            grasp=Grasp.from_vector(vectors[row]),
             quality=_share(chosen),
             grasp_displacement=motion,
-            grasp_displacement_cov=inverse @ covariance @ inverse.T,
+            grasp_displacement_cov=grasp_displacement_covariance(motion, covariance, origin),
             swing=sign * chosen.swing,
             swing_var=np.diag(chosen.swing_cov).copy(),
             score=float(scores[row]),
@@ -237,8 +238,3 @@ def _turned_covariance(covariance: np.ndarray, angle: float) -> np.ndarray:
     cos, sin = np.cos(angle), np.sin(angle)
     into = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
     return into @ covariance @ into.T
-
-
-def _flipped(covariance: np.ndarray, sign: float) -> np.ndarray:
-    signs = np.array([sign, sign, 1.0, 1.0])
-    return covariance * signs * signs[:, None]

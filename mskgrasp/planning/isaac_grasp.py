@@ -39,14 +39,10 @@ def write_isaac_grasp(path: Path, part: Part, certified: CertifiedGrasps) -> Non
     Raises:
         OSError: The disk is full or not writable.
     """
-    T_tcp_hand = Pose(position=np.array([0.0, 0.0, -TCP_OFFSET]), quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
+    T_tcp_hand = Pose.translation(np.array([0.0, 0.0, -TCP_OFFSET]))
     grasps = {}
     for number, one in enumerate(certified.grasps):
-        T_table_obj = Pose(
-            position=np.array([0.0, 0.0, part.resting.position[one.resting, 2]]),
-            quat_wxyz=part.resting.quat_wxyz[one.resting],
-        )
-        hand = T_table_obj.inverse() @ pose_base_tcp(one.grasp) @ T_tcp_hand
+        hand = part.resting[one.resting].inverse() @ pose_base_tcp(one.grasp) @ T_tcp_hand
         w, *xyz = (float(value) for value in hand.quat_wxyz)
         grasps[f"grasp_{number}_pose_{one.resting}"] = dict(
             confidence=round((one.lifted + 1) / (one.n + 2), 4),
@@ -111,9 +107,7 @@ def read_isaac_grasp(path: Path) -> IsaacGrasps:
         raise BadConfig(
             f"{path}: gripper_frame_link is {link!r}, legal: {', '.join(_TCP_IN_LINK)}, the only known hand"
         )
-    T_link_tcp = Pose(
-        position=np.array([0.0, 0.0, _TCP_IN_LINK[link]]), quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0])
-    )
+    T_link_tcp = Pose.translation(np.array([0.0, 0.0, _TCP_IN_LINK[link]]))
     found = {}
     grasps = values.get("grasps")
     if not isinstance(grasps, dict) or not grasps:
@@ -148,11 +142,7 @@ def top_down_grasp(part: Part, T_obj_tcp: Pose, stands: Sequence[bool] | None = 
     for number in range(len(part.resting_probability)):
         if stands is not None and not stands[number]:
             continue
-        T_table_obj = Pose(
-            position=np.array([0.0, 0.0, part.resting.position[number, 2]]),
-            quat_wxyz=part.resting.quat_wxyz[number],
-        )
-        T_table_tcp = T_table_obj @ T_obj_tcp
+        T_table_tcp = part.resting[number] @ T_obj_tcp
         axes = quat_to_matrix(np.asarray(T_table_tcp.quat_wxyz))
         tilt = float(np.arccos(np.clip(-axes[2, 2], -1.0, 1.0)))
         if tilt <= MOST_TILT and T_table_tcp.position[2] >= lowest_grasp_z(0.0) - _ROUNDING:

@@ -13,10 +13,9 @@ from hal.execute import APPROACH, PUT_DOWN, clear_height, let_go
 from mskgrasp.core.geometry import (
     Pose,
     quat_about_z,
-    quat_conjugate,
     quat_multiply,
     quat_rotate,
-    twist_and_swing,
+    twist_and_swing_between,
     wrap_angle,
 )
 from mskgrasp.core.grasp import Grasp, PartView
@@ -122,7 +121,7 @@ def place_error(before: Pose, after: Pose, centre_offset: np.ndarray, target: Ta
             is that of this point.
         target: Target of the centre.
     """
-    turn = float(twist_and_swing(quat_multiply(after.quat_wxyz, quat_conjugate(before.quat_wxyz)))[0])
+    turn = float(twist_and_swing_between(before, after)[0])
     cos, sin = np.cos(turn), np.sin(turn)
     x, y = centre_offset
     centre = after.position[:2] + [cos * x - sin * y, sin * x + cos * y]

@@ -12,7 +12,11 @@ import numpy as np
 from hal.backends import find_backend, package_of
 from hal.camera import RgbdFrame
 from hal.cell import Workspace
-from mskgrasp.core.displacement_covariance import displacement_jacobian
+from mskgrasp.core.displacement_covariance import (
+    grasp_displacement_covariance,
+    half_turned_covariance,
+    half_turned_displacement,
+)
 from mskgrasp.core.errors import BadPlanner, MskgraspError
 from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, to_grasp_displacement
@@ -122,7 +126,6 @@ def plan_of(proposed: ProposedGrasp, view: PartView, seconds: float) -> GraspPla
     grasp[3] = wrap_half_turn(given[3])
     # The axes of a grasp that is turned by half a turn are reversed.
     sign = 1.0 if np.cos(grasp[3] - given[3]) > 0 else -1.0
-    signs = np.array([sign, sign, 1.0, 1.0])
     quality = np.nan if proposed.quality is None else float(proposed.quality)
     if proposed.quality is not None and not 0 <= quality <= 1:
         raise ValueError(f"quality is {quality:g}, legal: 0 .. 1")
@@ -130,13 +133,13 @@ def plan_of(proposed: ProposedGrasp, view: PartView, seconds: float) -> GraspPla
     point = centre_in_grasp_frame(_checked("point_base", point_base, (3,)), grasp)
     motion = np.zeros(4)
     if proposed.displacement is not None:
-        moved = signs * _checked("displacement", proposed.displacement, (4,))
+        moved = half_turned_displacement(_checked("displacement", proposed.displacement, (4,)), sign)
         motion = np.asarray(to_grasp_displacement(moved, point))
     covariance, score = np.full((4, 4), np.nan), np.nan
     if proposed.displacement_cov is not None:
-        of_point = _checked("displacement_cov", proposed.displacement_cov, (4, 4)) * signs * signs[:, None]
-        inverse = np.linalg.inv(displacement_jacobian(motion, point))
-        covariance = inverse @ of_point @ inverse.T
+        given_cov = _checked("displacement_cov", proposed.displacement_cov, (4, 4))
+        of_point = half_turned_covariance(given_cov, sign)
+        covariance = grasp_displacement_covariance(motion, of_point, point)
         score = float(np.trace(of_point[:3, :3]) + view.gyration_radius**2 * of_point[3, 3])
     return GraspPlan(
         grasp=Grasp.from_vector(grasp),

@@ -16,7 +16,6 @@ from typing import TypeVar
 import numpy as np
 from pydantic import Field
 
-from hal.camera import RgbdFrame
 from mskgrasp.core.config import Config
 from mskgrasp.core.errors import NoPartFound
 from mskgrasp.core.geometry import wrap_half_turn
@@ -40,7 +39,7 @@ from mskgrasp.planning.certified import (
 from mskgrasp.planning.planner import Planner, shortlist, variance_score
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 from mskgrasp.simulation.pad_contact import HeldPart, moment_share
-from mskgrasp.simulation.repeats import PoseErrors, Repeat, place_part, repeat_grasp
+from mskgrasp.simulation.repeats import PoseErrors, Repeat, captured_frame, place_part, repeat_grasp
 from tasks import GraspDisplacementEnv
 
 CERTIFY_VERSION = 5
@@ -233,15 +232,7 @@ def candidate_grasps(
     held: list[HeldPart] = []
     for turn in rng.uniform(-np.pi, np.pi, size=3):
         pose = place_part(env, member.which, middle, float(turn))
-        depth = env.capture_depth()[0].cpu().numpy()
-        frame = RgbdFrame(
-            colour=np.zeros((*depth.shape, 3), np.uint8),
-            depth=depth,
-            intrinsics=env.intrinsics,
-            T_base_camera=env.T_base_camera,
-            timestamp_s=0.0,
-            serial="simulated",
-        )
+        frame = captured_frame(env)
         try:
             view, drawn = planner.sample(frame, rng)
         except NoPartFound:  # too flat for the camera

@@ -8,7 +8,9 @@ import numpy as np
 import torch
 from pydantic import Field
 
+from hal.camera import RgbdFrame
 from mskgrasp.core.config import Config
+from mskgrasp.core.displacement_covariance import half_turned_displacement
 from mskgrasp.core.geometry import Pose, quat_about_z, quat_multiply
 from mskgrasp.core.grasp import (
     FAILURES,
@@ -71,6 +73,19 @@ def place_part(env: GraspDisplacementEnv, which: int, place: np.ndarray, turn: f
     return pose
 
 
+def captured_frame(env: GraspDisplacementEnv) -> RgbdFrame:
+    """The scene as the task's depth camera sees it, without colour."""
+    depth = env.capture_depth()[0].cpu().numpy()
+    return RgbdFrame(
+        colour=np.zeros((*depth.shape, 3), np.uint8),
+        depth=depth,
+        intrinsics=env.intrinsics,
+        T_base_camera=env.T_base_camera,
+        timestamp_s=0.0,
+        serial="simulated",
+    )
+
+
 def repeat_grasp(
     env: GraspDisplacementEnv,
     which: int,
@@ -117,7 +132,7 @@ def repeat_grasp(
     return Repeat(
         reason="",
         error=error,
-        displacement=np.asarray(displacement) * [sign, sign, 1.0, 1.0],
+        displacement=half_turned_displacement(np.asarray(displacement), sign),
         swing=sign * np.asarray(swing_in_hand(before, after)),
     )
 

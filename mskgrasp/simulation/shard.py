@@ -17,6 +17,7 @@ from mskgrasp.core.grasp import HAND_GEOMETRY, MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
 from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, u16_to_depth, write_shard
+from mskgrasp.dataset.attempts import COLUMNS
 from mskgrasp.dataset.labels import ShardLabels
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.simulation.shard_task import ShardTask
@@ -219,25 +220,9 @@ def discard_reason(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray])
 
 
 def _stack(rows: list[dict[str, np.ndarray]], shape: tuple[int, int]) -> Attempts:
-    empty: dict[str, Any] = dict(
-        depth=np.zeros((0, *shape), np.uint16),
-        grasp=np.zeros((0, 4), np.float32),
-        success=np.zeros(0, bool),
-        failure=np.zeros(0, np.uint8),
-        displacement=np.zeros((0, 4), np.float32),
-        tilt=np.zeros(0, np.float32),
-        width_after=np.zeros(0, np.float32),
-        relative_speed=np.zeros(0, np.float32),
-        pose_base_obj=np.zeros((0, 7), np.float32),
-        pose_tcp_obj_before=np.zeros((0, 7), np.float32),
-        pose_tcp_obj_after=np.zeros((0, 7), np.float32),
-        attempt=np.zeros(0, np.int32),
-        draw=np.zeros(0, np.int32),
-        finger_force=np.zeros(0, np.float32),
-        friction_pad_part=np.zeros(0, np.float32),
-    )
-    if not rows:
-        return Attempts(**empty)
-    return Attempts(
-        **{name: np.stack([row[name] for row in rows]).astype(kind.dtype) for name, kind in empty.items()}
-    )
+    arrays: dict[str, Any] = {}
+    for name, column in COLUMNS.items():
+        rest = shape if column.shape is None else column.shape
+        values = np.stack([row[name] for row in rows]) if rows else np.zeros((0, *rest))
+        arrays[name] = values.astype(column.dtype)
+    return Attempts(**arrays)

@@ -16,6 +16,7 @@ from mskgrasp.core.geometry import (
     quat_conjugate,
     quat_multiply,
     twist_and_swing,
+    twist_and_swing_between,
     wrap_angle,
 )
 from mskgrasp.core.grasp import Grasp, centre_in_grasp_frame, object_displacement
@@ -255,7 +256,7 @@ def _centre_error(part: Part, plan: GraspPlan, true: Pose) -> np.ndarray:
 
 def _pose_error(grasp: Grasp, found: Pose, true: Pose) -> np.ndarray:
     """(3,) x, y and turn of a found pose less those of the true one, axes of the grasp frame."""
-    turn, _ = twist_and_swing(quat_multiply(found.quat_wxyz, quat_conjugate(true.quat_wxyz)))
+    turn, _ = twist_and_swing_between(true, found)
     return np.append(_along(grasp, np.asarray(found.position) - np.asarray(true.position)), float(turn))
 
 
@@ -282,7 +283,7 @@ def _moved(before: Pose, after: Pose, point_tcp: np.ndarray) -> np.ndarray:
 
 def _off(pose: Grasp, seen: Pose, point: np.ndarray, after: Pose, target: Target) -> np.ndarray:
     """(3,) x, y and turn of a placed part less those of its target, axes of the grasp frame at the target."""
-    made, _ = twist_and_swing(quat_multiply(after.quat_wxyz, quat_conjugate(seen.quat_wxyz)))
+    made, _ = twist_and_swing_between(seen, after)
     now = (after @ seen.inverse()).apply(point)
     off = np.array([now[0] - target.x, now[1] - target.y, 0.0])
     in_hand = Pose(position=np.zeros(3), quat_wxyz=pose.T_base_grasp.quat_wxyz).inverse().apply(off)

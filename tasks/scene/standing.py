@@ -10,7 +10,7 @@ import sapien
 from sapien.physx import PhysxCpuSystem, PhysxMaterial, PhysxRigidDynamicComponent
 
 from mskgrasp.core.errors import BadPart
-from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing
+from mskgrasp.core.geometry import Pose, quat_conjugate, quat_multiply, twist_and_swing_between
 from mskgrasp.core.settings import TABLE_Z, Physics
 from mskgrasp.parts import Part
 from tasks.scene.part_actor import add_hulls
@@ -89,10 +89,7 @@ def settled_poses(part: Part, physics: Physics) -> Iterator[Pose | None]:
     """
     scene, body = _scene_with(part, physics)
     for which in range(len(part.resting_probability)):
-        start = Pose(
-            position=np.array([0.0, 0.0, part.resting.position[which, 2]]),
-            quat_wxyz=part.resting.quat_wxyz[which],
-        )
+        start = part.resting[which]
         settled = _settle(scene, body, start, physics.rate_hz)
         yield settled if settled is not None and _lean(start, settled) <= MAX_LEAN else None
 
@@ -143,4 +140,4 @@ def _still(before: Pose, after: Pose) -> bool:
 
 def _lean(start: Pose, settled: Pose) -> float:
     """Swing between two poses, rad: their turn about the vertical does not count."""
-    return float(twist_and_swing(quat_multiply(settled.quat_wxyz, quat_conjugate(start.quat_wxyz)))[1])
+    return float(twist_and_swing_between(start, settled)[1])

@@ -148,12 +148,8 @@ class KnownPart:
 
     def pose(self, lying: Lying, x: float, y: float, turn: float, table_z: float) -> Pose:
         """``T_base_obj`` of the part at a place and turn of the frame of a resting pose."""
-        resting = Pose(
-            position=np.array([0.0, 0.0, self.part.resting.position[lying.resting, 2]]),
-            quat_wxyz=self.part.resting.quat_wxyz[lying.resting],
-        )
         place = Pose(position=np.array([x, y, table_z]), quat_wxyz=quat_about_z(np.asarray(turn)))
-        return place @ resting
+        return place @ self.part.resting[lying.resting]
 
 
 @dataclass(frozen=True, kw_only=True)
