@@ -60,7 +60,8 @@ def find_backend(name: Any, group: Group, built_in: tuple[str, ...], key: str) -
     if not owners:
         others = sorted(f"{entry.name} (package {_package(entry)})" for entry in found)
         legal = ", ".join(built_in) + " (built in)"
-        raise BadConfig(f"{key} is {name!r}; legal: {', '.join([legal, *others])}")
+        given = "missing" if name is None else repr(name)
+        raise BadConfig(f"{key} is {given}; legal: {', '.join([legal, *others])}")
     return None if name in built_in else next(entry for entry in found if entry.name == name)
 
 

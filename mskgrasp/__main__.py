@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 
+from mskgrasp import __version__
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 from mskgrasp.runtime.programs import GROUPS, PROGRAMS
@@ -21,7 +22,7 @@ _EXAMPLE = """Order of work, for a part of your own:
   mskgrasp evaluate --models models/mine --parts my_bracket
   mskgrasp doctor --cell my_cell.yaml                      # on a real cell; then --cell everywhere
 
-mskgrasp PROGRAM --help explains the options of a program and names the page about it.
+mskgrasp PROGRAM --help explains the options of a program and names the page about it; mskgrasp --version.
 mskgrasp completion bash|zsh|tcsh prints a script that completes programs and options (docs/index.md)."""
 
 
@@ -30,6 +31,9 @@ def main() -> None:
     name = sys.argv[1] if len(sys.argv) > 1 else "--help"
     if name in ("-h", "--help"):
         print(usage())
+        sys.exit(0)
+    if name == "--version":
+        print(f"mskgrasp {__version__}")
         sys.exit(0)
     if name == COMPLETION:
         run(f"mskgrasp {COMPLETION}", lambda: _print_completion(sys.argv[2:]))

@@ -75,6 +75,8 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
         )
     values = read_yaml(cell_file)
     cell = cell_from_values(_with_camera_at(values, config, cell_file), cell_file)
+    if cell.arm.simulated and cell.board_holder is None:
+        raise UsageError(f"{cell_file}: nothing draws a board in this simulated cell; type: sapien does")
     write_config(config.board, config.out / "board.yaml")
 
     def keep(index: int, picture: Picture, n_corners: int) -> None:
@@ -223,6 +225,7 @@ def _ask(prompt: str) -> None:
             forget_typed(sys.stdin)
         input(prompt + " ")
     except (EOFError, RuntimeError):  # at its end, or closed
+        print()
         raise UsageError("an operator must put the board into the hand; run this in a terminal") from None
 
 

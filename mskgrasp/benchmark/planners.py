@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import shutil
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -64,6 +66,17 @@ def check_planners(config: BenchmarkConfig) -> None:
             raise UsageError("planner 'program' needs --program: the command that starts it")
     if config.program and PROGRAM not in config.rows:
         raise UsageError("--program is given, but --planners does not name program; add it")
+    if config.program:
+        _check_program(config.program)
+
+
+def _check_program(command: str) -> None:
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise UsageError(f"--program {command!r}: {error}; close the quote") from error
+    if not words or shutil.which(words[0]) is None:
+        raise UsageError(f"--program {command!r}: there is no such program; give its path")
 
 
 def package_digests(names: tuple[str, ...]) -> dict[str, str]:

@@ -14,8 +14,8 @@ _repr.maxstring = _repr.maxother = 80
 
 
 def shown(value: object) -> str:
-    """A value as a message shows it: its ``repr``, abbreviated where it is long."""
-    return _repr.repr(value)
+    """A value as a message shows it: its ``repr``, abbreviated where it is long; None as in YAML."""
+    return "null" if value is None else _repr.repr(value)
 
 
 def printable(text: str) -> str:

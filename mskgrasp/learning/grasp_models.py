@@ -250,7 +250,8 @@ def require_model(folder: Path) -> None:
     for name in (DESCRIPTION, WEIGHTS):
         if not (folder / name).is_file():
             raise MissingModel(
-                f"no {name} in {folder}; train a model: python -m mskgrasp.train --out {folder}"
+                f"no {name} in {folder}; train a model: python -m mskgrasp.train --data DATASET "
+                f"--out {folder}"
             )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Tape
@@ -59,6 +59,12 @@ class PalletizeConfig(Config):
         if sides is not None:
             Tape(large=sides[0], small=sides[1])
         return sides
+
+    @model_validator(mode="after")
+    def _one_target(self) -> PalletizeConfig:
+        if self.slots is not None and self.target != PalletizeConfig.model_fields["target"].default:
+            raise ValueError("target and slots exclude each other: leave one out")
+        return self
 
     def squares(self) -> Tape | None:
         """The tape that measures; None: the tracker."""

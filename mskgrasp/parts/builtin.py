@@ -132,7 +132,11 @@ def unknown_part(name: str, *, builtin_only: bool = False) -> UnknownPart:
         return UnknownPart(f"{name} is drawn in CAD, which needs an extra: run EXTRAS=dev,cad .ci/setup")
     known = builtin_names() if builtin_only else (*builtin_names(), *imported_names())
     close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
-    hint = f"did you mean {', '.join(close)}?" if close else "`python -m mskgrasp.parts list` shows the parts"
+    hint = (
+        f"did you mean {', '.join(close)}?"
+        if close
+        else "`python -m mskgrasp.parts list` shows the parts, with --catalogue all"
+    )
     kind = "built-in part" if builtin_only else "part or part folder"
     return UnknownPart(f"no {kind} is called {name!r}: {hint}")
 

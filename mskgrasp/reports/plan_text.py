@@ -37,6 +37,7 @@ def plan_text(plan: GraspPlan) -> str:
             f"verdict       {verdict(plan.quality)}",
             f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
             *([] if np.isnan(plan.swing).any() else [f"tilt          {tilted}"]),
+            *([] if np.isnan(plan.score) else [f"precision     {precision(plan.score)}"]),
             f"planned in    {plan.seconds['total']:.2f} s ({stages})",
         ]
     )
@@ -49,6 +50,14 @@ def verdict(quality: float) -> str:
     return (
         f"not worth trying: the part is lifted with a predicted probability of {quality:.0%}, under "
         f"{MIN_QUALITY:.0%}; place it another way"
+    )
+
+
+def precision(score: float) -> str:
+    """A plan's variance score, m^2, in words."""
+    return (
+        f"the part's points are expected {1e3 * np.sqrt(score):.1f} mm (RMS) from their predicted places, a "
+        "tilt included; +- is one standard deviation"
     )
 
 

@@ -47,6 +47,8 @@ def parse(
         UsageError: An option is unknown, or has no value or one of another type.
     """
     rest, path = _take_config_option(list(sys.argv[1:] if argv is None else argv))
+    # The files' word for nothing, which the help uses, too.
+    rest = ["None" if word == "null" else word for word in rest]
     path = path or default_config
     default = read_config(model, path) if path is not None else None
     origin = f" (default: {default_config})" if default_config else ""

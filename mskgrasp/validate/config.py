@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from mskgrasp.core.config import Config
 from mskgrasp.core.settings import Physics
@@ -148,7 +148,10 @@ class ValidateConfig(Config):
                 "rates_hz, iterations and references need at least one value each: --rates-hz 500 1000"
             )
         for rate in self.rates_hz:
-            self.at(rate, self.iterations[0])
+            try:
+                self.at(rate, self.iterations[0])
+            except ValidationError as error:
+                raise ValueError(f"rates_hz: {rate} Hz: {error.errors()[0]['msg'].lower()}") from None
         finest = (max(*self.rates_hz, self.physics.rate_hz), self._most_iterations)
         for reference in self.references:
             if reference.rate_hz <= finest[0] or reference.position_iterations <= finest[1]:

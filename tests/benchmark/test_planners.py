@@ -60,6 +60,8 @@ def test_certified_grasps_that_were_not_made_are_named(planners, tmp_path: Path,
         (dict(planners=("paper",)), UsageError, "planner 'paper' needs --paper-models"),
         (dict(planners=("program",)), UsageError, "planner 'program' needs --program"),
         (dict(planners=("ours",), program="x"), UsageError, "--planners does not name program"),
+        (dict(planners=("program",), program="no-such-program -x"), UsageError, "there is no such program"),
+        (dict(planners=("program",), program="python 'a"), UsageError, "No closing quotation; close the"),
         (dict(planners=("ors",)), BadConfig, "--planners is 'ors'; legal: centroid, antipodal, paper, ours"),
     ],
 )

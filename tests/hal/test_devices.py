@@ -46,7 +46,7 @@ def test_a_cell_is_built_without_connecting(tmp_path: Path):
     ("changes", "message"),
     [
         ({"arm": {"driver": "ur5"}}, "'arm.driver' is 'ur5'; legal: franky, panda_py"),
-        ({"arm": {"driver": None}}, "'arm.driver' is None; legal: franky"),
+        ({"arm": {"driver": None}}, "'arm.driver' is missing; legal: franky"),
         ({"camera": {"driver": "webcam"}}, "'camera.driver' is 'webcam'; legal: "),
         ({"arm": {"max_sped": 1}}, "unknown key 'max_sped'; legal keys here: acceleration"),
         ({"arm": {"max_speed": 3.0}}, "arm: 'max_speed': input should be less than or equal to 1"),

@@ -14,8 +14,8 @@ from mskgrasp.core.errors import BadConfig
     ("text", "message"),
     [
         ("type: sapiens", "'type' is 'sapiens'; legal: sapien"),
-        ("part: hex_nut_m30", "'type' is None; legal: sapien"),
-        ("", "'type' is None"),
+        ("part: hex_nut_m30", "'type' is missing; legal: sapien"),
+        ("", "'type' is missing"),
         ("type: sapien\ngrasp_fource: 20", "unknown key 'grasp_fource'; legal keys here: camera"),
         ("type: sapien\ngrasp_force: 500", "'grasp_force': input should be less than or equal to 70"),
         ("type: sapien\nphysics: {gravity: 1}", "unknown key 'physics.gravity'"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import re
 import subprocess
 import sys
@@ -52,6 +53,10 @@ def test_an_unknown_program_is_one_line_and_a_usage_error(monkeypatch, capsys):
     line = capsys.readouterr().err
     assert ended.value.code == 2 and line.count("\n") == 1
     assert "'plann'" in line and "plan, assess" in line
+
+
+def test_the_version_is_that_of_the_package():
+    assert _mskgrasp("--version").stdout == f"mskgrasp {importlib.metadata.version('mskgrasp')}\n"
 
 
 def test_options_reach_the_program_and_its_exit_code_comes_back():

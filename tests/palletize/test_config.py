@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from mskgrasp.palletize.config import PalletizeConfig
@@ -27,3 +29,9 @@ def test_tape_measures_only_where_its_sizes_are_given():
 def test_what_cannot_be_run_is_refused(values):
     with pytest.raises(ValueError):
         PalletizeConfig.model_validate(values)
+
+
+def test_slots_and_a_target_exclude_each_other():
+    assert PalletizeConfig(slots=Path("grid.yaml")).slots == Path("grid.yaml")
+    with pytest.raises(ValueError, match="target and slots exclude each other"):
+        PalletizeConfig(slots=Path("grid.yaml"), target="0.5,0.06,0")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import numpy as np
@@ -34,3 +35,9 @@ def test_a_plan_says_whether_it_is_worth_trying():
     assert verdict(0.31).startswith("not worth trying: ") and "31%, under 50%" in verdict(0.31)
     plan = planner().plan(FRAME, np.random.default_rng(0))
     assert f"verdict       {verdict(plan.quality)}" in plan_text(plan).splitlines()
+
+
+def test_a_plan_says_how_far_the_part_may_miss_its_predicted_place():
+    plan = dataclasses.replace(planner().plan(FRAME, np.random.default_rng(0)), score=0.0132**2)
+    assert "expected 13.2 mm (RMS) from their predicted places, a tilt included" in plan_text(plan)
+    assert "precision" not in plan_text(dataclasses.replace(plan, score=np.nan))

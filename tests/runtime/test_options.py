@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from hal.calibrate.config import CalibrateConfig
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.runtime.options import parse, parse_command
 from tests.runtime.small_program import COMMANDS, Eat, ProgramConfig, parse_program
@@ -46,6 +47,11 @@ def test_a_command_is_read_with_its_options():
         argv=["eat", "pear", "--n-pieces=3"],
     )
     assert read == Eat("pear", 3)
+
+
+def test_nothing_is_written_as_in_the_files():
+    found = parse(CalibrateConfig, prog="p", description="d", argv=["--cell", "null", "--poses", "20"])
+    assert (found.cell, found.poses) == (None, 20)
 
 
 def test_help_shows_the_models_docstrings(capsys):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from mskgrasp.core.config import check_config, read_config
 from mskgrasp.core.errors import BadConfig
@@ -112,6 +113,11 @@ def test_variants_are_tried_beside_the_grid():
 def test_variants_that_name_nothing_are_refused(values, message):
     with pytest.raises(ValueError, match=message):
         ValidateConfig(variants={"group": {"typo": values}})
+
+
+def test_a_rate_that_no_simulation_has_is_refused_by_the_name_of_its_option():
+    with pytest.raises(ValidationError, match=r"rates_hz: 10 Hz: input should be greater than or equal to"):
+        ValidateConfig(rates_hz=(10, 500))
 
 
 def test_empty_lists_are_refused():

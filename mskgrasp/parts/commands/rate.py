@@ -84,5 +84,6 @@ def _report(index: Index, low: float, high: float) -> None:
         inside, expected, error = passing(index, low, high)
         print(
             f"{inside} of {n_rated} rated parts lie within {low:.0%} - {high:.0%}; of all "
-            f"{len(index.parts)} parts of the catalogue an estimated {expected:.0f} +- {2 * error:.0f} do"
+            f"{len(index.parts)} parts of the catalogue an estimated {expected:.0f} do (95 %: "
+            f"{max(0.0, expected - 1.96 * error):.0f} - {expected + 1.96 * error:.0f})"
         )

@@ -29,7 +29,16 @@ CELLS = Path(__file__).parents[3] / "configs" / "cells"
             ["--cell", str(CELLS / "sapien.yaml"), "--camera-at", "0", "0", "1"],
             "knows where it is",
         ),
-        (calibrate, ["--cell", "empty.yaml", "--camera-at", "0", "0", "1"], "'type' is None; legal: sapien"),
+        (
+            calibrate,
+            ["--cell", "empty.yaml", "--camera-at", "0", "0", "1"],
+            "'type' is missing; legal: sapien",
+        ),
+        (
+            calibrate,
+            ["--cell", str(CELLS / "mujoco.yaml")],
+            "nothing draws a board in this simulated cell; type: sapien",
+        ),
         (calibrate, ["--cell", "."], "Is a directory"),
         (calibrate, ["--camera-towards", "0.5", "0", "0"], "give camera_at, too"),
         (doctor, ["--cell", "none.yaml"], "No such file"),

@@ -131,7 +131,7 @@ def test_a_table_that_is_not_found_writes_nothing(tmp_path: Path, monkeypatch: p
     ("text", "arguments", "message"),
     [
         (None, (), "No such file"),
-        ("", (), "'type' is None; legal: sapien"),
+        ("", (), "'type' is missing; legal: sapien"),
         ("type: replay\nrecording: a.h5\n", (), "a recording has no table to touch"),
         (f"type: recorded\ncell: {CELLS}/sapien.yaml\nout: b.h5\n", (), "a recording has no table to touch"),
         (REPLAYED, (), "a recording has no table to touch"),
