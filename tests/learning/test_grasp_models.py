@@ -53,7 +53,8 @@ def test_missing_files_are_reported(tmp_path, folder):
     (folder / "model.safetensors").unlink()
     assert "no model.safetensors" in complaint(folder)
     with pytest.raises(
-        MissingModel, match=r"no model.safetensors in .*train a model: python -m mskgrasp.train --data DATASET --out"
+        MissingModel,
+        match=r"no model.safetensors in .*train a model: python -m mskgrasp.train --data DATASET",
     ):
         load_models(folder)
 
