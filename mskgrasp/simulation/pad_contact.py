@@ -162,4 +162,5 @@ def _clipped(mesh: trimesh.Trimesh, planes: list) -> trimesh.Trimesh:
 
 @lru_cache(maxsize=2)
 def _mesh(path: Path, content_hash: str) -> trimesh.Trimesh:
+    # The hash is for the cache alone: the file may be another by then.
     return trimesh.load_mesh(path, process=False)
