@@ -13,7 +13,7 @@ from hal.cell import Cell
 from hal.errors import BadBackend
 from hal.limits import ArmLimits
 from mskgrasp.core.config import Config, check_config
-from mskgrasp.core.errors import BadConfig, MskgraspError
+from mskgrasp.core.errors import BadConfig, MskgraspError, first_line
 
 Group = Literal["arms", "cameras", "cells", "planners"]
 DeviceT = TypeVar("DeviceT", Arm, Camera, Cell)
@@ -85,7 +85,9 @@ def build(
     try:
         backend = entry.load()
     except (Exception, SystemExit) as error:
-        raise BadBackend(f"{named} cannot be imported: {_line(error)}; repair or uninstall it") from error
+        raise BadBackend(
+            f"{named} cannot be imported: {first_line(error)}; repair or uninstall it"
+        ) from error
     if not (
         isinstance(backend, Backend)
         and isinstance(backend.config, type)
@@ -102,7 +104,7 @@ def build(
     except MskgraspError:
         raise
     except Exception as error:
-        raise BadBackend(f"{named} cannot be built: {_line(error)}") from error
+        raise BadBackend(f"{named} cannot be built: {first_line(error)}") from error
     _check(device, kind, named)
     return device
 
@@ -129,9 +131,3 @@ def _package(entry: EntryPoint) -> str:
 
 def _shown(value: Any) -> str:
     return f"the class {value.__name__}" if isinstance(value, type) else f"of type {type(value).__name__}"
-
-
-def _line(error: BaseException) -> str:
-    """An error of another's code in one line."""
-    first = next(iter(str(error).splitlines()), "")
-    return f"{type(error).__name__}: {first}" if first else type(error).__name__

@@ -27,6 +27,12 @@ def printable(text: str) -> str:
     return "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)
 
 
+def first_line(error: BaseException) -> str:
+    """Another package's error in one line: its class and the first line of its message."""
+    first = next(iter(str(error).splitlines()), "")
+    return f"{type(error).__name__}: {first}" if first else type(error).__name__
+
+
 def one_line(message: object) -> str:
     """A message as one printable line that fits on a screen; the middle of a longer one is left out."""
     text = str(message)

@@ -92,6 +92,11 @@ class CertifiedGrasp:
         return float(variance[:3].sum() + radius**2 * (variance[3] + np.trace(self.swing_cov)))
 
     @property
+    def expected_share(self) -> float:
+        """Expected share lifted: the mean of its posterior under a uniform prior."""
+        return (self.lifted + 1) / (self.n + 2)
+
+    @property
     def lifted_interval(self) -> tuple[float, float]:
         """95 % interval of the share lifted (Wilson)."""
         return wilson_interval(self.lifted, self.n)

@@ -26,7 +26,6 @@ from mskgrasp.parts import Part
 from mskgrasp.parts.alike_poses import PartSurface
 from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
 from mskgrasp.planning.certified import (
-    CertifiedGrasp,
     CertifiedGrasps,
     half_turned,
     radius_about_vertical,
@@ -178,7 +177,7 @@ class CertifiedPlanner:
         motion = to_grasp_displacement(mean, origin)
         return GraspPlan(
             grasp=Grasp.from_vector(vectors[row]),
-            quality=_share(chosen),
+            quality=chosen.expected_share,
             grasp_displacement=motion,
             grasp_displacement_cov=grasp_displacement_covariance(motion, covariance, origin),
             swing=sign * chosen.swing,
@@ -186,7 +185,7 @@ class CertifiedPlanner:
             score=float(scores[row]),
             view=view,
             candidates=Grasp.from_vector(vectors),
-            qualities=np.array([_share(one) for one in grasps]),
+            qualities=np.array([one.expected_share for one in grasps]),
             shortlist=order,
             shortlist_scores=scores[order],
             seconds={},
@@ -226,11 +225,6 @@ def reachable_by(cell: Cell) -> Callable[[Grasp], bool]:
         return True
 
     return reachable
-
-
-def _share(grasp: CertifiedGrasp) -> float:
-    """Expected share lifted: the mean of its posterior under a uniform prior."""
-    return (grasp.lifted + 1) / (grasp.n + 2)
 
 
 def _turned_covariance(covariance: np.ndarray, angle: float) -> np.ndarray:

@@ -45,7 +45,7 @@ def write_isaac_grasp(path: Path, part: Part, certified: CertifiedGrasps) -> Non
         hand = part.resting[one.resting].inverse() @ pose_base_tcp(one.grasp) @ T_tcp_hand
         w, *xyz = (float(value) for value in hand.quat_wxyz)
         grasps[f"grasp_{number}_pose_{one.resting}"] = dict(
-            confidence=round((one.lifted + 1) / (one.n + 2), 4),
+            confidence=round(one.expected_share, 4),
             position=[float(value) for value in hand.position],
             orientation=dict(w=w, xyz=xyz),
             cspace_position=dict(panda_finger_joint1=0.0),

@@ -17,7 +17,7 @@ from mskgrasp.core.displacement_covariance import (
     half_turned_covariance,
     half_turned_displacement,
 )
-from mskgrasp.core.errors import BadPlanner, MskgraspError
+from mskgrasp.core.errors import BadPlanner, MskgraspError, first_line
 from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, to_grasp_displacement
 from mskgrasp.perception.part_detection import view_part
@@ -89,13 +89,13 @@ class OtherPlanner:
         except MskgraspError:
             raise
         except Exception as error:
-            raise BadPlanner(f"planner {self._name!r} fails: {_line(error)}; repair it") from error
+            raise BadPlanner(f"planner {self._name!r} fails: {first_line(error)}; repair it") from error
         if isinstance(answer, GraspPlan):
             return answer
         try:
             return plan_of(answer, view, time.perf_counter() - started)
         except (ValueError, TypeError, AttributeError, IndexError) as error:
-            raise BadPlanner(f"planner {self._name!r} answers no grasp: {_line(error)}") from error
+            raise BadPlanner(f"planner {self._name!r} answers no grasp: {first_line(error)}") from error
 
 
 def view_of(frame: RgbdFrame, workspace: Workspace) -> PartView:
@@ -181,7 +181,7 @@ def installed_planner(name: str, built_in: tuple[str, ...], workspace: Workspace
         make: Callable[[Workspace], Any] = entry.load()
         planner = make(workspace)
     except (Exception, SystemExit) as error:
-        raise BadPlanner(f"{named} cannot be made: {_line(error)}; repair or uninstall it") from error
+        raise BadPlanner(f"{named} cannot be made: {first_line(error)}; repair or uninstall it") from error
     if not callable(getattr(planner, "plan", None)):
         raise BadPlanner(f"{named} must be a function that returns an object with plan(frame, rng)")
     return OtherPlanner(planner, workspace, name)
@@ -192,9 +192,3 @@ def _checked(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
     if array.shape != shape or not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite and of shape {shape}, got {array.tolist()}")
     return array
-
-
-def _line(error: BaseException) -> str:
-    """An error of another's code in one line."""
-    first = next(iter(str(error).splitlines()), "")
-    return f"{type(error).__name__}: {first}" if first else type(error).__name__

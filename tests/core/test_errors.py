@@ -20,6 +20,7 @@ from mskgrasp.core.errors import (
     MskgraspError,
     UnknownPart,
     UsageError,
+    first_line,
     one_line,
     printable,
     shown,
@@ -67,6 +68,11 @@ def test_a_short_value_is_shown_as_it_is():
     for value in ("word", 3, 2.5, ["a", 1], {"a": 1}):
         assert shown(value) == repr(value)
     assert shown(None) == "null"  # as in the files
+
+
+def test_an_error_of_another_package_is_its_class_and_its_first_line():
+    assert first_line(ValueError("no such port\nsee the manual")) == "ValueError: no such port"
+    assert first_line(KeyboardInterrupt()) == "KeyboardInterrupt"
 
 
 def test_a_message_is_one_line_that_cannot_control_the_terminal():
