@@ -74,7 +74,7 @@ class CertifiedGrasp:
         return self.slope @ pose_cov @ self.slope.T + self.residual
 
     def score(self, pose_cov: np.ndarray, radius: float) -> float:
-        """Expected squared distance, m^2, by which the part's points miss their predicted places, laid flat.
+        """Expected squared distance, m^2, of the part's points from where they are predicted, a tilt counted.
 
         The variance score of `mskgrasp.planning.planner.variance_score`.
 

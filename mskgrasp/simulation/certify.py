@@ -134,7 +134,7 @@ class _Candidate:
     repeats: list[Repeat]
 
     def score(self, radius: float) -> float:
-        """Squared distance, m^2, by which the part's points miss the mean of their places, laid flat."""
+        """Squared distance, m^2, of the part's points from the mean of their places, a tilt counted."""
         lifted = [one for one in self.repeats if not one.reason]
         failed = (len(self.repeats) - len(lifted)) / len(self.repeats) * FAILED**2
         if len(lifted) < 2:
