@@ -26,14 +26,15 @@ TAPED = "u_bracket_60x35"
 """Has room for two squares of tape."""
 
 
-class SimulatedOperator:
+class SimulatedOperator(io.StringIO):
     """Operator who places the part when asked to and answers the questions."""
 
     def __init__(self, place, answers: str):
+        super().__init__()
         self._place = place
         self._answers = iter(answers)
 
-    def readline(self) -> str:
+    def readline(self, *_: object) -> str:  # type: ignore[override]
         answer = next(self._answers, "")
         if answer == "\n":
             self._place()
@@ -50,7 +51,7 @@ def test_without_feeder_and_tracker_an_operator_places_parts_and_tape_measures(t
     assert whole.feeder is not None and whole.tracker is not None
     feeder, tracker, prompts = whole.feeder, whole.tracker, io.StringIO()
     hands = SimulatedOperator(lambda: feeder.present(TAPED, 5), "\nn\ny\nyq")
-    operator = Operator(cell, answers=hands, prompts=prompts)  # type: ignore[arg-type]
+    operator = Operator(cell, answers=hands, prompts=prompts)
     task = PlacementTask(
         part=TAPED, number=0, index=0, slot=Slot(x=0.52, y=0.05, theta=1.0), correction="predicted", seed=5,
         keep=False,
