@@ -231,17 +231,17 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
     arm = cell.arm
     held = arm.in_hand()
     if held is not None:
-        if take is None and not arm.simulated:
-            raise HandFull(
-                "the hand holds something, which would fall: put it down (hal.put_down), or take it and open "
-                "the fingers (arm.open_gripper), then go home"
-            )
         if held.T_base_tcp is None:
             if take is None or not take():
                 raise HandFull(
                     "the hand has held something since an earlier program, which would fall from an unknown "
                     "height: hold it, run python -m hal.home, which opens the fingers, then start again"
                 )
+        elif take is None and not arm.simulated:
+            raise HandFull(
+                "the hand holds something, which would fall: put it down (hal.put_down), or take it and open "
+                "the fingers (arm.open_gripper), then go home"
+            )
         elif arm.simulated or take is None or not take():
             _put_down_below(cell, float(held.T_base_tcp.position[2]))
     arm.open_gripper()
