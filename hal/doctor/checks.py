@@ -272,14 +272,14 @@ def check_motion(arm: Arm) -> Iterator[Finding]:
 # ---------------------------------------------------------------------- camera
 
 
-def check_stream(camera: Camera, frames: list[RgbdFrame], *, timeout_s: float = 5.0) -> Iterator[Finding]:
+def check_stream(camera: Camera, frames: list[RgbdFrame]) -> Iterator[Finding]:
     """Take frames, append them to ``frames``, and report their rate, age and completeness."""
     ages = []
     try:
-        camera.capture(timeout_s=timeout_s)  # the first may take its time
+        camera.capture()  # the first may take its time
         begin = time.monotonic()
         for _ in range(_N_FRAMES):
-            frame = camera.capture(timeout_s=timeout_s)
+            frame = camera.capture()
             ages.append(time.monotonic() - frame.timestamp_s)
             frames.append(frame)
     except HalError as error:

@@ -42,15 +42,11 @@ def expected_motion(plan: GraspPlan) -> Pose:
     return motion_of(plan.grasp.T_base_grasp, plan.displacement, plan.view.centre_base, plan.swing)
 
 
-def likely_motions(plan: GraspPlan, n_sigma: float = 2.0) -> list[Pose]:
-    """The motions at both ends of the axes of the ellipsoid of a plan's displacement.
+def likely_motions(plan: GraspPlan) -> list[Pose]:
+    """The motions at two standard deviations along each axis of a plan's spread, both ways.
 
     The turn counts by the way of the part's points at its radius of gyration, so that all four axes are
     lengths. Without a predicted variance there are none.
-
-    Args:
-        plan: The plan.
-        n_sigma: Standard deviations.
 
     Returns:
         Eight motions as `motion_of`.
@@ -59,7 +55,7 @@ def likely_motions(plan: GraspPlan, n_sigma: float = 2.0) -> list[Pose]:
         return []
     lengths = np.array([1.0, 1.0, 1.0, plan.view.gyration_radius])
     variances, axes = np.linalg.eigh(plan.displacement_cov * lengths * lengths[:, None])
-    steps = n_sigma * np.sqrt(np.maximum(variances, 0.0)) * axes / lengths[:, None]
+    steps = 2.0 * np.sqrt(np.maximum(variances, 0.0)) * axes / lengths[:, None]
     return [
         motion_of(plan.grasp.T_base_grasp, plan.displacement + sign * step, plan.view.centre_base, plan.swing)
         for step in steps.T

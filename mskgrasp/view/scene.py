@@ -129,9 +129,9 @@ def add_region(scene: SceneApi, name: str, region: Region, table_z: float) -> No
     scene.add_line_segments(name, sides, rgb(FAINT), thickness=1.5, thickness_units="screen")
 
 
-def closing_lines(grasps: Grasp, length: float = CLOSING) -> np.ndarray:
+def closing_lines(grasps: Grasp) -> np.ndarray:
     """Ends (n, 2, 3) of lines through n grasps along the direction in which they close, base frame."""
-    ends = np.array([[0.0, -length / 2, 0.0], [0.0, length / 2, 0.0]])
+    ends = np.array([[0.0, -CLOSING / 2, 0.0], [0.0, CLOSING / 2, 0.0]])
     vectors = grasps.as_vector()
     return np.stack([pose_base_grasp(vectors).apply(end) for end in ends], axis=1)
 
@@ -159,18 +159,17 @@ class HandNode:
     Args:
         scene: The scene.
         name: Of the node.
-        colour: Of all three.
         opacity: None: solid.
     """
 
-    def __init__(self, scene: SceneApi, name: str, colour: Colour = HAND, opacity: float | None = None):
+    def __init__(self, scene: SceneApi, name: str, opacity: float | None = None):
         self.node: FrameHandle = scene.add_frame(name, show_axes=False)
         left, right, palm = hand_boxes(0.0)
         self._fingers = [
-            add_part(scene, f"{name}/{side}", box, colour=colour, opacity=opacity)
+            add_part(scene, f"{name}/{side}", box, colour=HAND, opacity=opacity)
             for side, box in (("left", left), ("right", right))
         ]
-        add_part(scene, f"{name}/palm", palm, colour=colour, opacity=opacity)
+        add_part(scene, f"{name}/palm", palm, colour=HAND, opacity=opacity)
 
     def place(self, T_base_tcp: Pose, width: float = MAX_OPENING) -> None:
         """Put the hand at a pose, its pads ``width`` metres apart."""

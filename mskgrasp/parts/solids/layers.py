@@ -30,6 +30,8 @@ _LEAST_AREA_MM2 = 0.02
 _LEAST_WIDTH_MM = 0.01
 """Narrower polygons are remainders between two cuts, and flat to a convex hull."""
 _MOST_SECTIONS = 400
+_LARGE_FACES = 3
+"""Largest faces whose normals are directions to cut across, beside the axes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +51,7 @@ class Tolerances:
     holes: float
 
 
-def layer_directions(mesh: trimesh.Trimesh, most: int = 3) -> list[np.ndarray]:
+def layer_directions(mesh: trimesh.Trimesh) -> list[np.ndarray]:
     """Directions (3,) to cut layers across: the axes, and normals of large faces in other directions.
 
     Those with the largest share of the surface along or across them come first.
@@ -57,7 +59,7 @@ def layer_directions(mesh: trimesh.Trimesh, most: int = 3) -> list[np.ndarray]:
     normals, areas = mesh.face_normals, mesh.area_faces
     found = list(np.eye(3))
     left = areas.copy()
-    for _ in range(most):
+    for _ in range(_LARGE_FACES):
         normal = normals[int(left.argmax())]
         left = np.where(np.abs(normals @ normal) > _ALONG, 0.0, left)
         if all(abs(normal @ other) < 1 - 1e-4 for other in found):

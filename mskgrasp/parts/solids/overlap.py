@@ -29,7 +29,7 @@ _GUARD_MM = 1e-3
 """Distance from a plane within which a point does not count as before it; planes are rounded."""
 
 
-def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[np.ndarray]:
+def overlapped(hulls: Sequence[np.ndarray]) -> list[np.ndarray]:
     """The pieces, each with as much of the neighbours that it touches as leaves their union unchanged.
 
     A contact pushes along the shortest way out of a piece. Where two pieces meet at a face, that way leads
@@ -37,7 +37,6 @@ def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[
 
     Args:
         hulls: Corners (n, 3) of each piece, mm.
-        reach_mm: Depth of the overlap, mm.
 
     Returns:
         As many pieces in the same order. An extension that fills a concave side, needs too many corners,
@@ -59,7 +58,7 @@ def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[
         for other in near:
             plane = _plane_between(sides[number], pieces[other])
             if plane is not None:
-                slices.append(_slice(bodies[other], *plane, reach_mm))
+                slices.append(_slice(bodies[other], *plane))
         here = [number, *near]
         union = Manifold.batch_boolean([bodies[n] for n in here], OpType.Add)
         extended = _extended(points, slices, union, [sides[n] for n in here])
@@ -67,10 +66,10 @@ def overlapped(hulls: Sequence[np.ndarray], reach_mm: float = REACH_MM) -> list[
     return found
 
 
-def _slice(body: Manifold, normal: np.ndarray, offset: float, reach_mm: float) -> np.ndarray:
-    """Corners (n, 3), beyond a plane, of the slice of a body that reaches to a depth beyond it."""
+def _slice(body: Manifold, normal: np.ndarray, offset: float) -> np.ndarray:
+    """Corners (n, 3), beyond a plane, of the slice of a body that reaches `REACH_MM` beyond it."""
     # trim_by_plane keeps the side that the normal points to.
-    slab = body.trim_by_plane(tuple(-normal), -(offset + reach_mm))
+    slab = body.trim_by_plane(tuple(-normal), -(offset + REACH_MM))
     corners = np.asarray(slab.to_mesh64().vert_properties)[:, :3]
     return corners[corners @ normal > offset + 1e-3]
 

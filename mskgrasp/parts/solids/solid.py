@@ -157,15 +157,15 @@ def cut(
     return result
 
 
-def few_corners(points: np.ndarray, most: int = MAX_HULL_VERTICES) -> np.ndarray:
+def few_corners(points: np.ndarray) -> np.ndarray:
     """Corners of a convex body near the hull of the points: those that stand out farthest are kept."""
     corners = points[np.sort(ConvexHull(points).vertices)]
-    if len(corners) <= most:
+    if len(corners) <= MAX_HULL_VERTICES:
         return corners
     spread = np.linalg.norm(corners - corners.mean(axis=0), axis=1)
     first = {int((sign * corners[:, axis]).argmax()) for axis in range(3) for sign in (1, -1)}
     chosen = sorted(first | {int(spread.argmax())})
-    while len(chosen) < most:
+    while len(chosen) < MAX_HULL_VERTICES:
         try:
             planes = ConvexHull(corners[chosen]).equations
         except QhullError:  # the first few may lie in a plane

@@ -81,8 +81,9 @@ def _drawn(row: Row, size: dict[str, float]) -> Any:
             return getattr(open_builds, kind)()
 
 
-def _torus_pieces(extents: np.ndarray, segments: int = 18, sides: int = 10) -> list[np.ndarray]:
+def _torus_pieces(extents: np.ndarray) -> list[np.ndarray]:
     """Pieces of a ring of round cross-section."""
+    segments, sides = 18, 10
     thickness = float(extents[2])
     middle = (float(extents[0]) - thickness) / 2
     profile = s.balanced_polygon(thickness / 2, sides, np.pi / sides)

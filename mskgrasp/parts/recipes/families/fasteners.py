@@ -8,7 +8,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from mskgrasp.parts.recipes.families.listing import one
-from mskgrasp.parts.recipes.recipe import STEEL, Recipe, table_row
+from mskgrasp.parts.recipes.recipe import Recipe, table_row
 from mskgrasp.parts.solids import solid as s
 from mskgrasp.parts.solids.solid import Maker
 
@@ -70,14 +70,12 @@ def recipes() -> Iterator[Recipe]:
             yield one(table_row(file, d_mm=d), name, make, source=source, family=family)
 
 
-def with_lengths(
-    file_name: str, lengths: Lengths, name: str, make: Maker, source: str, density: float = STEEL
-) -> Iterator[Recipe]:
+def with_lengths(file_name: str, lengths: Lengths, name: str, make: Maker, source: str) -> Iterator[Recipe]:
     """A recipe for each thread diameter of a table and each of its nominal lengths."""
     for d, chosen in lengths.items():
         for length in chosen:
             row = table_row(file_name, d_mm=d) | {"l_mm": float(length)}
-            yield one(row, name, make, source=source, density=density)
+            yield one(row, name, make, source=source)
 
 
 def hex_bolt(size: dict[str, float]) -> s.Solid:

@@ -22,12 +22,10 @@ Step = float | tuple[float, float]
 Station = tuple[np.ndarray, float]
 
 
-def arc(
-    radius: float, z: float, start: float, end: float, x: float = 0.0, count: int = 24
-) -> list[tuple[float, float]]:
-    """Points of a half profile on a circle about (x, z), from one angle to another in degrees."""
+def arc(radius: float, z: float, start: float, end: float, count: int = 24) -> list[tuple[float, float]]:
+    """Points of a half profile on a circle about (0, z), from one angle to another in degrees."""
     angles = np.radians(np.linspace(start, end, count))
-    points = np.stack([x + radius * np.cos(angles), z + radius * np.sin(angles)], axis=1)
+    points = np.stack([radius * np.cos(angles), z + radius * np.sin(angles)], axis=1)
     # A rounding error off the axis would open a needle-thin bore.
     points[np.abs(points[:, 0]) < 1e-9, 0] = 0.0
     return [(float(a), float(b)) for a, b in points]

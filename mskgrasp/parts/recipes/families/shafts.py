@@ -33,16 +33,16 @@ def recipes() -> Iterator[Recipe]:
     )
 
 
-def seats(size: dict[str, float], chamfer: float = CHAMFER) -> sh.Shape:
+def seats(size: dict[str, float]) -> sh.Shape:
     """Up to five cylinders of ``d1_mm``, ``l1_mm`` ... on top of each other, both ends chamfered."""
     numbers = [n for n in range(1, 6) if size.get(f"d{n}_mm", 0.0) > 0]
     radii = [size[f"d{n}_mm"] / 2 for n in numbers]
     ends = np.cumsum([0.0, *(size[f"l{n}_mm"] for n in numbers)])
-    profile = [(0.0, 0.0), (radii[0] - chamfer, 0.0), (radii[0], chamfer)]
+    profile = [(0.0, 0.0), (radii[0] - CHAMFER, 0.0), (radii[0], CHAMFER)]
     for radius, z0, z1 in zip(radii, ends[:-1], ends[1:], strict=True):
         profile += [(radius, float(z0))] * int(z0 > 0) + [(radius, float(z1))] * int(z1 < ends[-1])
     top = float(ends[-1])
-    profile += [(radii[-1], top - chamfer), (radii[-1] - chamfer, top), (0.0, top)]
+    profile += [(radii[-1], top - CHAMFER), (radii[-1] - CHAMFER, top), (0.0, top)]
     return sh.turned(profile)
 
 
