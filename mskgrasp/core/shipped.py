@@ -25,3 +25,8 @@ def example_file(name: str) -> Path | None:
     """The path of a shipped example part such as ``bracket.stl``; None if no example has that name."""
     path = _EXAMPLES / name
     return path if Path(name).name == name and path.is_file() else None
+
+
+def is_example(path: Path) -> bool:
+    """Whether a file is an example part that ships."""
+    return path.resolve().parent == _EXAMPLES

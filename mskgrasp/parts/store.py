@@ -25,6 +25,10 @@ from mskgrasp.parts.part import SCHEMA_VERSION, Part
 
 FILES: tuple[str, ...] = ("mesh.ply", "hulls.glb", "part.json")
 LEGAL_FOLDER = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+ORIGIN = "imported_from"
+"""Key of ``part.json``: the file and options of an import."""
+
+_UNPHYSICAL = ("content_hash", "recipe_hash", "source", "licence", ORIGIN)
 
 _ABANDONED_S = 3600.0
 """Temporary folders older than this were left behind by a killed process."""
@@ -56,9 +60,7 @@ def parts_folder() -> Path:
 def content_hash(mesh: bytes, hulls: bytes, record: dict[str, Any]) -> str:
     """Hex digest of all that determines a part's behaviour in a grasp: mesh, hulls and physical data."""
     physical = {
-        key: value
-        for key, value in record.items()
-        if key not in ("content_hash", "recipe_hash", "source", "licence") and not key.startswith("hull_")
+        key: value for key, value in record.items() if key not in _UNPHYSICAL and not key.startswith("hull_")
     }
     digest = hashlib.sha256()
     for block in (mesh, hulls, json.dumps(physical, sort_keys=True).encode()):
@@ -70,12 +72,12 @@ def write_part(name: str, mesh: bytes, hulls: bytes, record: dict[str, Any]) -> 
     """Write a part to the parts folder under its name, replacing another part of that name.
 
     The files are written to a temporary folder that is renamed at the end. Where another process was faster
-    and its part has the same recipe, that part is kept.
+    with the same part, that one is kept.
     """
     record = record | {"content_hash": content_hash(mesh, hulls, record)}
     text = json.dumps(record, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
     contents = dict(zip(FILES, (mesh, hulls, text.encode()), strict=True))
-    return read_part(_put(parts_folder(), name, contents, record["recipe_hash"]))
+    return read_part(_put(parts_folder(), name, contents))
 
 
 def pack_part(part: Part) -> dict[str, bytes]:
@@ -109,10 +111,10 @@ def receive_part(name: str, digest: str, contents: Mapping[str, bytes]) -> Part:
         raise BadPart(
             f"part '{name}' arrived damaged: its files do not match the hash {digest[:16]}; try again"
         )
-    return read_part(_put(root, folder, contents, str(record.get("recipe_hash"))))
+    return read_part(_put(root, folder, contents))
 
 
-def _put(root: Path, name: str, contents: Mapping[str, bytes], recipe: str) -> Path:
+def _put(root: Path, name: str, contents: Mapping[str, bytes]) -> Path:
     root.mkdir(parents=True, exist_ok=True)
     _remove_abandoned(root)
     temporary = root / f".tmp-{name}-{uuid.uuid4().hex[:12]}"
@@ -123,7 +125,7 @@ def _put(root: Path, name: str, contents: Mapping[str, bytes], recipe: str) -> P
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-        _replace_folder(temporary, root / name, recipe)
+        _replace_folder(temporary, root / name)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return root / name
@@ -170,7 +172,7 @@ def read_record(folder: Path) -> dict[str, Any]:
 _REMEDY = "delete the folder, then build or import the part again"
 
 
-def _replace_folder(temporary: Path, final: Path, recipe: str) -> None:
+def _replace_folder(temporary: Path, final: Path) -> None:
     for _ in range(20):
         try:
             os.rename(temporary, final)
@@ -178,7 +180,7 @@ def _replace_folder(temporary: Path, final: Path, recipe: str) -> None:
         except OSError as error:
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
                 raise
-        if stored_recipe_hash(final) == recipe:
+        if _holds_the_same(final, temporary):
             return
         old = temporary.with_name(temporary.name + "-old")
         try:
@@ -190,6 +192,15 @@ def _replace_folder(temporary: Path, final: Path, recipe: str) -> None:
         else:
             old.unlink()
     raise BadPart(f"{final} keeps being replaced by another process: run one build at a time")
+
+
+def _holds_the_same(folder: Path, other: Path) -> bool:
+    """Whether a folder holds an undamaged part with the record of another's."""
+    try:
+        read_part(folder)
+        return _read(folder, "part.json") == _read(other, "part.json")
+    except BadPart:
+        return False
 
 
 def _remove_abandoned(root: Path) -> None:
@@ -229,8 +240,11 @@ def _part_of(folder: Path, record: dict[str, Any]) -> Part:
     count = len(probability)
     if count < 1 or not np.isclose(probability.sum(), 1.0, atol=1e-6) or (probability < 0).any():
         raise ValueError("resting_probability does not sum to 1")
+    name = _text(record, "name")
+    if not LEGAL_FOLDER.fullmatch(name):  # pictures and folders are named after it
+        raise ValueError(f"the name {name!r} is not legal")
     return Part(
-        name=_text(record, "name"),
+        name=name,
         folder=folder,
         family=_text(record, "family"),
         source=_text(record, "source"),

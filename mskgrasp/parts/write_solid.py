@@ -55,6 +55,7 @@ def write_solid(
     dimensions: dict[str, float],
     recipe_hash: str,
     coarse: bool = False,
+    origin: dict[str, Any] | None = None,
 ) -> Part:
     """Measure a solid, let its hulls overlap, move its centroid to the origin and store it as a part.
 
@@ -68,6 +69,7 @@ def write_solid(
         dimensions: Nominal dimensions, metres.
         recipe_hash: Hash of all that determines the part.
         coarse: Accept hulls that are farther from the mesh than those of a fine part; its grade says so.
+        origin: Of an imported part, stored beside what determines it.
 
     Raises:
         BadPart: Its hulls are too far from its mesh, or PhysX would not take them. The caller names the part.
@@ -111,6 +113,8 @@ def write_solid(
         "resting_probability": probability,
         "recipe_hash": recipe_hash,
     }
+    if origin is not None:
+        record[store.ORIGIN] = origin
     return store.write_part(
         name, _ply(mesh), _glb(hulls), {key: _plain(value) for key, value in record.items()}
     )

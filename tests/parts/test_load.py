@@ -1,6 +1,6 @@
 import pytest
 
-from mskgrasp.core.errors import UnknownPart
+from mskgrasp.core.errors import BadPart, UnknownPart
 from mskgrasp.core.shipped import example_file
 from mskgrasp.parts import builtin, find_part, load_part, read_part, store
 from mskgrasp.parts.recipes import cad
@@ -8,9 +8,11 @@ from mskgrasp.parts.recipes import cad
 
 def test_a_cad_file_a_name_and_a_folder_give_the_same_part():
     from_file = load_part(example_file("bracket.stl"), unit="mm")
-    assert from_file.name == "bracket" and 0.01 < from_file.longest_axis < 0.2
-    for source in ("bracket", from_file.folder):
+    assert from_file.name == "example_bracket" and 0.01 < from_file.longest_axis < 0.2
+    for source in ("example_bracket", from_file.folder):
         assert load_part(source).content_hash == from_file.content_hash
+        with pytest.raises(BadPart, match="is no CAD file, whose unit could be in: leave it away"):
+            load_part(source, unit="in")
     assert read_part(from_file.folder).mass == from_file.mass
 
 

@@ -84,6 +84,7 @@ def test_a_truncated_file_is_refused_when_loaded_and_rebuilt(file_name):
         ("dimensions", None),
         ("schema_version", 99),
         ("name", 3),
+        ("name", "../elsewhere"),
         ("quat_obj_principal", [0, 0, 0, 0]),
     ],
 )

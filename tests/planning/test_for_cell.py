@@ -61,6 +61,8 @@ def test_a_cad_file_is_made_a_part(tmp_path, monkeypatch):
     name = part_name(str(file))
     assert find_part(name).longest_axis == pytest.approx(0.004)
     assert part_name(str(file), "in") == name and find_part(name).longest_axis == pytest.approx(0.004 * 25.4)
+    with pytest.raises(BadPart, match="my-bracket is no CAD file, whose unit could be in"):
+        part_name(name, "in")
 
 
 def test_a_file_that_is_no_cad_file_is_an_error(tmp_path, monkeypatch):

@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
 import re
+import shlex
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import trimesh
 from scipy.spatial import QhullError
 
 from mskgrasp.core.errors import BadPart, printable
+from mskgrasp.core.shipped import is_example
 from mskgrasp.core.units import Unit
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import LEGAL_NAME, builtin_names
 from mskgrasp.parts.catalogue import SETS
 from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
 from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, read_content, read_mesh
+from mskgrasp.parts.importing.origin import Origin, read_origin
 from mskgrasp.parts.part import Part
 from mskgrasp.parts.solids.mesh_pieces import mesh_pieces
 from mskgrasp.parts.solids.one_thread import hold_manifold_to_one_thread
@@ -36,6 +37,8 @@ STEEL = 7850.0
 """Density of parts unless stated, kg/m^3."""
 USUAL_DENSITY = (10.0, 25_000.0)
 """From foam to osmium, kg/m^3."""
+
+_OTHER = "choose another, python -m mskgrasp.parts import FILE --name NAME"
 
 _TRANSLITERATION = str.maketrans(
     {"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "å": "aa", "æ": "ae"}
@@ -91,7 +94,8 @@ def import_file(
     hold_manifold_to_one_thread()
     name = legal_name(path.stem if name is None else name)
     content = read_content(path)
-    sha256 = hashlib.sha256(content).digest()
+    sha256 = _sha256(content)
+    origin = Origin(path=path.resolve(), sha256=sha256.hex(), unit=unit, bodies=bodies)
     digest = _recipe_hash(path, sha256, family, unit, density, licence, bodies)
     if bodies != "split":
         _check_available(name, check_name)
@@ -120,7 +124,7 @@ def import_file(
         known = _known(each, recipe_hash)
         if known is None:
             unchanged = False
-            known = _make(mesh, path, each, family, density, licence, recipe_hash)
+            known = _make(mesh, path, each, family, density, licence, recipe_hash, origin)
         parts.append(known)
     return Imported(
         parts=tuple(parts), unchanged=unchanged, unit=file.unit, notes=(*file.notes, *repaired.notes)
@@ -135,35 +139,53 @@ def import_part(path: Path, **options: object) -> Part:
 def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
     """The part of a CAD file that a program is given: as it was imported from it, else imported as steel.
 
-    A file that has changed since is imported again with the same density, family and licence, and a note.
+    A file that has changed since is imported again with the options of that import, and a note. A shipped
+    example becomes a part whose name begins with ``example_``, so that it replaces none of the user's.
 
     Args:
         path: As in `import_file`.
         unit: As in `import_file`; None: that of the import. A file that was imported with another one is
-            imported again, with the same density, family and licence.
+            imported again, with the other options of that import.
 
     Raises:
-        BadPart: As in `import_file`.
+        BadPart: As in `import_file`; or the part of this name was made of another file.
     """
-    folder = store.parts_folder() / legal_name(path.stem)
+    name = legal_name(f"example_{path.stem}" if is_example(path) else path.stem)
+    folder = store.parts_folder() / name
     stored = store.stored_recipe_hash(folder)
-    if stored is not None:
-        known, sha256 = store.read_part(folder), hashlib.sha256(read_content(path)).digest()
-        for its_unit, bodies in itertools.product((None, *get_args(Unit)), get_args(Bodies)):
-            options = known.family, its_unit, known.density, known.licence, bodies
-            if _recipe_hash(path, sha256, *options) == stored:
-                if unit in (None, its_unit):
-                    return known
-                return import_part(
-                    path, unit=unit, family=known.family, density=known.density, licence=known.licence,
-                    bodies=bodies,
-                )  # fmt: skip
-        if known.name not in builtin_names():
-            note(f"{path} has changed since its import; imported again with {known.density:g} kg/m^3")
-            return import_part(
-                path, unit=unit, family=known.family, density=known.density, licence=known.licence
-            )
-    return import_part(path, unit=unit)
+    if stored is None or name in builtin_names():
+        return import_part(path, name=name, unit=unit)
+    known, origin, sha256 = store.read_part(folder), read_origin(folder), _sha256(read_content(path))
+    command = f"python -m mskgrasp.parts import {shlex.quote(str(path))}"
+    if origin is None:
+        raise BadPart(
+            f"the part {name!r} does not say of which file it was made, as those of today do: import it "
+            f"again, {command}, with its density and unit"
+        )
+    changed = sha256.hex() != origin.sha256
+    if changed and path.resolve() != origin.path:
+        raise BadPart(
+            f"the part {name!r} was made of {origin.path}, and {path} is another file: import it, {command}, "
+            "in place of that part, or with --name"
+        )
+    options = known.family, origin.unit, known.density, known.licence, origin.bodies
+    current = _recipe_hash(origin.path, bytes.fromhex(origin.sha256), *options) == stored
+    if current and not changed and unit in (None, origin.unit):
+        return known
+    unit = unit or origin.unit
+    if changed:
+        read_in = f", --unit {unit}" if unit else ""
+        note(f"{path} has changed since its import; imported again with {known.density:g} kg/m^3{read_in}")
+    elif not current:
+        note(f"{path} was imported by another version of mskgrasp; imported again")
+    return import_part(
+        path, name=name, unit=unit, family=known.family, density=known.density, licence=known.licence,
+        bodies=origin.bodies,
+    )  # fmt: skip
+
+
+def _sha256(content: bytes) -> bytes:
+    return hashlib.sha256(content).digest()
 
 
 def _recipe_hash(
@@ -205,15 +227,17 @@ def legal_name(text: str) -> str:
 
 def _check_available(name: str, check_name: Callable[[str], None]) -> None:
     if name in builtin_names():
-        raise BadPart(f"the name {name!r} belongs to a built-in part: choose another with --name")
+        raise BadPart(f"the name {name!r} belongs to a built-in part: {_OTHER}")
     if name in SETS:
-        raise BadPart(f"the name {name!r} stands for a set of parts: choose another with --name")
+        raise BadPart(f"the name {name!r} stands for a set of parts: {_OTHER}")
     check_name(name)
 
 
 def _known(name: str, recipe_hash: str) -> Part | None:
     folder = store.parts_folder() / name
-    return store.read_part(folder) if store.stored_recipe_hash(folder) == recipe_hash else None
+    if store.stored_recipe_hash(folder) != recipe_hash or read_origin(folder) is None:
+        return None
+    return store.read_part(folder)
 
 
 def _make(
@@ -224,6 +248,7 @@ def _make(
     density: float,
     licence: str,
     recipe_hash: str,
+    origin: Origin,
 ) -> Part:
     try:
         return write_solid(
@@ -238,6 +263,7 @@ def _make(
             },
             recipe_hash=recipe_hash,
             coarse=True,
+            origin=origin.model_dump(mode="json"),
         )
     except BadPart as error:
         raise BadPart(f"{path}: {error}") from error

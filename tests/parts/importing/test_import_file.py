@@ -1,5 +1,6 @@
 """CAD files as they come: good ones become parts, others are refused in one line."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,9 @@ import trimesh
 from build123d import Box, Cylinder, export_step
 
 from mskgrasp.core.errors import BadPart
+from mskgrasp.core.shipped import example_file
 from mskgrasp.parts import find_part
+from mskgrasp.parts.importing import import_file as importing
 from mskgrasp.parts.importing.import_file import import_file, import_part, legal_name, part_of_file
 
 
@@ -84,11 +87,78 @@ def test_a_file_that_a_program_is_given_is_the_part_that_was_imported_from_it(tm
     assert inches.longest_axis == pytest.approx(0.004 * 25.4)
     assert (inches.density, inches.licence) == (1050.0, "MIT")  # of the import
     assert part_of_file(file).longest_axis == pytest.approx(0.004 * 25.4)  # as it was imported last
-    trimesh.creation.box((4, 3, 2.5)).export(file)
-    assert part_of_file(file).extents == pytest.approx([0.004, 0.003, 0.0025])  # another file
-    assert "has changed since its import; imported again with 1050 kg/m^3" in capsys.readouterr().err
-    assert (part_of_file(file).density, part_of_file(file).licence) == (1050.0, "MIT")
+    moved = file.rename(tmp_path / "box.STL")
+    assert part_of_file(moved).content_hash == inches.content_hash
     assert capsys.readouterr().err == ""
+
+
+def test_a_file_that_has_changed_is_imported_again_with_the_options_of_its_import(tmp_path, capsys):
+    file = tmp_path / "pair.stl"
+    box, beside = trimesh.creation.box((1, 0.5, 0.4)), trimesh.creation.box((1, 0.5, 0.4))
+    beside.apply_translation((0.9, 0, 0))
+    (box + beside).export(file)
+    import_part(file, unit="in", density=1050.0, licence="MIT", bodies="union")
+    box.apply_translation((0.1, 0, 0))
+    (box + beside).export(file)
+    part = part_of_file(file)
+    assert part.extents == pytest.approx(25.4e-3 * np.array([1.8, 0.5, 0.4]))
+    assert (part.density, part.licence) == (1050.0, "MIT")
+    said = "pair.stl has changed since its import; imported again with 1050 kg/m^3, --unit in"
+    assert said in capsys.readouterr().err
+    assert part_of_file(file).content_hash == part.content_hash
+    assert capsys.readouterr().err == ""
+
+
+def test_another_version_imports_a_file_again_with_the_options_of_its_import(tmp_path, monkeypatch, capsys):
+    file = tmp_path / "box.stl"
+    trimesh.creation.box((1, 0.5, 0.4)).export(file)
+    part = import_part(file, unit="in", density=1050.0)
+    monkeypatch.setattr(importing, "IMPORT_VERSION", importing.IMPORT_VERSION + 1)
+    assert part_of_file(file).content_hash == part.content_hash
+    assert "box.stl was imported by another version of mskgrasp; imported again" in capsys.readouterr().err
+    assert part_of_file(file).content_hash == part.content_hash
+    assert capsys.readouterr().err == ""
+
+
+def test_a_program_does_not_replace_the_part_of_another_file(tmp_path):
+    mine, other = tmp_path / "clamp.stl", tmp_path / "other" / "clamp.stl"
+    other.parent.mkdir()
+    trimesh.creation.box((40, 30, 20)).export(mine)
+    trimesh.creation.box((50, 30, 20)).export(other)
+    part = import_part(mine, density=1050.0)
+    with pytest.raises(BadPart, match=r"was made of \S*clamp.stl, and \S*other/clamp.stl is another file"):
+        part_of_file(other)
+    assert part_of_file(mine).content_hash == find_part("clamp").content_hash == part.content_hash
+    same = tmp_path / "copy" / "clamp.stl"
+    same.parent.mkdir()
+    same.write_bytes(mine.read_bytes())
+    assert part_of_file(same).content_hash == part.content_hash
+    assert import_part(other).extents[0] == pytest.approx(0.05)  # asked for by its name
+
+
+def test_a_shipped_example_does_not_replace_a_part_of_its_name(tmp_path):
+    file = tmp_path / "bracket.stl"
+    trimesh.creation.box((40, 30, 20)).export(file)
+    part = import_part(file)
+    example = example_file("bracket.stl")
+    assert example is not None
+    assert part_of_file(example).name == "example_bracket"
+    assert part_of_file(file).content_hash == find_part("bracket").content_hash == part.content_hash
+
+
+def test_a_part_that_does_not_name_its_file_is_to_be_imported_again(tmp_path):
+    file = tmp_path / "box.stl"
+    trimesh.creation.box((40, 30, 20)).export(file)
+    part = import_part(file, unit="mm", density=2700.0)
+    record = part.folder / "part.json"
+    values = json.loads(record.read_text())
+    del values["imported_from"]  # as stored before parts named it
+    record.write_text(json.dumps(values))
+    assert find_part("box").content_hash == part.content_hash
+    with pytest.raises(BadPart, match=r"does not say of which file .*: import it again, python -m mskgrasp"):
+        part_of_file(file)
+    assert not import_file(file, unit="mm", density=2700.0).unchanged
+    assert part_of_file(file).content_hash == part.content_hash
 
 
 def test_a_unit_that_the_import_did_not_name_leaves_the_density_as_it_is(tmp_path):

@@ -1,0 +1,32 @@
+"""The file of an imported part, as its folder names it."""
+
+import json
+
+import pytest
+import trimesh
+
+from mskgrasp.parts import find_part
+from mskgrasp.parts.importing.import_file import import_part
+from mskgrasp.parts.importing.origin import read_origin
+
+
+def test_a_part_names_its_file_and_what_it_was_imported_with(tmp_path):
+    file = tmp_path / "box.stl"
+    trimesh.creation.box((1, 0.5, 0.4)).export(file)
+    origin = read_origin(import_part(file, unit="in", bodies="union").folder)
+    assert origin is not None and (origin.path, origin.unit, origin.bodies) == (file, "in", "union")
+    assert read_origin(find_part("hex_nut_m30").folder) is None
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("path", 3), ("sha256", None), ("unit", "furlong"), ("bodies", [])]
+)
+def test_a_damaged_origin_counts_as_none(tmp_path, key, value):
+    file = tmp_path / "box.stl"
+    trimesh.creation.box((40, 30, 20)).export(file)
+    part = import_part(file)
+    record = part.folder / "part.json"
+    values = json.loads(record.read_text())
+    values["imported_from"][key] = value
+    record.write_text(json.dumps(values))
+    assert find_part("box").mass == part.mass and read_origin(part.folder) is None
