@@ -134,7 +134,7 @@ class SimulatedWorld(ABC):
         self.presented, self.presented_seed = self.presented + 1, seed
         if self.arm_reset is not None:
             self.arm_reset()
-        self._place(new, seed, keep)
+        self._place(new, _in_32_bits(seed), keep)
 
     @abstractmethod
     def _place(self, part: Part, seed: int, keep: bool) -> None:
@@ -270,6 +270,11 @@ class SimulatedArm(SharingDevice, Arm, Generic[WorldT]):
             raise OutOfWorkspace(
                 f"no straight line from here to TCP {shown(T_base_tcp.position)} m within the joint limits"
             )
+
+
+def _in_32_bits(seed: int) -> int:
+    """The seed, or where simulators could not take one so large, a number drawn from it."""
+    return seed if seed < 2**32 else int(np.random.SeedSequence(seed).generate_state(1)[0])
 
 
 def joint_motion_s(way: float, speed: float) -> float:

@@ -22,13 +22,17 @@ _HEAR = (
 
 @contextmanager
 def running(module: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """``python -m module`` that hears Ctrl-C however the tests were started, and ends with the block."""
+    """``python -m module`` that hears Ctrl-C however the tests were started, and ends with the block.
+
+    It has no terminal, so that a signal is sent to it alone.
+    """
     with subprocess.Popen(
         [sys.executable, "-c", _HEAR, module, *arguments],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        start_new_session=True,
     ) as process:
         try:
             yield process

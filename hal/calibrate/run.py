@@ -75,6 +75,11 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
         )
     values = read_yaml(cell_file)
     cell = cell_from_values(_with_camera_at(values, config, cell_file), cell_file)
+    if cell.recorded:
+        raise UsageError(
+            f"{cell_file}: a recording cannot be calibrated; solve the pictures of that calibration again "
+            "with --from FOLDER"
+        )
     if cell.arm.simulated and cell.board_holder is None:
         raise UsageError(f"{cell_file}: nothing draws a board in this simulated cell; type: sapien does")
     write_config(config.board, config.out / "board.yaml")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import os
 import shlex
 import signal
 import subprocess
@@ -28,9 +28,6 @@ Without --run the arm's state is read with every frame and the arm does not move
 Ten frames: python -m hal.record --cell configs/cells/sapien.yaml --out frames.h5
 
 A whole run: python -m hal.record --cell configs/cells/sapien.yaml --out run.h5 --run mskgrasp.plan"""
-
-_INTERRUPTED_S = 2.0
-"""A program that received Ctrl-C itself has stopped the arm and ended after this, s."""
 
 
 def main() -> int:
@@ -85,12 +82,18 @@ def _run(config: RecordConfig, command: str) -> int:
             try:
                 return process.wait()
             except KeyboardInterrupt:
-                _pass_interrupt(process)
+                # A second one would interrupt the program while it stops the arm and finishes the file.
+                if not _in_foreground():
+                    process.send_signal(signal.SIGINT)
 
 
-def _pass_interrupt(process: subprocess.Popen[bytes]) -> None:
-    """Pass Ctrl-C on to a program that did not get it: terminals send it to both, kill does not."""
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(_INTERRUPTED_S)
-        return
-    process.send_signal(signal.SIGINT)
+def _in_foreground() -> bool:
+    """Whether a terminal sends Ctrl-C to this program, and so to all that it has started."""
+    try:
+        terminal = os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY)
+    except OSError:
+        return False
+    try:
+        return os.tcgetpgrp(terminal) == os.getpgrp()
+    finally:
+        os.close(terminal)

@@ -67,6 +67,8 @@ class Playback:
                 self._next = 0
             if self._next == len(self._commands):
                 if self._calls == {"capture"}:
+                    if not self._commands:
+                        raise CaptureFailed(f"{self.recording.path} holds no frame; record some")
                     raise CaptureFailed(
                         f"all {len(self._commands)} frames of {self.recording.path} have been taken; record "
                         "more, or set camera.loop to true"
@@ -120,17 +122,22 @@ class Playback:
             return None
 
     def same_question(self, call: str, arguments: dict[str, Any]) -> Event:
-        """The answer to a query that does not depend on its time; raises what it raised.
+        """The answer to the nearest query, which does not depend on its time; raises what it raised.
 
         Raises:
             NotRecorded: The recording holds no such query.
         """
-        for event in self.recording.events:
-            if event.call == call and self._same(event.arguments, arguments):
-                if event.error is not None:
-                    raise rebuild(event.error)
-                return event
-        raise NotRecorded(f"{self.recording.path} holds no {_words(call, arguments)}")
+        found = [
+            event
+            for event in self.recording.events
+            if event.call == call and self._same(event.arguments, arguments)
+        ]
+        if not found:
+            raise NotRecorded(f"{self.recording.path} holds no {_words(call, arguments)}")
+        event = min(found, key=lambda one: _apart(one.arguments, arguments))
+        if event.error is not None:
+            raise rebuild(event.error)
+        return event
 
     def _window(self) -> tuple[int, int]:
         """Indices of the events between the command before and the one that comes next."""
@@ -157,6 +164,15 @@ class Playback:
         return one.shape == other.shape and bool(
             np.allclose(one, other, rtol=0, atol=allowed, equal_nan=True)
         )
+
+
+def _apart(recorded: dict[str, Any], given: dict[str, Any]) -> float:
+    """Greatest difference of numbers of two queries with the same arguments."""
+    differences = [
+        np.abs(np.asarray(recorded[key], dtype=np.float64) - np.asarray(given[key], dtype=np.float64))
+        for key in recorded
+    ]
+    return max((float(np.nan_to_num(one).max()) for one in differences), default=0.0)
 
 
 def _words(call: str, arguments: dict[str, Any]) -> str:

@@ -90,16 +90,17 @@ class RecordingWriter:
         """Finish the file after its last user; delete one without calls (the cell did not open)."""
         self._users = max(0, self._users - 1)
         if self._users == 0 and self._file is not None:
-            with self._lock:
-                file, self._file = self._file, None
-                with self._named_in_errors():
-                    events: Any = file["events"]
-                    n_events = len(events)
-                    file.close()
-            if n_events:
-                os.replace(self.part, self._path)
-            else:
-                self.part.unlink()
+            with ctrl_c_deferred():
+                with self._lock:
+                    file, self._file = self._file, None
+                    with self._named_in_errors():
+                        events: Any = file["events"]
+                        n_events = len(events)
+                        file.close()
+                if n_events:
+                    os.replace(self.part, self._path)
+                else:
+                    self.part.unlink()
 
     def call(
         self,

@@ -70,7 +70,7 @@ class CellPanel(Panel):
             self.plan_button = gui.add_button("plan", color="blue")
             self.live = gui.add_checkbox("plan live", False, disabled=self.cell.recorded)
             self.present_button = gui.add_button(
-                "present the part anew", visible=self.cell.feeder is not None
+                "present the part anew", visible=self.cell.feeder is not None and self._part is not None
             )
             self.execute_button = gui.add_button("execute ...", disabled=True, hint=off)
             self.stop_button = gui.add_button("stop", color="red", disabled=not may_move)
@@ -118,7 +118,7 @@ class CellPanel(Panel):
             HalError: The cell has no feeder, or was lost.
         """
         part = self._part
-        assert part is not None, "only a cell with a feeder shows the button"
+        assert part is not None, "the button is shown where the part is known"
         self._seed += 1
         present(self.cell, str(part.folder), self._seed)
         self.arm.look()
@@ -188,7 +188,10 @@ class CellPanel(Panel):
             done = self.engine.grasp(plan, self._part)
             result = done.result
             if result is None:
-                self.page.tell("the arm refuses this grasp, or the way to it")
+                self.page.tell(
+                    "the arm refuses this grasp, or part of the way; if it is over the part or holds it, "
+                    "recover and go home"
+                )
                 return
             if result.aborted is not None:
                 self.page.tell(f"**the arm stopped**: {result.aborted}")
@@ -206,7 +209,7 @@ class CellPanel(Panel):
         """Acknowledge a stop and move the arm home; nothing moves without ``allow_motion``.
 
         Raises:
-            HalError: The cause is still present, or the hand holds something.
+            HalError: The cause is still present.
         """
         if not self._config.allow_motion:
             return
@@ -214,7 +217,8 @@ class CellPanel(Panel):
         self.page.tell("the arm moves ...")
         with self.arm.in_motion():
             self.cell.arm.recover()
-            go_home(self.cell, tallest=self.engine.passed)
+            # Whoever said yes holds what is in the hand of a real arm; a simulated one puts it down.
+            go_home(self.cell, tallest=self.engine.passed, take=lambda: True)
         self.page.tell("the arm is at home; plan again")
 
     def _stop(self) -> None:
@@ -234,7 +238,12 @@ class CellPanel(Panel):
 
     def _ask_to_recover(self, event: GuiEvent[GuiButtonHandle]) -> None:
         self.live.value = False
-        question = "The arm acknowledges its stop, opens the fingers, rises and goes home. May it move?"
+        full = (
+            "puts down what it holds"
+            if self.cell.arm.simulated
+            else "opens the fingers (**hold what is between them: it falls**)"
+        )
+        question = f"The arm acknowledges its stop, {full}, rises and goes home. May it move?"
         self._ask(event, question, self.recover)
 
     def _ask(self, event: GuiEvent[GuiButtonHandle], question: str, work: Work) -> None:

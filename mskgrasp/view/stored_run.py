@@ -60,7 +60,7 @@ def read_run(folder: Path) -> list[StoredTrial]:
     if not lines:
         raise UsageError(f"{path} holds no trial yet; wait for the first one")
     if "point_base" in lines[0] and "seed" in lines[0]:
-        return [_evaluated(folder, trial) for trial in read_trials(path, Trial.from_json)]
+        return read_trials(path, lambda values: _evaluated(folder, Trial.from_json(values)))
     if "slot" in lines[0] and "correction" in lines[0]:
         return read_trials(path, lambda values: _placed(folder, values))
     raise UsageError(f"{path} is of another program; legal: runs of mskgrasp.evaluate and mskgrasp.palletize")
@@ -71,7 +71,7 @@ def _evaluated(folder: Path, trial: Trial) -> StoredTrial:
     outcome = "lifted" if trial.success else f"not lifted ({trial.reason})"
     if trial.refusal:
         outcome += f": {trial.refusal}"
-    pose = None if trial.pose_base_obj is None else Pose.from_vector(np.array(trial.pose_base_obj))
+    pose = _array(trial.pose_base_obj)
     return StoredTrial(
         name=trial.key,
         part=trial.part,
@@ -81,7 +81,7 @@ def _evaluated(folder: Path, trial: Trial) -> StoredTrial:
         predicted=_array(trial.predicted),
         measured=_array(trial.measured),
         point_base=_array(trial.point_base),
-        T_base_obj=pose,
+        T_base_obj=None if pose is None else Pose.from_vector(pose.reshape(7)),
     )
 
 

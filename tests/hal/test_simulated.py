@@ -15,12 +15,13 @@ from tasks.robot import motion
 
 
 class ToyWorld(SimulatedWorld):
-    """Counts how often it is built and freed."""
+    """Counts how often it is built and freed, and keeps the seeds of the places of parts."""
 
     built = freed = 0
+    seeds: tuple[int, ...] = ()
 
     def _place(self, part: Part, seed: int, keep: bool) -> None:
-        pytest.fail("no part is asked for")
+        self.seeds += (seed,)
 
     def part_pose(self) -> Pose:
         pytest.fail("no pose is asked for")
@@ -74,6 +75,15 @@ def test_a_camera_outside_its_context_names_itself():
 
 def test_the_hand_accelerates_as_in_simulated_attempts():
     assert PEAK_ACCELERATION == motion.PEAK_ACCELERATION
+
+
+def test_seeds_that_simulators_could_not_take_become_others():
+    world = make_world()
+    for seed in (7, 2**32 - 1, 2**32, 2**32 + 7, 2**63 - 1):
+        world.present("hex_nut_m30", seed)
+        assert world.presented_seed == seed
+    assert world.seeds[:2] == (7, 2**32 - 1)
+    assert len(set(world.seeds)) == 5 and max(world.seeds) < 2**32
 
 
 def test_a_world_calls_the_function_that_an_arm_was_given():

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -161,10 +163,33 @@ def test_stop_ends_a_motion_at_once_and_recovery_is_asked_for(page: Page, engine
     away = np.abs(arm.state().joints - engine.cell.workspace.home).max()
     panel.plan_button.value = True
     work(page)
-    asked(page, panel._ask_to_recover).buttons["yes, move"].value = True
+    question = asked(page, panel._ask_to_recover)
+    assert "acknowledges its stop, puts down what it holds, rises and goes home" in question.text
+    question.buttons["yes, move"].value = True
     work(page)
     assert page.said == "the arm is at home; plan again"
     assert np.abs(arm.state().joints - engine.cell.workspace.home).max() < min(0.01, away + 0.01)
+
+
+def test_a_person_who_lets_a_real_arm_recover_holds_what_is_in_its_hand(
+    page: Page, engine: TrialEngine, monkeypatch
+):
+    panel = panel_of(page, engine, allow_motion=True)
+    homed = []
+    monkeypatch.setattr(type(engine.cell.arm), "simulated", False)
+    monkeypatch.setattr("mskgrasp.view.cell_panel.go_home", lambda cell, **options: homed.append(options))
+    question = asked(page, panel._ask_to_recover)
+    assert "opens the fingers (**hold what is between them: it falls**)" in question.text
+    question.buttons["yes, move"].value = True
+    work(page)
+    assert len(homed) == 1 and homed[0]["take"]()
+
+
+def test_a_part_that_is_not_known_is_not_presented_anew(page: Page, engine: TrialEngine, monkeypatch):
+    assert panel_of(page, engine).present_button.visible
+    cell = replace(engine.cell, feeder=cast(Any, SimpleNamespace()))  # as that of a recorded cell
+    monkeypatch.setattr(engine, "cell", cell)
+    assert not CellPanel(page, engine, ViewConfig(planner=FEW), None).present_button.visible
 
 
 def test_a_stop_after_a_yes_holds_though_the_motion_has_not_begun(

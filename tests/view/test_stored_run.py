@@ -36,6 +36,13 @@ def test_a_run_of_evaluate_holds_frames_poses_and_displacements(tmp_path: Path):
     assert second.outcome == "not lifted (refused): too dark" and second.file is None is second.grasp
 
 
+@pytest.mark.parametrize("damage", [{"grasp": ["a"] * 4}, {"pose_base_obj": [0.5, 0.0, 0.01]}])
+def test_a_damaged_trial_is_an_error_of_one_line(tmp_path: Path, damage: dict[str, list]):
+    append_trial(tmp_path / TRIALS, trial().to_json() | damage)
+    with pytest.raises(BadDataset, match=r"trials.jsonl.*line 1"):
+        read_run(tmp_path)
+
+
 def test_a_run_of_palletize_holds_targets_and_pictures(tmp_path: Path):
     failed = replace(PLACEMENT, slot=1, placed=False, reason="slipped", translation_error=None)
     for one in (PLACEMENT, failed):

@@ -10,7 +10,7 @@ import tyro
 
 from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.parts.builtin import find_part
-from mskgrasp.parts.catalogue import read_index
+from mskgrasp.parts.catalogue import read_index, require_name
 from mskgrasp.parts.commands.grade import coarse_note, grade_text
 from mskgrasp.runtime.progress import advance_to, progress
 from mskgrasp.simulation.resting import Resting, resting_of
@@ -51,6 +51,7 @@ def run_show(command: Show) -> int:
     # Matplotlib takes a second to load; the other commands do not need it.
     from mskgrasp.parts.figures.picture import draw_part
 
+    require_name(command.name)
     part = find_part(command.name)
     out = command.out or Path(f"{part.name}.png")
     _check(out)

@@ -8,6 +8,8 @@ import pytest
 
 from hal.calibrate import run as calibrate
 from hal.doctor import run as doctor
+from hal.replay import recorded_cell
+from tests.hal.replay.toy import toy_cell
 from tests.programs import run_here
 
 CELLS = Path(__file__).parents[3] / "configs" / "cells"
@@ -53,3 +55,12 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     done = run_here(program.main, *arguments)
     assert done.returncode == 2 and message in done.stderr
     assert done.stderr.startswith("program: ") and done.stderr.count("\n") == 1
+
+
+def test_a_recording_is_not_calibrated(tmp_path: Path):
+    with recorded_cell(toy_cell(), tmp_path / "toy.h5").connected() as cell:
+        cell.camera.capture()
+    cell_file = tmp_path / "cell.yaml"
+    cell_file.write_text(f"type: replay\nrecording: {tmp_path / 'toy.h5'}\n")
+    done = run_here(calibrate.main, "--cell", str(cell_file), "--out", str(tmp_path / "out"))
+    assert done.returncode == 2 and "a recording cannot be calibrated; solve the pictures" in done.stderr

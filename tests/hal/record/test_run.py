@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -62,6 +65,38 @@ def test_ctrl_c_keeps_the_frames(cell_file: Path, tmp_path: Path):
         _, printed = program.communicate(timeout=TIMEOUT_S)
     assert program.returncode == 130 and "Ctrl-C" in printed and "Traceback" not in printed
     assert read_recording(out).n_frames == 1
+
+
+@pytest.mark.slow
+def test_ctrl_c_in_a_terminal_reaches_the_program_once(cell_file: Path, tmp_path: Path):
+    out, inner = tmp_path / "run.h5", tmp_path / "inner.h5"
+    run = f"hal.record --out {inner} --interval 3600"
+    program = [sys.executable, "-m", "hal.record", "--cell", str(cell_file), "--out", str(out), "--run", run]
+    keyboard, terminal = os.openpty()
+    with (
+        open(keyboard, "wb", buffering=0) as keys,
+        subprocess.Popen(
+            ["setsid", "--ctty", "--wait", *program], stdin=terminal, stdout=terminal, stderr=terminal
+        ) as ran,
+    ):
+        os.close(terminal)
+        wait_for_frame(tmp_path / "inner.h5.part")
+        keys.write(b"\x03")
+        assert ran.wait(timeout=TIMEOUT_S) == 130
+    assert read_recording(out).n_frames == read_recording(inner).n_frames == 1
+
+
+def test_a_terminal_sends_ctrl_c_to_what_runs_in_its_foreground():
+    ask = [sys.executable, "-c", "from hal.record.run import _in_foreground as it; exit(7 if it() else 3)"]
+    keyboard, terminal = os.openpty()
+    try:
+        assert (
+            subprocess.run(["setsid", "--ctty", "--wait", *ask], stdin=terminal, check=False).returncode == 7
+        )
+        assert subprocess.run(["setsid", "--wait", *ask], stdin=terminal, check=False).returncode == 3
+    finally:
+        os.close(keyboard)
+        os.close(terminal)
 
 
 @pytest.mark.slow

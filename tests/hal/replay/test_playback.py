@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from hal import execute_grasp
-from hal.errors import NeedsRecovery, NotRecorded
+from hal.errors import NeedsRecovery, NotRecorded, OutOfWorkspace
+from hal.replay import recorded_cell
 from mskgrasp.core.grasp import Grasp
-from tests.hal.replay.program import GRASP, replayed
+from tests.hal.replay.program import GRASP, at, replayed
+from tests.hal.replay.toy import toy_cell
 
 
 def test_another_command_is_refused_names_both_and_nothing_follows_before_recover(recording: Path):
@@ -42,6 +44,23 @@ def test_commands_may_differ_by_the_tolerances_and_no_more(recording: Path):
         cell.camera.capture()
         with pytest.raises(NotRecorded):
             execute_grasp(cell, Grasp.from_vector(GRASP + np.array([2e-3, 0, 0, 0])))
+
+
+def test_a_question_gets_the_answer_to_the_nearest_one(tmp_path: Path):
+    within, beyond = (
+        at(0.5, x=0.9998),
+        at(0.5, x=1.0003),
+    )  # the box ends at 1 m
+    with recorded_cell(toy_cell(), tmp_path / "run.h5").connected() as cell:
+        with pytest.raises(OutOfWorkspace):
+            cell.arm.check_pose(beyond)
+        cell.arm.check_pose(within)
+    with replayed(tmp_path / "run.h5").connected() as cell:
+        cell.arm.check_pose(within)
+        with pytest.raises(OutOfWorkspace):
+            cell.arm.check_pose(beyond)
+        with pytest.raises(NotRecorded):
+            cell.arm.check_pose(at(0.5, x=0.99))
 
 
 def test_a_frame_comes_where_it_was_taken(recording: Path):

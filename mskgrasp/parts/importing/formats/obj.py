@@ -35,6 +35,8 @@ def load_obj(content: bytes) -> Loaded:
                 vertices.append([x, y, z])
                 continue
             corners = [int(word.split(b"/", 1)[0]) for word in words[1:]]
+            if 0 in corners:
+                raise ValueError("vertices are counted from 1")
         except ValueError as error:
             text = line.decode("ascii", "replace").strip()[:40]
             raise Unreadable(

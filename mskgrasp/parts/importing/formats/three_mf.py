@@ -54,7 +54,8 @@ class _Model:
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self.unit = "millimeter"
+        self.unit: str | None = None
+        """As the file states it; by the specification millimetres where none does."""
         self.objects: dict[_Key, _Object] = {}
         self.items: list[tuple[_Key, np.ndarray]] = []
         self._current = _Object()
@@ -73,7 +74,7 @@ class _Model:
             case "item":
                 self.items.append((self._key(attributes), _matrix(attributes)))
             case "model":
-                self.unit = attributes.get("unit", "millimeter")
+                self.unit = attributes.get("unit")
                 _check_extensions(attributes)
 
     def _key(self, attributes: dict[str, str]) -> _Key:
@@ -101,11 +102,15 @@ def load_3mf(content: bytes) -> Loaded:
             f"is not a readable 3MF (bad or missing attribute {error}): export it again"
         ) from error
     root = models[0]
-    if root.unit not in _UNITS:
-        raise Unreadable(f"states the unit {root.unit!r}, 3MF knows {', '.join(_UNITS)}: export it again")
+    unit = root.unit or "millimeter"
+    if unit not in _UNITS:
+        raise Unreadable(f"states the unit {unit!r}, 3MF knows {', '.join(_UNITS)}: export it again")
+    units = {model.unit for model in models if model.unit} | {unit}
+    if len(units) > 1:
+        raise Unreadable(f"states several units, {' and '.join(sorted(units))}: export it again")
     objects = {key: item for model in models for key, item in model.objects.items()}
     surfaces, skipped = _placed(root, objects)
-    name, length = _UNITS[root.unit]
+    name, length = _UNITS[unit]
     notes = (f"left out {skipped} support object{'s' if skipped > 1 else ''}",) if skipped else ()
     return Loaded(objects=tuple(surfaces), unit=name, unit_mm=length, notes=notes)
 

@@ -72,6 +72,7 @@ def test_names_of_an_obj_may_be_in_any_encoding_and_its_materials_are_not_opened
     [
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "refers to a missing vertex"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -9\n", "refers to a missing vertex"),
+        ("v 0 0 0\nv 1 0 0\nf 0 1 2\nv 0 1 0\n", "line 3"),
         ("v 0 0 0\nv 1 0\n", "line 2"),
         ("v 0 0 0\nv 1 0 zero\nv 0 1 0\nf 1 2 3\n", "not a readable OBJ"),
         ("v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", "not finite"),

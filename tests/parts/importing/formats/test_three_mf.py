@@ -80,8 +80,12 @@ def test_a_3mf_may_keep_its_objects_in_further_models_as_slicers_do():
         'xmlns:p="http://schemas.microsoft.com/3dmanufacturing/production/2015/06"/></components></object>'
     )
     ten = f'<object id="1">{mesh_xml(trimesh.creation.box((10, 10, 10)))}</object>'
-    content = three_mf(model(main, '<item objectid="8"/>'), model(ten, ""))
-    assert volume(read("sliced.3mf", content)) == pytest.approx(1000)
+    item = '<item objectid="8"/>'
+    assert volume(read("sliced.3mf", three_mf(model(main, item), model(ten, "")))) == pytest.approx(1000)
+    inches = three_mf(model(main, item, root='unit="inch"'), model(ten, ""))
+    assert volume(read("sliced.3mf", inches)) == pytest.approx(1000 * 25.4**3)
+    mixed = three_mf(model(main, item, root='unit="inch"'), model(ten, "", root='unit="meter"'))
+    assert "states several units, inch and meter" in refusal("sliced.3mf", mixed)
 
 
 def test_supports_of_a_3mf_are_left_out_and_reported():
