@@ -222,6 +222,8 @@ class GraspDisplacementEnv(BaseEnv):
         return TableFriction(self.scene.px, part, table, self.physics.friction_table_part)
 
     def _initialize_episode(self, env_idx: Tensor, options: dict) -> None:
+        if options.get("parts") and not options.get("reconfigure"):
+            raise BadConfig("options: other parts are loaded with reconfigure=True alone; add it")
         self._outcome = None
         given = options.get("pose_base_obj")
         if given is None:

@@ -158,3 +158,8 @@ def test_wrong_settings_are_named(boxes):
         make(boxes, physics=dict(gravitiy=9.8))
     with pytest.raises(BadPart, match="no_such_part"):
         make(boxes, parts=["no_such_part"])
+
+
+def test_other_parts_without_a_new_scene_are_refused(env):
+    with pytest.raises(BadConfig, match="other parts are loaded with reconfigure=True alone"):
+        env.reset(seed=0, options=dict(parts=["hex_nut_m30"]))
