@@ -11,7 +11,7 @@ from mskgrasp.assess.summary import Row
 from mskgrasp.assess.trials import EXACT, NOISY
 from mskgrasp.reports.html import write_html
 from mskgrasp.reports.section import Section
-from mskgrasp.runtime.console_table import Table
+from mskgrasp.runtime.console_table import PageLink, Table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,18 +38,17 @@ class IndexEntry:
 
 
 def write_index(path: Path, entries: Sequence[IndexEntry], tolerance: Tolerance) -> None:
-    """Write the index page."""
+    """Write the index page; the name of a part leads to its report."""
     ranked = sorted(
         entries,
         key=lambda one: (not one.rows, *(-(one.share(name) or 0.0) for name in (EXACT, NOISY)), one.name),
     )
     rows = [
         (
-            one.name,
+            one.name if one.folder is None else PageLink(text=one.name, path=f"{one.folder}/report.html"),
             _percent(one.share(EXACT)),
             _percent(one.share(NOISY)),
             one.headline,
-            "-" if one.folder is None else f"{one.folder}/report.html",
         )
         for one in ranked
     ]
@@ -62,7 +61,7 @@ def write_index(path: Path, entries: Sequence[IndexEntry], tolerance: Tolerance)
         sections=[
             Section(
                 title=f"Parts: within {tolerance}",
-                tables=[Table(header=("part", EXACT, NOISY, "verdict", "report"), rows=rows)],
+                tables=[Table(header=("part", EXACT, NOISY, "verdict"), rows=rows)],
             )
         ],
     )

@@ -14,7 +14,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from mskgrasp.core import palette
 from mskgrasp.core.files import write_whole
 from mskgrasp.reports.section import Figure, Section
-from mskgrasp.runtime.console_table import Link, cell_text
+from mskgrasp.runtime.console_table import Link, PageLink, cell_text
 
 _TEMPLATE = "report.html.j2"
 _KINDS = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
@@ -45,6 +45,7 @@ def write_html(
     )
     environment.filters |= {"cell_text": cell_text, "data_url": _data_url}
     environment.tests["link"] = lambda cell: isinstance(cell, Link)
+    environment.tests["page_link"] = lambda cell: isinstance(cell, PageLink)
     page = environment.get_template(_TEMPLATE).render(
         title=title,
         conclusion=conclusion,

@@ -41,12 +41,25 @@ class Link:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PageLink:
+    """A cell that leads to a page beside the report.
+
+    Attributes:
+        text: Text of the cell.
+        path: Path of the page, from the folder of the report; `/` between folders.
+    """
+
+    text: str
+    path: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Table:
     """A table.
 
     Attributes:
         header: (k,) names of the columns; all empty: no header is shown.
-        rows: Rows of k cells each: text, numbers, `Link` or None.
+        rows: Rows of k cells each: text, numbers, `Link`, `PageLink` or None.
         caption: Shown above it; empty: none.
         total: The last row sums up the others.
 
@@ -71,7 +84,7 @@ class Table:
 
 def cell_text(cell: object) -> str:
     """A cell as plain text; a dash for None."""
-    if isinstance(cell, Link):
+    if isinstance(cell, Link | PageLink):
         return cell.text
     return "–" if cell is None else printable(str(cell))
 

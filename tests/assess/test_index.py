@@ -28,5 +28,18 @@ def test_the_most_precise_part_comes_first_and_one_without_a_report_last(tmp_pat
             "[...document.querySelectorAll('tbody tr')].map(row => row.children[0].innerText)"
         )
         assert names == ["good", "poor", "never", "broken.stl"]
+        pages = page.evaluate("[...document.querySelectorAll('td a')].map(a => a.getAttribute('href'))")
+        assert pages == ["good/report.html", "poor/report.html", "never/report.html"]
         assert "1 of 4 parts" in page.evaluate("document.querySelector('.conclusion').innerText")
         assert page.complaints == []
+
+
+def test_a_part_leads_to_its_report_whatever_its_folder_is_called(tmp_path):
+    report = tmp_path / 'a: "b" #1 %2F' / "report.html"
+    report.parent.mkdir()
+    report.write_text("<title>its report</title>")
+    one = entry(report.parent.name, [made(0)])
+    write_index(tmp_path / "index.html", [one], TOLERANCE)
+    with Page(tmp_path / "index.html") as page:
+        address = page.evaluate("document.querySelector('td a').href")
+    assert address == report.as_uri()
