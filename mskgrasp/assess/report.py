@@ -155,7 +155,12 @@ def trials_section(rows: Sequence[Row], tolerance: Tolerance, figure: Path) -> S
                 f"{np.degrees(TILT_LIMIT):g} degrees",
             )
         ],
-        figures=[Figure(path=figure, caption="Share of attempts that end within a distance of the target")],
+        figures=[
+            Figure(
+                path=figure,
+                caption="Share of attempts that end within a distance of the target, whatever the turn",
+            )
+        ],
     )
 
 
