@@ -92,7 +92,8 @@ def draw_grasps(part: Part, certified: CertifiedGrasps, path: Path) -> None:
                 reach = max(reach, 1e3 * (float(np.abs(grasp.grasp[:2]).max()) + MAX_OPENING / 2))
             axis.set(xlim=(-reach - 6, reach + 6), ylim=(-reach - 6, reach + 6))
             share = _share_of(part, certified, number)
-            axis.set_title(f"pose {number}: {share:.0%}, {len(grasps)} grasps", fontsize=9)
+            grasps_text = "1 grasp" if len(grasps) == 1 else f"{len(grasps)} grasps"
+            axis.set_title(f"pose {number}: {share:.0%}, {grasps_text}", fontsize=9)
             axis.set(aspect="equal", xlabel="mm")
 
 

@@ -200,7 +200,8 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     draw_jaw(axes, plan.grasp.position, float(plan.grasp.theta))
     axes.plot([], [], color=BLUE, lw=1.4, ls=(0, (4, 2)), marker="s", label="chosen grasp")
     axes.legend(loc="lower left", fontsize=8)
-    axes.set(xlabel="base x, mm", ylabel="base y, mm", title=f"{len(plan.candidates)} candidates")
+    n = len(plan.candidates)
+    axes.set(xlabel="base x, mm", ylabel="base y, mm", title="1 candidate" if n == 1 else f"{n} candidates")
 
 
 def _closing_line(axes: Axes, origin: np.ndarray, theta: float) -> None:
