@@ -190,8 +190,9 @@ def _examples(out: Path, placements: Sequence[Placement]) -> Section:
     if not rows:
         return Section(title="Examples")
     draw_corrections(rows, out / "placed.png")
+    which = "each part" if len(chosen) == len(names) else f"{len(chosen)} of {len(names)} parts"
     caption = (
-        "The first compared placement of each part: the part with the grasp, and the part as placed. Green: "
+        f"The first compared placement of {which}: the part with the grasp, and the part as placed. Green: "
         "target, the longer arm along the part's longer side, and the part's outline at the target"
     )
     return Section(title="Examples", figures=[Figure(path=out / "placed.png", caption=caption)])
