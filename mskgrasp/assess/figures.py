@@ -24,7 +24,7 @@ _COLOURS: dict[Correction, str] = {"none": FAINT, "predicted": BLUE, "seen": GRE
 _NAMES: dict[Correction, str] = {
     "none": "placed directly", "predicted": "corrected by the prediction", "seen": "part seen in the hand",
 }  # fmt: skip
-_MOST = 6
+MOST_POSES = 6
 """Resting poses drawn, the most probable ones."""
 
 
@@ -73,7 +73,7 @@ def draw_grasps(part: Part, certified: CertifiedGrasps, path: Path) -> None:
         int(number)
         for number in np.argsort(-part.resting_probability, kind="stable")
         if number not in certified.like
-    ][:_MOST]
+    ][:MOST_POSES]
     mesh = trimesh.load_mesh(part.mesh_path, process=False)
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
     columns = min(3, len(numbers))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mskgrasp.assess.config import Tolerance
-from mskgrasp.assess.figures import draw_grasps, draw_shares
+from mskgrasp.assess.figures import MOST_POSES, draw_grasps, draw_shares
 from mskgrasp.assess.scene import scene_page
 from mskgrasp.assess.summary import DISTANCES, Row, summarise, summary_json, verdict
 from mskgrasp.assess.trials import EXACT, NOISY
@@ -212,6 +212,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
             )
         )
     rows.sort(key=lambda row: -float(row[1].rstrip("%")))
+    drawn = f", in the {MOST_POSES} most probable poses" if len(rows) > MOST_POSES else ""
     return Section(
         title="Resting poses",
         text=[
@@ -229,7 +230,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
                 rows=rows,
             )
         ],
-        figures=[Figure(path=figure, caption="Certified grasps from above, the best one in blue")],
+        figures=[Figure(path=figure, caption=f"Certified grasps from above, the best one in blue{drawn}")],
     )
 
 
