@@ -90,6 +90,10 @@ def test_errors_of_a_page_are_reported(tmp_path):
 def test_it_fits_a_phone(report):
     with Page(report, width=390) as page:
         assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+        table, caption = page.evaluate(
+            "['table', 'caption span'].map(a => document.querySelector(a).getBoundingClientRect().right)"
+        )
+        assert caption < 390 < table  # which scrolls, its caption does not
 
 
 def test_a_reader_who_prefers_the_dark_sees_a_dark_page(report):
