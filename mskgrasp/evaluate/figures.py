@@ -27,6 +27,7 @@ from mskgrasp.evaluate.comparison import (
     POLICY_NAMES,
     SIDES,
     DisplacementSummary,
+    ModelStatistics,
     figure_names,
 )
 from mskgrasp.evaluate.summary import Interval, SuccessSummary, displacement_errors, rms
@@ -136,16 +137,19 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
                     interval = getattr(certified, f"{kind}_interval")
                     _bar(axes, order.index(_CAD), value, interval, scale, GREEN)
                 for x, name in enumerate(order):
-                    for k, policy in enumerate(POLICIES):
-                        found = models[ours[name]].of(policy, side) if name in ours else None
+                    own, papers = _policies_of(models.get(ours.get(name, "")), name)
+                    first = x - (len(own) + len(papers) - 1) / 2 * _BAR
+                    for k, policy in enumerate(own):
+                        found = models[ours[name]].of(policy, side)
                         if found is not None and found.trials:
                             value = getattr(found, f"{kind}_rmse")
                             interval = getattr(found, f"{kind}_interval")
-                            _bar(axes, x + (k - 2) * _BAR, value, interval, scale, _OURS[policy])
-                        paper = PAPER.get(name, {}).get(policy)
+                            _bar(axes, first + k * _BAR, value, interval, scale, _OURS[policy])
+                    for k, policy in enumerate(papers, len(own)):
+                        paper = PAPER[name][policy]
                         if paper is not None and (name, side) != ("LOWESS", "novel"):  # fitted to known parts
                             value = getattr(paper, f"{kind}_rmse")
-                            _bar(axes, x + (k + 1) * _BAR, value, None, scale, _PAPERS[policy])
+                            _bar(axes, first + k * _BAR, value, None, scale, _PAPERS[policy])
                 axes.set_title(f"{kind.capitalize()} RMSE, {side} parts")
                 axes.set_ylabel(unit)
                 labels = [_tick_label(name, ours.get(name, name)) for name in order]
@@ -161,6 +165,16 @@ def draw_comparison(summary: DisplacementSummary, path: Path) -> None:
             label = f"{POLICY_NAMES['certified']}, this run (all parts)"
             handles.append(Patch(color=GREEN, label=label))
         figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9)
+
+
+def _policies_of(model: ModelStatistics | None, name: str) -> tuple[list[Policy], list[Policy]]:
+    """Policies that have a bar on either side: of a model of this run, and of the paper's of that name."""
+    own: list[Policy] = []
+    for policy in POLICIES:
+        sides = [] if model is None else [model.of(policy, side) for side in SIDES]
+        if any(one is not None and one.trials for one in sides):
+            own.append(policy)
+    return own, [policy for policy, bar in PAPER.get(name, {}).items() if bar is not None]
 
 
 def _tick_label(name: str, label: str) -> str:

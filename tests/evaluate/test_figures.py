@@ -81,6 +81,9 @@ def test_a_models_bars_stand_beside_the_papers_at_their_heights(tmp_path: Path, 
     assert sorted(bar.get_height() for bar in bars if abs(bar.get_x() - at) < 0.6) == pytest.approx(
         [0.24, 0.3, 0.43]  # figure 5 of the paper beside this run's
     )
+    for tick in range(len(names)):
+        group = [middle for bar in bars if abs((middle := bar.get_x() + bar.get_width() / 2) - tick) < 0.5]
+        assert np.mean(group) == pytest.approx(tick)
     novel = kept[0].axes[2]
     assert min(bar.get_x() for bar in novel.patches) > 0.5  # LOWESS, the first, predicts no novel part
     assert picture(tmp_path / "displacement.png").shape[0] == 1110
