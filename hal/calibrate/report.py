@@ -75,7 +75,7 @@ def describe(found: HandEye, views: Sequence[View], before: Pose, offset: DepthO
         f"{np.degrees(found.rms_rotation_rad):.2f} degrees (RMS, each picture on its own)",
         f"repeatable  to {found.half_translation_m * 1e3:.2f} mm at the board and "
         f"{np.degrees(found.half_rotation_rad):.3f} degrees (one half of the pictures against the other)",
-        f"squares     seem {100 * (found.scale - 1):+.2f} % larger than specified",
+        f"squares     seem {100 * (found.scale - 1):+z.2f} % larger than specified",
         f"moved by    {moved * 1e3:.2f} mm and {np.degrees(turned):.3f} degrees from the camera's "
         "previous pose",
     ]
@@ -86,7 +86,7 @@ def describe(found: HandEye, views: Sequence[View], before: Pose, offset: DepthO
         remedy = f"; add {-offset.metres:.4f} to camera.depth_offset"
     return [
         *lines,
-        f"depth       the board is measured {offset.metres * 1e3:+.1f} mm too far, +- "
+        f"depth       the board is measured {offset.metres * 1e3:+z.1f} mm too far, +- "
         f"{offset.spread * 1e3:.1f} mm between pictures{remedy}",
     ]
 

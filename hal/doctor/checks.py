@@ -346,7 +346,7 @@ def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
     off = plane.z - workspace.table_z
     tilt_rad = float(np.arctan(np.linalg.norm(np.subtract(plane.slope, workspace.table_slope))))
     tilt_deg = np.degrees(tilt_rad)
-    said = f"{off * 1e3:+.1f} mm from table_z {workspace.table_z:.4f} m, tilted by {tilt_deg:.2f} degrees"
+    said = f"{off * 1e3:+z.1f} mm from table_z {workspace.table_z:.4f} m, tilted by {tilt_deg:.2f} degrees"
     if tilt_rad > 2 * _TILT_OK:
         yield Finding(
             level="fail",
@@ -358,7 +358,7 @@ def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
             level="fail",
             subject="table",
             text=f"{said}: parts are not detected with an error this large; run hal.touch: if table_z "
-            f"holds, add {off:+.4f} to camera.depth_offset (the camera measures "
+            f"holds, add {off:+z.4f} to camera.depth_offset (the camera measures "
             f"{'short' if off > 0 else 'too far'})",
         )
     elif off > HIGHEST_TABLE:
@@ -366,7 +366,7 @@ def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
             level="fail",
             subject="table",
             text=f"{said}: programs refuse a table seen more than {HIGHEST_TABLE * 1e3:g} mm higher; run "
-            f"hal.touch: if table_z holds, add {off:+.4f} to camera.depth_offset",
+            f"hal.touch: if table_z holds, add {off:+z.4f} to camera.depth_offset",
         )
     elif abs(off) > max(_TABLE_OK, workspace.min_height / 2) or tilt_rad > _TILT_OK:
         yield Finding(

@@ -68,7 +68,7 @@ class Grip:
     def lines(self) -> list[str]:
         """The result as lines of text."""
         off = self.tape_width - self.max_width
-        width = f"width  {1e3 * self.max_width:.1f} mm by the hand, {off * 1e3:+.1f} mm by tape"
+        width = f"width  {1e3 * self.max_width:.1f} mm by the hand, {off * 1e3:+z.1f} mm by tape"
         if abs(off) > _SAME_WIDTH:
             width += ": other fingers than it was homed with? run python -m hal.home, then measure again"
         spread = float(np.ptp(self.forces)) / self.finger_force

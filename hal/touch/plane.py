@@ -62,7 +62,7 @@ def fit_plane(points: np.ndarray, region: tuple[float, float, float, float], fla
     worst = float(np.abs(residuals).max())
     if worst > flatness:
         shown = ", ".join(
-            f"{1e3 * off:+.2f} mm at ({x:.3f}, {y:.3f}) m"
+            f"{1e3 * off:+z.2f} mm at ({x:.3f}, {y:.3f}) m"
             for (x, y), off in zip(points[:, :2], residuals, strict=True)
         )
         raise NoPlane(

@@ -60,9 +60,9 @@ class TableReport:
         """The result as lines of text."""
         plane = self.plane
         against = (
-            "" if self.stated_z is None else f", {1e3 * (plane.z - self.stated_z):+.2f} mm from the stated"
+            "" if self.stated_z is None else f", {1e3 * (plane.z - self.stated_z):+z.2f} mm from the stated"
         )
-        off = ", ".join(f"{1e3 * value:+.2f}" for value in plane.residuals)
+        off = ", ".join(f"{1e3 * value:+z.2f}" for value in plane.residuals)
         matters = "no line is needed for it" if plane.level else "written as table_slope"
         return [
             f"table      table_z {plane.z:.5f} m in the middle of the region{against}",

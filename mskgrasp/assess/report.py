@@ -222,7 +222,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
             "distance by which the part's points miss their predicted places, with errors of the seen pose "
             f"of {1e3 * errors['position']:g} mm and {np.degrees(errors['turn']):.2g} degrees, friction "
             f"{friction}, force {force} N a pad, and the arm's {1e3 * noise['arm_position_std']:g} mm. "
-            "The least of several is rather too small; the trials are made afresh."
+            "The smallest of several estimates is somewhat too small; the trials below are other simulations."
         ],
         tables=[
             Table(
@@ -246,8 +246,8 @@ def _grasps_section(certified: CertifiedGrasps) -> Section:
                 f"{1e3 * x:.1f}, {1e3 * y:.1f}, {1e3 * z:.1f}",
                 f"{np.degrees(theta):.1f}",
                 f"{grasp.lifted} of {grasp.n} [{low:.0%}, {high:.0%}]",
-                ", ".join(f"{1e3 * value:+.2f}" for value in grasp.mean[:3]),
-                f"{np.degrees(grasp.mean[3]):+.2f}",
+                ", ".join(f"{1e3 * value:+z.2f}" for value in grasp.mean[:3]),
+                f"{np.degrees(grasp.mean[3]):+z.2f}",
                 ", ".join(f"{1e3 * value:.2f}" for value in std[:3]),
                 f"{np.degrees(std[3]):.2f}",
                 f"{np.degrees(np.linalg.norm(grasp.swing)):.1f}",

@@ -212,7 +212,7 @@ def _tolerances_section(rows: Sequence[Row]) -> Section:
 
 def _refusals_section(refused: Sequence[Refusal], figure: Path) -> Section:
     table = [
-        (one.planner, f"{one.bound:.2f}", f"{one.refused:.0%}", one.parts, _share(one.placed))
+        (one.planner, f"{one.bound:.4f}", f"{one.refused:.0%}", one.parts, _share(one.placed))
         for one in refused
     ]
     return Section(

@@ -126,8 +126,8 @@ def _text(moved: np.ndarray, std: np.ndarray | None = None) -> str:
     spread = [""] * 4
     if std is not None and np.isfinite(std).all():
         spread = [f" ± {1e3 * one:.1f}" for one in std[:3]] + [f" ± {np.degrees(std[3]):.0f}"]
-    shifts = [f"{name} {1e3 * moved[k]:+.1f}{spread[k]}" for k, name in enumerate("xy")]
-    return f"{',  '.join(shifts)} mm,  turn {np.degrees(moved[3]):+.0f}{spread[3]}°"
+    shifts = [f"{name} {1e3 * moved[k]:+z.1f}{spread[k]}" for k, name in enumerate("xy")]
+    return f"{',  '.join(shifts)} mm,  turn {np.degrees(moved[3]):+z.0f}{spread[3]}°"
 
 
 def _painted(view: View) -> Image.Image:

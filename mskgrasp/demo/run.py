@@ -78,14 +78,14 @@ def demo_text(demo: Demo) -> str:
         return f"the part was not lifted: {demo.failure}; try another --seed"
     predicted, std = demo.plan.displacement, demo.plan.displacement_std
     expected = ", ".join(
-        f"{name} {1e3 * predicted[k]:+.1f} +- {1e3 * std[k]:.1f} mm" for k, name in enumerate(("dx", "dy"))
+        f"{name} {1e3 * predicted[k]:+z.1f} +- {1e3 * std[k]:.1f} mm" for k, name in enumerate(("dx", "dy"))
     )
     measured = ", ".join(
-        f"{name} {1e3 * demo.displacement[k]:+.1f} mm" for k, name in enumerate(("dx", "dy"))
+        f"{name} {1e3 * demo.displacement[k]:+z.1f} mm" for k, name in enumerate(("dx", "dy"))
     )
     turns = [np.degrees(one[3]) for one in (predicted, std, demo.displacement)]
     return (
         f"lifted, predicted quality {demo.plan.quality:.2f}\n"
-        f"shift in the hand, expected  {expected}, turn {turns[0]:+.1f} +- {turns[1]:.1f} deg\n"
-        f"shift in the hand, measured  {measured}, turn {turns[2]:+.1f} deg"
+        f"shift in the hand, expected  {expected}, turn {turns[0]:+z.1f} +- {turns[1]:.1f} deg\n"
+        f"shift in the hand, measured  {measured}, turn {turns[2]:+z.1f} deg"
     )

@@ -64,10 +64,8 @@ def outcome_text(trial: Trial) -> str:
     if trial.measured is None:
         return f"lifted, not measured ({trial.unmeasured.split(':')[0]})"
     dx, dy, dz, turn = trial.measured
-    height = "" if np.isnan(dz) else f", dz {dz * 1e3:+.1f}"
-    text = (
-        f"lifted, moved dx {dx * 1e3:+.1f}, dy {dy * 1e3:+.1f}{height} mm, turn {np.degrees(turn):+.1f} deg"
-    )
+    height = "" if np.isnan(dz) else f", dz {dz * 1e3:+z.1f}"
+    text = f"lifted, moved dx {dx * 1e3:+z.1f}, dy {dy * 1e3:+z.1f}{height} mm, turn {np.degrees(turn):+z.1f} deg"
     if trial.predicted is None:
         return text
     distance, angle = displacement_errors(np.array([trial.predicted]), np.array([trial.measured]))
@@ -95,7 +93,7 @@ def _displacement(mean: list[float], std: list[float]) -> str:
     texts = []
     for name, value, deviation in zip(("dx", "dy", "dz", "turn"), mean, std, strict=True):
         scale, unit = (180 / np.pi, "deg") if name == "turn" else (1e3, "mm")
-        number = "-" if np.isnan(value) else f"{value * scale:+.1f}"
+        number = "-" if np.isnan(value) else f"{value * scale:+z.1f}"
         spread = "" if np.isnan(deviation) else f" +- {deviation * scale:.1f}"
         texts.append(f"{name} {number}{spread} {unit}")
     return ", ".join(texts)

@@ -249,7 +249,7 @@ def _shift(displacement: list[float] | None) -> str:
     if displacement is None:
         return "-"
     x, y, _, turn = displacement
-    return f"({x * 1e3:+.1f}, {y * 1e3:+.1f}) mm, {np.degrees(turn):+.1f} deg"
+    return f"({x * 1e3:+z.1f}, {y * 1e3:+z.1f}) mm, {np.degrees(turn):+z.1f} deg"
 
 
 def _why_lost(one: Placement) -> str:

@@ -27,6 +27,7 @@ _PAD_WIDTH, _PAD_THICKNESS = 0.020, 0.008  # drawn size of a finger pad seen fro
 _FEW = 6  # grasps of the best scores drawn besides the chosen one
 _DEVIATIONS = 2.0  # standard deviations that ellipses show
 _MM = 1e3
+_CUT_MM = 10.0  # greatest height that counts in an outline: half of it exceeds a depth camera's noise
 
 
 def _from_above(
@@ -156,14 +157,14 @@ def _plan_text(plan: GraspPlan, point_base: np.ndarray) -> str:
     names = "xyz"
     known = np.isfinite(std).all()
     parts = [
-        f"{name} {shift[i]:+.1f}" + (f" ± {std[i]:.1f}" if known else "") + " mm"
+        f"{name} {shift[i]:+z.1f}" + (f" ± {std[i]:.1f}" if known else "") + " mm"
         for i, name in enumerate(names)
     ]
     turn = np.degrees(mean[3])
     spread = f" ± {np.degrees(deviation[3]):.1f}" if known else ""
     return (
         f"quality {plan.quality:.2f}     expected shift in the hand: {',  '.join(parts)},  "
-        f"turn {turn:+.1f}{spread}°     planned in {plan.seconds['total']:.1f} s"
+        f"turn {turn:+z.1f}{spread}°     planned in {plan.seconds['total']:.1f} s"
     )
 
 
@@ -266,8 +267,10 @@ def _outline(
     pixel = (np.arange(n) - (n - 1) / 2) * (side * _MM / n)
     x, y = np.meshgrid(origin[0] + pixel, origin[1] - pixel)
     # A camera pixel is several of these: without the blur the outline shows its stairs.
-    smooth = cv2.GaussianBlur(heights, (0, 0), 0.0015 / (side / n))
-    level = [0.5 * max(float(heights.max()), 0.1)]
+    # Clipped, the foot of a bracket counts as much as its wall.
+    low = np.minimum(heights, _CUT_MM)
+    smooth = cv2.GaussianBlur(low, (0, 0), 0.0015 / (side / n))
+    level = [0.5 * max(float(low.max()), 0.1)]
     axes.contour(x, y, smooth, levels=level, colors=[INK], linewidths=0.9, zorder=5)
     return x, y, smooth, level
 
@@ -358,7 +361,7 @@ def _draw_attempt(axes: Axes, attempts: Attempts, info: ShardInfo, row: int) -> 
         _outlines(axes, heights, centre[:2] * _MM, side, centre[:2] * _MM, shift, turn)
         _arrow(axes, centre[:2] * _MM, shift, width=1.3, head=7)
         distance = float(np.linalg.norm(displacement[:3])) * _MM
-        caption = f"{distance:.1f} mm, {np.degrees(displacement[3]):+.0f}°"
+        caption = f"{distance:.1f} mm, {np.degrees(displacement[3]):+z.0f}°"
     else:
         caption = FAILURES[int(attempts.failure[row])]
     axes.set_title(

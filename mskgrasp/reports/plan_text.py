@@ -14,10 +14,10 @@ def plan_text(plan: GraspPlan) -> str:
     x, y, z, theta = plan.grasp.as_vector()
     mean, std = plan.displacement, plan.displacement_std
     shifts = ", ".join(
-        f"{name} {value * 1e3:+.1f} +- {deviation * 1e3:.1f} mm"
+        f"{name} {value * 1e3:+z.1f} +- {deviation * 1e3:.1f} mm"
         for name, value, deviation in zip(("dx", "dy", "dz"), mean[:3], std[:3], strict=True)
     )
-    turn = f"dtheta {np.degrees(mean[3]):+.1f} +- {np.degrees(std[3]):.1f} deg"
+    turn = f"dtheta {np.degrees(mean[3]):+z.1f} +- {np.degrees(std[3]):.1f} deg"
     tilt = float(np.degrees(np.linalg.norm(plan.swing)))
     spread = float(np.degrees(np.sqrt(plan.swing_var.sum())))
     tilted = f"{tilt:.1f} +- {spread:.1f} deg"

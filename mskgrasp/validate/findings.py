@@ -64,7 +64,7 @@ class SettingComparison:
                 said.append(f"{what}: no grasps to compare")
             else:
                 said.append(
-                    f"{what}: {scale * test.estimate:+.2f} {unit}, the interval {scale * test.low:.2f} .. "
+                    f"{what}: {scale * test.estimate:+z.2f} {unit}, the interval {scale * test.low:.2f} .. "
                     f"{scale * test.high:.2f} is {scale * test.excess:.2f} beyond the margin of "
                     f"{scale * test.margin:g}"
                 )

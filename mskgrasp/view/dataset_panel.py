@@ -206,7 +206,7 @@ def attempt_text(columns: dict[str, np.ndarray], number: int, n_chosen: int, n_a
 def shift_text(displacement: np.ndarray) -> str:
     """A displacement (4,) in words."""
     dx, dy, dz = 1e3 * np.asarray(displacement[:3], dtype=np.float64)
-    return f"dx {dx:+.1f}, dy {dy:+.1f}, dz {dz:+.1f} mm, turn {np.degrees(displacement[3]):+.1f} deg"
+    return f"dx {dx:+z.1f}, dy {dy:+z.1f}, dz {dz:+z.1f} mm, turn {np.degrees(displacement[3]):+z.1f} deg"
 
 
 def comparison_text(replay: Replay, stored: str, displacement: np.ndarray) -> str:

@@ -130,7 +130,7 @@ def _entry_table(entries: Iterable[Entry]) -> Table:
                 str(entry.n_hulls),
                 f"{1e3 * entry.hull_error_p95:.2f}",
                 f"{1e3 * entry.hull_error:.2f}",
-                f"{100 * entry.hull_volume_ratio - 100:+.1f} %",
+                f"{100 * entry.hull_volume_ratio - 100:+z.1f} %",
                 f"{rating.rate:.0%} ({low:.0%} - {high:.0%})" if rating else "not rated",
             )
         )

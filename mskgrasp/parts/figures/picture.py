@@ -49,7 +49,7 @@ def draw_part(part: Part, out: Path) -> None:
     hulls = f"{part.n_hulls} convex hull{'s' if part.n_hulls > 1 else ''}"
     fit = (
         f"largest error {part.hull_error * 1e3:.2f} mm, 95 % under {record['hull_error_p95'] * 1e3:.2f} mm, "
-        f"volume {100 * record['hull_volume_ratio'] - 100:+.1f} %"
+        f"volume {100 * record['hull_volume_ratio'] - 100:+z.1f} %"
     )
     figure.text(0.745, 0.385, hulls, fontsize=12, color=INK, ha="center", weight="bold")
     figure.text(0.745, 0.356, fit, fontsize=10, color=SLATE, ha="center")

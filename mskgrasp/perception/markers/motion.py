@@ -94,7 +94,7 @@ def _check_same_part(before: Markers, after: Markers) -> None:
     risen = 1e3 * (after.points_base[:, 2] - before.points_base[:, 2])
     if not np.abs(risen).max() <= 1e3 * HEIGHT_CHANGE:
         raise MarkersNotFound(
-            f"mismatch: the squares lie {risen[0]:+.1f} and {risen[1]:+.1f} mm higher than before, at most "
+            f"mismatch: the squares lie {risen[0]:+z.1f} and {risen[1]:+z.1f} mm higher than before, at most "
             f"{1e3 * HEIGHT_CHANGE:g} mm is noise: the part fell over, or lies on something; leave this "
             "trial out"
         )

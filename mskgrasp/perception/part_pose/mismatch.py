@@ -135,7 +135,7 @@ def reason_to_refuse(mismatch: Mismatch, seen: Seen) -> str:
     if mismatch.unexplained > MOST_UNEXPLAINED:
         return f"{mismatch.unexplained:.0%} of its pixels are where the part has no surface"
     if abs(mismatch.rise) > MOST_RISE + SIGNIFICANT * mismatch.rise_sigma:
-        return f"its surfaces are {1e3 * mismatch.rise:+.1f} mm from where they would be"
+        return f"its surfaces are {1e3 * mismatch.rise:+z.1f} mm from where they would be"
     if mismatch.tilt > MOST_TILT + SIGNIFICANT * mismatch.tilt_sigma:
         return f"it is tilted by {np.degrees(mismatch.tilt):.1f} degrees"
     if mismatch.patch > most_patch:
