@@ -65,7 +65,8 @@ def outcome_text(trial: Trial) -> str:
         return f"lifted, not measured ({trial.unmeasured.split(':')[0]})"
     dx, dy, dz, turn = trial.measured
     height = "" if np.isnan(dz) else f", dz {dz * 1e3:+z.1f}"
-    text = f"lifted, moved dx {dx * 1e3:+z.1f}, dy {dy * 1e3:+z.1f}{height} mm, turn {np.degrees(turn):+z.1f} deg"
+    shift = f"dx {dx * 1e3:+z.1f}, dy {dy * 1e3:+z.1f}{height} mm, turn {np.degrees(turn):+z.1f} deg"
+    text = f"lifted, moved {shift}"
     if trial.predicted is None:
         return text
     distance, angle = displacement_errors(np.array([trial.predicted]), np.array([trial.measured]))
