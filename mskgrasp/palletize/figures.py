@@ -234,4 +234,5 @@ def draw_pallets(images: dict[Correction, np.ndarray], slots: Sequence[Slot], ti
                         Rectangle((at[0] - w / 2, at[1] - h / 2), w, h, fill=False, ec="white", lw=1.0)
                     )
             axes.set(title=TITLES[name], xticks=[], yticks=[], aspect="equal")
+            axes.spines[:].set_visible(False)
         figure.suptitle(title, x=0.01, ha="left", fontsize=11)
