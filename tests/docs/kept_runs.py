@@ -13,13 +13,12 @@ import json
 import lzma
 from pathlib import Path
 
-from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import read_bounded, write_whole
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.run_folder import INPUTS, SETTINGS, TRIALS
 from tests.docs.pages import ROOT
-from tests.docs.stored_reports import RESULTS, RUNS
+from tests.docs.stored_reports import RESULTS, known_runs
 
 KEPT = RESULTS / "runs"
 FILES = (TRIALS, INPUTS, "cell.yaml", SETTINGS)
@@ -71,7 +70,7 @@ def restore(path: Path, out: Path) -> int:
 
 def main() -> int:
     """Store or restore."""
-    runs = {name: run["out"] for name, run in read_yaml(RUNS).items() if "out" in run}
+    runs = {name: run["out"] for name, run in known_runs().items() if "out" in run}
     parser = argparse.ArgumentParser(prog="python -m tests.docs.kept_runs", description="Keep long runs.")
     parser.add_argument("what", choices=("keep", "restore"))
     parser.add_argument("names", nargs="+", choices=sorted(runs), metavar="NAME", help="runs of runs.yaml")

@@ -35,7 +35,6 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from mskgrasp.benchmark.report import stored_sections
-from mskgrasp.core.config import read_yaml
 from mskgrasp.core.settings import Physics
 from mskgrasp.dataset.label_error import STORED as LABEL_ERROR
 from mskgrasp.dataset.label_error import LabelError
@@ -57,7 +56,7 @@ from mskgrasp.validate.tables import label_error_section, validation_sections
 from tests.benchmarks.report import markdown_rows
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT
-from tests.docs.stored_reports import REPORTS, RESULTS, RUNS, read_stored
+from tests.docs.stored_reports import REPORTS, RESULTS, known_runs, read_stored
 from tests.docs.summary_rows import rows_of
 from tests.docs.summary_table import INDEX, README, with_summary
 from tests.docs.uses_of_test_parts import commit, log_use
@@ -145,7 +144,7 @@ def record(name: str) -> None:
     Raises:
         CalledProcessError: The command failed.
     """
-    facts = read_yaml(RUNS)[name]
+    facts = known_runs()[name]
     recorded = f"commit {commit()}, {datetime.date.today().isoformat()}"
     out = ROOT / facts.get("out", f"out/results/{name}")
     if "out" not in facts:  # a folder of its own checks what it holds
@@ -264,7 +263,7 @@ def main() -> int:
         description="Render the pages of results from stored reports.",
     )
     parser.add_argument(
-        "--record", nargs="+", default=[], choices=sorted(read_yaml(RUNS)), metavar="NAME",
+        "--record", nargs="+", default=[], choices=sorted(known_runs()), metavar="NAME",
         help="runs of docs/results/runs.yaml to make anew first",
     )  # fmt: skip
     for name in parser.parse_args().record:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 from mskgrasp.core.config import read_yaml
@@ -38,10 +39,21 @@ class StoredReport:
         return self.facts.get("weights", shipped_weights()) != shipped_weights()
 
 
+def known_runs() -> dict[str, Any]:
+    """The runs of runs.yaml, not to be changed."""
+    return _runs_of(RUNS.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=1)
+def _runs_of(_changed_ns: int) -> dict[str, Any]:
+    """Parses runs.yaml once for every state of it, as that takes a tenth of a second."""
+    return read_yaml(RUNS)
+
+
 def read_stored(name: str) -> StoredReport:
     """Reads a stored report, following a reference to another JSON file of the repository."""
     values = json.loads((REPORTS / f"{name}.json").read_text(encoding="utf-8"))
-    run = read_yaml(RUNS).get(name)
+    run = known_runs().get(name)
     known = run | dict(command=f"`{run['command']}`") if run else {}
     report = values["report"]
     if isinstance(report, str) and report.endswith(".json"):

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from mskgrasp.core.config import read_config, read_yaml
+from mskgrasp.core.config import read_config
 from mskgrasp.evaluate.config import EvaluateConfig
 from tests.docs import stored_reports
 from tests.docs.make_results import FACTS, rendered
 from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT, without_code
-from tests.docs.stored_reports import REPORTS, RUNS, StoredReport, read_stored
+from tests.docs.stored_reports import REPORTS, StoredReport, known_runs, read_stored
 from tests.docs.summary_rows import IN_README, ROWS, rows_of
 from tests.docs.summary_table import FORMER, HEADER, INDEX, README, shown_rows, summary, with_summary
 from tests.sim_in_the_loop.regression import shipped_weights
@@ -71,13 +71,13 @@ def test_every_stored_report_is_on_a_page_and_every_run_has_one():
     stored = {path.stem for path in REPORTS.glob("*.json")}
     shown = {name for page in RESULTS for name in re.findall(r"<!-- run: (\w+) -->", page.read_text())}
     # A run with a page of its own has none before its first record.
-    assert stored == shown >= {name for name, run in read_yaml(RUNS).items() if "page" not in run}
+    assert stored == shown >= {name for name, run in known_runs().items() if "page" not in run}
 
 
 def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
     index = tmp_path / "README.md"
     index.write_text("# Results\n\n| page | measured |\n|---|---|\n| [Speed](speed.md) | speed |\n\nMore.\n")
-    runs = {name: run["page"] for name, run in read_yaml(RUNS).items() if "page" in run}
+    runs = {name: run["page"] for name, run in known_runs().items() if "page" in run}
     runs = {name: page for name, page in runs.items() if page["file"] == "models.md"}
     assert list(runs) == ["model_baselines", "equal_recipes", "displacement_same_data", "oracles"]
     for name in (*runs, "oracles"):
@@ -173,7 +173,7 @@ def test_the_readme_states_the_share_placed_and_that_of_a_simple_planner():
 
 
 def test_a_run_of_the_paper_s_size_has_a_command_that_its_configuration_fits():
-    for name, run in read_yaml(RUNS).items():
+    for name, run in known_runs().items():
         if "--config configs/evaluate" in run["command"]:
             path = ROOT / run["command"].split("--config ")[1].split()[0]
             assert name.startswith(read_config(EvaluateConfig, path).experiment) and "out" in run
