@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from mskgrasp.core.errors import PartNotRecognised, TableTooHigh
 from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.shipped import PRETRAINED, config_file
 from mskgrasp.parts import Part, find_part
+from mskgrasp.perception.part_pose import KnownPart
 from mskgrasp.planning.certified import rest_frame, to_base
 from mskgrasp.planning.certified_planner import (
     SIMULATED_ALIKE,
@@ -24,9 +26,18 @@ from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
 from mskgrasp.planning.planner import Planner
 from mskgrasp.reports.plan_text import plan_text
+from tests.perception.part_pose.cells import prepared
 from tests.planning.test_certified import certified, certified_grasp
 
 PART = find_part("l_bracket_60x40")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def a_part_is_prepared_once() -> Iterator[None]:
+    """Not anew by each planner that is made of it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(KnownPart, "of", prepared)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,17 +12,24 @@ from hal.camera import RgbdFrame
 from hal.cell import Cell
 from hal.sensor_noise import SensorNoise, add_noise
 from mskgrasp.core.geometry import Pose, quat_about_z
-from mskgrasp.parts import find_part
+from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
 
-_KNOWN: dict[str, KnownPart] = {}
+_KNOWN: dict[tuple[str, tuple[bool, ...]], KnownPart] = {}
+_prepare = KnownPart.of
+
+
+def prepared(part: Part, stands: Sequence[bool] | None = None) -> KnownPart:
+    """What `KnownPart.of` makes, which takes seconds, made once in a process."""
+    key = part.content_hash, tuple(stands or ())
+    if key not in _KNOWN:
+        _KNOWN[key] = _prepare(part, stands)
+    return _KNOWN[key]
 
 
 def known(name: str) -> KnownPart:
     """A part of the starter set, prepared once."""
-    if name not in _KNOWN:
-        _KNOWN[name] = KnownPart.of(find_part(name))
-    return _KNOWN[name]
+    return prepared(find_part(name))
 
 
 def presented(cell: Cell, name: str, seed: int) -> tuple[RgbdFrame, Pose]:
