@@ -39,7 +39,8 @@ def test_a_shift_of_all_distances_is_estimated_exactly(shift: float):
     found = median_excess(floor + shift, floor, PART, MARGIN, replicates=50)
     assert found.estimate == pytest.approx(shift, abs=1e-12)
     assert found.low == pytest.approx(shift, abs=1e-12) and found.high == pytest.approx(shift, abs=1e-12)
-    assert found.passed == (found.high < MARGIN)
+    if abs(shift - MARGIN) > 1e-9:
+        assert found.passed == (shift < MARGIN)
 
 
 @pytest.mark.parametrize(("shift", "passed"), [(0.0, True), (0.6 * MARGIN, True), (1.4 * MARGIN, False)])
@@ -47,7 +48,8 @@ def test_independent_distances_inside_the_margin_pass_and_others_do_not(shift: f
     def test(rng: np.random.Generator) -> Equivalence:
         return median_excess(distances(rng) + shift, distances(rng), PART, MARGIN, replicates=200)
 
-    assert (share_passed(40, test) > 0.8) == passed
+    share = share_passed(40, test)
+    assert share > 0.8 if passed else share <= ALPHA
 
 
 @pytest.mark.slow
