@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -57,9 +58,9 @@ def station(
                 yield Station(camera, table, lambda: ReplayCamera(config))
         case _:
             with pytest.MonkeyPatch.context() as patch:
-                bench = Bench(Path(folder), patch)
-                with bench.camera() as camera:
-                    yield Station(camera, table, bench.camera)
+                make = partial(Bench(Path(folder), patch).camera, colour_scale=3)
+                with make() as camera:
+                    yield Station(camera, table, make)
 
 
 class TestCamera(CameraContract):

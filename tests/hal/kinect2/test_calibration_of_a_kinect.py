@@ -54,7 +54,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> list[Picture]:
             table_z=0.0, region=(0.38, 0.62, -0.12, 0.12), home=np.zeros(7), min_height=0.006,
             lift_height=0.1, grasp_force=20.0,
         )  # fmt: skip
-        with bench.camera(depth_offset=0.0) as camera:
+        with bench.camera(depth_offset=0.0, colour_scale=3) as camera:
             cell = Cell(camera=WatchingCamera(camera, bench, arm), arm=arm, workspace=table)
             take_pictures(
                 cell, BOARD, HELD, n=16, tilt_rad=np.radians(30), nearest=0.5, speed=0.2, settle_s=0.0,
@@ -101,7 +101,7 @@ def test_colour_is_registered_with_the_corrected_depth(
     bench.show_board(
         BOARD, Pose(position=np.array([0.05, -0.03, 0.75]), quat_wxyz=quat_about_z(np.array(0.3)))
     )
-    with bench.camera(depth_offset=depth_offset) as camera:
+    with bench.camera(depth_offset=depth_offset, colour_scale=3) as camera:
         frame = camera.capture(30.0)
     assert frame.infrared is not None and frame.fine_colour is not None
     true = detect(BOARD, infrared_grey(frame.infrared))

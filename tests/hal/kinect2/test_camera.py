@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ import pytest
 
 from hal import driver_process
 from hal.errors import CaptureFailed, CommunicationLost, DriverMissing, NotConnected
-from hal.kinect2 import Kinect2Config
+from hal.kinect2 import Kinect2Camera, Kinect2Config
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import BadConfig, MarkersNotFound, MskgraspError, NoPartFound
 from mskgrasp.perception.markers import find_markers
@@ -28,9 +29,18 @@ BLOCK = (0.04, 0.10, -0.03, 0.02)
 """Of fake/pylibfreenect2/scene.py: left, right, top, bottom, m; right of the middle, seen from the camera."""
 
 
-def test_the_image_is_not_mirrored_and_a_pixel_is_where_its_ray_says(bench: Bench):
-    with bench.camera() as camera:
-        frame = camera.capture()
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kinect2Camera]:
+    """A connected camera to which nothing happens, for tests that only take frames."""
+    with pytest.MonkeyPatch.context() as patch:  # the driver's process keeps its environment
+        camera = Bench(tmp_path_factory.mktemp("kinect"), patch).camera()
+        camera.connect()
+    yield camera
+    camera.close()
+
+
+def test_the_image_is_not_mirrored_and_a_pixel_is_where_its_ray_says(opened: Kinect2Camera):
+    frame = opened.capture()
     rows, columns = np.nonzero(frame.depth < 0.775)
     z = 0.75
     left, right = (columns.min() - 0.5, columns.max() + 0.5)
@@ -52,11 +62,10 @@ def test_depth_is_metres_and_every_kind_of_invalid_is_nan(bench: Bench):
     assert np.nanmin(depth) == pytest.approx(0.75 + 0.004, abs=1e-6)
 
 
-def test_colour_is_rgb_registered_to_depth_and_no_view_of_the_drivers_memory(bench: Bench):
-    with bench.camera() as camera:
-        first = camera.capture()
-        kept = first.colour.copy(), first.depth.copy()
-        camera.capture()
+def test_colour_is_rgb_registered_to_depth_and_no_view_of_the_drivers_memory(opened: Kinect2Camera):
+    first = opened.capture()
+    kept = first.colour.copy(), first.depth.copy()
+    opened.capture()
     middle = np.s_[60:-60, 40:-40]  # the colour camera sees less to the top and the bottom
     red = first.colour[middle][..., 0]
     assert (red == 200).mean() > 0.995 and ((red == 200) | (red == 0)).all()  # black: hidden by the block
@@ -86,12 +95,11 @@ def test_intrinsics_come_from_the_config_then_the_calibration_then_the_factory(b
     assert found[0, 0] == pytest.approx(expected)
 
 
-def test_a_frame_is_exposed_after_it_was_asked_for(bench: Bench):
-    with bench.camera() as camera:
-        time.sleep(0.3)  # a frame waits in the driver meanwhile
-        for _ in range(3):
-            asked = time.monotonic()
-            assert asked <= camera.capture().timestamp_s <= time.monotonic()
+def test_a_frame_is_exposed_after_it_was_asked_for(opened: Kinect2Camera):
+    time.sleep(0.3)  # a frame waits in the driver meanwhile
+    for _ in range(3):
+        asked = time.monotonic()
+        assert asked <= opened.capture().timestamp_s <= time.monotonic()
 
 
 @pytest.mark.parametrize(
@@ -201,14 +209,13 @@ def test_after_ctrl_c_no_frame_from_before_it_is_delivered(bench: Bench, monkeyp
         assert camera.capture().timestamp_s >= asked
 
 
-def test_two_threads_get_a_frame_each(bench: Bench):
+def test_two_threads_get_a_frame_each(opened: Kinect2Camera):
     frames = []
-    with bench.camera() as camera:
-        threads = [threading.Thread(target=lambda: frames.append(camera.capture())) for _ in range(2)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+    threads = [threading.Thread(target=lambda: frames.append(opened.capture())) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
     assert len(frames) == 2 and frames[0].timestamp_s != frames[1].timestamp_s
 
 
@@ -231,7 +238,7 @@ def test_tape_of_12_and_8_mm_is_found_in_the_fine_colour(bench: Bench):
         (0.5, 0.0, 0.09, 0.05, 0.03, 195),
         *((x, y, side, side, z, 228) for (x, y, z), side in zip(squares, (0.012, 0.008), strict=True)),
     )
-    with bench.camera() as camera, bench.camera(colour_scale=1) as coarse:
+    with bench.camera(colour_scale=3) as camera, bench.camera() as coarse:
         fine = camera.capture(30.0)
         without = coarse.capture(30.0)
     assert fine.fine_colour is not None and fine.fine_colour.shape == (3 * 424, 3 * 512, 3)
