@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +19,14 @@ from hal.errors import LoadTooHeavy, MotionAborted, NeedsRecovery, NotConnected,
 from hal.franka.driver import DriverName
 from hal.franka.path import JointPath, joint_path
 from mskgrasp.core.geometry import Pose
-from tests.hal.franka.robots import arm_at, fci5, robot_for
+from tests.hal.franka.robots import FakeRobot, arm_at, fci5, robot_for
+
+
+@pytest.fixture(scope="module")
+def panda() -> Iterator[FakeRobot]:
+    """A robot that panda_py drives, for tests that leave it on, with its hand homed, and without a fault."""
+    with fci5() as robot:
+        yield robot
 
 
 @pytest.mark.slow
@@ -77,27 +85,51 @@ def test_a_robot_knows_the_part_in_its_hand_until_the_fingers_move(tmp_path: Pat
             assert robot.load() == pytest.approx(np.zeros(13))
 
 
-def test_a_part_over_what_the_reflex_holds_is_refused(tmp_path: Path):
+def test_a_motion_that_the_solver_gives_up_is_planned_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A motion of days is what makes it give up every time."""
+    impossible = [2, 3]
+
+    def path_from(*args: Any, **settings: Any) -> JointPath:
+        path = joint_path(*args, **settings)
+        if impossible[0] == 0:
+            return path
+        impossible[0] -= 1
+        return replace(path, seconds=1e6 * path.seconds)
+
+    monkeypatch.setattr("hal.franka.arm.joint_path", path_from)
+    with robot_for("franky") as robot, arm_at(tmp_path, "franky", robot.host) as arm:
+        goal = arm.state().joints + np.array([0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1])
+        arm.move_to_joints(goal, speed=0.5)
+        stood = arm.state().joints
+        assert impossible[0] == 0 and stood == pytest.approx(goal, abs=JOINT_TOLERANCE)
+        impossible[:] = impossible[1:]
+        with pytest.raises(MotionAborted, match="planner failed with error code"):
+            arm.move_to_joints(goal - 0.1, speed=0.5)
+        assert impossible[0] == 0 and arm.state().joints == pytest.approx(stood, abs=JOINT_TOLERANCE)
+
+
+def test_a_part_over_what_the_reflex_holds_is_refused(tmp_path: Path, panda: FakeRobot):
     """15 N and 15 N m, four fifths of which may be weight."""
-    with fci5() as robot:
-        with arm_at(tmp_path, "panda_py", robot.host, contact_force=15.0, contact_torque=15.0) as arm:
-            assert arm.limits.max_load == pytest.approx(0.8 * 15 / 9.81)
-            with pytest.raises(LoadTooHeavy, match=r"weighs 1.300 kg, this arm carries 1.223 kg: .*force"):
-                arm.set_load(replace(LOAD, mass=1.3))
-            assert robot.load() == pytest.approx(np.zeros(13))
-            arm.set_load(replace(LOAD, mass=1.2))  # a refusal is no fault
+    with arm_at(tmp_path, "panda_py", panda.host, contact_force=15.0, contact_torque=15.0) as arm:
+        assert arm.limits.max_load == pytest.approx(0.8 * 15 / 9.81)
+        before = panda.load()
+        with pytest.raises(LoadTooHeavy, match=r"weighs 1.300 kg, this arm carries 1.223 kg: .*force"):
+            arm.set_load(replace(LOAD, mass=1.3))
+        assert panda.load() == pytest.approx(before)
+        arm.set_load(replace(LOAD, mass=1.2))  # a refusal is no fault
+        assert panda.load()[0] == pytest.approx(1.2)
 
 
-def test_a_load_that_the_robot_refuses_is_a_fault(tmp_path: Path):
-    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host) as arm:
-        robot.order("reflex")
+def test_a_load_that_the_robot_refuses_is_a_fault(tmp_path: Path, panda: FakeRobot):
+    with arm_at(tmp_path, "panda_py", panda.host) as arm:
+        panda.order("reflex")
         with pytest.raises(MotionAborted, match="recover"):
             arm.set_load(LOAD)
         with pytest.raises(NeedsRecovery):
             arm.move_gripper(0.05)
         arm.recover()
         arm.set_load(LOAD)
-        assert robot.load()[0] == pytest.approx(0.4)
+        assert panda.load()[0] == pytest.approx(0.4)
 
 
 @pytest.mark.slow
@@ -115,8 +147,8 @@ def test_a_part_that_slips_away_after_closing_is_not_held(tmp_path: Path, driver
         assert state.gripper_width < 1e-3 and not arm.holds(state)
 
 
-def test_a_touch_that_the_reflex_would_end_is_refused_and_is_no_fault(tmp_path: Path):
-    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host, contact_force=8.0) as arm:
+def test_a_touch_that_the_reflex_would_end_is_refused_and_is_no_fault(tmp_path: Path, panda: FakeRobot):
+    with arm_at(tmp_path, "panda_py", panda.host, contact_force=8.0) as arm:
         here = arm.state().T_base_tcp
         with pytest.raises(OutOfWorkspace, match=r"10 N is not under arm.contact_force 8 N"):
             arm.move_until_contact(here, force=10.0)
@@ -143,36 +175,13 @@ def test_pads_that_meet_something_on_their_way_are_reported(tmp_path: Path):
         arm.move_gripper(0.05)
 
 
-def test_the_config_bounds_the_speed_whatever_a_program_asks_for(tmp_path: Path):
-    with fci5() as robot, arm_at(tmp_path, "panda_py", robot.host, max_speed=0.05) as arm:
+def test_the_config_bounds_the_speed_whatever_a_program_asks_for(tmp_path: Path, panda: FakeRobot):
+    with arm_at(tmp_path, "panda_py", panda.host, max_speed=0.05) as arm:
         here = arm.state().T_base_tcp
         target = Pose(position=here.position - np.array([0, 0, 0.05]), quat_wxyz=here.quat_wxyz)
         begin = time.monotonic()
         arm.move_to_pose(target, speed=1.0)
         assert time.monotonic() - begin > 15 / 8 * 0.05 / 0.05 * 0.9
-
-
-def test_a_motion_that_the_solver_gives_up_is_planned_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """A motion of days is what makes it give up every time."""
-    impossible = [2, 3]
-
-    def path_from(*args: Any, **settings: Any) -> JointPath:
-        path = joint_path(*args, **settings)
-        if impossible[0] == 0:
-            return path
-        impossible[0] -= 1
-        return replace(path, seconds=1e6 * path.seconds)
-
-    monkeypatch.setattr("hal.franka.arm.joint_path", path_from)
-    with robot_for("franky") as robot, arm_at(tmp_path, "franky", robot.host) as arm:
-        goal = arm.state().joints + np.array([0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1])
-        arm.move_to_joints(goal, speed=0.5)
-        stood = arm.state().joints
-        assert impossible[0] == 0 and stood == pytest.approx(goal, abs=JOINT_TOLERANCE)
-        impossible[:] = impossible[1:]
-        with pytest.raises(MotionAborted, match="planner failed with error code"):
-            arm.move_to_joints(goal - 0.1, speed=0.5)
-        assert impossible[0] == 0 and arm.state().joints == pytest.approx(stood, abs=JOINT_TOLERANCE)
 
 
 def test_a_slowed_arm_keeps_a_share_of_the_speeds_of_its_file(tmp_path: Path, monkeypatch):
