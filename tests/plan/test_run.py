@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from hal import Cell, open_cell
+from hal.arm import JOINT_TOLERANCE
 from hal.errors import ArmInView
 from mskgrasp.core.errors import BadConfig, UnknownPart
 from mskgrasp.parts import find_part
@@ -39,18 +40,26 @@ def test_a_plan_is_written_with_its_picture_and_a_seed_repeats_it(tmp_path: Path
 
 def test_no_grasp_is_planned_while_the_arm_may_be_in_view_unless_it_goes_home(tmp_path: Path, monkeypatch):
     """The simulated arm stands at home when the cell is opened."""
+    off_home: list[np.ndarray] = []
 
     @contextmanager
     def away(path: Path) -> Iterator[Cell]:
         with open_cell(path) as cell:
             cell.arm.move_to_joints(cell.workspace.home + np.array([0.3, 0, 0, 0, 0, 0, 0]))
-            yield cell
+            try:
+                yield cell
+            finally:
+                off_home.append(cell.arm.state().joints - cell.workspace.home)
 
     monkeypatch.setattr("mskgrasp.plan.run.open_cell", away)
     config = PlanConfig(out=tmp_path / "plan", planner=PlannerConfig(n_candidates=60))
     with pytest.raises(ArmInView, match="joint 1 is 0.30 rad from home"):
         plan_grasp(config)
-    assert plan_grasp(config.model_copy(update={"go_home": True})).quality >= 0
+    assert not (config.out / "plan.json").exists()
+    plan_grasp(config.model_copy(update={"go_home": True}))
+    assert (config.out / "plan.json").exists()
+    assert off_home[0] == pytest.approx([0.3, 0, 0, 0, 0, 0, 0], abs=JOINT_TOLERANCE)
+    assert off_home[1] == pytest.approx(np.zeros(7), abs=JOINT_TOLERANCE)
 
 
 def test_an_unknown_part_and_an_unknown_cell_are_refused_and_nothing_is_written(tmp_path: Path):
