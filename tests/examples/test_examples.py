@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -32,8 +33,11 @@ def test_an_example_has_at_most_60_lines(path):
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 60
 
 
-def test_a_grasp_planned_on_a_cad_file_lifts_the_part_in_simulation():
-    printed = run("plan_on_cad_file.py")
+def test_a_grasp_planned_on_a_cad_file_lifts_the_part_in_simulation(monkeypatch, capsys):
+    path = str(EXAMPLES / "plan_on_cad_file.py")
+    monkeypatch.setattr(sys, "argv", [path])
+    runpy.run_path(path, run_name="__main__")  # in this process, which has imported the simulator
+    printed = capsys.readouterr().out
     assert "bracket: " in printed
     assert float(re.search(r"predicted quality ([\d.]+)", printed)[1]) > 0.9
     assert printed.rstrip().endswith("\nlifted")
