@@ -65,5 +65,5 @@ def test_a_heat_sink_is_a_plate_with_fins_to_its_hulls(tmp_path):
     mesh_of(heat_sink()).export(path)
     (part,) = imported([path], tmp_path / "parts", 1)["sink.stl"].imported.parts
     assert part.grade == "fine" and 1e3 * part.hull_error < 0.2
-    assert part.hull_volume_ratio == 1 or abs(part.hull_volume_ratio - 1) < 0.01
+    assert abs(part.hull_volume_ratio - 1) < 0.01
     assert part.n_hulls <= 28  # a plate cut to PhysX' slenderness, and 13 fins

@@ -67,4 +67,4 @@ def test_a_hostile_or_foreign_glb_is_refused():
     assert "is not a GLB" in refusal("box.glb", b"glTX" + content[4:])
     assert "version 1" in refusal("box.glb", content[:4] + struct.pack("<I", 1) + content[8:])
     empty = with_json(content, lambda tree: [tree.pop(key) for key in ("meshes", "nodes", "scenes", "scene")])
-    assert "GLB" in refusal("box.glb", empty) or "triangles" in refusal("box.glb", empty)
+    assert "holds no triangles" in refusal("box.glb", empty)
