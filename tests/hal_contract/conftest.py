@@ -16,12 +16,16 @@ SLOW_ON_A_ROBOT = ("test_a_hand_that_meets_nothing_arrives", "test_a_straight_mo
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        if (
-            item.path.parent == Path(__file__).parent
-            and item.name.startswith(SLOW_ON_A_ROBOT)
-            and "[franky" in item.name
-        ):
+        if item.path.parent != Path(__file__).parent:
+            continue
+        slow = item.name.startswith(SLOW_ON_A_ROBOT) and "[franky" in item.name
+        if slow or (item.path.name == "test_arm_contract.py" and is_rehearsed(item)):
             item.add_marker(pytest.mark.slow)
+
+
+def is_rehearsed(item: pytest.Item) -> bool:
+    """Whether it tests SAPIEN's arm by a contract that the same arm has to pass while it is recorded."""
+    return "[sapien" in item.name and "cell" in getattr(item, "fixturenames", ())
 
 
 @pytest.fixture(params=["sapien.yaml", "mujoco.yaml"], scope="module")
