@@ -37,12 +37,14 @@ LONGEST = (
     "learning/test_trainer.py",
     "parts/recipes/test_families.py",
     "validate/test_run.py",
+    "train/test_run.py",
+    "view/test_run.py",
     "kills/test_kills.py",
     "collect/test_crashes.py",
     "hal_contract/test_same_code.py",
 )
-"""Files that take most of a minute, the last three of the slow tests: started first, so that no process is
-left alone with one at the end."""
+"""Files that take most of a minute, or a third of one and come last by their names, and at the end three that
+take long with the slow tests: started first, so that no process is left alone with one."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
