@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image
 
+from hal.sim import Film
+from mskgrasp.demo import run
 from mskgrasp.demo.config import DemoConfig
 from mskgrasp.demo.run import STAGES, Demo, demo_text, demonstrate
 from tests.figures import picture
 from tests.planning.hand_made import FRAME, planner
 
 
-def test_a_part_is_lifted_and_filmed(tmp_path: Path, capsys):
+def test_a_part_is_lifted_and_filmed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
+    # A quarter of the pixels, which software renders one by one.
+    monkeypatch.setattr(run, "Film", partial(Film, n_pixels=200))
     demo = demonstrate(DemoConfig(out=tmp_path / "demo"))
     assert not demo.failure
     # A shift that can be seen, and one that the network knows: by zero it would miss twice as much.
