@@ -22,6 +22,7 @@ from mskgrasp.trials.trial import Prediction, Trial
 from mskgrasp.trials.trial_files import read_trial, trial_file, write_trial
 from tests import synthetic
 from tests.evaluate.made_trials import trial
+from tests.figures import picture
 
 
 def captured() -> RgbdFrame:
@@ -77,7 +78,10 @@ def test_a_trial_without_a_plan_is_drawn_as_its_frame(tmp_path: Path):
     assert plan is None and after is not None and after.fine_colour is not None
     assert frame.fine_colour is not None
     draw_trial(tmp_path, one, tmp_path / "one.png")
-    assert (tmp_path / "one.png").exists()
+    write_trial(trial_file(tmp_path, one.key), synthetic.frame([]), None, None)
+    draw_trial(tmp_path, one, tmp_path / "empty.png")
+    box, empty = (picture(tmp_path / name) for name in ("one.png", "empty.png"))
+    assert box.shape == empty.shape and not np.array_equal(box, empty)
 
 
 def test_trials_are_read_back_equal_and_an_incomplete_last_line_is_removed(tmp_path: Path):
