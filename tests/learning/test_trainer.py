@@ -2,6 +2,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,16 +14,34 @@ from safetensors.torch import save_file
 
 from mskgrasp.core import metrics
 from mskgrasp.core.errors import BadDataset, BadModel, UsageError
-from mskgrasp.learning.config import StageConfig
+from mskgrasp.learning.config import LearningConfig, StageConfig
 from mskgrasp.learning.grasp_models import ModelCalibration, Models, load_models, save_model
 from mskgrasp.learning.held_out import calibrate, predict_grasp_displacement
-from mskgrasp.learning.samples import read_samples
+from mskgrasp.learning.model_metrics import EpochMetrics
+from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.sides import split
 from mskgrasp.learning.stage import Reporter, Stage, TrainingDiverged
 from mskgrasp.learning.trainer import stages_of
 from mskgrasp.learning.trainer import train as learn
 from tests import synthetic
 from tests.learning.small import HAND, PATCH, SHORT
+
+Learned = tuple[Models, list[EpochMetrics]]
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Samples, LearningConfig], Learned]:
+    """Trainings that nothing stops; the same one is made once, and its networks are not to be changed."""
+    made: dict[str, Learned] = {}
+
+    def train(samples: Samples, config: LearningConfig) -> Learned:
+        key = config.model_dump_json()  # the network in it decides how the dataset is seen
+        if key not in made:
+            path = tmp_path_factory.mktemp("whole") / "checkpoint.safetensors"
+            made[key] = learn(samples, config, checkpoint_path=path)
+        return made[key]
+
+    return train
 
 
 @pytest.mark.slow
@@ -53,13 +74,13 @@ class StopAfter(Reporter):
     ("after", "batch_norm"),
     [*(pytest.param(n, False, marks=pytest.mark.slow) for n in (1, 2, 4)), (1, True), (4, True)],
 )
-def test_a_stopped_run_goes_on_to_the_same_weights(samples, tmp_path, after, batch_norm):
+def test_a_stopped_run_goes_on_to_the_same_weights(samples, learned, tmp_path, after, batch_norm):
     path = tmp_path / "checkpoint.safetensors"
     stages = {
         name: getattr(SHORT, name).model_copy(update={"batch_norm": batch_norm}) for name in ("gqn", "gdn")
     }
     config = SHORT.model_copy(update=stages)
-    whole, history = learn(samples, config, checkpoint_path=tmp_path / "whole.safetensors")
+    whole, history = learned(samples, config)
     with pytest.raises(KeyboardInterrupt):
         learn(samples, config, checkpoint_path=path, reporter=StopAfter(after))
     resumed, again = learn(samples, config, checkpoint_path=path)
@@ -81,8 +102,14 @@ TRANSFER = HAND.model_copy(
 """The displacement network keeps the features that it starts with."""
 
 
-def test_the_displacement_network_starts_from_features_that_learned_the_quality(dataset, tmp_path):
-    samples = read_samples(dataset, TRANSFER.network)
+@pytest.fixture(scope="module")
+def hand_samples(dataset) -> Samples:
+    """The dataset as the network of the hand sees it."""
+    return read_samples(dataset, TRANSFER.network)
+
+
+def test_the_displacement_network_starts_from_features_that_learned_the_quality(hand_samples, tmp_path):
+    samples = hand_samples
     models, history = learn(samples, TRANSFER, checkpoint_path=tmp_path / "whole")
     assert [one.stage for one in history] == ["gqn", "gqn", "transfer", "transfer", "gdn"]
     assert history[3].auroc is not None and history[3].validation_loss < history[2].validation_loss
@@ -101,10 +128,10 @@ def test_the_displacement_network_starts_from_features_that_learned_the_quality(
 
 
 @pytest.mark.parametrize("after", [pytest.param(2, marks=pytest.mark.slow), 3, 4])
-def test_a_run_with_transfer_goes_on_to_the_same_weights(dataset, tmp_path, after):
-    samples = read_samples(dataset, TRANSFER.network)
+def test_a_run_with_transfer_goes_on_to_the_same_weights(hand_samples, learned, tmp_path, after):
+    samples = hand_samples
     config = TRANSFER.model_copy(update={"gdn": SHORT.gdn})
-    whole, history = learn(samples, config, checkpoint_path=tmp_path / "whole")
+    whole, history = learned(samples, config)
     with pytest.raises(KeyboardInterrupt):
         learn(samples, config, checkpoint_path=tmp_path / "c", reporter=StopAfter(after))
     resumed, again = learn(samples, config, checkpoint_path=tmp_path / "c")
@@ -113,30 +140,35 @@ def test_a_run_with_transfer_goes_on_to_the_same_weights(dataset, tmp_path, afte
     assert [one.train_loss for one in again] == [one.train_loss for one in history]
 
 
-def test_a_checkpoint_of_a_stage_that_is_not_wanted_any_more_is_refused(dataset, tmp_path):
-    samples = read_samples(dataset, TRANSFER.network)
+def test_a_checkpoint_of_a_stage_that_is_not_wanted_any_more_is_refused(hand_samples, tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        learn(samples, TRANSFER, checkpoint_path=tmp_path / "c", reporter=StopAfter(3))
+        learn(hand_samples, TRANSFER, checkpoint_path=tmp_path / "c", reporter=StopAfter(3))
     without = TRANSFER.model_copy(update={"transfer": None})
     with pytest.raises(UsageError, match="made with other settings"):
-        learn(samples, without, checkpoint_path=tmp_path / "c")
+        learn(hand_samples, without, checkpoint_path=tmp_path / "c")
 
 
-def test_the_seed_decides_the_weights_and_the_global_generator_is_left_alone(samples, tmp_path):
+def test_the_seed_decides_the_weights_and_the_global_generator_is_left_alone(samples, learned, tmp_path):
+    first, _ = learned(samples, SHORT)
     torch.manual_seed(5)
     state = torch.get_rng_state()
-    first, _ = learn(samples, SHORT, checkpoint_path=tmp_path / "a")
-    assert torch.equal(torch.get_rng_state(), state)
     other, _ = learn(samples, SHORT.model_copy(update={"seed": 1}), checkpoint_path=tmp_path / "b")
+    assert torch.equal(torch.get_rng_state(), state)
     assert not torch.equal(first.gqn.head[0].weight, other.gqn.head[0].weight)
 
 
-def stopped(samples, folder):
-    """The checkpoint of a training that was stopped after its first epoch."""
-    path = folder / "checkpoint.safetensors"
+@pytest.fixture(scope="module")
+def first_epoch(samples, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("stopped") / "checkpoint.safetensors"
     with pytest.raises(KeyboardInterrupt):
         learn(samples, SHORT, checkpoint_path=path, reporter=StopAfter(1))
     return path
+
+
+@pytest.fixture
+def stopped(first_epoch: Path, tmp_path: Path) -> Path:
+    """The checkpoint of a training that was stopped after its first epoch; a copy, to be changed."""
+    return Path(shutil.copy(first_epoch, tmp_path))
 
 
 def contents(path):
@@ -145,31 +177,28 @@ def contents(path):
         return {key: file.get_tensor(key) for key in file.keys()}, file.metadata()
 
 
-def test_a_checkpoint_of_other_data_is_refused(samples, tmp_path):
-    path = stopped(samples, tmp_path)
+def test_a_checkpoint_of_other_data_is_refused(samples, stopped):
     other = dataclasses.replace(samples, fingerprint="0")
     with pytest.raises(UsageError, match="other data"):
-        learn(other, SHORT, checkpoint_path=path)
+        learn(other, SHORT, checkpoint_path=stopped)
 
 
-def test_a_checkpoint_of_samples_made_otherwise_is_refused(samples, tmp_path):
-    path = stopped(samples, tmp_path)
-    tensors, metadata = contents(path)
+def test_a_checkpoint_of_samples_made_otherwise_is_refused(samples, stopped):
+    tensors, metadata = contents(stopped)
     progress = json.loads(metadata["progress"])
     del progress["samples_version"]  # as files were before samples had a version
-    save_file(tensors, path, metadata={"progress": json.dumps(progress)})
+    save_file(tensors, stopped, metadata={"progress": json.dumps(progress)})
     with pytest.raises(UsageError, match="made with version 1 of the samples, this is version 3"):
-        learn(samples, SHORT, checkpoint_path=path)
+        learn(samples, SHORT, checkpoint_path=stopped)
 
 
-def test_a_checkpoint_whose_optimiser_learned_other_layers_is_refused(samples, tmp_path):
-    path = stopped(samples, tmp_path)
-    tensors, metadata = contents(path)
+def test_a_checkpoint_whose_optimiser_learned_other_layers_is_refused(samples, stopped):
+    tensors, metadata = contents(stopped)
     first, second = "optimiser/0/exp_avg", "optimiser/1/exp_avg"
     tensors[first], tensors[second] = tensors[second], tensors[first]
-    save_file(tensors, path, metadata=metadata)
+    save_file(tensors, stopped, metadata=metadata)
     with pytest.raises(BadModel, match="the optimiser's state is that of other layers"):
-        learn(samples, SHORT, checkpoint_path=path)
+        learn(samples, SHORT, checkpoint_path=stopped)
 
 
 def test_a_mean_only_network_and_the_papers_optimiser_can_be_trained(samples, tmp_path):
@@ -269,8 +298,8 @@ def test_training_ends_when_the_validation_loss_stops_falling_and_resumes_to_the
     assert torch.equal(whole.gdn.mean_head[0].weight, resumed.gdn.mean_head[0].weight)
 
 
-def test_a_trained_quality_network_is_taken_over(samples, tmp_path):
-    first, history = learn(samples, SHORT, checkpoint_path=tmp_path / "a")
+def test_a_trained_quality_network_is_taken_over(samples, learned, tmp_path):
+    first, history = learned(samples, SHORT)
     other, again = learn(samples, SHORT, checkpoint_path=tmp_path / "b", quality=first.gqn)
     assert {one.stage for one in again} == {"gdn"}
     pairs = [(first.gqn, other.gqn), (first.gdn, other.gdn)]  # the same start, the same displacement network
