@@ -40,7 +40,7 @@ def test_a_bar_is_assessed_and_placed_within_a_millimetre(cad, tmp_path, monkeyp
     out = tmp_path / "out"
     for condition in set(CONDITIONS) - {EXACT, NOISY}:
         monkeypatch.delitem(CONDITIONS, condition)
-    arguments = (cad / "bar.stl", "--out", out, "--simulations", 72, "--trials", 1, "--workers", 1)
+    arguments = (cad / "bar.stl", "--out", out, "--simulations", 36, "--trials", 1, "--workers", 1)
     assert run(monkeypatch, *arguments) == 0
     said = capsys.readouterr().out
     values = json.loads((out / "report.json").read_text())
