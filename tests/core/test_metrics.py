@@ -161,8 +161,10 @@ def test_bootstrap_draws_whole_objects():
     assert 0.5 < high - low < 1.1 and low < np.mean(objects) < high
 
 
-def test_one_object_does_not_tell_how_objects_differ():
+def test_one_object_does_not_tell_how_objects_differ_and_two_do():
     assert np.isnan(metrics.bootstrap_interval([np.arange(9.0)], np.mean)).all()
+    low, high = metrics.bootstrap_interval([np.zeros(2), np.ones(2)], np.mean)
+    assert low <= 0.0 < 1.0 <= high  # one in four draws has either alone
 
 
 def test_the_mean_of_few_objects_is_in_its_interval_nearly_as_often_as_stated():
