@@ -51,6 +51,7 @@ class Arm(Device):
     Attributes:
         simulated: Nothing moves in the real world, so no operator needs to confirm.
         links: Outline of the arm, which keeps off table and keep-outs; None: the hand alone is checked.
+        pace: Share of the speeds at which it would move otherwise: `slow_down`.
     """
 
     simulated: bool = False
@@ -63,7 +64,7 @@ class Arm(Device):
         self._held: Held | None = None
         self._moved_fingers = False
         self._load: Load | None = None
-        self._pace = 1.0
+        self.pace = 1.0
 
     # ------------------------------------------------------------------ commands
 
@@ -83,7 +84,7 @@ class Arm(Device):
         """
         if not 0 < pace <= 1:
             raise ValueError(f"pace {pace:g} is outside 0 .. 1")
-        self._pace = pace
+        self.pace = pace
 
     def move_to_joints(self, joints: np.ndarray, *, speed: float = 0.3) -> None:
         """Move all joints to (n,) radians at a fraction ``speed`` of their greatest speeds.
@@ -103,7 +104,7 @@ class Arm(Device):
             check_joint_path(self.limits, self._forward_all, here, target)
             if self.links is not None:
                 check_path(self.links, self.limits, np.stack([here, target]), "the way to these joints")
-            self._move_to_joints(target, self._pace * speed)
+            self._move_to_joints(target, self.pace * speed)
             error = np.abs(self._state().joints - target).max()
             if error > JOINT_TOLERANCE:
                 raise MotionAborted(f"the arm stopped {error:.4f} rad short of its joint target")
@@ -125,7 +126,7 @@ class Arm(Device):
             self._check_line(self.limits, *legs)
             for number, leg in enumerate(legs):
                 try:
-                    self._move_to_pose(leg, self._pace * speed)
+                    self._move_to_pose(leg, self.pace * speed)
                 except OutOfWorkspace as error:
                     if number == 0:
                         raise
@@ -161,7 +162,7 @@ class Arm(Device):
         self._check_pose(limits, T_base_tcp)
         with self._motion():
             self._check_line(limits, T_base_tcp)
-            contact = self._move_until_contact(T_base_tcp, force, self._pace * speed)
+            contact = self._move_until_contact(T_base_tcp, force, self.pace * speed)
             if contact is None:
                 self._check_arrival(T_base_tcp)
             return contact
@@ -416,7 +417,7 @@ class Arm(Device):
 
     @abstractmethod
     def _move_to_joints(self, joints: np.ndarray, speed: float) -> None:
-        """Move; ``speed`` is slowed down already, a greatest speed of the backend's own is not: ``_pace``."""
+        """Move; ``speed`` is slowed down already, a greatest speed of the backend's own is not: ``pace``."""
 
     def _legs(self, T_base_tcp: Pose) -> list[Pose]:
         """Ends of the straight motions that lead to a pose, which is the last of them."""

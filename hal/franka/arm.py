@@ -152,7 +152,7 @@ class FrankaArm(Arm):
             lambda here: joint_path(
                 here,
                 joints,
-                speed=min(speed, self._pace * config.max_joint_speed) * JOINT_SPEED,
+                speed=min(speed, self.pace * config.max_joint_speed) * JOINT_SPEED,
                 acceleration=np.full(7, config.joint_acceleration),
             )
         )
@@ -200,11 +200,11 @@ class FrankaArm(Arm):
             lambda here: straight_path(
                 here,
                 T_base_tcp,
-                speed=min(speed, self._pace * config.max_speed),
-                turn_speed=self._pace * TURN_SPEED,
+                speed=min(speed, self.pace * config.max_speed),
+                turn_speed=self.pace * TURN_SPEED,
                 acceleration=config.acceleration,
                 turn_acceleration=config.joint_acceleration,
-                joint_speed=self._pace * config.max_joint_speed * JOINT_SPEED,
+                joint_speed=self.pace * config.max_joint_speed * JOINT_SPEED,
                 lower=self.limits.joint_lower,
                 upper=self.limits.joint_upper,
             ),

@@ -83,4 +83,4 @@ def test_a_device_that_fails_to_close_still_closes_the_recording(
 def test_a_recorded_arm_is_slowed_by_its_own_speeds(tmp_path: Path):
     bare = toy_cell()
     recorded_cell(bare, tmp_path / "run.h5").arm.slow_down(0.1)
-    assert bare.arm._pace == 0.1
+    assert bare.arm.pace == 0.1
