@@ -107,7 +107,9 @@ def conclusion(
     if not any(trial.lifted for trial in trials):
         reasons = counted(Counter(trial.reason for trial in trials if trial.reason))
         why = next(iter(certified.without.values()), "")
-        most = wilson_interval(0, len(trials))[1]
+        # All planners and conditions share the scenes, and without certified grasps the plans.
+        scenes = len({trial.number for trial in trials})
+        most = wilson_interval(0, scenes)[1]
         width = least_widths(part).min()
         lead = f"{part.name} was not grasped: none"
         if width > MAX_OPENING:
@@ -118,7 +120,7 @@ def conclusion(
             )
         return (
             f"{lead} of {len(trials)} attempts lifted it ({reasons}{'; ' + why if why else ''}); "
-            f"95 % interval of the share lifted: 0 to {most:.0%}."
+            f"95 % interval of the share lifted, by {scenes} scenes: 0 to {most:.0%}."
         )
     lines = [f"With {'an ' if name == EXACT else ''}{name}: {text}." for name, text in verdicts.items()]
     return " ".join(lines)

@@ -118,14 +118,23 @@ def stored_sections(values: Mapping[str, Any]) -> list[Section]:
 
 
 def conclusion(rows: Sequence[Row], facts: RunFacts) -> str:
-    """The planner that places most parts by its own prediction, in a line."""
-    best = max(rows, key=lambda row: row.first("predicted").value)
+    """The planner that places most parts by its own prediction, or those that do, in a line."""
+    most = max(row.first("predicted").value for row in rows)
+    first = [row for row in rows if row.first("predicted").value == most]
+    best = first[0]
     found, without = best.first("predicted"), best.first("none")
+    lead = f"Of all {found.of} attempts at {best.n_parts} parts"
+    if most == 0:
+        return f"{lead}, no planner places any within {TOLERANCE}, in the cell {facts.cell}."
     low, high = found.interval
+    placed = f"{found.value:.0%} corrected by its prediction (95 % interval {low:.0%} to {high:.0%})"
+    if len(first) > 1:
+        names = " and ".join(row.planner for row in first)
+        return f"{lead}, {names} each place {placed} within {TOLERANCE}, in the cell {facts.cell}."
+    places = "places" if len(rows) == 1 else "places most"
     return (
-        f"Of all {found.of} attempts at {best.n_parts} parts, {best.planner} places most within {TOLERANCE}: "
-        f"{found.value:.0%} corrected by its prediction (95 % interval {low:.0%} to {high:.0%}), "
-        f"{without.value:.0%} without a correction, in the cell {facts.cell}."
+        f"{lead}, {best.planner} {places} within {TOLERANCE}: {placed}, {without.value:.0%} without a "
+        f"correction, in the cell {facts.cell}."
     )
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
+import shutil
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 from mskgrasp.benchmark.config import QUICK_PARTS, BenchmarkConfig
 from mskgrasp.benchmark.part_list import BenchmarkPart, benchmark_parts
@@ -18,7 +21,7 @@ from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.run_inputs import BY_CONTENT, keep_certified, model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.progress import progress
-from mskgrasp.runtime.run_folder import opened_run
+from mskgrasp.runtime.run_folder import file_digest, opened_run
 from mskgrasp.runtime.worker_pool import process_count
 from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import CellFile, read_cell
@@ -69,7 +72,7 @@ def benchmark(config: BenchmarkConfig) -> None:
     if config.paper_models is not None:
         inputs |= model_digests(config.paper_models, "paper")
     if config.program:
-        inputs["program"] = config.program
+        inputs |= program_digests(config.program)
     inputs |= package_digests(config.rows)
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         if "certified" in config.rows:
@@ -95,6 +98,10 @@ def _parts(config: BenchmarkConfig, training: dict) -> tuple[list[str], list[Ben
     """Names or folders of the parts, built where they are not yet, and their descriptions."""
     if config.parts:
         sources = part_names(config.parts, training, config.n_parts)
+        if not sources:
+            raise UsageError(
+                f"--parts {' '.join(config.parts)} names no part; `python -m mskgrasp.parts list` does"
+            )
         index = read_index().parts
         found = []
         for source in sources:
@@ -143,6 +150,14 @@ def _counted(rows: Sequence[str], count: Callable[[str], int]) -> dict[str, int]
     networks = [name for name in ("paper", "ours", "ours-min-quality", "certified") if name in rows]
     found = {name: count("paper" if name == "paper" else "") for name in networks}
     return {name: n for name, n in found.items() if n}
+
+
+def program_digests(command: str) -> dict[str, str]:
+    """A program's command, and digests of the files that it names; of what these read nothing is known."""
+    words = shlex.split(command)
+    paths = dict(zip(words, [Path(shutil.which(words[0]) or words[0]), *map(Path, words[1:])], strict=True))
+    files = {f"program: {word}": file_digest(path) for word, path in paths.items() if path.is_file()}
+    return {"program": command} | files
 
 
 def _trials(

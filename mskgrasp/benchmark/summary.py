@@ -161,8 +161,8 @@ def _row(planner: str, trials: Sequence[PlacedTrial], seed: int) -> Row:
 def refusals(trials: Sequence[PlacedTrial], seed: int) -> list[Refusal]:
     """Precision of each planner that predicts qualities, by the share of attempts that it leaves out.
 
-    An attempt without a quality, such as one in which no part was found, is left out first. Those that the
-    planner refused itself are never among those tried.
+    An attempt without a quality, such as one in which no part was found, is left out first. Those in which
+    the planner itself planned nothing are never among those tried.
     """
     found = []
     for planner, some in by_planner(trials).items():
@@ -173,7 +173,7 @@ def refusals(trials: Sequence[PlacedTrial], seed: int) -> list[Refusal]:
         off, turn = np.array(errors).T
         hits = (off <= DISTANCE) & (turn <= ANGLE)
         order = np.argsort(qualities, kind="stable")
-        planned = np.array([one.reason != PLANNER_REFUSED for one in some])
+        planned = np.array([one.reason != PLANNER_REFUSED and one.grasp is not None for one in some])
         for part_refused in REFUSED:
             least = float(qualities[order[int(part_refused * len(order))]])
             tried = planned & (qualities >= least)

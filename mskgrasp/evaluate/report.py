@@ -33,7 +33,8 @@ _ATTEMPT_COLUMNS = (
     f"tilted by over {np.degrees(TILT_LIMIT):g} deg", "RMSE without those", "turn RMSE without those",
 )  # fmt: skip
 _ATTEMPTS_EXPLAINED = (
-    "Of all attempts, those that lifted nothing included: the share in which the part was lifted and the "
+    "Of all attempts, those that lifted nothing included, and those that lifted the part and were not "
+    "measured left out: the share in which the part was lifted and the "
     "predicted displacement is off by at most so much. Tilted: share of the lifted parts that hang tilted in "
     "the hand. In brackets: 95 % interval by parts."
 )
@@ -117,7 +118,8 @@ def conclusion(summary: SuccessSummary | DisplacementSummary) -> str:
     certified = summary.policies.get(POLICY_NAMES["certified"])
     if certified is not None and certified.translation_rmse is not None:
         errors = f"{millimetres(certified.translation_rmse)} and {degrees(certified.rotation_rmse)}"
-        return f"RMSE of {POLICY_NAMES['certified']}: {errors}."
+        n, planned = certified.certified or (0, 0)
+        return f"RMSE with the CAD known ({n} of {planned} planned grasps are certified): {errors}."
     label, model = next(iter(summary.models.items()))
     for policy in reversed(POLICIES):
         errors = [

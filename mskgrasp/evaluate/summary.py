@@ -110,7 +110,7 @@ class TrialStatistics:
         parts = np.array([trial.part for trial in compared])
         errors = displacement_errors(predicted, measured)
         planned_by = [trial.planned_by for trial in trials if trial.policy == "certified" and trial.grasp]
-        flat = np.array([(trial.tilt or 0.0) <= TILT_LIMIT for trial in compared], dtype=bool)
+        flat = np.array([(np.inf if t.tilt is None else t.tilt) <= TILT_LIMIT for t in compared], dtype=bool)
         errors_of_zero = displacement_errors(0 * predicted, measured)
         known = len(parts) > 0 and np.isfinite(std).all() and np.isfinite(measured).all()
         return cls(
@@ -244,12 +244,16 @@ def _interval(errors: np.ndarray, parts: np.ndarray) -> Interval | None:
 
 
 def _within(trials: Sequence[Trial], compared: Sequence[Trial], distances: np.ndarray) -> list[Share] | None:
-    """Shares of all trials within each of `WITHIN`, of those compared with their errors (n,), metres."""
+    """Shares of all trials within each of `WITHIN`, of those compared with their errors (n,), metres.
+
+    A part that was lifted and not measured may be anywhere, and is left out.
+    """
     if not compared:
         return None
     off = dict(zip((trial.key for trial in compared), distances.tolist(), strict=True))
-    parts = [trial.part for trial in trials]
-    return [Share.count([off.get(trial.key, np.inf) <= most for trial in trials], parts) for most in WITHIN]
+    known = [trial for trial in trials if trial.key in off or not trial.success]
+    parts = [trial.part for trial in known]
+    return [Share.count([off.get(trial.key, np.inf) <= most for trial in known], parts) for most in WITHIN]
 
 
 def _tilted(lifted: Sequence[Trial]) -> Share | None:

@@ -24,6 +24,8 @@ from mskgrasp.planning.place_pose import Target, check_place
 
 SEEN_TOLERANCE = 0.003
 """Error of a part's sides in a depth image, about a pixel, m."""
+BESIDE = 0.05
+"""Least distance of a slot from the region in which parts are fed, m: placed parts must not reach into it."""
 _ANGLES = np.radians([-90.0, -45.0, 0.0, 45.0])
 
 
@@ -169,6 +171,22 @@ def check_slots_in_reach(cell: Cell, slots: Sequence[Slot]) -> None:
                 raise UsageError(
                     f"{name} at ({slot.x:g}, {slot.y:g}) m cannot be used: {error}; move it"
                 ) from error
+
+
+def check_slots_beside_region(cell: Cell, slots: Sequence[Slot]) -> None:
+    """Refuse slots where a placed part would be taken for the next one, or lie where that one is presented.
+
+    Raises:
+        UsageError: A slot is nearer than `BESIDE` to the region in which parts are fed.
+    """
+    x_min, x_max, y_min, y_max = cell.workspace.region
+    for number, slot in enumerate(slots, 1):
+        beside = max(x_min - slot.x, 0, slot.x - x_max), max(y_min - slot.y, 0, slot.y - y_max)
+        if math.hypot(*beside) < BESIDE - 1e-9:
+            raise UsageError(
+                f"slot {number} at ({slot.x:g}, {slot.y:g}) m is nearer than {BESIDE:g} m to the region of "
+                f"the next part, x {x_min:g} to {x_max:g} m, y {y_min:g} to {y_max:g} m: move it"
+            )
 
 
 def first_reachable(cell: Cell, poses: Sequence[Grasp], *, tallest: float = 0.0) -> int:

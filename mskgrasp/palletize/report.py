@@ -92,7 +92,7 @@ def print_report(summary: PlacementSummary, console: Console | None = None) -> N
 
 def _conclusion(summary: PlacementSummary) -> str:
     rows = summary.corrections.values()
-    placed = f"{sum(row.placed for row in rows)} of {sum(row.tried for row in rows)} parts placed"
+    placed = f"{sum(row.placed for row in rows)} of {sum(row.tried for row in rows)} placements succeeded"
     if not summary.compared:
         return f"{placed}; no error was measured under every correction."
     medians = [

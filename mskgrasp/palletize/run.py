@@ -16,7 +16,13 @@ from mskgrasp.core.files import write_whole
 from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
-from mskgrasp.palletize.pallet_slots import Slot, check_room, check_slots_in_reach, chosen_slots
+from mskgrasp.palletize.pallet_slots import (
+    Slot,
+    check_room,
+    check_slots_beside_region,
+    check_slots_in_reach,
+    chosen_slots,
+)
 from mskgrasp.palletize.pick_and_place import PickAndPlace, PlacementTask
 from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
 from mskgrasp.palletize.report import write_report
@@ -117,9 +123,15 @@ def _check(config: PalletizeConfig, slots: list[Slot]) -> tuple[tuple[Correction
     cell = cell_from_yaml(config.cell)
     if config.workers > 1 and not cell.simulated:
         raise UsageError(f"--workers {config.workers}: {config.cell} is one cell; omit --workers")
+    if config.tape is not None and cell.simulated and not cell.draws_tape:
+        raise UsageError(
+            f"--tape: {config.cell} draws no tape on parts; omit --tape, or use a cell of type sapien"
+        )
     asks = Operator(cell, yes=config.yes).asks
     if not cell.recorded:  # a recording replays queries in its order only
         check_slots_in_reach(cell, slots)
+    if config.slots is not None:
+        check_slots_beside_region(cell, slots)
     can: tuple[Correction, ...] = CORRECTIONS if cell.tracker is not None else CORRECTIONS[:2]
     wanted = tuple(dict.fromkeys(config.corrections)) or can
     if not set(wanted) <= set(can):

@@ -180,9 +180,12 @@ def _kill(process: subprocess.Popen[str]) -> None:
 
 
 def _proposed(values: dict[str, Any]) -> ProposedGrasp:
-    if "refused" in values:
-        raise NoGraspFound(str(values["refused"]))
-    unknown = sorted(set(values) - {"grasp", *_FIELDS})
+    refused = values.get("refused")
+    if refused is not None:
+        if not isinstance(refused, str):
+            raise TypeError(f"refused is {refused!r}, not a reason")
+        raise NoGraspFound(refused)
+    unknown = sorted(set(values) - {"grasp", "refused", *_FIELDS})
     if unknown:
         raise ValueError(f"unknown keys {unknown}")
     known: dict[str, Any] = {name: values[name] for name in _FIELDS if values.get(name) is not None}

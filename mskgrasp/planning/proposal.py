@@ -119,7 +119,7 @@ def plan_of(proposed: ProposedGrasp, view: PartView, seconds: float) -> GraspPla
         seconds: Time taken.
 
     Raises:
-        ValueError: A value has another shape, or is not finite, or no probability.
+        ValueError: A value has another shape, is not finite, or no probability or covariance.
     """
     given = _checked("grasp", proposed.grasp.as_vector(), (4,))
     grasp = given.copy()
@@ -138,6 +138,9 @@ def plan_of(proposed: ProposedGrasp, view: PartView, seconds: float) -> GraspPla
     covariance, score = np.full((4, 4), np.nan), np.nan
     if proposed.displacement_cov is not None:
         given_cov = _checked("displacement_cov", proposed.displacement_cov, (4, 4))
+        least = np.linalg.eigvalsh(given_cov).min()
+        if not np.allclose(given_cov, given_cov.T) or least < -1e-9 * np.abs(given_cov).max():
+            raise ValueError("displacement_cov is no covariance: it must be symmetric and positive")
         of_point = half_turned_covariance(given_cov, sign)
         covariance = grasp_displacement_covariance(motion, of_point, point)
         score = float(np.trace(of_point[:3, :3]) + view.gyration_radius**2 * of_point[3, 3])

@@ -14,13 +14,12 @@ def plan_text(plan: GraspPlan) -> str:
     x, y, z, theta = plan.grasp.as_vector()
     mean, std = plan.displacement, plan.displacement_std
     shifts = ", ".join(
-        f"{name} {value * 1e3:+z.1f} +- {deviation * 1e3:.1f} mm"
+        f"{name} {value * 1e3:+z.1f}{_spread(deviation * 1e3)} mm"
         for name, value, deviation in zip(("dx", "dy", "dz"), mean[:3], std[:3], strict=True)
     )
-    turn = f"dtheta {np.degrees(mean[3]):+z.1f} +- {np.degrees(std[3]):.1f} deg"
+    turn = f"dtheta {np.degrees(mean[3]):+z.1f}{_spread(np.degrees(std[3]))} deg"
     tilt = float(np.degrees(np.linalg.norm(plan.swing)))
-    spread = float(np.degrees(np.sqrt(plan.swing_var.sum())))
-    tilted = f"{tilt:.1f} +- {spread:.1f} deg"
+    tilted = f"{tilt:.1f}{_spread(np.degrees(np.sqrt(plan.swing_var.sum())))} deg"
     stages = ", ".join(f"{name} {value:.2f} s" for name, value in plan.seconds.items() if name != "total")
     pose = [] if plan.pose is None else [_pose_text(plan.pose)]
     n = len(plan.candidates)
@@ -68,3 +67,8 @@ def _pose_text(pose: PartPose) -> str:
         f"part          resting pose {pose.resting} at x {x:.4f} +- {std[0]:.4f} m, "
         f"y {y:.4f} +- {std[1]:.4f} m, its turn known to +- {np.degrees(std[2]):.1f} deg"
     )
+
+
+def _spread(deviation: float) -> str:
+    """A standard deviation after its mean; nothing where none is predicted."""
+    return "" if np.isnan(deviation) else f" +- {deviation:.1f}"

@@ -104,7 +104,7 @@ def read_cell(
             )
         if cell.simulated:
             squares = squares or values.get("tape") or {}
-            values |= {"tape": squares, "colour_scale": max(FINE, values.get("colour_scale", 1))}
+            values |= {"tape": squares, "colour_scale": max(FINE, int(values.get("colour_scale", 1)))}
         squares = check_config(Tape, squares, "--tape" if tape else f"{path}: tape")
     cell_from_values(values, path)  # refuses an invalid file before any worker starts
     return CellFile(path=path, values=values, tape=squares, simulated=cell.simulated)

@@ -117,21 +117,28 @@ def complaints(found: Comparison) -> list[str]:
     return said
 
 
-def intervals(mujoco: Outcomes, sapien: Outcomes) -> dict[str, tuple[float, float]]:
+def intervals(mujoco: Outcomes, sapien: Outcomes) -> dict[str, tuple[float, float] | None]:
     """95 % intervals of the figures of all grasps, by the bootstrap over parts.
 
     Returns:
-        ``agreement`` (a share), ``shift_median`` and ``shift_p90`` (m).
+        ``agreement`` (a share), ``shift_median`` and ``shift_p90`` (m); None of too few parts.
     """
     rows = np.stack([mujoco.success == sapien.success, distances(mujoco, sapien)], axis=1)
     settled = mujoco.settled & sapien.settled
     by_part = [rows[settled & (sapien.part == part)] for part in np.unique(sapien.part[settled])]
     figures: dict[str, Callable[[np.ndarray], float]] = {
         "agreement": lambda drawn: float(drawn[:, 0].mean()),
-        "shift_median": lambda drawn: float(np.nanpercentile(drawn[:, 1], 50)),
-        "shift_p90": lambda drawn: float(np.nanpercentile(drawn[:, 1], 90)),
+        "shift_median": lambda drawn: _percentile(drawn[:, 1], 50),
+        "shift_p90": lambda drawn: _percentile(drawn[:, 1], 90),
     }
-    return {name: bootstrap_interval(by_part, figure) for name, figure in figures.items()}
+    found = {name: bootstrap_interval(by_part, figure) for name, figure in figures.items()}
+    return {name: ends if np.isfinite(ends).all() else None for name, ends in found.items()}
+
+
+def _percentile(values: np.ndarray, share: float) -> float:
+    """Percentile of the values that are known, NaN of none."""
+    known = values[~np.isnan(values)]
+    return float(np.percentile(known, share)) if len(known) else np.nan
 
 
 def lasting_disagreements(found: Mapping[str, Outcomes]) -> int:
@@ -178,19 +185,22 @@ def _of(outcomes: Outcomes, part: str) -> Outcomes:
 
 def _in_words(record: dict[str, Any]) -> str:
     everything = Comparison.from_json(record["engines"]["all"])
-    low, high = record["intervals"]["agreement"]
     shifts = [
-        f"{1e3 * value:.2f} mm ({name}; {1e3 * ends[0]:.2f} .. {1e3 * ends[1]:.2f})"
+        f"{1e3 * value:.2f} mm ({name}{_ends(ends, 1e3, 2)})"
         for name, value, ends in (
             ("median", everything.shift_median, record["intervals"]["shift_median"]),
             ("90 %", everything.shift_p90, record["intervals"]["shift_p90"]),
         )
     ]
     return (
-        f"S agrees in {everything.agreement:.1%} ({100 * low:.1f} .. {100 * high:.1f}) of {everything.n} "
-        f"grasps; displacements of {everything.n_both} differ by {' and '.join(shifts)}. Intervals: 95 %, "
-        "bootstrap over parts."
+        f"S agrees in {everything.agreement:.1%} (of {everything.n} grasps"
+        f"{_ends(record['intervals']['agreement'], 100, 1)}); displacements of {everything.n_both} differ by "
+        f"{' and '.join(shifts)}. Intervals: 95 %, bootstrap over parts."
     )
+
+
+def _ends(ends: Sequence[float] | None, scale: float, digits: int) -> str:
+    return "" if ends is None else f"; {scale * ends[0]:.{digits}f} .. {scale * ends[1]:.{digits}f}"
 
 
 def _table(rows: Sequence[tuple[str, Comparison]]) -> Table:

@@ -11,7 +11,7 @@ import pytest
 
 from mskgrasp.assess.config import parse_tolerance
 from mskgrasp.assess.report import poses_section, write_report
-from mskgrasp.assess.trials import NOISY
+from mskgrasp.assess.trials import EXACT, NOISY
 from tests.assess.made_trials import failed, made
 from tests.browser import Page
 from tests.planning.test_certified import PART, certified, certified_grasp
@@ -82,11 +82,16 @@ def test_a_part_that_nothing_lifts_gets_a_report_that_says_so_first(tmp_path):
     none = certified(
         without={0: "no grasp lifts it in 95% of the simulations (best 0%)"}, conditions=CONDITIONS
     )
-    headline, _ = write_report(
-        tmp_path, PART, none, [failed(0, "refused"), failed(1, "refused")], parse_tolerance("1mm,2deg"), {}
-    )
-    assert headline.startswith("hex_nut_m20 was not grasped: none of 2 attempts lifted it (")
-    assert "refused" in headline and "no grasp lifts it" in headline and "0 to 66%" in headline
+    trials = [
+        failed(number, "refused", planner=planner, condition=condition)
+        for number in range(2)
+        for planner in ("certified", "networks")
+        for condition in (EXACT, NOISY)
+    ]
+    headline, _ = write_report(tmp_path, PART, none, trials, parse_tolerance("1mm,2deg"), {})
+    assert headline.startswith("hex_nut_m20 was not grasped: none of 8 attempts lifted it (")
+    assert "refused" in headline and "no grasp lifts it" in headline
+    assert "by 2 scenes: 0 to 66%" in headline  # in which both planners plan the same
 
 
 def test_a_pose_in_which_the_part_always_tilts_is_told_with_its_grasps():

@@ -7,7 +7,8 @@ import json
 import pytest
 
 from mskgrasp.benchmark.part_list import BenchmarkPart
-from mskgrasp.benchmark.report import RunFacts, stored_sections, write_report
+from mskgrasp.benchmark.report import RunFacts, conclusion, stored_sections, write_report
+from mskgrasp.benchmark.summary import summarise
 from tests.benchmark.made_trials import failed, made
 from tests.browser import Page
 
@@ -15,6 +16,19 @@ PARTS = [
     BenchmarkPart(name="nut", family="nut", split="test", standard="ISO 4032"),
     BenchmarkPart(name="bracket", family="bracket", split="test", standard=""),
 ]
+
+
+def facts_of(parts: list[BenchmarkPart]) -> RunFacts:
+    return RunFacts(
+        cell="sapien",
+        noise="off",
+        seed=0,
+        parts=parts,
+        trained_on={"ours": 1},
+        chosen_by={"certified": 2},
+        known_families={"ours": 2},
+        settings=dict(seed=0),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -26,17 +40,7 @@ def written(tmp_path_factory):
           for part in PARTS for number in range(4)),
         *(failed(4, "centroid", part=part.name, quality=None) for part in PARTS),
     ]  # fmt: skip
-    facts = RunFacts(
-        cell="sapien",
-        noise="off",
-        seed=0,
-        parts=PARTS,
-        trained_on={"ours": 1},
-        chosen_by={"certified": 2},
-        known_families={"ours": 2},
-        settings=dict(seed=0),
-    )
-    headline, sections = write_report(out, trials, facts)
+    headline, sections = write_report(out, trials, facts_of(PARTS))
     return out, headline, {section.title: section for section in sections}
 
 
@@ -47,6 +51,19 @@ def test_the_first_line_names_the_planner_that_places_most(written):
         "prediction (95 % interval 72% to 100%), 0% without a correction"
     )
     assert json.loads((out / "report.json").read_text())["headline"] == headline
+
+
+@pytest.mark.parametrize(
+    ("trials", "said"),
+    [
+        ([made(0), failed(0, "centroid")], "1 parts, ours places most within 1 mm and 2 degrees: 100% corr"),
+        ([made(0)], "1 parts, ours places within 1 mm and 2 degrees: 100% corrected"),
+        ([made(0), made(0, "centroid")], "1 parts, ours and centroid each place 100% corrected by its"),
+        ([failed(0), failed(0, "centroid")], "1 parts, no planner places any within 1 mm and 2 degrees"),
+    ],
+)
+def test_a_winner_is_named_only_where_there_is_one(trials, said):
+    assert said in conclusion(summarise(trials, 0), facts_of(PARTS[:1]))
 
 
 def test_the_numbers_are_stored(written):

@@ -11,7 +11,7 @@ import pytest
 
 from mskgrasp.benchmark.__main__ import main
 from mskgrasp.benchmark.part_list import BenchmarkPart
-from mskgrasp.benchmark.run import known_families, known_parts
+from mskgrasp.benchmark.run import known_families, known_parts, program_digests
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 from tests.programs import Ended, run_here
@@ -43,6 +43,27 @@ def test_other_parts_of_a_familiar_family_are_counted():
     training = {"": dict(training_parts=["hex_nut_m30", "a_part_of_mine"])}
     assert known_families(("ours", "antipodal"), training, nuts) == {"ours": 1}
     assert known_families(("antipodal",), training, nuts) == {}
+
+
+def test_a_program_that_is_edited_is_another_one(tmp_path):
+    program = tmp_path / "planner.py"
+    program.write_text("print(1)\n")
+    command = f"{shlex.quote(sys.executable)} {program} --fast"
+    first = program_digests(command)
+    assert first["program"] == command and set(first) == {
+        "program", f"program: {sys.executable}", f"program: {program}",
+    }  # fmt: skip
+    program.write_text("print(2)\n")
+    assert {name for name, digest in program_digests(command).items() if first[name] != digest} == {
+        f"program: {program}"
+    }
+
+
+def test_a_set_without_a_part_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("mskgrasp.benchmark.run.part_names", lambda *_: [])
+    done = run(tmp_path / "out", "--parts", "test")
+    assert done.returncode == 2 and "--parts test names no part" in done.stderr
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

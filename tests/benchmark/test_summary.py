@@ -44,6 +44,13 @@ def test_the_camera_at_the_hand_has_the_stated_errors_and_the_same_for_all_plann
     assert placing_error(failed(0), "camera", 0) is None
 
 
+def test_attempts_for_which_a_planner_plans_nothing_are_not_tried():
+    good = [made(number, "program", quality=0.9) for number in range(2)]
+    nothing = dict(grasp=None, quality=None, reason="no grasp found")
+    found = refusals([*good, *(failed(number, planner="program", **nothing) for number in range(2, 10))], 0)
+    assert {(one.refused, one.placed.n, one.placed.of) for one in found} == {(0.8, 2, 2)}
+
+
 def test_precision_rises_as_attempts_of_low_quality_are_refused():
     good = [made(number, quality=0.95) for number in range(5)]
     poor = [failed(number, quality=0.1 + 0.01 * number) for number in range(5, 9)]

@@ -49,7 +49,7 @@ def test_the_conclusion_of_a_comparison_names_model_parts_and_policy():
     )
     simulated = trial(policy="certified", chosen_by=CERTIFIED, measured=[0.0, 0.001, 0.0, -0.1])
     text = conclusion(compare_models([*best, chosen, simulated], {"one": Model()}))
-    assert text.startswith("RMSE of certified grasps: ")
+    assert text.startswith("RMSE with the CAD known (0 of 1 planned grasps are certified): ")
     assert conclusion(compare_models([], {"one": Model()})) == "No displacement was measured."
 
 

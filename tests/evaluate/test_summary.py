@@ -64,6 +64,16 @@ def test_shares_within_an_error_are_of_all_attempts_and_parts_that_hang_tilted_a
     assert "50.0% [" in printed(summarise_trials([*precise, tilted, lost]))
 
 
+def test_what_was_not_measured_is_not_counted_as_off_and_a_tilt_that_is_not_known_not_as_flat():
+    exact = dict(predicted=[0.0, 0.004, 0.0, -0.1], tilt=None)
+    unmeasured = [trial(number=k, measured=None, unmeasured="one found: 1 of 2", tilt=None) for k in (2, 3)]
+    trials = [*(trial(number=k, **exact) for k in (0, 1)), *unmeasured, trial(number=4, **NOTHING, tilt=None)]
+    found = summarise_trials(trials).overall
+    assert found.within is not None
+    assert [(one.n, one.of) for one in found.within] == [(2, 3), (2, 3)]
+    assert (found.flat, found.flat_translation_rmse, found.tilted) == (0, None, None)
+
+
 def test_grasps_of_the_networks_are_told_from_certified_ones():
     by = ("networks", "certified", "certified", "uncertified")
     own = [trial(number=k, policy="certified", planned_by=one) for k, one in enumerate(by)]

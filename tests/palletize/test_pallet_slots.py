@@ -11,7 +11,14 @@ from hal import cell_from_yaml
 from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.palletize.config import PalletizeConfig
-from mskgrasp.palletize.pallet_slots import Slot, check_room, check_slots_in_reach, chosen_slots, read_slots
+from mskgrasp.palletize.pallet_slots import (
+    Slot,
+    check_room,
+    check_slots_beside_region,
+    check_slots_in_reach,
+    chosen_slots,
+    read_slots,
+)
 from mskgrasp.parts import find_part
 from mskgrasp.perception.footprint import Footprint, usual_footprint
 
@@ -47,7 +54,19 @@ def test_a_single_target_is_the_only_slot_and_a_file_takes_its_place(tmp_path):
 def test_the_shipped_grid_is_within_reach_of_its_cell():
     slots = read_slots(GRID)
     assert len(slots) == 6 and len({(slot.x, slot.y) for slot in slots}) == 6
-    check_slots_in_reach(cell_from_yaml(REPOSITORY / "configs" / "palletize" / "cell.yaml"), slots)
+    cell = cell_from_yaml(REPOSITORY / "configs" / "palletize" / "cell.yaml")
+    check_slots_in_reach(cell, slots)
+    check_slots_beside_region(cell, slots)
+
+
+def test_a_slot_that_reaches_into_the_region_of_the_next_part_is_named():
+    cell = cell_from_yaml(REPOSITORY / "configs" / "cells" / "sapien.yaml")
+    x_min, x_max, y_min, y_max = cell.workspace.region
+    beside = Slot(x=0.5, y=y_min - 0.05, theta=0.0)
+    check_slots_beside_region(cell, [beside, Slot(x=x_max + 0.04, y=y_max + 0.04, theta=0.0)])
+    for x, y in ((0.5, 0.0), (0.5, y_min - 0.049), (x_min - 0.03, y_max + 0.03)):
+        with pytest.raises(UsageError, match=r"slot 2 at .* is nearer than 0.05 m to the region"):
+            check_slots_beside_region(cell, [beside, Slot(x=x, y=y, theta=0.0)])
 
 
 def test_a_slot_out_of_reach_is_named():

@@ -68,7 +68,7 @@ def test_the_files_hold_the_summary_and_every_figure(run: tuple[Path, list[Place
     assert {path.name for path in out.glob("*.png")} == {"errors.png", "placed.png", "pallet-000.png"}
     page = (out / "report.html").read_text()
     assert page.count("<img") == 3 + 3  # and the three placements under the prediction
-    assert "10 of 11 parts placed; median error by correction: none 6.0 mm and 3.4 deg, predicted 2.0" in page
+    assert "10 of 11 placements succeeded; median error by correction: none 6.0 mm and 3.4 deg, pred" in page
 
 
 def test_the_worst_under_the_prediction_come_first_and_the_lost_with_their_reason(run):
@@ -86,7 +86,7 @@ def test_a_run_without_a_measured_placement_is_reported_too(tmp_path: Path):
     summary = write_report(PalletizeConfig(out=tmp_path), tmp_path, lost, [Slot(x=0.5, y=0.0, theta=0.0)])
     assert summary.compared == 0
     page = (tmp_path / "report.html").read_text()
-    assert "0 of 1 parts placed; no error was measured under every correction." in page
+    assert "0 of 1 placements succeeded; no error was measured under every correction." in page
     assert "nan" not in (tmp_path / "report.json").read_text().lower()
 
 

@@ -79,6 +79,7 @@ def test_a_request_has_a_seed_of_the_generator(program):
 def test_a_program_may_refuse_a_part(program):
     with pytest.raises(NoGraspFound, match="too wide"):
         ask(program(answer("{'refused': 'too wide'}")))
+    assert ask(program(answer("{'grasp': [0.4, 0.0, 0.02, 0], 'refused': None}"))).quality is None
 
 
 @pytest.mark.parametrize(
@@ -87,6 +88,7 @@ def test_a_program_may_refuse_a_part(program):
         ("print('hello', flush=True)", "must answer a line such as .* got 'hello'"),
         (answer("{'grasp': [0.4, 0.0, 0.02]}"), "must answer a line such as"),
         (answer("{'grasp': [0.4, 0.0, 0.02, 0], 'qality': 1}"), "must answer a line such as"),
+        (answer("{'grasp': [0.4, 0.0, 0.02, 0], 'refused': False}"), "must answer a line such as"),
         (answer("[1, 2]"), "must answer a line such as"),
         ("raise RuntimeError('no licence')", r"ended with exit code 1 \(RuntimeError: no licence\)"),
         ("sys.exit(3)", "ended with exit code 3"),

@@ -71,6 +71,8 @@ def test_what_is_not_predicted_is_zero_or_unknown():
         (dict(quality=1.5), "quality is 1.5"),
         (dict(displacement=np.zeros(3)), "displacement must be finite and of shape"),
         (dict(displacement_cov=np.full((4, 4), np.nan)), "displacement_cov must be finite"),
+        (dict(displacement_cov=np.diag([-1e-6, 1e-6, 1e-6, 1e-4])), "displacement_cov is no covariance"),
+        (dict(displacement_cov=SPREAD + np.eye(4, k=1) * 1e-7), "displacement_cov is no covariance"),
         (dict(grasp=Grasp.from_vector(np.array([0.4, np.nan, 0.1, 0.0]))), "grasp must be finite"),
     ],
 )

@@ -41,3 +41,12 @@ def test_a_plan_says_how_far_the_part_may_miss_its_predicted_place():
     plan = dataclasses.replace(planner().plan(FRAME, np.random.default_rng(0)), score=0.0132**2)
     assert "expected 13.2 mm (RMS) from their predicted places, a tilt included" in plan_text(plan)
     assert "precision" not in plan_text(dataclasses.replace(plan, score=np.nan))
+
+
+def test_without_a_predicted_variance_no_deviation_is_told():
+    plan = planner().plan(FRAME, np.random.default_rng(0))
+    nothing = np.full(2, np.nan)
+    known = dataclasses.replace(
+        plan, grasp_displacement_cov=np.full((4, 4), np.nan), swing_var=nothing, score=np.nan
+    )
+    assert "nan" not in plan_text(known) and "dtheta -5.7 deg" in plan_text(known)

@@ -37,7 +37,7 @@ def test_measuring_by_markers_adds_tape_to_a_simulated_cell(tmp_path: Path):
     found = read_cell(sapien, noise=None, measure="markers", tape=(0.01, 0.006))
     assert found.values["tape"] == {"large": 0.01, "small": 0.006}
     path = tmp_path / "cell.yaml"
-    path.write_text("type: sapien\ntape: {large: 0.009, small: 0.006}\ncolour_scale: 4\n")
+    path.write_text("type: sapien\ntape: {large: 0.009, small: 0.006}\ncolour_scale: '4'\n")
     found = read_cell(path, noise=None, measure="markers", tape=None)
     assert found.tape is not None and found.tape.sides == (0.009, 0.006) and found.values["colour_scale"] == 4
 

@@ -81,6 +81,5 @@ def test_both_engines_try_the_same_grasps(tmp_path: Path):
     assert found["hex_nut_m30"] == found["all"] and found["all"]["n"] == 3
     assert found["all"]["agreement"] >= 0.6 and found[f"mujoco{SHIFTED}"]["shift_median"] < 1e-3
     assert "mujoco" in record["versions"]
-    low, high = record["intervals"]["agreement"]
-    assert low == high == found["all"]["agreement"]  # of one part
-    assert "S agrees in" in done.stdout and "Intervals: 95 %" in done.stdout
+    assert set(record["intervals"].values()) == {None}  # of one part
+    assert "(of 3 grasps); displacements of" in done.stdout and "nan .. nan" not in done.stdout
