@@ -102,6 +102,8 @@ def read_isaac_grasp(path: Path) -> IsaacGrasps:
     values = read_yaml(path, MOST_BYTES)
     if values.get("format") != "isaac_grasp":
         raise BadConfig(f"{path}: format is {values.get('format')!r}, legal: 'isaac_grasp'")
+    if values.get("format_version", 1.0) != 1.0:
+        raise BadConfig(f"{path}: format_version is {values['format_version']!r}, legal: 1.0")
     link = values.get("gripper_frame_link")
     if not isinstance(link, str) or link not in _TCP_IN_LINK:
         raise BadConfig(
@@ -114,6 +116,8 @@ def read_isaac_grasp(path: Path) -> IsaacGrasps:
         raise BadConfig(f"{path} holds no grasps")
     for name, one in grasps.items():
         try:
+            if not isinstance(one["orientation"]["xyz"], list):
+                raise TypeError("xyz is no list")
             position = np.array(one["position"], dtype=np.float64).reshape(3)
             quat = np.array([one["orientation"]["w"], *one["orientation"]["xyz"]], dtype=np.float64).reshape(
                 4
@@ -123,6 +127,8 @@ def read_isaac_grasp(path: Path) -> IsaacGrasps:
                 raise ValueError("position or orientation is not finite, or no rotation")
         except (LookupError, TypeError, ValueError, OverflowError) as error:
             raise BadConfig(f"{path}: grasp {name!r} has no pose: {' '.join(str(error).split())}") from error
+        if str(name) in found:  # 1 and '1' are two keys of YAML
+            raise BadConfig(f"{path}: two grasps are called {name}; rename one")
         found[str(name)] = Pose(position=position, quat_wxyz=quat / np.linalg.norm(quat)) @ T_link_tcp
     return IsaacGrasps(values=values, T_mesh_tcp=found)
 

@@ -103,6 +103,9 @@ def test_grasps_that_are_numbered_are_scored_too(tmp_path):
     assert yaml.safe_load(scored.read_text())["grasps"] == {1: values["grasps"][1] | {"confidence": 0.25}}
 
 
+HERE = dict(position=[0.0, 0.0, 0.0], orientation=dict(w=1.0, xyz=[0.0, 0.0, 0.0]))
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -110,6 +113,9 @@ def test_grasps_that_are_numbered_are_scored_too(tmp_path):
         (dict(gripper_frame_link="robotiq_base"), "gripper_frame_link is 'robotiq_base', legal: panda_hand"),
         (dict(gripper_frame_link=["panda_hand"]), r"gripper_frame_link is \['panda_hand'\], legal"),
         (dict(grasps={}), "holds no grasps"),
+        (dict(format_version=2.0), "format_version is 2.0, legal: 1.0"),
+        (dict(grasps={1: HERE, "1": HERE}), "two grasps are called 1; rename one"),
+        (dict(grasps=dict(a=HERE | {"orientation": dict(w=0.0, xyz="100")})), "grasp 'a' has no pose: xyz"),
         (dict(grasps={"one": dict(position=[0, 0])}), "grasp 'one' has no pose"),
         (
             dict(grasps={"one": dict(position=[0, 0, 10**400], orientation=dict(w=1.0, xyz=[0, 0, 0]))}),
