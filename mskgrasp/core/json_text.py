@@ -1,11 +1,20 @@
-"""Parsing of JSON text that may be malformed or malicious."""
+"""Parsing of JSON text that may be malformed or malicious, and of records in it."""
 
 from __future__ import annotations
 
 import json
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import fields
+from functools import cache
+from typing import Annotated, Any, TypeVar, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+Record = TypeVar("Record")
+Three = Annotated[list[float], Field(min_length=3, max_length=3)]
+Four = Annotated[list[float], Field(min_length=4, max_length=4)]
+Seven = Annotated[list[float], Field(min_length=7, max_length=7)]
 
 
 def parse_json(text: str | bytes) -> Any:
@@ -18,6 +27,23 @@ def parse_json(text: str | bytes) -> Any:
         return json.loads(text, object_pairs_hook=_without_doubles)
     except RecursionError as error:
         raise ValueError("too many brackets inside each other") from error
+
+
+def checked(record: Record) -> Record:
+    """The record, an instance of a dataclass, if its fields hold what they are annotated with.
+
+    Raises:
+        ValueError: One does not.
+    """
+    _fields_of(type(record)).model_validate(vars(record))
+    return record
+
+
+@cache
+def _fields_of(kind: type) -> type[BaseModel]:
+    hints = get_type_hints(kind, include_extras=True)
+    wanted: dict[str, Any] = {field.name: (hints[field.name], ...) for field in fields(kind)}
+    return create_model(kind.__name__, __config__=ConfigDict(strict=True), **wanted)
 
 
 def _without_doubles(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from mskgrasp.core.json_text import Four, checked
+
 Correction = Literal["none", "predicted", "truth"]
 CORRECTIONS: tuple[Correction, Correction, Correction] = ("none", "predicted", "truth")
 
@@ -44,9 +46,9 @@ class Placement:
     target: tuple[float, float, float]
     placed: bool
     reason: str
-    grasp: list[float] | None = None
-    predicted: list[float] | None = None
-    measured: list[float] | None = None
+    grasp: Four | None = None
+    predicted: Four | None = None
+    measured: Four | None = None
     translation_error: float | None = None
     rotation_error: float | None = None
     unmeasured: str = ""
@@ -68,7 +70,11 @@ class Placement:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Placement:
-        """The placement that `to_json` converted."""
+        """The placement that `to_json` converted.
+
+        Raises:
+            TypeError, ValueError, KeyError: The values are not a placement.
+        """
         x, y, theta = values["target"]
         rest: dict[str, Any] = {name: value for name, value in values.items() if name != "target"}
-        return cls(target=(x, y, theta), **rest)
+        return checked(cls(target=(x, y, theta), **rest))

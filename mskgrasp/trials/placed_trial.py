@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
+from mskgrasp.core.json_text import Four, Three, checked
 from mskgrasp.planning.grasp_plan import PlannedBy
 
 Key = tuple[str, str, int, str]
@@ -56,15 +57,15 @@ class PlacedTrial:
     resting: int | None = None
     wrong_pose: bool = False
     quality: float | None = None
-    grasp: list[float] | None = None
-    predicted: list[float] | None = None
-    measured: list[float] | None = None
-    held: list[float] | None = None
-    expected: list[float] | None = None
+    grasp: Four | None = None
+    predicted: Four | None = None
+    measured: Four | None = None
+    held: Four | None = None
+    expected: Four | None = None
     tilt: float | None = None
-    seeing: list[float] | None = None
-    carried: list[float] | None = None
-    placed: list[float] | None = None
+    seeing: Three | None = None
+    carried: Three | None = None
+    placed: Three | None = None
 
     @property
     def key(self) -> Key:
@@ -98,5 +99,9 @@ class PlacedTrial:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> PlacedTrial:
-        """The trial that `to_json` converted."""
-        return cls(**values)
+        """The trial that `to_json` converted.
+
+        Raises:
+            TypeError, ValueError: The values are not a trial.
+        """
+        return checked(cls(**values))

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from mskgrasp.core.json_text import Four, Seven, Three, checked
 from mskgrasp.planning.grasp_plan import PlannedBy
 
 Policy = Literal["quality", "low_variance", "recentred", "certified"]
@@ -31,8 +32,8 @@ class Prediction:
         std: (4,) standard deviations; NaN where the model predicts none.
     """
 
-    mean: list[float]
-    std: list[float]
+    mean: Four
+    std: Four
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,20 +76,20 @@ class Trial:
     seed: int
     success: bool
     reason: str
-    grasp: list[float] | None = None
+    grasp: Four | None = None
     quality: float | None = None
-    point_base: list[float] | None = None
-    predicted: list[float] | None = None
-    predicted_std: list[float] | None = None
-    measured: list[float] | None = None
+    point_base: Three | None = None
+    predicted: Four | None = None
+    predicted_std: Four | None = None
+    measured: Four | None = None
     tilt: float | None = None
     planning_s: float | None = None
     family: str = ""
     policy: Policy = "low_variance"
     chosen_by: str = ""
     unmeasured: str = ""
-    true: list[float] | None = None
-    pose_base_obj: list[float] | None = None
+    true: Four | None = None
+    pose_base_obj: Seven | None = None
     predictions: dict[str, Prediction] = field(default_factory=dict)
     refusal: str = ""
     planned_by: PlannedBy | None = None
@@ -118,7 +119,7 @@ class Trial:
             str(label): Prediction(mean=list(one["mean"]), std=_none_to_nan(one["std"]) or [])
             for label, one in values.get("predictions", {}).items()
         }
-        trial = cls(**values)
+        trial = checked(cls(**values))
         if not _LEGAL_KEY.fullmatch(trial.key):
             raise ValueError(trial.key)
         return trial

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
+from dataclasses import dataclass
+from typing import Any, Literal, cast
 
 import pytest
 
-from mskgrasp.core.json_text import parse_json
+from mskgrasp.core.json_text import Four, Three, checked, parse_json
 
 
 def test_sound_text_is_read():
@@ -36,3 +39,21 @@ def test_a_key_that_occurs_twice_is_found_among_many_in_no_time():
     with pytest.raises(ValueError, match=f"key '{n - 1}' occurs twice"):
         parse_json(text)
     assert time.monotonic() - began < 10
+
+
+@dataclass(frozen=True)
+class Kept:
+    name: str
+    at: Three
+    grasp: Four | None = None
+    how: Literal["so", "thus"] = "so"
+
+
+def test_a_record_holds_what_its_fields_say():
+    assert checked(Kept("a", [1.0, 2, math.nan])).at[:2] == [1.0, 2]
+    for wrong in (
+        Kept("a", [1.0, 2.0]), Kept(cast(Any, 3), [1.0] * 3), Kept("a", [cast(Any, "1")] * 3),
+        Kept("a", [1.0] * 3, [1.0] * 5), Kept("a", [1.0] * 3, how=cast(Any, "foo")),
+    ):  # fmt: skip
+        with pytest.raises(ValueError):
+            checked(wrong)
