@@ -56,7 +56,9 @@ def write_values(path: Path, section: str, values: Mapping[str, str], *, after: 
         BadConfig: The file cannot be rewritten; it is as before.
     """
     path = path.resolve()  # a link stays a link
-    text = path.read_text(encoding="utf-8")
+    stored = path.read_bytes().decode()
+    line_end = "\r\n" if "\r\n" in stored else "\n"
+    text = stored.replace("\r\n", "\n")
     new = with_values(text, section, values, after=after)
     before, found = yaml.safe_load(text), _load(new)
     told = {key: yaml.safe_load(value) for key, value in values.items()}
@@ -64,7 +66,7 @@ def write_values(path: Path, section: str, values: Mapping[str, str], *, after: 
     if found != expected:
         by_hand = ", ".join(f"{key}: {value}" for key, value in values.items())
         raise BadConfig(f"{path}: the text cannot be edited; write {by_hand} into {section} by hand")
-    write_whole(path, new.encode())
+    write_whole(path, new.replace("\n", line_end).encode())
 
 
 def require_writable(path: Path, what: str) -> None:

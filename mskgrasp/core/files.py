@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import fcntl
 import io
 import os
+import shutil
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,8 +24,8 @@ def write_whole(path: Path, content: bytes) -> None:
     """Write a file atomically: its name always refers to the old content or to all of the new.
 
     The content is written to ``<name>.<random>.tmp`` in the same folder, synced and renamed, so that several
-    processes, on one machine or more, can write the same file. A process that is killed leaves its temporary
-    file behind.
+    processes, on one machine or more, can write the same file. A file that is there keeps its permissions. A
+    process that is killed leaves its temporary file behind.
 
     Raises:
         OSError: The disk is full or not writable; no temporary file is left behind.
@@ -35,6 +37,8 @@ def write_whole(path: Path, content: bytes) -> None:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
+        with contextlib.suppress(FileNotFoundError):
+            shutil.copymode(path, temporary)
         os.replace(temporary, path)
     except OSError as error:
         temporary.unlink(missing_ok=True)

@@ -183,6 +183,8 @@ def shape_problems(arrays: Mapping[str, np.ndarray]) -> Iterator[str]:
         if array.shape != (n, *rest) or (column.shape is None and array.ndim != 3):
             wanted = "h, w" if column.shape is None else ", ".join(map(str, column.shape))
             yield f"{name} has shape {array.shape}, must be ({n}, {wanted})"
+        elif column.shape is None and 0 in array.shape[1:]:
+            yield f"{name} has shape {array.shape}: its images are empty"
 
 
 def problems(attempts: Attempts) -> Iterator[str]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.dataset.label_error import read_label_error
@@ -95,6 +96,9 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
     size, info, image = 0, None, (0, 0)
     for path in watch(paths):
         columns, info = read_columns(path, ("success", "failure", "displacement"))
+        codes = columns["failure"]
+        if len(codes) and not 0 <= codes.min() <= codes.max() < len(FAILURES):
+            raise BadDataset(f"{path}: failure counts what has no name; delete it and collect again")
         counts[info.family].update(attempts=len(columns["success"]), successes=int(columns["success"].sum()))
         parts[info.family].add(info.part)
         failures.update(columns["failure"][~columns["success"]].tolist())
@@ -190,7 +194,7 @@ def tables(card: Card) -> list[CardTable]:
 def report(card: Card) -> dict[str, Any]:
     """Make the card's content as JSON: number of attempts, physics of the labels, tables."""
     simulations = ", ".join(sorted({names.get("simulation", "unknown") for names, _ in card.versions}))
-    rate, iterations = (card.physics[name] for name in ("rate_hz", "position_iterations"))
+    rate, iterations = (card.physics.get(name, "unknown") for name in ("rate_hz", "position_iterations"))
     return {
         "n": f"{card.attempts} attempts at {card.parts} parts, seed {card.seed}",
         "labels": f"{rate} Hz, {iterations} iterations; simulation version {simulations}",

@@ -21,7 +21,7 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import object_displacement, pose_base_tcp
 from mskgrasp.dataset.attempts import COLUMNS, ShardInfo
 from mskgrasp.dataset.export import Watch, check_export_path, renamed_at_the_end, same_settings
-from mskgrasp.dataset.shards import list_shards, read_columns
+from mskgrasp.dataset.shards import list_shards, read_columns, require_counts
 
 _FORMAT = "mskgrasp-labels"
 LABELS_VERSION = 1
@@ -135,7 +135,7 @@ def _read(path: Path) -> list[ShardLabels]:
             shared, shards = (json.loads(_array(file, name).tobytes()) for name in ("shared", "shards"))
             arrays = {name: _array(file, name) for name in (*_EXACT, *_DIGITS)}
         counts = [int(shard.pop("n")) for shard in shards]
-        if any(len(values) != sum(counts) for values in arrays.values()):
+        if min(counts, default=0) < 0 or any(len(values) != sum(counts) for values in arrays.values()):
             raise ValueError("its arrays do not fit its shards")
         columns = _columns(arrays)
         ends = np.cumsum([0, *counts])
@@ -146,7 +146,15 @@ def _read(path: Path) -> list[ShardLabels]:
             )
             for shard, start, end in zip(shards, ends[:-1], ends[1:], strict=True)
         ]
-    except (OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError) as error:
+    except (
+        OSError,
+        RuntimeError,
+        LookupError,
+        ArithmeticError,
+        ValueError,
+        TypeError,
+        AttributeError,
+    ) as error:
         problem = " ".join(str(error).split()).strip("'\"")
         raise BadDataset(f"{path} is damaged or no file of labels ({problem})") from error
 
@@ -203,6 +211,9 @@ def _to_json(info: ShardInfo, *, only: Iterable[str] = (), exclude: Iterable[str
 def _from_json(record: dict[str, Any]) -> ShardInfo:
     x_min, x_max, y_min, y_max = (float(value) for value in record["region"])
     info = ShardInfo(**record)
+    if not (isinstance(info.part, str) and isinstance(info.index, int) and isinstance(info.discarded, dict)):
+        raise ValueError("a shard has no part, index and numbers of discarded attempts")
+    require_counts(info.discarded)
     return replace(
         info,
         region=(x_min, x_max, y_min, y_max),

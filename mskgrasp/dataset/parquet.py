@@ -76,7 +76,8 @@ def export_parquet(folder: Path, out: Path, watch: Watch = iter, *, licence: str
             for table in _groups(folder, schema, watch):
                 file.write_table(table)
                 n += table.num_rows
-        text = _FRONT_MATTER.format(licence=licence, name=folder.name, file=out.name)
+        name, file_name = (json.dumps(text) for text in (folder.resolve().name, out.name))  # legal in YAML
+        text = _FRONT_MATTER.format(licence=licence, name=name, file=file_name)
         text += markdown(read_card(folder)) + _LAYOUT.format(file=out.name)
         (temporary / CARD).write_text(text, encoding="utf-8")
     return n

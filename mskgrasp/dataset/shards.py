@@ -234,6 +234,8 @@ def _read_info(file: h5py.File) -> ShardInfo:
     pose = np.asarray(attrs["T_base_camera"], dtype=np.float64).reshape(7)
     if not (np.isfinite(intrinsics).all() and np.isfinite(pose).all()):
         raise ValueError("camera calibration is not finite")
+    if not (intrinsics[0, 0] > 0 and intrinsics[1, 1] > 0 and np.array_equal(intrinsics[2], [0, 0, 1])):
+        raise ValueError("intrinsics are those of no pinhole camera")
     return ShardInfo(
         part=str(attrs["part"]),
         part_hash=str(attrs["part_hash"]),
@@ -245,8 +247,8 @@ def _read_info(file: h5py.File) -> ShardInfo:
         table_z=float(attrs["table_z"]),
         region=(x_min, x_max, y_min, y_max),
         physics=_mapping(attrs, "physics"),
-        versions=_mapping(attrs, "versions"),
-        discarded=_mapping(attrs, "discarded"),
+        versions=_mapping(attrs, "versions", str),
+        discarded=require_counts(_mapping(attrs, "discarded", int)),
         redrawn=int(attrs.get("redrawn", 0)),
         toppled=float(attrs.get("toppled", 0.0)),
         fidelity=str(attrs.get("fidelity", "cpu")),
@@ -255,11 +257,22 @@ def _read_info(file: h5py.File) -> ShardInfo:
     )
 
 
-def _mapping(attrs: dict[str, Any], name: str) -> dict[str, Any]:
+def _mapping(attrs: dict[str, Any], name: str, kind: type = object) -> dict[str, Any]:
     values = json.loads(attrs[name])
-    if not isinstance(values, dict):
-        raise ValueError(f"attribute {name} is no JSON object")
+    if not isinstance(values, dict) or not all(isinstance(value, kind) for value in values.values()):
+        raise ValueError(f"attribute {name} is no JSON object of such values")
     return values
+
+
+def require_counts(discarded: dict[str, int]) -> dict[str, int]:
+    """Refuse numbers of discarded attempts that are no numbers of attempts.
+
+    Raises:
+        ValueError: One is negative, or no whole number.
+    """
+    if not all(isinstance(n, int) and n >= 0 for n in discarded.values()):
+        raise ValueError("discarded counts no attempts")
+    return discarded
 
 
 def _check(attempts: Attempts, source: str) -> None:

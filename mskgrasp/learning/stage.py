@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from mskgrasp.core import metrics
-from mskgrasp.core.errors import BadDataset, MskgraspError
+from mskgrasp.core.errors import BadDataset, BadModel, MskgraspError
 from mskgrasp.learning import held_out
 from mskgrasp.learning.batch_norm import add_batch_norms, fold_batch_norms
 from mskgrasp.learning.config import LearningConfig, StageConfig
@@ -156,17 +156,18 @@ class Stage:
                 self._set_rate(self.learning_rate(number * self.batches + index))
                 losses.append(self.learn(rows))
                 if not math.isfinite(losses[-1]):
-                    raise TrainingDiverged(
-                        f"the {self.name}'s loss became {losses[-1]} in epoch {number + 1}; train into "
-                        f"another --out with {self.name}.learning_rate below {self.settings.learning_rate:g}"
-                    )
+                    raise self._diverged(f"loss became {losses[-1]}", number)
                 reporter.batch(losses[-1])
             self.network.eval()
+        try:
+            validated = self._validate()
+        except BadModel as error:
+            raise self._diverged("predictions are not finite", number) from error
         return EpochMetrics(
             stage=self.name,
             epoch=number + 1,
             train_loss=sum(losses) / len(losses),
-            **self._validate(),
+            **validated,
             seconds=round(time.perf_counter() - started, 2),
         )
 
@@ -227,6 +228,12 @@ class Stage:
         """Give the network the weights of an epoch and its final layers; nothing can be learned after it."""
         self.network.load_state_dict(weights)
         fold_batch_norms(self.network.features)
+
+    def _diverged(self, what: str, number: int) -> TrainingDiverged:
+        return TrainingDiverged(
+            f"the {self.name}'s {what} in epoch {number + 1}; train into another --out with "
+            f"{self.name}.learning_rate below {self.settings.learning_rate:g}"
+        )
 
     def _validate(self) -> dict[str, float]:
         if self.of_quality:

@@ -41,7 +41,7 @@ def plan_grasp(config: PlanConfig) -> GraspPlan:
         raise UsageError("--planner.policy certified needs the part on the table: --part NAME")
     load_models(config.models)  # refused before a part is imported or a cell opened
     part = None if config.part is None else part_name(config.part, config.unit)
-    if config.unit is not None and part == config.part:
+    if config.unit is not None and part is None:
         raise UsageError("--unit is for a CAD file in --part; omit it")
     if part is not None:
         find_part(part)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hal.cell import Cell
 from hal.errors import HalError
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.errors import UsageError
 from mskgrasp.core.shipped import example_file
 from mskgrasp.core.units import Unit
 from mskgrasp.learning.compute_device import compute_device
@@ -61,7 +61,8 @@ def part_name(text: str, unit: Unit | None = None) -> str:
     The name of a shipped example refers to that file where the current folder has no such file.
 
     Raises:
-        BadPart: The file cannot be imported as one part, the name is empty, or a unit is given for no file.
+        BadPart: The file cannot be imported as one part, or the name is empty.
+        UsageError: A unit is given for what is no file.
     """
     require_name(text)
     path = Path(text)
@@ -70,7 +71,7 @@ def part_name(text: str, unit: Unit | None = None) -> str:
         path = example
     if not path.is_file():
         if unit is not None:
-            raise BadPart(f"{text} is no CAD file, whose unit could be {unit}: leave it away")
+            raise UsageError(f"--unit is for a CAD file; {text} is none: omit it")
         return text
     from mskgrasp.parts.importing.import_file import part_of_file  # most parts need no decomposition
 

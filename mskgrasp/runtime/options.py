@@ -48,6 +48,7 @@ def parse(
     """
     rest, path = _take_config_option(list(sys.argv[1:] if argv is None else argv))
     # The files' word for nothing, which the help uses, too.
+    says_nothing = "null" in rest
     rest = ["None" if word == "null" else word for word in rest]
     path = path or default_config
     default = read_config(model, path) if path is not None else None
@@ -59,8 +60,22 @@ def parse(
     parsed = parse_arguments(
         model, rest, prog=prog, also_legal=["--config"], description=description, registry=registry, **known
     )
-    # No warnings: types are checked next.
-    return check_config(model, parsed.model_dump(warnings=False), "command line", name=_option)
+    values = parsed.model_dump(warnings=False)  # types are checked next
+    if says_nothing:
+        _refuse_the_word(values, ())
+    return check_config(model, values, "command line", name=_option)
+
+
+def _refuse_the_word(values: Any, location: tuple[str, ...]) -> None:
+    """Refuse a null that was taken for a text, since the option must have a value."""
+    if isinstance(values, dict):
+        for key, value in values.items():
+            _refuse_the_word(value, (*location, str(key)))
+    elif isinstance(values, list | tuple):
+        for value in values:
+            _refuse_the_word(value, location)
+    elif values is not None and str(values) == "None":
+        raise UsageError(f"{_option(location)} cannot be null; give a value, or omit it for the default")
 
 
 def parse_command(

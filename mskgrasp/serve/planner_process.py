@@ -112,7 +112,9 @@ class PlannerProcess:
             self._connection.send_bytes(body)
             if not self._connection.poll(timeout_s):
                 self.stop()
-                raise ProcessEnded(f"the request took longer than {timeout_s:g} s; send a smaller image")
+                raise ProcessEnded(
+                    f"the request took longer than {timeout_s:g} s; send a smaller image, or fewer grasps"
+                )
             return int(self._connection.recv_bytes()), self._connection.recv_bytes()
         except (EOFError, OSError) as error:
             self.stop()

@@ -25,6 +25,8 @@ Kind = Literal["plan", "score"]
 
 MAX_GRASPS = 4096
 """Most grasps of a request to /score."""
+_MOST_VALUES = 8 * MAX_GRASPS
+"""Most commas or brackets in JSON: some more than the largest request has."""
 MAX_ALTERNATIVES = 100
 """Most alternatives of a plan."""
 REACH = 3.0
@@ -126,8 +128,11 @@ def parse_json(kind: type[RequestT], body: bytes) -> RequestT:
     """Check a request in JSON.
 
     Raises:
-        Rejected: It is not JSON, or a field is missing, unknown or not legal.
+        Rejected: It is not JSON, has too many values, or a field is missing, unknown or not legal.
     """
+    # Counted first: parsed, a body of many small values takes a hundred times its size. None is in base64.
+    if max(body.count(sign) for sign in b",[{") > _MOST_VALUES:
+        raise Rejected(413, f"the request has more values than {MAX_GRASPS} grasps have; send fewer grasps")
     _refuse_unknown(kind, body)
     try:
         return kind.model_validate_json(body, strict=True)

@@ -43,6 +43,14 @@ def test_two_writers_of_one_file_killed_at_any_moment_leave_a_whole_one(tmp_path
     assert all(other.suffix == ".tmp" for other in tmp_path.iterdir() if other != path)
 
 
+def test_a_file_that_is_there_keeps_its_permissions(tmp_path):
+    path = tmp_path / "data"
+    write_whole(path, b"old")
+    path.chmod(0o640)
+    write_whole(path, b"new")
+    assert path.read_bytes() == b"new" and path.stat().st_mode & 0o777 == 0o640
+
+
 def test_a_file_that_cannot_be_written_leaves_the_old_one_and_nothing_else(tmp_path, monkeypatch):
     path = tmp_path / "data"
     write_whole(path, b"old")

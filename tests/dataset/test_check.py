@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from mskgrasp.core.errors import UsageError
+from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES, pose_base_tcp
 from mskgrasp.dataset import read_shard
@@ -262,6 +262,45 @@ def test_settings_that_ask_for_absurdly_many_shards_are_answered_at_once(data):
     assert 100 < len(missing) < 1000 and any("others are not named" in reason for reason in missing)
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("intrinsics", np.zeros((3, 3)), "intrinsics are those of no pinhole camera"),
+        (
+            "intrinsics",
+            [[300.0, 0, 80], [0, 300, 80], [0, 0, 0]],
+            "intrinsics are those of no pinhole camera",
+        ),
+        ("discarded", '{"a": "x"}', "attribute discarded is no JSON object of such values"),
+        ("versions", '{"simulation": [1]}', "attribute versions is no JSON object of such values"),
+    ],
+)
+def test_a_damaged_property_is_a_fault_and_ends_no_program(data, name, value, said):
+    attribute(shard(data), name, value)
+    assert said in only(data)
+    with pytest.raises(BadDataset, match=said):
+        read_card(data)
+
+
+def test_an_image_without_pixels_is_a_fault(data):
+    with h5py.File(shard(data), "r+") as file:
+        n = len(file["success"])
+        del file["depth"]
+        file["depth"] = np.zeros((n, 0, 0), np.float32)
+    assert "its images are empty" in only(data)
+
+
+def test_a_failure_without_a_name_ends_the_card_in_a_line(data):
+    path, row = next(
+        (path, rows[0])
+        for path in sorted((data / "shards").glob("*.h5"))
+        if len(rows := np.flatnonzero(~read_shard(path)[0].success))
+    )
+    put(path, "failure", row, 200)
+    with pytest.raises(BadDataset, match="failure counts what has no name"):
+        read_card(data)
+
+
 def test_a_shard_with_too_few_attempts_is_named(data):
     with h5py.File(shard(data), "r+") as file:
         for column in list(file):
@@ -273,7 +312,7 @@ def test_a_shard_with_too_few_attempts_is_named(data):
     attribute(shard(data), "discarded", '{"part_not_seen": 1}')
     assert faults(data) == {}
     attribute(shard(data), "discarded", '{"part_not_seen": -1}')
-    assert "must be a count" in only(data)
+    assert "discarded counts no attempts" in only(data)
 
 
 @pytest.mark.parametrize(

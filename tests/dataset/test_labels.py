@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import h5py
@@ -81,6 +82,23 @@ def test_bad_files_are_refused_by_name(folder: Path, tmp_path: Path):
     out.write_bytes(out.read_bytes()[:500])
     with pytest.raises(BadDataset, match=r"boxes\.labels is damaged"):
         read_labels([out])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"n": float("inf")}, {"part": [1]}, {"index": "a"}, {"discarded": [1]}, {"discarded": {"a": -1}}],
+)
+def test_a_damaged_shard_is_an_error_of_one_line(folder: Path, tmp_path: Path, changes: dict):
+    out = tmp_path / "boxes.labels"
+    export_labels(folder, out)
+    with h5py.File(out, "r+") as file:
+        shards = json.loads(np.asarray(file["shards"]).tobytes())
+        shards[0] |= changes
+        del file["shards"]
+        file["shards"] = np.frombuffer(json.dumps(shards).encode(), np.uint8)
+    with pytest.raises(BadDataset, match=r"boxes\.labels is damaged") as caught:
+        read_labels([out])
+    assert "\n" not in str(caught.value)
 
 
 def test_an_array_in_another_file_is_refused(folder: Path, tmp_path: Path):

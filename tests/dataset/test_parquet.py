@@ -43,7 +43,9 @@ def test_parquet_holds_every_column_with_units_images_and_a_card(collected, join
     assert table.schema.field("tilt").metadata == {b"unit": b"rad", b"frame": b"grasp"}
     card = (out.parent / "README.md").read_text()
     head, rest = card.removeprefix("---\n").split("---\n", 1)
-    assert yaml.safe_load(head)["configs"][0]["data_files"] == "data.parquet"
+    described = yaml.safe_load(head)
+    assert described["configs"][0]["data_files"] == "data.parquet"
+    assert described["pretty_name"] == collected.name
     assert "| attempts | 12 |" in rest and "## Layout" in rest
     first, *_ = list_shards(collected)
     copy = tmp_path / "discarded" / "shards"

@@ -55,7 +55,6 @@ def test_poses_must_agree_with_each_other(attempts):
         ("region", (0.5, 0.3, -0.1, 0.1), "must be x_min < x_max"),
         ("seed", -1, "must not be negative"),
         ("part_hash", "", "part_hash is empty"),
-        ("discarded", {"too_fast": -2}, "discarded['too_fast'] is -2, must be a count"),
     ],
 )
 def test_a_property_that_cannot_be_is_named(attempts, name, value, words):

@@ -47,6 +47,15 @@ def test_a_file_without_the_section_is_refused(text: str):
         with_values(text, "w", {"b": "1"}, after="a")
 
 
+def test_a_file_keeps_its_line_ends_and_permissions(tmp_path: Path):
+    path = tmp_path / "cell.yaml"
+    path.write_bytes(b"type: real\r\nw:\r\n  a: 1  # first\r\n")
+    path.chmod(0o664)
+    write_values(path, "w", {"b": "2"}, after="a")
+    assert path.read_bytes() == b"type: real\r\nw:\r\n  a: 1  # first\r\n  b: 2\r\n"
+    assert path.stat().st_mode & 0o777 == 0o664
+
+
 def test_a_text_that_cannot_be_edited_is_left_as_it_is(tmp_path: Path):
     """An alias: the same value would change in two places."""
     path = tmp_path / "cell.yaml"

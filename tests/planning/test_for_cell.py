@@ -8,7 +8,7 @@ import trimesh
 
 from hal import cell_from_yaml
 from hal.errors import HalError
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.core.settings import Physics
 from mskgrasp.core.shipped import PRETRAINED, SIMULATED_CELL
 from mskgrasp.learning.grasp_models import load_models
@@ -61,7 +61,7 @@ def test_a_cad_file_is_made_a_part(tmp_path, monkeypatch):
     name = part_name(str(file))
     assert find_part(name).longest_axis == pytest.approx(0.004)
     assert part_name(str(file), "in") == name and find_part(name).longest_axis == pytest.approx(0.004 * 25.4)
-    with pytest.raises(BadPart, match="my-bracket is no CAD file, whose unit could be in"):
+    with pytest.raises(UsageError, match="--unit is for a CAD file; my-bracket is none: omit it"):
         part_name(name, "in")
 
 

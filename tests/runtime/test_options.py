@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from hal.calibrate.config import CalibrateConfig
-from mskgrasp.core.errors import BadConfig
+from mskgrasp.collect.config import CollectConfig
+from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.runtime.options import parse, parse_command
 from tests.runtime.small_program import COMMANDS, Eat, ProgramConfig, parse_program
 
@@ -52,6 +53,12 @@ def test_a_command_is_read_with_its_options():
 def test_nothing_is_written_as_in_the_files():
     found = parse(CalibrateConfig, prog="p", description="d", argv=["--cell", "null", "--poses", "20"])
     assert (found.cell, found.poses) == (None, 20)
+
+
+@pytest.mark.parametrize("words", [["--out", "null"], ["--parts", "nut", "null"]])
+def test_nothing_is_refused_where_there_must_be_a_value(words: list[str]):
+    with pytest.raises(UsageError, match=f"{words[0]} cannot be null; give a value, or omit it"):
+        parse(CollectConfig, prog="p", description="d", argv=words)
 
 
 def test_help_shows_the_models_docstrings(capsys):

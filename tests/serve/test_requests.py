@@ -11,6 +11,7 @@ import pytest
 from mskgrasp.serve.rejection import Rejected
 from mskgrasp.serve.requests import (
     JSON,
+    MAX_GRASPS,
     NPZ,
     PlaceRequest,
     PlanRequest,
@@ -53,10 +54,11 @@ def test_a_quaternion_of_nearly_unit_length_is_normalised():
 
 
 def test_a_million_digits_and_deep_nesting_are_refused():
-    for body in (b"[" * 1_000_000, b"9" * 1_000_000, text(seed=10**400)):
+    bodies = {b"[" * 1_000_000: 413, b"[" * 10_000: 400, b"9" * 1_000_000: 400, text(seed=10**400): 400}
+    for body, status in bodies.items():
         with pytest.raises(Rejected) as refused:
             parse_frame(PlanRequest, JSON, body)
-        assert refused.value.status == 400 and len(str(refused.value)) < 500
+        assert refused.value.status == status and len(str(refused.value)) < 500
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -69,12 +71,28 @@ def test_a_grasp_may_be_turned_by_the_whole_half_turn_in_any_precision(dtype: ty
 
 
 def test_unknown_fields_are_refused_before_they_take_memory():
-    body = json.dumps({f"{k:x}": 0 for k in range(100_000)}).encode()
+    body = json.dumps({f"{k:x}": 0 for k in range(30_000)}).encode()
     tracemalloc.start()
     with pytest.raises(Rejected, match="0: extra inputs are not permitted; legal fields: depth_png"):
         parse_frame(PlanRequest, JSON, body)
     assert tracemalloc.get_traced_memory()[1] < 20 * len(body)
     tracemalloc.stop()
+
+
+@pytest.mark.parametrize("value", [b'{"":0}', b"{}", b"[]", b"0"])
+def test_a_body_of_many_small_values_takes_no_memory(value: bytes):
+    body = b'{"grasps":[' + b",".join([value] * 1_000_000) + b"]}"
+    tracemalloc.start()
+    with pytest.raises(Rejected, match="more values than 4096 grasps have") as refused:
+        parse_frame(ScoreRequest, JSON, body)
+    assert refused.value.status == 413 and tracemalloc.get_traced_memory()[1] < 100_000
+    tracemalloc.stop()
+
+
+def test_the_most_grasps_are_no_more_values_than_are_read():
+    grasps = [[0.5, 0.0, 0.02, 0.1]] * MAX_GRASPS
+    asked, _ = parse_frame(ScoreRequest, JSON, text(grasps=grasps))
+    assert len(asked.grasps) == MAX_GRASPS
 
 
 def test_the_fields_of_a_place_request_become_grasp_and_target():
