@@ -25,10 +25,10 @@ _REPEATS = 200
 
 @dataclass(frozen=True, kw_only=True)
 class Value:
-    """A figure: the mean over seeds, its 95 % interval over parts, and its deviation over seeds."""
+    """A figure: the mean over seeds, its 95 % interval over parts (None of one), its deviation over seeds."""
 
     mean: float
-    interval: tuple[float, float]
+    interval: tuple[float, float] | None
     deviation: float
 
 
@@ -125,9 +125,10 @@ STATISTICS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 
 def _value(values: Sequence[np.ndarray], statistic: Callable[[np.ndarray], np.ndarray]) -> Value:
     each = statistic(np.concatenate(values))
+    ends = metrics.bootstrap_interval(values, lambda v: float(statistic(v).mean()), repeats=_REPEATS)
     return Value(
         mean=float(each.mean()),
-        interval=metrics.bootstrap_interval(values, lambda v: float(statistic(v).mean()), repeats=_REPEATS),
+        interval=ends if np.isfinite(ends).all() else None,
         deviation=float(each.std()),
     )
 
@@ -273,5 +274,8 @@ def _cell(value: Value | None, factor: float, unit: str = "", *, signed: bool = 
         return None
     sign = "+" if signed else ""
     digits = 1 if factor == 100 else 2
+    text = f"{factor * value.mean:{sign}.{digits}f}{unit}"
+    if value.interval is None:
+        return text
     low, high = (f"{factor * bound:{sign}.{digits}f}" for bound in value.interval)
-    return f"{factor * value.mean:{sign}.{digits}f}{unit} [{low}, {high}]"
+    return f"{text} [{low}, {high}]"
