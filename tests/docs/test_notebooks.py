@@ -90,7 +90,10 @@ def test_the_backend_tutorial_plans_grasps_and_refuses_with_devices_of_its_own(t
 def test_a_part_is_grasped_and_assessed_in_its_tutorial(tmp_path: Path):
     # Its quick certified grasps must not replace others of the same part.
     printed = run("your_part", tmp_path, XDG_CACHE_HOME=str(tmp_path / "cache"))
-    assert re.search(r"^example_bracket: \d+ g, ", printed, re.MULTILINE) and "lifted, predicted quality" in printed
+    assert (
+        re.search(r"^example_bracket: \d+ g, ", printed, re.MULTILINE)
+        and "lifted, predicted quality" in printed
+    )
     rows = re.findall(r"lifted (\d+) of (\d+) \{", printed)
     assert rows and all(0 < int(of) and int(n) <= int(of) for n, of in rows)
     assert (tmp_path / "out" / "my_part" / "assess" / "report.html").is_file()
