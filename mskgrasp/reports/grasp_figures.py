@@ -27,7 +27,8 @@ _PAD_WIDTH, _PAD_THICKNESS = 0.020, 0.008  # drawn size of a finger pad seen fro
 _FEW = 6  # grasps of the best scores drawn besides the chosen one
 _DEVIATIONS = 2.0  # standard deviations that ellipses show
 _MM = 1e3
-_CUT_MM = 10.0  # greatest height that counts in an outline: half of it exceeds a depth camera's noise
+_LOW_MM, _HIGH_MM = 4.0, 14.0  # greatest height that counts in an outline, without and with a camera's noise
+_EXACT_MM = 0.1  # median height of the table, either way, of a camera without noise
 
 
 def _from_above(
@@ -268,7 +269,8 @@ def _outline(
     x, y = np.meshgrid(origin[0] + pixel, origin[1] - pixel)
     # A camera pixel is several of these: without the blur the outline shows its stairs.
     # Clipped, the foot of a bracket counts as much as its wall.
-    low = np.minimum(heights, _CUT_MM)
+    exact = np.median(np.abs(heights)) < _EXACT_MM  # most of it is the table
+    low = np.minimum(heights, _LOW_MM if exact else _HIGH_MM)
     smooth = cv2.GaussianBlur(low, (0, 0), 0.0015 / (side / n))
     level = [0.5 * max(float(low.max()), 0.1)]
     axes.contour(x, y, smooth, levels=level, colors=[INK], linewidths=0.9, zorder=5)
