@@ -21,7 +21,7 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import object_displacement, pose_base_tcp
 from mskgrasp.dataset.attempts import COLUMNS, ShardInfo
 from mskgrasp.dataset.export import Watch, check_export_path, renamed_at_the_end, same_settings
-from mskgrasp.dataset.shards import list_shards, read_columns, require_counts
+from mskgrasp.dataset.shards import DAMAGE, list_shards, read_columns, require_counts
 
 _FORMAT = "mskgrasp-labels"
 LABELS_VERSION = 1
@@ -146,15 +146,7 @@ def _read(path: Path) -> list[ShardLabels]:
             )
             for shard, start, end in zip(shards, ends[:-1], ends[1:], strict=True)
         ]
-    except (
-        OSError,
-        RuntimeError,
-        LookupError,
-        ArithmeticError,
-        ValueError,
-        TypeError,
-        AttributeError,
-    ) as error:
+    except DAMAGE as error:
         problem = " ".join(str(error).split()).strip("'\"")
         raise BadDataset(f"{path} is damaged or no file of labels ({problem})") from error
 

@@ -20,6 +20,8 @@ from mskgrasp.dataset.attempts import COLUMNS, Attempts, ShardInfo, problems, sh
 SCHEMA_VERSION = 3
 """Version 1 had no relative speeds, and stored attempts at parts that were not at rest as failures; version 2
 had neither number, force nor friction of each attempt."""
+DAMAGE = OSError, RuntimeError, LookupError, ArithmeticError, ValueError, TypeError, AttributeError
+"""Errors with which h5py, and what reads its values, report damage, depending on where it is found."""
 _FORMAT = "mskgrasp-shard"
 _MOST_BYTES = 2**32
 """Largest plausible array: more than 10,000 images of the largest camera."""
@@ -178,16 +180,7 @@ def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], Sh
             return {name: _array(file, name) for name in names}, _read_info(file)
     except BadDataset:
         raise
-    except (
-        OSError,
-        RuntimeError,
-        LookupError,
-        ArithmeticError,
-        ValueError,
-        TypeError,
-        AttributeError,
-    ) as error:
-        # h5py reports damage with any of these, depending on where it is found.
+    except DAMAGE as error:
         problem = " ".join(str(error).split()).strip("'\"")
         raise BadDataset(
             f"{path} is damaged or no HDF5 file ({problem}); delete it and collect again"

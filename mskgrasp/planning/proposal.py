@@ -138,8 +138,9 @@ def plan_of(proposed: ProposedGrasp, view: PartView, seconds: float) -> GraspPla
     covariance, score = np.full((4, 4), np.nan), np.nan
     if proposed.displacement_cov is not None:
         given_cov = _checked("displacement_cov", proposed.displacement_cov, (4, 4))
+        rounding = 1e-6 * np.abs(given_cov).max()
         least = np.linalg.eigvalsh(given_cov).min()
-        if not np.allclose(given_cov, given_cov.T) or least < -1e-9 * np.abs(given_cov).max():
+        if np.abs(given_cov - given_cov.T).max() > rounding or least < -rounding:
             raise ValueError("displacement_cov is no covariance: it must be symmetric and positive")
         of_point = half_turned_covariance(given_cov, sign)
         covariance = grasp_displacement_covariance(motion, of_point, point)
