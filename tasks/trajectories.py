@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from mani_skill.utils.io_utils import dump_json
 
+from mskgrasp.core.files import require_space
 from mskgrasp.core.geometry import Pose, quat_to_matrix
 from tasks.scene.frames import to_world
 
@@ -63,12 +64,13 @@ def write_trajectories(
         Number of episodes written.
 
     Raises:
-        OSError: The disk is full or not writable.
+        OSError: The disk is nearly full or not writable.
     """
     camera = camera_parameters(intrinsics, T_base_camera)
     listed: list[dict[str, Any]] = []
     with h5py.File(path, "w") as file:
         for number, episode in enumerate(episodes):
+            require_space(path)
             _write_group(file.create_group(f"traj_{number}", track_order=True), episode, camera)
             pose = [float(value) for value in episode.T_base_obj[0]]
             options = dict(parts=[episode.part], reconfigure=True, pose_base_obj=[pose])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -22,11 +21,10 @@ from hal.camera import RgbdFrame
 from hal.cell import Workspace
 from hal.replay.events import KIND, SCHEMA, Event, plain
 from mskgrasp.core.errors import UsageError
+from mskgrasp.core.files import require_space
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
 T = TypeVar("T")
-LEAST_FREE = 2**26
-"""Least free space of the disk, bytes: HDF5 cannot close a file that it has failed to write."""
 
 
 class RecordingWriter:
@@ -68,7 +66,7 @@ class RecordingWriter:
         if self._file is None:
             try:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
-                self._check_space()
+                require_space(self.part)
                 self._file = h5py.File(self.part, "x")
             except OSError as error:
                 self._users -= 1
@@ -153,7 +151,7 @@ class RecordingWriter:
         with self._lock:
             if self._file is None:
                 return -1
-            self._check_space()
+            require_space(self.part)
             optional = dict(fine_colour=frame.fine_colour, infrared=frame.infrared)
             values = dict(
                 colour=frame.colour,
@@ -185,15 +183,6 @@ class RecordingWriter:
                     dataset.resize(index + 1, axis=0)
                     dataset[index] = value
             return index
-
-    def _check_space(self) -> None:
-        """Refuse to write while the file can still be closed.
-
-        Raises:
-            OSError: The disk is nearly full.
-        """
-        if shutil.disk_usage(self.part.parent).free < LEAST_FREE:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.part))
 
     @contextmanager
     def _named_in_errors(self) -> Iterator[None]:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LOCK = ".lock"
+LEAST_FREE = 2**26
+"""Least free space of a disk for `require_space`, bytes."""
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -63,6 +65,18 @@ def write_figure(figure: Figure, path: Path, **options: Any) -> None:
     buffer = io.BytesIO()
     figure.savefig(buffer, format=path.suffix.removeprefix(".").lower() or "png", **options)
     write_whole(path, buffer.getvalue())
+
+
+def require_space(path: Path) -> None:
+    """Check that the disk of a file's folder is not nearly full.
+
+    HDF5 cannot close a file that it has failed to write: it must end before that.
+
+    Raises:
+        OSError: It has less than `LEAST_FREE`.
+    """
+    if shutil.disk_usage(path.parent).free < LEAST_FREE:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
 def is_leftover(path: Path) -> bool:

@@ -17,10 +17,11 @@ import h5py
 import numpy as np
 
 from mskgrasp.core.errors import BadDataset, MissingDataset
+from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import object_displacement, pose_base_tcp
 from mskgrasp.dataset.attempts import COLUMNS, ShardInfo
-from mskgrasp.dataset.export import Watch, check_export_path, renamed_at_the_end, same_settings
+from mskgrasp.dataset.export import Watch, check_export_path, same_settings
 from mskgrasp.dataset.shards import DAMAGE, list_shards, read_columns, require_counts
 
 _FORMAT = "mskgrasp-labels"
@@ -58,6 +59,7 @@ def export_labels(folder: Path, out: Path, watch: Watch = iter) -> int:
     Raises:
         BadDataset: A shard is damaged, the shards do not belong together, or are older than schema 3.
         UsageError: The file exists, or cannot be made.
+        OSError: The disk is full or not writable.
     """
     check_export_path(folder, out, ".labels")
     names = (*_EXACT, *_DIGITS)
@@ -78,10 +80,8 @@ def export_labels(folder: Path, out: Path, watch: Watch = iter) -> int:
     counts = [len(one) for one in pieces["failure"]]
     joined = {name: np.concatenate(one) for name, one in pieces.items()}
     held = joined["failure"] == 0
-    with (
-        renamed_at_the_end(out.parent, [out]) as temporary,
-        h5py.File(temporary / out.name, "w", libver="latest") as file,
-    ):
+    # Built in memory: on a full disk HDF5 leaves a handle that cannot be closed.
+    with h5py.File("labels", "w", libver="latest", driver="core", backing_store=False) as file:
         file.attrs["format"], file.attrs["version"] = _FORMAT, LABELS_VERSION
         # As data, not attributes, which HDF5 limits to 64 kB.
         for name, record in (
@@ -100,6 +100,9 @@ def export_labels(folder: Path, out: Path, watch: Watch = iter) -> int:
             if len(values):
                 options |= {"compression": "gzip", "compression_opts": 9, "shuffle": True, "chunks": True}
             file.create_dataset(name, data=values, track_times=False, **options)
+        file.flush()
+        image = file.id.get_file_image()
+    write_whole(out, image)
     return sum(counts)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from mskgrasp.core.files import LOCK, is_leftover, read_bounded, write_figure, write_whole
+from mskgrasp.core.files import LOCK, is_leftover, read_bounded, require_space, write_figure, write_whole
 
 
 def write_for_ever(path: Path, letter: bytes) -> None:
@@ -95,6 +95,14 @@ def test_what_a_killed_writer_leaves_is_known_by_its_name(tmp_path, monkeypatch)
     os.wait()
     (left,) = tmp_path.iterdir()
     assert is_leftover(left) and is_leftover(tmp_path / LOCK) and not is_leftover(tmp_path / "data")
+
+
+def test_room_is_required_of_the_disk_of_a_file(tmp_path, monkeypatch):
+    require_space(tmp_path / "data")
+    monkeypatch.setattr("mskgrasp.core.files.LEAST_FREE", 2**62)  # more than any disk has
+    with pytest.raises(OSError, match="No space left on device") as raised:
+        require_space(tmp_path / "data")
+    assert raised.value.filename == str(tmp_path / "data")
 
 
 def test_a_figure_is_written_in_the_format_of_its_suffix_and_an_error_names_it(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import resource
 from pathlib import Path
 
 import h5py
@@ -59,6 +60,15 @@ def test_labels_are_a_small_part_of_the_dataset(tmp_path: Path):
     folder = synthetic.write_dataset(tmp_path / "boxes", n_parts=1, n_attempts=400, seed=3)
     export_labels(folder, tmp_path / "boxes.labels")
     assert (tmp_path / "boxes.labels").stat().st_size < 400 * 60 + 15_000
+
+
+def test_a_file_that_cannot_be_written_is_named_and_leaves_nothing(folder: Path, tmp_path: Path, request):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    request.addfinalizer(lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limits))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    with pytest.raises(OSError, match="File too large") as raised:
+        export_labels(folder, tmp_path / "boxes.labels")
+    assert raised.value.filename == str(tmp_path / "boxes.labels") and list(tmp_path.iterdir()) == [folder]
 
 
 def test_bad_files_are_refused_by_name(folder: Path, tmp_path: Path):

@@ -40,6 +40,16 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def test_a_full_disk_is_an_error_with_the_files_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("mskgrasp.core.files.LEAST_FREE", 2**62)  # more than any disk has
+    with pytest.raises(OSError, match="No space left on device") as raised:
+        write_trajectories(
+            tmp_path / "data.h5", [episode(0, success=True)], env_kwargs={}, intrinsics=INTRINSICS,
+            T_base_camera=OVERHEAD, description="made by hand",
+        )  # fmt: skip
+    assert raised.value.filename == str(tmp_path / "data.h5")
+
+
 def test_maniskills_loader_reads_what_was_written(written: Path):
     data = ManiSkillTrajectoryDataset(str(written))
     assert len(data) == 3

@@ -61,7 +61,7 @@ def test_a_full_disk_ends_the_recording_with_its_name_and_keeps_it(tmp_path: Pat
         recorded_cell(toy_cell(), out).connected() as cell,
     ):
         cell.camera.capture()
-        monkeypatch.setattr("hal.replay.writer.LEAST_FREE", 2**62)  # more than any disk has
+        monkeypatch.setattr("mskgrasp.core.files.LEAST_FREE", 2**62)  # more than any disk has
         cell.camera.capture()
     assert raised.value.filename == f"{out}.part"
     assert read_recording(out).n_frames == 1
