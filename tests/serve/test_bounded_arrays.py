@@ -61,17 +61,36 @@ def lying(body: bytes, size: int) -> bytes:
     return bytes(changed)
 
 
+def repeated(body: bytes, n: int) -> bytes:
+    """The archive of one array, with that array n times in its directory."""
+    at, end = body.index(b"PK\x01\x02"), body.index(b"PK\x05\x06")
+    entry, tail = body[at:end], bytearray(body[end:])
+    tail[12:16] = struct.pack("<I", n * len(entry))
+    return body[:at] + entry * n + bytes(tail)
+
+
 @pytest.mark.parametrize(
     ("make", "status", "message"),
     [
         (lambda: packed(bytes(300_000_000)), 413, "300000000 bytes unpacked"),
         (lambda: lying(packed(bytes(300_000_000)), 1000), 400, "damaged|header"),
+        (lambda: repeated(packed(b"1"), 300_000), 400, "has 300000 arrays"),
+        (lambda: repeated(packed(b"1"), 4), 400, "has 4 arrays"),
         (lambda: packed(b"\x93NUMPY\x01\x00" + struct.pack("<H", 60_000) + b" " * 60_000), 400, "no header"),
         (lambda: packed(b"\x93NUMPY\x09\x00" + bytes(100)), 400, "no header"),
         (lambda: packed(b"\x93NUMPY\x01\x00\x0b\x00{'shape':(3" + bytes(100)), 400, "no header"),
         (lambda: packed(b"\x93NUMPY\x01\x00\x0b\x00{['shape']:1" + bytes(100)), 400, "no header"),
     ],
-    ids=("bomb", "lying bomb", "long header", "unknown version", "cut literal", "unhashable key"),
+    ids=(
+        "bomb",
+        "lying bomb",
+        "many entries",
+        "an entry too many",
+        "long header",
+        "unknown version",
+        "cut literal",
+        "unhashable key",
+    ),
 )
 def test_a_bomb_is_refused_without_being_unpacked(make: Callable[[], bytes], status: int, message: str):
     body = make()
