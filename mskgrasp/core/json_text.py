@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import fields
@@ -27,6 +28,15 @@ def parse_json(text: str | bytes) -> Any:
         return json.loads(text, object_pairs_hook=_without_doubles)
     except RecursionError as error:
         raise ValueError("too many brackets inside each other") from error
+
+
+def finite(value: Any) -> Any:
+    """The value with null for each number in it that JSON does not have: NaN and the infinities."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def checked(record: Record) -> Record:

@@ -17,6 +17,7 @@ import torch
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import exclusive_lock, is_leftover, write_whole
+from mskgrasp.core.json_text import finite
 from mskgrasp.dataset.fingerprint import dataset_fingerprint
 from mskgrasp.learning.compute_device import compute_device
 from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, read_meta, save_model
@@ -132,7 +133,7 @@ def _train_into(out: Path, config: TrainConfig, samples: Samples, sides: Sides, 
         draw_uncertainty(
             models, samples, sides.test if len(sides.test) else sides.validation, out / "uncertainty.png"
         )
-    _write(out / "metrics.json", json.dumps(_finite(models.meta.metrics), indent=2, allow_nan=False) + "\n")
+    _write(out / "metrics.json", json.dumps(finite(models.meta.metrics), indent=2, allow_nan=False) + "\n")
     _write(out / "card.md", model_card(models.meta))
     save_model(out, models)  # last: it says that the training is finished
     (out / CHECKPOINT).unlink(missing_ok=True)
@@ -196,15 +197,6 @@ def _table(history: list[EpochMetrics]) -> str:
 
 def _write(path: Path, text: str) -> None:
     write_whole(path, text.encode())
-
-
-def _finite(value: Any) -> Any:
-    """Replace NaN, which JSON does not have, by null."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _summarise(report: dict[str, Any], out: Path) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from hal.errors import DriverMissing
 from mskgrasp.core.grasp import FAILURES
+from mskgrasp.core.json_text import finite
 from mskgrasp.core.metrics import bootstrap_interval
 from mskgrasp.parts import Part
 from mskgrasp.reports.console import print_sections
@@ -73,7 +74,7 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
     }
     print_sections(engine_sections(record))
     path = config.out / "engines.json"
-    path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(finite(record), indent=1, allow_nan=False) + "\n", encoding="utf-8")
     print(f"wrote {path}")
     print(f"the engines differ: {'; '.join(failed)}" if failed else "the engines agree")
     return 1 if failed else 0

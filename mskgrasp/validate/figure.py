@@ -29,7 +29,8 @@ def _draw_checks(axes: Any, checks: Sequence[dict[str, Any]]) -> None:
     axes.axvspan(-1, 1, color=PALE_GREEN, lw=0)
     for row, check in enumerate(checks):
         middle, half = (check["high"] + check["low"]) / 2, (check["high"] - check["low"]) / 2
-        error = max(-2.0, min(2.0, (check["measured"] - middle) / half))
+        measured = check["measured"]  # null: beyond all that was tried
+        error = 2.0 if measured is None else max(-2.0, min(2.0, (measured - middle) / half))
         axes.plot(error, row, "o", ms=6, color=GREEN if check["passed"] else RED)
     axes.set_yticks(range(len(checks)), [check["name"] for check in checks], fontsize=7)
     axes.set(xlim=(-2.2, 2.2), ylim=(len(checks) - 0.5, -0.5), xlabel="error in units of the tolerance")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mskgrasp.core.errors import BadPart
+from mskgrasp.core.json_text import finite
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.hulls import hull_corners
 from mskgrasp.reports.console import print_sections
@@ -49,7 +50,7 @@ def validate(config: ValidateConfig) -> int:
     record: dict[str, Any] = {
         "settings": config.model_dump(mode="json"),
         "versions": versions(),
-        "closed_form": [check.to_json() for check in checks],
+        "closed_form": finite([check.to_json() for check in checks]),
         "parts": [one.to_json() for one in fidelity],
     }
     print_sections(validation_sections(record))
@@ -58,9 +59,9 @@ def validate(config: ValidateConfig) -> int:
         record |= found.to_json()
         print_sections(validation_sections(record)[2:])
         failed += [f"production, {config.production}: {said}" for said in found.choice.production_fails]
-    record["failed"] = failed
+    record = finite(record | {"failed": failed})
     stored = config.out / "validate.json"
-    stored.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    stored.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     picture = draw(config.out / "validate.png", record)
     print(f"wrote {stored} and {picture}")
     print(f"{len(failed)} of the checks failed: {'; '.join(failed)}" if failed else "all checks passed")

@@ -31,7 +31,8 @@ def _closed_form(checks: Sequence[Record]) -> Section:
     rows = [
         (
             "ok" if one["passed"] else "FAILED", one["name"], one["formula"], f"{one['expected']:.4g}",
-            f"{one['measured']:.4g}", f"{one['low']:.4g} .. {one['high']:.4g}", one["unit"],
+            None if one["measured"] is None else f"{one['measured']:.4g}",
+            f"{one['low']:.4g} .. {one['high']:.4g}", one["unit"],
         )
         for one in checks
     ]  # fmt: skip

@@ -9,11 +9,16 @@ from typing import Any, Literal, cast
 
 import pytest
 
-from mskgrasp.core.json_text import Four, Three, checked, parse_json
+from mskgrasp.core.json_text import Four, Three, checked, finite, parse_json
 
 
 def test_sound_text_is_read():
     assert parse_json(b'{"a": [1, {"a": null}], "b": "\\u00fc"}') == {"a": [1, {"a": None}], "b": "ü"}
+
+
+def test_numbers_that_json_does_not_have_become_null():
+    values = {"a": [1.5, math.nan, (math.inf, 2)], "b": {"c": -math.inf, "d": "nan"}, "e": True}
+    assert finite(values) == {"a": [1.5, None, [None, 2]], "b": {"c": None, "d": "nan"}, "e": True}
 
 
 @pytest.mark.parametrize(

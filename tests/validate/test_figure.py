@@ -27,6 +27,14 @@ def test_without_comparisons_the_closed_form_errors_are_drawn_alone(tmp_path: Pa
     assert picture(tmp_path / "validate.png").shape[1] == 1275
 
 
+def test_a_check_that_no_tried_value_meets_is_drawn_at_the_edge(tmp_path: Path, monkeypatch):
+    kept = keep_figures(figure, monkeypatch)
+    beyond = dict(record()["closed_form"][1], measured=None)
+    figure.draw(tmp_path / "validate.png", {"closed_form": [beyond]})
+    (dot,) = kept[0].axes[0].lines
+    assert dot.get_xdata()[0] == 2.0 and same_color(dot.get_color(), RED)
+
+
 def test_settings_are_drawn_over_their_cost_and_variants_with_their_spread(tmp_path: Path, monkeypatch):
     kept = keep_figures(figure, monkeypatch)
     figure.draw(tmp_path / "validate.png", record())

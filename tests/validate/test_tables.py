@@ -32,6 +32,13 @@ def test_checks_that_fail_are_marked():
     assert table.rows[1][3:] == ("0.03", "0.04", "0.0285 .. 0.0315", "m")
 
 
+def test_a_check_that_no_tried_value_meets_has_a_dash():
+    values = record()
+    beyond = dict(values["closed_form"][1], measured=None)
+    (table,) = by_title(record(closed_form=[beyond]))["Closed-form physics"].tables
+    assert table.rows[0][:5] == ("FAILED", "way", "v^2 / (2 mu g)", "0.03", None)
+
+
 def test_a_part_that_differs_from_its_mesh_is_named():
     values = record()
     bad = dict(values["parts"][0], part="bolt", mass_error=0.1, passed=False)
