@@ -32,7 +32,7 @@ from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import make_planner, tell_model
 from mskgrasp.planning.run_inputs import BY_CONTENT, inputs_of, keep_certified
 from mskgrasp.runtime.cli import make_folder
-from mskgrasp.runtime.progress import progress
+from mskgrasp.runtime.progress import note, progress
 from mskgrasp.runtime.run_folder import (
     TRIALS,
     append_trial,
@@ -95,6 +95,11 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
         )
     check_loads(config.cell, map(find_part, names))
     pallets = _pallets(config, names, slots, corrections)
+    if untried := set(names) - {task.part for pallet in pallets for task in pallet}:
+        note(
+            f"{len(untried)} of {len(names)} parts are not tried: {config.slots} has room for {len(slots)}, "
+            f"and is filled {config.trials} times; raise --trials to try all"
+        )
     check_room((find_part(task.part), task.slot) for pallet in pallets for task in pallet)
     inputs = inputs_of(config.cell, config.models, names)
     if config.slots is not None:

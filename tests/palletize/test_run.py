@@ -120,3 +120,13 @@ def test_an_impossible_run_is_refused_before_anything_moves(tmp_path, monkeypatc
         palletize(config(tmp_path / "out", **(changes | files)))
     assert caught.value.exit_code == 2
     assert "\n" not in str(caught.value) and not (tmp_path / "out").exists()
+
+
+def test_parts_beyond_the_slots_of_all_pallets_are_told(tmp_path, capsys):
+    (tmp_path / "small.yaml").write_text("slots: [{x: 0.5, y: 0.2, size: [0.02, 0.03]}]")
+    with pytest.raises(UsageError, match="is smaller than"):
+        palletize(config(tmp_path / "out", slots=tmp_path / "small.yaml", parts=(PART, "hex_nut_m48")))
+    assert (
+        f"1 of 2 parts are not tried: {tmp_path / 'small.yaml'} has room for 1, and"
+        in capsys.readouterr().err
+    )
