@@ -13,9 +13,10 @@ from mskgrasp.core.grasp import Grasp, PartView, to_object_displacement
 from mskgrasp.parts import Part
 from mskgrasp.perception.part_pose import PartPose
 
-PlannedBy = Literal["networks", "uncertified", "certified"]
-"""What a planned grasp and its outcome come from: the networks' predictions, or simulations made beforehand,
-by which it is certified or not (`mskgrasp.planning.certified`)."""
+PlannedBy = Literal["networks", "uncertified", "certified", "another planner"]
+"""What a planned grasp and its outcome come from: the networks' predictions; simulations made beforehand, by
+which it is certified or not (`mskgrasp.planning.certified`); or a planner that is not ours
+(`mskgrasp.planning.proposal`)."""
 
 
 @dataclass(frozen=True)

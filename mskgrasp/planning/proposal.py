@@ -159,6 +159,7 @@ def plan_of(proposed: ProposedGrasp, view: PartView, seconds: float) -> GraspPla
         shortlist=np.array([0]),
         shortlist_scores=np.array([score]),
         seconds={"total": seconds},
+        planned_by="another planner",
     )
 
 

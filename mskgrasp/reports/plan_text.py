@@ -27,6 +27,7 @@ def plan_text(plan: GraspPlan) -> str:
         "networks": f"best of {n}: {plan.qualities.max():.3f}",
         "uncertified": f"{n} simulated grasps, none certified",
         "certified": f"{n} certified grasps",
+        "another planner": "as the planner states it",
     }[plan.planned_by]
     return "\n".join(
         [

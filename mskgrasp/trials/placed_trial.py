@@ -26,7 +26,7 @@ class PlacedTrial:
         condition: Name of the cell's condition.
         number: Index of the trial; all planners share its scene.
         planner: Name of what planned the grasp, or was to plan it.
-        planned_by: What the grasp comes from; the networks where none was found.
+        planned_by: What the grasp comes from; None where none was found.
         lifted: The part was lifted and held.
         reason: Reason why it was not lifted or not placed; empty where it was placed.
         resting: Index of the resting pose that was found; None where the part was not recognised.
@@ -51,7 +51,7 @@ class PlacedTrial:
     condition: str
     number: int
     planner: str
-    planned_by: PlannedBy = "networks"
+    planned_by: PlannedBy | None = None
     lifted: bool = False
     reason: str = ""
     resting: int | None = None

@@ -62,6 +62,7 @@ def test_a_grasp_beyond_half_a_turn_is_the_same_with_its_axes_reversed():
 def test_what_is_not_predicted_is_zero_or_unknown():
     plan = plan_of(ProposedGrasp(grasp=GRASP), VIEW, 0.1)
     assert plan.displacement == pytest.approx(np.zeros(4)) and np.isnan(plan.quality)
+    assert plan.planned_by == "another planner"
     assert np.isnan(plan.displacement_cov).all() and np.isnan(plan.score)
 
 
