@@ -24,6 +24,10 @@ from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.reports.style import saved_figure
 
 _PAD_WIDTH, _PAD_THICKNESS = 0.020, 0.008  # drawn size of a finger pad seen from above, metres
+_BELOW: dict[str, Any] = dict(
+    loc="upper left", bbox_to_anchor=(0.0, -0.09), ncols=3, fontsize=8, borderpad=0.0, columnspacing=1.2
+)
+"""A legend below the axes, where it covers nothing."""
 _FEW = 6  # grasps of the best scores drawn besides the chosen one
 _DEVIATIONS = 2.0  # standard deviations that ellipses show
 _MM = 1e3
@@ -142,7 +146,7 @@ def draw_plan(
         measured: (4,) displacement of that point in its execution, drawn beside the expected one.
         note: A line of text under the plan's.
     """
-    with saved_figure(path, 11.5, 5.7 + 0.25 * bool(note)) as figure:
+    with saved_figure(path, 11.5, 5.9 + 0.25 * bool(note)) as figure:
         left, right = figure.subplots(1, 2)
         _draw_candidates(figure, left, frame, plan)
         point = plan.view.centre_base if point_base is None else point_base
@@ -201,7 +205,7 @@ def _draw_candidates(figure: Figure, axes: Axes, frame: RgbdFrame, plan: GraspPl
     axes.plot([], [], color=BLUE, lw=1.0, alpha=0.6, marker="|", label=f"{len(few)} of best score")
     draw_jaw(axes, plan.grasp.position, float(plan.grasp.theta))
     axes.plot([], [], color=BLUE, lw=1.4, ls=(0, (4, 2)), marker="s", label="chosen grasp")
-    axes.legend(loc="lower left", fontsize=8)
+    axes.legend(**_BELOW)
     n = len(plan.candidates)
     axes.set(xlabel="base x, mm", ylabel="base y, mm", title="1 candidate" if n == 1 else f"{n} candidates")
 
@@ -237,7 +241,7 @@ def _draw_chosen(
     if measured is not None:
         _outlines(axes, heights, np.zeros(2), side, centre, measured[:2] * _MM, float(measured[3]), GREEN)
         axes.plot([], [], color=GREEN, lw=1.3, ls="--", label="part measured in the hand")
-    axes.legend(loc="upper left", fontsize=8)
+    axes.legend(**_BELOW)
     axes.plot(*centre, "+", color=ORANGE, ms=8, mew=1.5, zorder=9)
     covariance = covariance[:2, :2] if np.isfinite(covariance).all() else np.zeros((2, 2))
     axes.set(
