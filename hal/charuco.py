@@ -42,6 +42,11 @@ class Board(Config):
                 f"marker {self.marker:g} m must be 0.4 to 0.9 times the square ({self.square:g} m); legal: "
                 f"{0.4 * self.square:.4f} .. {0.9 * self.square:.4f}"
             )
+        if self.n_corners < MIN_CORNERS:
+            raise ValueError(
+                f"a board of {self.columns} x {self.rows} squares has {self.n_corners} corners, "
+                f"{MIN_CORNERS} are needed; legal: 3 x 4 squares or more"
+            )
         if self.columns * self.rows > 2 * _N_MARKERS + 1:
             raise ValueError(
                 f"a board of {self.columns} x {self.rows} squares needs more than the {_N_MARKERS} "

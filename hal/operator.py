@@ -45,7 +45,7 @@ class Operator:
         if self.asks and answers is None and (sys.stdin is None or not sys.stdin.isatty()):
             raise UsageError(
                 "this cell asks its operator before the arm moves, and standard input is no terminal; start "
-                "it in one, or give --yes if the arm may move by itself"
+                "it in one, or where the program has --yes give it if the arm may move by itself"
             )
         self._answers = answers or sys.stdin
         self._prompts = prompts or sys.stderr
@@ -70,12 +70,10 @@ class Operator:
             return
         others = "leave the pallet as it is" if keep else "clear everything else away"
         self.inform(f"{name}: '{Path(part).name}'".removeprefix(": "))
-        if self.asks:
-            self._ask(
-                f"Shake the part in its box, tip it out into the region, {others}. Enter when your hands are "
-                "out of the cell, q to stop: ",
-                {"": True},
-            )
+        self.wait_for(
+            f"Shake the part in its box, tip it out into the region, {others}. Enter when your hands are "
+            "out of the cell, q to stop: "
+        )
 
     def may_move(self, picture: Path, summary: str) -> bool:
         """Whether the arm may move; True without a question if no operator is asked.
@@ -105,6 +103,15 @@ class Operator:
         """
         return not self.asks or self._ask(question, {"y": True, "n": False})
 
+    def wait_for(self, request: str) -> None:
+        """Wait until the operator has done something and presses Enter; not at all if no operator is asked.
+
+        Raises:
+            StoppedByOperator: The operator ended the run.
+        """
+        if self.asks:
+            self._ask(request, {"": True})
+
     def take(self) -> bool:
         """Have the operator hold what the hand holds, before the fingers open.
 
@@ -114,12 +121,10 @@ class Operator:
         Raises:
             StoppedByOperator: The operator ended the run; the fingers stay closed.
         """
-        if self.asks:
-            self._ask(
-                "The hand holds something. Take hold of it; Enter: the fingers open and the arm moves home, "
-                "q to stop: ",
-                {"": True},
-            )
+        self.wait_for(
+            "The hand holds something. Take hold of it; Enter: the fingers open and the arm moves home, "
+            "q to stop: "
+        )
         return self.asks
 
     def number(self, question: str, lower: float, upper: float) -> float:
@@ -147,10 +152,9 @@ class Operator:
         """
         if self.asks:
             self.inform(f"The arm stopped: {reason}")
-            self._ask(
+            self.wait_for(
                 "Check it and remove obstacles. Enter to continue (it may open its fingers, moves up and "
-                "home), q to stop: ",
-                {"": True},
+                "home), q to stop: "
             )
         cell.arm.recover()
 

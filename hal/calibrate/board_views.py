@@ -162,7 +162,7 @@ def take_pictures(
         if found == 0:
             first.append(picture)
         if found == 0 and taken == _HOPELESS:
-            arm.move_to_pose(start, speed=speed)
+            _bring_back(cell, start, speed)
             refuse_invisible(board, first)
             image = "pictures" if picture.infrared is None else "infrared images"
             raise BadCalibrationSet(
@@ -171,14 +171,21 @@ def take_pictures(
             )
         if found == n or taken == _SPARE * n:
             break
+    _bring_back(cell, start, speed)
     if taken == 0 or found < MIN_VIEWS:
         raise BadCalibrationSet(
             f"the arm could bring the board before the camera {taken} times and it was found {found} times, "
             f"at least {MIN_VIEWS} are needed; check where the camera is said to be (--camera-at), the "
             "workspace's box, --nearest and --board-at"
         )
-    arm.move_to_pose(start, speed=speed)
     return taken
+
+
+def _bring_back(cell: Cell, start: Pose, speed: float) -> None:
+    try:
+        cell.arm.move_to_pose(start, speed=speed)
+    except OutOfWorkspace:
+        pass  # no straight path there: a person takes the board where it is
 
 
 def _possible(cell: Cell) -> Callable[[Pose], bool]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +30,9 @@ from hal.calibrate.report import (
 from hal.camera_calibration import Calibration, calibration_path, write_calibration
 from hal.cell import Cell, Workspace
 from hal.charuco import Board
+from hal.errors import OutOfWorkspace
 from hal.open_cell import cell_from_values, cell_from_yaml
-from hal.operator import forget_typed
+from hal.operator import Operator
 from hal.table import fit_table
 from mskgrasp.core.config import check_config, read_config, read_yaml, write_config
 from mskgrasp.core.errors import UsageError
@@ -67,6 +67,7 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
     Raises:
         UsageError, BadConfig: The folder is in use, or the cell file is not valid.
         HalError: Arm or camera failed, or the board was not seen.
+        StoppedByOperator: The operator ended the program.
     """
     if picture_paths(config.out):
         raise UsageError(
@@ -82,6 +83,7 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
         )
     if cell.arm.simulated and cell.board_holder is None:
         raise UsageError(f"{cell_file}: nothing draws a board in this simulated cell; type: sapien does")
+    operator = Operator(cell)
     write_config(config.board, config.out / "board.yaml")
 
     def keep(index: int, picture: Picture, n_corners: int) -> None:
@@ -90,7 +92,7 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
 
     with cell.connected():
         write_picture(config.out / "table.npz", Picture.of(cell.camera.capture(), cell.arm.state()))
-        _take_board(cell, config)
+        _take_board(cell, config, operator)
         take_pictures(
             cell,
             config.board,
@@ -103,7 +105,9 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
             rng=np.random.default_rng(config.seed),
             keep=keep,
         )
-        _give_board_back(cell)
+        operator.wait_for("Take hold of the board; Enter: the fingers open, q to stop: ")
+        if operator.asks:
+            cell.arm.open_gripper()
     return cell.workspace
 
 
@@ -172,7 +176,8 @@ def _describe_table(
 def _with_camera_at(values: dict[str, Any], config: CalibrateConfig, cell_file: Path) -> dict[str, Any]:
     """The cell's values with a camera measured by tape in place of a calibration file."""
     camera = values.get("camera")
-    if not isinstance(camera, dict) or "calibration" not in camera:
+    stated = camera.get("calibration") if isinstance(camera, dict) else None
+    if not isinstance(stated, str):
         if config.camera_at is None:
             return values
         cell_from_values(values, cell_file)  # faults of the file itself are reported first
@@ -180,9 +185,9 @@ def _with_camera_at(values: dict[str, Any], config: CalibrateConfig, cell_file: 
             f"--camera-at is for a camera with a calibration file; that of {cell_file} knows where it is"
         )
     if config.camera_at is None:
-        if not calibration_path(camera["calibration"], cell_file).is_file():
+        if not calibration_path(stated, cell_file).is_file():
             raise UsageError(
-                f"{cell_file}: there is no calibration file {camera['calibration']} yet; measure with a tape "
+                f"{cell_file}: there is no calibration file {stated} yet; measure with a tape "
                 "where the camera is and give it as --camera-at X Y Z (base frame, m), good to 3 cm; if it "
                 "does not look straight down, add --camera-towards X Y Z, what is in the middle of its image"
             )
@@ -198,40 +203,34 @@ def _with_camera_at(values: dict[str, Any], config: CalibrateConfig, cell_file: 
     )
     path = config.out.absolute() / "by_hand.yaml"
     write_calibration(path, by_hand)
-    return {**values, "camera": {**camera, "calibration": str(path)}}
+    return {**values, "camera": {**values["camera"], "calibration": str(path)}}
 
 
-def _take_board(cell: Cell, config: CalibrateConfig) -> None:
+def _take_board(cell: Cell, config: CalibrateConfig, operator: Operator) -> None:
     board, arm = config.board, cell.arm
     if cell.board_holder is not None:
         arm.move_gripper(_PLATE)
         width, height = (edge + 2 * _MARGIN for edge in board.size)
         cell.board_holder.hold_board(board.image(80, _MARGIN), (width, height), config.T_tcp_board())
         return
-    _ask("Press Enter: the fingers open.")
+    try:
+        arm.check_pose(arm.state().T_base_tcp)
+    except OutOfWorkspace as error:
+        raise OutOfWorkspace(
+            f"the hand could not return here to give the board back: {error}; guide it by hand to over the "
+            "region"
+        ) from error
+    held = "" if arm.in_hand() is None else "The hand holds something: take hold of it. "
+    operator.wait_for(f"{held}Enter: the fingers open, q to stop: ")
     arm.open_gripper()
-    _ask("Hold the board's handle between the fingers, printed side up, and press Enter: the fingers close.")
+    operator.wait_for(
+        "Hold the board's handle between the fingers, printed side up; Enter: the fingers close, q to stop: "
+    )
     if not arm.grasp(cell.workspace.grasp_force).holding:
         raise BadCalibrationSet(
             "the fingers closed on nothing; hold the board's handle between them, start again"
         )
-    _ask("Step back, a hand on the emergency stop, and press Enter: the arm moves.")
-
-
-def _give_board_back(cell: Cell) -> None:
-    if cell.board_holder is None:
-        _ask("Take hold of the board and press Enter: the fingers open.")
-        cell.arm.open_gripper()
-
-
-def _ask(prompt: str) -> None:
-    try:
-        if sys.stdin is not None:
-            forget_typed(sys.stdin)
-        input(prompt + " ")
-    except (EOFError, RuntimeError):  # at its end, or closed
-        print()
-        raise UsageError("an operator must put the board into the hand; run this in a terminal") from None
+    operator.wait_for("Step back, a hand on the emergency stop; Enter: the arm moves, q to stop: ")
 
 
 def _stored_board(path: Path, given: Board) -> Board:

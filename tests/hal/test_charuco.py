@@ -158,6 +158,7 @@ def test_drawn_corners_are_green_where_found_and_red_where_expected():
         (dict(marker=0.015), "marker 0.015 m must be"),
         (dict(columns=12, rows=9), r"12 x 9 squares needs more than the 50 markers"),
         (dict(columns=2), "greater than or equal to 3"),
+        (dict(columns=3, rows=3), "3 x 3 squares has 4 corners, 6 are needed; legal: 3 x 4"),
     ],
 )
 def test_a_board_that_cannot_be_is_refused(settings: dict, message: str):

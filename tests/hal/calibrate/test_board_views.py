@@ -112,6 +112,20 @@ def test_a_camera_that_does_not_look_straight_down_is_found(monkeypatch: pytest.
     assert distance < 3e-3 and np.degrees(angle) < 0.3
 
 
+def test_a_board_that_cannot_be_brought_back_straight_is_taken_where_it_is(monkeypatch: pytest.MonkeyPatch):
+    cell = bench()
+    start, move = cell.arm.state().T_base_tcp, cell.arm.move_to_pose
+
+    def refuse_the_way_back(pose: Pose, *, speed: float) -> None:
+        if pose_distance(pose, start) == (0, 0):
+            raise OutOfWorkspace("no straight line from here")
+        move(pose, speed=speed)
+
+    monkeypatch.setattr(cell.arm, "move_to_pose", refuse_the_way_back)
+    n_taken, _ = take(cell)
+    assert n_taken >= N
+
+
 def test_an_arm_that_reaches_too_few_poses_says_so(monkeypatch):
     cell = bench()
     reached: list[tuple[float, ...]] = []

@@ -9,6 +9,7 @@ import pytest
 from hal.calibrate import run as calibrate
 from hal.doctor import run as doctor
 from hal.replay import recorded_cell
+from tests.hal.real_cell import measured_cell
 from tests.hal.replay.toy import toy_cell
 from tests.programs import run_here
 
@@ -41,6 +42,8 @@ CELLS = Path(__file__).parents[3] / "configs" / "cells"
             ["--cell", str(CELLS / "mujoco.yaml")],
             "nothing draws a board in this simulated cell; type: sapien",
         ),
+        (calibrate, ["--cell", "null.yaml"], "'calibration': input is not a valid path"),
+        (doctor, ["--cell", "null.yaml", "--gripper"], "'calibration': input is not a valid path"),
         (calibrate, ["--cell", "."], "Is a directory"),
         (calibrate, ["--camera-towards", "0.5", "0", "0"], "give camera_at, too"),
         (doctor, ["--cell", "none.yaml"], "No such file"),
@@ -52,6 +55,9 @@ def test_wrong_input_is_one_line_and_exit_code_2(
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty.yaml").touch()
+    measured_cell(tmp_path).rename(tmp_path / "null.yaml")
+    text = (tmp_path / "null.yaml").read_text()
+    (tmp_path / "null.yaml").write_text(text.replace("calibration: kinect2.yaml", "calibration: null"))
     done = run_here(program.main, *arguments)
     assert done.returncode == 2 and message in done.stderr
     assert done.stderr.startswith("program: ") and done.stderr.count("\n") == 1

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import signal
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hal import Cell
+from hal.calibrate import run
 from hal.calibrate.board_views import Picture, picture_paths, read_picture, take_pictures, write_picture
 from hal.calibrate.config import CalibrateConfig
 from hal.calibrate.hand_eye import BadCalibrationSet, HandEye, solve_hand_eye
 from hal.calibrate.run import _stored_board, capture, solve
 from hal.camera_calibration import read_calibration
 from hal.charuco import Board
+from hal.errors import OutOfWorkspace
+from hal.operator import Operator, StoppedByOperator
 from mskgrasp.core.config import write_config
 from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.core.geometry import pose_distance
@@ -127,6 +133,71 @@ def taken(ink: str) -> list[Picture]:
         rng=np.random.default_rng(0), keep=lambda _, picture, __: kept.append(picture),
     )  # fmt: skip
     return kept
+
+
+def with_operator(monkeypatch: pytest.MonkeyPatch, cell: Cell, answers: str) -> io.StringIO:
+    """The program calibrates this cell, and its operator answers this; what they are asked."""
+    asked = io.StringIO()
+    monkeypatch.setattr(run, "cell_from_values", lambda *_: cell)
+    monkeypatch.setattr(run, "Operator", partial(Operator, answers=io.StringIO(answers), prompts=asked))
+    return asked
+
+
+TOY = CalibrateConfig(board=TOY_BOARD, poses=8, settle_s=0.0)
+
+
+def test_an_operator_gives_the_board_and_takes_it_back(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    cell = bench()
+    asked = with_operator(monkeypatch, cell, "\nno\n\n\n\n")
+    start = cell.arm.state().T_base_tcp
+    capture(TOY.model_copy(update={"out": tmp_path}), SAPIEN)
+    assert len(picture_paths(tmp_path)) >= 8
+    cell.arm.connect()
+    assert pose_distance(cell.arm.state().T_base_tcp, start) == pytest.approx((0, 0), abs=1e-6)
+    assert cell.arm.state().gripper_width == cell.arm.limits.gripper.stroke
+    places = [asked.getvalue().index(words) for words in (
+        "Enter: the fingers open, q to stop: ", "Enter: the fingers close", "'no' is no valid answer",
+        "Enter: the arm moves", "Take hold of the board; Enter: the fingers open",
+    )]  # fmt: skip
+    assert places == sorted(places) and "The hand holds" not in asked.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("answers", "n_pictures"), [("q\n", 0), ("\nq\n", 0), ("\n\nq\n", 0), ("\n\n\nq\n", 8)]
+)
+def test_an_operator_may_stop_at_every_question(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, answers: str, n_pictures: int
+):
+    with_operator(monkeypatch, bench(), answers)
+    with pytest.raises(StoppedByOperator):
+        capture(TOY.model_copy(update={"out": tmp_path}), SAPIEN)
+    assert len(picture_paths(tmp_path)) == n_pictures
+
+
+def test_what_the_hand_holds_is_taken_before_the_fingers_open(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    cell = bench()
+    cell.arm.grasp(20.0)
+    asked = with_operator(monkeypatch, cell, "q\n")
+    with pytest.raises(StoppedByOperator):
+        capture(TOY.model_copy(update={"out": tmp_path}), SAPIEN)
+    assert "The hand holds something: take hold of it. Enter: the fingers open" in asked.getvalue()
+    cell.arm.connect()
+    assert cell.arm.in_hand() is not None
+
+
+def test_a_hand_that_may_not_return_where_it_stands_gets_no_board(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    cell = bench()
+    cell.arm._joints[1] = 1.2  # type: ignore[attr-defined]  # guided by hand: y is 1 m at most
+    asked = with_operator(monkeypatch, cell, "\n\n\n")
+    with pytest.raises(
+        OutOfWorkspace, match=r"to give the board back: .* outside the workspace .*; guide it by hand"
+    ):
+        capture(TOY.model_copy(update={"out": tmp_path}), SAPIEN)
+    assert asked.getvalue() == ""
 
 
 @pytest.mark.slow
