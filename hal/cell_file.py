@@ -55,32 +55,44 @@ def write_values(path: Path, section: str, values: Mapping[str, str], *, after: 
     Raises:
         BadConfig: The file cannot be rewritten; it is as before.
     """
-    path = path.resolve()  # a link stays a link
+    # A link stays a link.
+    write_whole(path.resolve(), _with_values_of(path, section, values, after))
+
+
+def _with_values_of(path: Path, section: str, values: Mapping[str, str], after: str) -> bytes:
     stored = path.read_bytes().decode()
     line_end = "\r\n" if "\r\n" in stored else "\n"
     text = stored.replace("\r\n", "\n")
-    new = with_values(text, section, values, after=after)
+    try:
+        new = with_values(text, section, values, after=after)
+    except BadConfig as error:
+        raise BadConfig(f"{path}: {error}") from error
     before, found = yaml.safe_load(text), _load(new)
     told = {key: yaml.safe_load(value) for key, value in values.items()}
     expected = {**before, section: {**before[section], **told}}
     if found != expected:
         by_hand = ", ".join(f"{key}: {value}" for key, value in values.items())
         raise BadConfig(f"{path}: the text cannot be edited; write {by_hand} into {section} by hand")
-    write_whole(path, new.replace("\n", line_end).encode())
+    return new.replace("\n", line_end).encode()
 
 
-def require_writable(path: Path, what: str) -> None:
+def require_writable(path: Path, what: str, section: str, values: Mapping[str, str], *, after: str) -> None:
     """Refuse a cell's file that cannot be rewritten, before anything is measured.
 
     Args:
         path: The file.
         what: Measurement that is written there, for the message.
+        section: As of `with_values`.
+        values: Likewise; those that are written later may be others.
+        after: Likewise.
 
     Raises:
         UsageError: The file or its folder is not writable.
+        BadConfig: Its text cannot be edited.
     """
     if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):
         raise UsageError(f"{path} is not writable; {what} is written there: copy the file, give the copy")
+    _with_values_of(path, section, values, after)
 
 
 def number(value: float, digits: int = 5) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from hal.arm import Arm
 from hal.arm_state import ArmState
 from hal.cell import Cell
-from hal.cell_file import number, require_writable, with_values, write_values
+from hal.cell_file import number, require_writable, write_values
 from hal.errors import HalError
 from hal.open_cell import cell_from_values
 from hal.operator import Operator, StoppedByOperator
@@ -110,8 +110,7 @@ def measure_gripper(path: Path) -> int:
     values = read_yaml(path)
     cell = cell_from_values(values, path)
     _check_kind(cell, path)
-    with_values(path.read_text(encoding="utf-8"), SECTION, {KEY: "null"}, after=ANCHOR)
-    require_writable(path, "the measurement")
+    require_writable(path, "the measurement", SECTION, {KEY: "null"}, after=ANCHOR)
     operator = Operator(cell)
     with cell.arm:
         grip = measure(cell, operator)

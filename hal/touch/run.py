@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from hal.cell_file import require_writable
 from hal.open_cell import cell_from_values
 from hal.operator import Operator, StoppedByOperator
-from hal.touch.cell_file import with_table, write_table
+from hal.touch.cell_file import require_table_writable, write_table
 from hal.touch.config import TouchConfig
 from hal.touch.plane import fit_plane
 from hal.touch.report import TableReport, draw_table
@@ -100,10 +99,10 @@ def _stated_height(values: dict[str, Any], config: TouchConfig) -> float | None:
     path, workspace = config.cell, values.get("workspace")
     if not isinstance(workspace, dict):
         if config.table_at is not None:
+            cell_from_values(values, path)  # faults of the file itself are reported first
             raise UsageError(f"--table-at is for a cell with arm and camera; {path} knows where its table is")
         return None
-    with_table(path.read_text(encoding="utf-8"), 0.0, None)  # refused before anything moves
-    require_writable(path, "the table")
+    require_table_writable(path)
     stated = workspace.get("table_z")
     if stated is None and config.table_at is None:
         raise UsageError(

@@ -70,10 +70,27 @@ def test_a_file_that_is_not_writable_is_refused_before_anything_is_measured(
 ):
     path = tmp_path / "cell.yaml"
     path.write_text("w: {a: 1}\n")
-    require_writable(path, "the table")
+    require_writable(path, "the table", "w", {"a": "2"}, after="a")
     monkeypatch.setattr("os.access", lambda *_: False)
     with pytest.raises(UsageError, match="is not writable; the table is written there"):
-        require_writable(path, "the table")
+        require_writable(path, "the table", "w", {"a": "2"}, after="a")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("v: &v {a: 1}\nw: *v\n", "write a: 2 into w by hand"),
+        ("w: {b: 1}\n", "the file has no w.a; write 'a: null'"),
+    ],
+)
+def test_a_text_that_cannot_be_edited_is_refused_before_anything_is_measured(
+    tmp_path: Path, text: str, message: str
+):
+    path = tmp_path / "cell.yaml"
+    path.write_text(text)
+    with pytest.raises(BadConfig) as caught:
+        require_writable(path, "the table", "w", {"a": "2"}, after="a")
+    assert message in str(caught.value) and str(path) in str(caught.value) and path.read_text() == text
 
 
 def test_numbers_are_written_without_exponents():

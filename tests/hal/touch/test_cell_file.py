@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hal.touch.cell_file import with_table, write_table
+from hal.cell_file import with_values
+from hal.touch.cell_file import require_table_writable, table_values, write_table
 from mskgrasp.core.errors import BadConfig
 
 BLOCK = """# a cell
@@ -16,6 +17,10 @@ workspace:
   table_z: null    # not measured
   region: [0.38, 0.62, -0.12, 0.12]   # table_z: 0.3 is no key
 """
+
+
+def with_table(text: str, z: float, slope: tuple[float, float] | None) -> str:
+    return with_values(text, "workspace", table_values(text, z, slope), after="table_z")
 
 
 def test_a_height_takes_the_place_of_null_and_comments_stay():
@@ -53,9 +58,13 @@ def test_small_numbers_are_written_as_numbers():
 
 
 @pytest.mark.parametrize("text", ["", "workspace: 3", "workspace: {region: [1]}", "table_z: 0.1"])
-def test_a_file_without_the_key_is_refused(text: str):
+def test_a_file_without_the_key_is_refused(tmp_path: Path, text: str):
+    path = tmp_path / "cell.yaml"
+    path.write_text(text)
+    with pytest.raises(BadConfig, match=rf"{path}: the file has no workspace\.table_z"):
+        require_table_writable(path)
     with pytest.raises(BadConfig, match=r"no workspace\.table_z"):
-        with_table(text, 0.1, None)
+        write_table(path, 0.1, None)
 
 
 def test_a_file_is_replaced_as_a_whole_through_a_link(tmp_path: Path):

@@ -137,6 +137,12 @@ def test_a_table_that_is_not_found_writes_nothing(tmp_path: Path, monkeypatch: p
         (REPLAYED, (), "a recording has no table to touch"),
         (REAL + "workspace: {table_z: null}\n", (), "give it as --table-at Z"),
         (REAL + "workspace: {}\n", ("--table-at", "0"), "no workspace.table_z"),
+        (REAL, ("--table-at", "0"), "'workspace': field required"),
+        (
+            REAL + "v: &v {table_z: 0.0}\nworkspace: *v\n",
+            (),
+            "write table_z: 0.0, table_slope: [0.0, 0.0] into workspace by",
+        ),
         (REAL + "workspace: {table_z: null}\n", ("--table-at", "0"), "standard input is no terminal"),
         ("type: mujoco\n", ("--table-at", "0"), "--table-at is for a cell with arm and camera"),
         ("type: mujoco\n", ("--force", "90"), "less than or equal to 15"),
