@@ -341,6 +341,20 @@ class Arm(Device):
         """
         self._check_pose(self.limits, T_base_tcp)
 
+    def check_joints(self, joints: np.ndarray) -> None:
+        """Refuse a target of (n,) radians outside its limits or the workspace, or too near to something.
+
+        Nothing moves, and the arm need not be connected.
+
+        Raises:
+            OutOfWorkspace: Names the limit that the target violates.
+        """
+        target = np.asarray(joints, dtype=np.float64)
+        check_target_joints(self.limits, target)
+        check_target_pose(self.limits, self._forward(target))
+        if self.links is not None:
+            check_joints(self.links, self.limits, target)
+
     def check_load(self, mass: float) -> None:
         """Refuse a part that the arm cannot carry, by its mass in kg; move nothing.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, assert_never, get_args
@@ -114,7 +115,7 @@ def _camera(values: dict[str, Any], workspace: Workspace, path: Path) -> tuple[C
 
 
 def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
-    """Refuse a workspace whose grasps or home the arm would refuse later, with a part in its hand."""
+    """Refuse a workspace whose grasps the arm would refuse later, with a part in its hand."""
     least, most = arm.limits.gripper.force[0], arm.limits.max_force
     if not least <= workspace.grasp_force <= most:
         raise BadConfig(
@@ -126,15 +127,6 @@ def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
             f"{path}: workspace.home has {len(workspace.home)} joints, the arm has {arm.limits.n_joints}; "
             "state joints at which it is out of the camera's sight"
         )
-    outside = np.flatnonzero(
-        (workspace.home < arm.limits.joint_lower) | (workspace.home > arm.limits.joint_upper)
-    )
-    if len(outside):
-        i = int(outside[0])
-        raise BadConfig(
-            f"{path}: workspace.home puts joint {i + 1} at {workspace.home[i]:.3f} rad, outside "
-            f"{arm.limits.joint_lower[i]:.3f} .. {arm.limits.joint_upper[i]:.3f} rad"
-        )
     if (reason := out_of_reach(arm, workspace)) is not None:
         raise BadConfig(
             f"{path}: workspace.region {list(workspace.region)} cannot be grasped everywhere, {reason}"
@@ -142,9 +134,12 @@ def _check_fit(arm: Arm, workspace: Workspace, path: Path) -> None:
 
 
 def out_of_reach(arm: Arm, workspace: Workspace) -> str | None:
-    """Reason why a corner of the region cannot be grasped, lifted or approached; None if all can be."""
+    """Reason why a place of the region cannot be grasped, lifted or approached; None if all can be.
+
+    Looked at are its corners, the middles of its edges, and its own.
+    """
     x_min, x_max, y_min, y_max = workspace.region
-    for x, y in ((x_min, y_min), (x_min, y_max), (x_max, y_min), (x_max, y_max)):
+    for x, y in itertools.product(np.linspace(x_min, x_max, 3), np.linspace(y_min, y_max, 3)):
         lowest = float(workspace.lowest_grasp_z(np.array([x, y])))
         for z in (lowest, lowest + workspace.lift_height, workspace.table_z + APPROACH):
             for theta in (-np.pi / 2, 0.0, np.pi / 2):

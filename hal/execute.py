@@ -216,7 +216,8 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
     """Open the fingers, retreat upward and move the arm out of the camera's sight.
 
     What the hand holds is not dropped: a person takes it, or the hand puts it down straight below, as high as
-    it was grasped. What it has held since an earlier program, a person must take.
+    it was grasped. What it has held since an earlier program, a person must take. An arm that was guided by
+    hand to beside the box moves home without the retreat.
 
     Args:
         cell: Connected.
@@ -226,6 +227,7 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
 
     Raises:
         HandFull: The hand holds something that nobody took; nothing moved.
+        OutOfWorkspace: No way home is free of table and keep-outs; only the fingers moved.
         MotionAborted: The hand touched something.
     """
     arm = cell.arm
@@ -248,10 +250,11 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
     state = arm.state()
     if np.abs(state.joints - cell.workspace.home).max() < JOINT_TOLERANCE:
         return
-    here = state.T_base_tcp
-    above = max(clear_height(cell, tallest), here.position[2] + RETREAT)
-    above = min(above, float(arm.limits.box_upper[2]))
-    arm.move_to_pose(_moved_to_height(here, above), speed=0.25)
+    here, limits = state.T_base_tcp, arm.limits
+    inside = (limits.box_lower <= here.position) & (here.position <= limits.box_upper)
+    if inside[:2].all():  # an arm that was guided by hand out of the box may not rise there
+        above = max(clear_height(cell, tallest), here.position[2] + RETREAT)
+        arm.move_to_pose(_moved_to_height(here, min(above, float(limits.box_upper[2]))), speed=0.25)
     arm.move_to_joints(cell.workspace.home)
 
 

@@ -188,7 +188,8 @@ def _check_way(limits: ArmLimits, poses: Pose, what: str) -> None:
     if excess.max() > excess[0] + _SLACK:
         worst = poses.position[int(excess.argmax())]
         raise OutOfWorkspace(
-            f"{what} passes {shown(worst)} m, outside the workspace {_box(limits)}; move there in steps"
+            f"{what} passes {shown(worst)} m, outside the workspace {_box(limits)}; move there in steps, or "
+            "guide the arm by hand into the middle of it"
         )
 
 

@@ -9,7 +9,6 @@ from typing import Any, Literal, assert_never, get_args
 
 from hal.backends import build, find_backend
 from hal.cell import Cell
-from hal.collisions import check_joints
 from hal.errors import OutOfWorkspace
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import BadConfig
@@ -50,26 +49,25 @@ def cell_from_values(values: dict[str, Any], path: Path) -> Cell:
     """
     cell = _build(values, path)
     if not cell.recorded:
-        _check_keep_out(cell, values, path)
+        _check_home(cell, path)
     return cell
 
 
-def _check_keep_out(cell: Cell, values: dict[str, Any], path: Path) -> None:
-    """Refuse keep-outs, or a table, that the arm at home is in or too near to.
+def _check_home(cell: Cell, path: Path) -> None:
+    """Refuse a home that the arm would refuse later, and keep-outs that it cannot keep.
 
     Raises:
-        BadConfig: Names the link, what it is near to, and the remedy.
+        BadConfig: Names the joint, the place or the link and what it is near to, and the remedy.
     """
     arm = cell.arm
-    if arm.links is None:
-        if arm.limits.keep_out:
-            raise BadConfig(f"{path}: the links of this arm are unknown, so that it cannot keep out; omit it")
-        return
+    if arm.links is None and arm.limits.keep_out:
+        raise BadConfig(f"{path}: the links of this arm are unknown, so that it cannot keep out; omit it")
     try:
-        check_joints(arm.links, arm.limits, cell.workspace.home)
+        arm.check_joints(cell.workspace.home)
     except OutOfWorkspace as error:
         raise BadConfig(
-            f"{path}: at home {error}; move the home pose (home), or correct keep_out or the camera's pose"
+            f"{path}: home is refused: {error}; state other joints there, or correct the workspace's box, "
+            "keep_out or the camera's pose"
         ) from error
 
 

@@ -157,6 +157,14 @@ class ReplayArm(SharingDevice, Arm):
         """
         self._playback.same_question("check_pose", {"T_base_tcp": plain(T_base_tcp)})
 
+    def check_joints(self, joints: np.ndarray) -> None:
+        """A recording does not tell.
+
+        Raises:
+            NotRecorded: Always.
+        """
+        raise NotRecorded("recordings hold no checks of joints; ask the cell itself")
+
     def _replay(self, call: str, **arguments: Any) -> Any:
         self._require_connection()
         following = self._playback.peek()

@@ -155,6 +155,10 @@ class RecordingArm(SharingDevice, Arm):
         """See `Arm.check_pose`."""
         self._writer.call("check_pose", dict(T_base_tcp=T_base_tcp), lambda: self._arm.check_pose(T_base_tcp))
 
+    def check_joints(self, joints: np.ndarray) -> None:
+        """See `Arm.check_joints`; not recorded, since a replayed cell is not checked."""
+        self._arm.check_joints(joints)
+
     def _record(self, call: str, **arguments: Any) -> Any:
         return self._writer.call(
             call, arguments, lambda: getattr(self._arm, call)(**arguments), after=self._after

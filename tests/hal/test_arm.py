@@ -56,6 +56,22 @@ def test_a_joint_motion_that_leaves_the_box_between_its_ends_is_refused(arm: Toy
     assert arm.moves == 0
 
 
+def test_joints_are_checked_without_a_connection_and_without_a_motion():
+    arm = ToyArm()
+    arm.check_joints(joints_at(0.4, 0.0, 0.5))
+    for joints, message in [
+        (joints_at(0.4, 1.2, 0.5), "joint 2 to 1.200 rad is outside"),
+        (joints_at(0.4, 0.0, 0.005), "over the table"),
+        (np.zeros(3), "joints must be 7 finite numbers"),
+    ]:
+        with pytest.raises(OutOfWorkspace, match=message):
+            arm.check_joints(joints)
+    arm.limits = dataclasses.replace(arm.limits, box_upper=np.array([0.3, 1.0, 1.0]))
+    with pytest.raises(OutOfWorkspace, match="outside the workspace"):
+        arm.check_joints(joints_at(0.4, 0.0, 0.5))
+    assert arm.moves == 0
+
+
 def test_an_arm_that_was_guided_out_of_its_box_may_come_back_but_go_no_farther(arm: ToyArm):
     arm.limits = dataclasses.replace(arm.limits, box_upper=np.array([1.0, 1.0, 0.7]))
     arm._joints = joints_at(0.4, 0.0, 0.8)

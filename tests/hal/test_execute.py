@@ -329,6 +329,18 @@ def test_on_its_way_home_the_hand_first_rises(cell: Cell, arm: WritingArm):
     assert arm.log == [("gripper", 0.08)]
 
 
+def test_an_arm_that_was_guided_out_of_the_box_goes_home_without_rising_there(cell: Cell, arm: WritingArm):
+    home = cell.workspace.home.tolist()
+    arm._joints = np.array([0.4, 1.2, 0.3, 0, 0, 0, 0])  # y is 1 m at most
+    go_home(cell)
+    assert arm.log == [("gripper", 0.08), ("joints", home)]
+    # From above it the hand comes down into the box first.
+    arm._joints = np.array([0.4, 0.2, 1.3, 0, 0, 0, 0])
+    arm.log.clear()
+    go_home(cell)
+    assert arm.log == [("gripper", 0.08), ("pose", [0.4, 0.2, 1.0]), ("joints", home)]
+
+
 def test_nothing_moves_to_what_a_camera_sees_whose_pose_was_measured_by_hand(
     cell: Cell, arm: WritingArm, monkeypatch: pytest.MonkeyPatch
 ):

@@ -61,6 +61,8 @@ def test_a_question_gets_the_answer_to_the_nearest_one(tmp_path: Path):
             cell.arm.check_pose(beyond)
         with pytest.raises(NotRecorded):
             cell.arm.check_pose(at(0.5, x=0.99))
+        with pytest.raises(NotRecorded, match="ask the cell itself"):
+            cell.arm.check_joints(cell.workspace.home)
 
 
 def test_a_frame_comes_where_it_was_taken(recording: Path):
