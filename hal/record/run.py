@@ -63,6 +63,8 @@ def _run(config: RecordConfig, command: str) -> int:
         words = shlex.split(command)
     except ValueError as error:
         raise UsageError(f"--run {command!r}: {error}; close the quote") from error
+    if words[:1] == ["mskgrasp"] and len(words) > 1:  # as on the command line
+        words = [f"mskgrasp.{words[1]}", *words[2:]]
     if not words or words[0].split(".")[0] not in ("mskgrasp", "hal"):
         raise UsageError(
             f"--run {command!r}: the first word must be a program of this project, such as mskgrasp.plan"

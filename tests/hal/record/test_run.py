@@ -56,6 +56,15 @@ def test_a_program_runs_on_the_recorded_cell_and_its_faults_are_kept(cell_file: 
     assert recording.events[-1].error is not None and recording.events[-1].error[0] == "NotRecorded"
 
 
+def test_a_program_may_be_named_as_on_the_command_line(
+    cell_file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    done = record(
+        "--cell", str(cell_file), "--out", str(tmp_path / "run.h5"), "--run", "mskgrasp plan --no-such"
+    )
+    assert done.returncode == 2 and "mskgrasp.plan: unknown option --no-such" in capfd.readouterr().err
+
+
 def test_ctrl_c_keeps_the_frames(cell_file: Path, tmp_path: Path):
     out = tmp_path / "frames.h5"
     arguments = ["--cell", str(cell_file), "--out", str(out), "--interval", "3600"]
