@@ -135,9 +135,10 @@ def check_renderer() -> Finding:
 def check_calibration(values: dict[str, Any], cell_file: Path, workspace: Workspace) -> Finding | None:
     """Whether the calibration file exists, is accurate and plausible; None if the camera needs none."""
     camera = values.get("camera")
-    if not isinstance(camera, dict) or "calibration" not in camera:
+    stated = camera.get("calibration") if isinstance(camera, dict) else None
+    if not isinstance(camera, dict) or not isinstance(stated, str):
         return None
-    path = calibration_path(camera["calibration"], cell_file)
+    path = calibration_path(stated, cell_file)
     try:
         calibration = read_calibration(path, serial=camera.get("serial"))
     except BadConfig as error:
@@ -204,7 +205,8 @@ def check_arm(arm: Arm, connect_s: float) -> Iterator[Finding]:
         level="ok",
         subject="arm",
         text=f"connected in {connect_s:.1f} s, state in {took * 1e3:.0f} ms, TCP at "
-        f"{np.round(state.T_base_tcp.position, 3).tolist()} m, pads {state.gripper_width * 1e3:.1f} mm apart",
+        f"{np.round(state.T_base_tcp.position, 3).tolist()} m, pads {state.gripper_width * 1e3:.1f} mm "
+        f"apart, joints {np.round(state.joints, 4).tolist()} rad",
     )
     outside = np.flatnonzero(
         (state.joints < arm.limits.joint_lower) | (state.joints > arm.limits.joint_upper)
@@ -220,7 +222,7 @@ def check_arm(arm: Arm, connect_s: float) -> Iterator[Finding]:
 
 
 def check_reach(arm: Arm, workspace: Workspace) -> Finding:
-    """Whether every corner of the region can be grasped, lifted and approached."""
+    """Whether corners, edges and middle of the region can be grasped, lifted and approached."""
     if (reason := out_of_reach(arm, workspace)) is not None:
         return Finding(level="fail", subject="workspace", text=f"{reason}; make workspace.region smaller")
     return Finding(
