@@ -188,6 +188,16 @@ def test_the_interval_of_an_rms_is_over_clusters_and_wide_where_they_differ():
     assert metrics.rms_interval([np.zeros(2), np.array([3.0, 3.0])])[0] == 0.0
 
 
+def test_the_interval_of_an_rms_of_alike_clusters_covers_it_about_as_often_as_stated():
+    drawn = np.random.default_rng(0).normal(size=(400, 12, 3))
+    found = [metrics.rms_interval(list(one)) for one in drawn]
+    assert 0.92 < np.mean([low <= 1.0 <= high for low, high in found]) < 0.98
+    # Two clusters, by hand: t of one degree of freedom, and half the logarithm of 9, twice over two.
+    low, high = metrics.rms_interval([np.array([1.0]), np.array([3.0])])
+    reach = 12.7062 * np.log(3) / 2
+    assert np.log([low, high]) == pytest.approx(np.log(5) / 2 + np.array([-reach, reach]), rel=1e-4)
+
+
 def test_the_expected_calibration_error_is_the_mean_gap_of_the_bins():
     probability = np.array([0.1] * 10 + [0.9] * 30)
     success = np.array([True] * 3 + [False] * 7 + [True] * 24 + [False] * 6)
