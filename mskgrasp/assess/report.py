@@ -224,7 +224,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
             "distance by which the part's points miss their predicted places, with errors of the seen pose "
             f"of {1e3 * errors['position']:g} mm and {np.degrees(errors['turn']):.2g} degrees, friction "
             f"{friction}, force {force} N a pad, and the arm's {1e3 * noise['arm_position_std']:g} mm. "
-            "The smallest of several estimates is somewhat too small; the trials below are other simulations."
+            "The smallest of several estimates is somewhat too small; the trials above are other simulations."
         ],
         tables=[
             Table(

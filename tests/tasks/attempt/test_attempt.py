@@ -79,7 +79,7 @@ def test_an_empty_grasp_is_missed(attempt):
 
 def test_a_part_wider_than_the_hand_opens_is_not_grasped(attempt):
     outcome = attempt((0.5, 0.0, Z, 0.0), part="wide")
-    assert not outcome["success"] and reason(outcome) in ("collided", "missed")
+    assert not outcome["success"] and reason(outcome) == "collided"  # the fingers land on it
 
 
 def test_a_finger_that_lands_on_the_part_ends_the_descent(attempt):
@@ -91,7 +91,7 @@ def test_friction_holds_what_it_can_hold_and_no_more(attempt):
     """Two pads hold 2 mu F = 2 * 0.5 * 30 N; the lift adds at most 1.6 m/s^2 to gravity."""
     assert attempt((0.5, 0.0, Z, 0.0), part="heavy")["success"]
     outcome = attempt((0.5, 0.0, Z, 0.0), part="too-heavy")
-    assert not outcome["success"] and reason(outcome) in ("slipped", "missed")
+    assert not outcome["success"] and reason(outcome) == "slipped"
 
 
 def test_a_part_that_is_not_at_rest_makes_no_label(attempt):
