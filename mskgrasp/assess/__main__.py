@@ -26,8 +26,7 @@ def main() -> int:
     config = parse(AssessConfig, prog="python -m mskgrasp.assess", description=DESCRIPTION)
     with ctrl_c_deferred():  # not for a mistyped option
         from mskgrasp.assess.run import assess
-    assess(config)
-    return 0
+    return assess(config)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from mskgrasp.core.units import Unit
 _TOLERANCE = re.compile(r"\s*([0-9.]+)\s*(mm|m)\s*,\s*([0-9.]+)\s*(deg|rad)\s*")
 SIMULATIONS, QUICK_SIMULATIONS = 1200, 400
 """Simulated grasps that certify a part's grasps."""
-LEAST_SIMULATIONS = 20
+LEAST_SIMULATIONS = 24
 """Fewest of which any grasp comes, as in `mskgrasp.simulation.certify.CertifyConfig`."""
 TRIALS, QUICK_TRIALS = 24, 8
 """Trials of each policy with an exact camera; half as many with noise, a quarter with each friction."""
@@ -52,7 +52,8 @@ class AssessConfig(Config):
     models: Path = PRETRAINED
     """Folder with model.safetensors and model.json; by default the shipped one."""
     simulations: int = Field(default=0, ge=0, le=1_000_000)
-    """Simulated grasps that certify a part's grasps, at least 20; 0: 1200, or 400 with --quick."""
+    """About so many simulated grasps certify a part's grasps, at least 24 for each kind of resting pose;
+    0: 1200, or 400 with --quick."""
     trials: int = Field(default=0, ge=0, le=100_000)
     """Trials of each policy with an exact camera; 0: 24, or 8 with --quick."""
     workers: int = Field(default=0, ge=0)

@@ -41,8 +41,11 @@ class Assessed:
     rows: list[Row]
 
 
-def assess(config: AssessConfig) -> None:
+def assess(config: AssessConfig) -> int:
     """Assess all parts, each in a folder of its own where there are several.
+
+    Returns:
+        The exit code: 1 where one of several parts could not be assessed, as the index says.
 
     Raises:
         UsageError: There is no part, or the folder holds other files.
@@ -56,7 +59,7 @@ def assess(config: AssessConfig) -> None:
         found = _assess_one(find_part(part_name(sources[0], config.unit)), config, out, tolerance)
         print(f"\n{found.headline}")
         print(f"wrote {out}/report.html, report.json, grasps.json, grasps.isaac.yaml")
-        return
+        return 0
     make_folder(config.out)
     entries = []
     for number, source in enumerate(sources, 1):
@@ -75,6 +78,7 @@ def assess(config: AssessConfig) -> None:
             )
         write_index(config.out / "index.html", entries, tolerance)
     print(f"wrote {config.out}/index.html")
+    return 1 if any(entry.folder is None for entry in entries) else 0
 
 
 def _sources(config: AssessConfig) -> list[str]:
@@ -123,7 +127,7 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
     # A part outside the cache is known by its folder alone.
     place = str(part.folder)
     workers = process_count(config.workers)
-    inputs = model_digests(config.models) | part_digests([place])
+    inputs = {"part": part.name} | model_digests(config.models) | part_digests([place])
     with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         settings = CertifyConfig(simulations=config.n_simulations, seed=config.seed)
         certified = certify([place], settings, config.models, workers)[part.name]

@@ -55,7 +55,7 @@ APART = (0.006, np.radians(12.0))
 class CertifyConfig(Config):
     """Settings of the certification of grasps."""
 
-    simulations: int = Field(default=1200, ge=20)
+    simulations: int = Field(default=1200, ge=24)
     """Simulated grasps of a part, shared by its resting poses."""
     per_stream: int = Field(default=200, ge=20)
     """Greatest number of simulations of one stream, of which three or so grasps come."""

@@ -58,6 +58,10 @@ def test_a_bar_is_assessed_and_placed_within_a_millimetre(cad, tmp_path, monkeyp
     assert "5 mm and 5 degrees" in (out / "report.html").read_text()
     with pytest.raises(UsageError, match="seed differ"):
         run(monkeypatch, *arguments, "--seed", 1)
+    trimesh.creation.box([60.0, 24.0, 18.0]).export(cad / "plate.stl")
+    with pytest.raises(UsageError, match=r"other inputs \(part differ\); choose another --out"):
+        run(monkeypatch, cad / "plate.stl", *arguments[1:])
+    assert (out / TRIALS).read_bytes() == stored
 
 
 @pytest.mark.slow
@@ -88,6 +92,13 @@ def test_trials_planned_by_other_certified_grasps_are_made_again(tmp_path, capsy
     ]  # fmt: skip
     assert "2 trials are made again: 'hex_nut_m20' has other certified grasps" in capsys.readouterr().err
     assert (tmp_path / FILE).read_bytes() == more.contents()
+
+
+def test_several_parts_of_which_one_cannot_be_assessed_end_with_1_and_an_index(cad, tmp_path, monkeypatch):
+    for name in ("broken", "torn"):
+        (cad / f"{name}.stl").write_bytes(b"solid nothing\n")
+    assert run(monkeypatch, cad / "broken.stl", cad / "torn.stl", "--out", tmp_path / "out") == 1
+    assert (tmp_path / "out" / "index.html").read_text().count("torn.stl") >= 1
 
 
 def test_a_file_that_is_named_twice_is_one_part(cad, monkeypatch):
