@@ -12,7 +12,7 @@ import numpy as np
 
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.grasp import FAILURES
-from mskgrasp.core.metrics import wilson_interval
+from mskgrasp.core.metrics import clustered_wilson_interval
 from mskgrasp.dataset.label_error import read_label_error
 from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
 
@@ -22,11 +22,15 @@ CardTable = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """Number of parts, attempts and successes of one family."""
+    """Attempts at the parts of one family.
 
-    parts: int
-    attempts: int
-    successes: int
+    Attributes:
+        tried: Number of attempts at each part.
+        won: Number of those that lifted it.
+    """
+
+    tried: tuple[int, ...]
+    won: tuple[int, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,12 +72,12 @@ class Card:
     @property
     def attempts(self) -> int:
         """Number of attempts."""
-        return sum(family.attempts for family in self.families.values())
+        return sum(sum(family.tried) for family in self.families.values())
 
     @property
     def successes(self) -> int:
         """Number of attempts that lifted the part."""
-        return sum(family.successes for family in self.families.values())
+        return sum(sum(family.won) for family in self.families.values())
 
 
 def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = iter) -> Card:
@@ -86,8 +90,8 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
     Raises:
         BadDataset: There is no shard, or one is damaged.
     """
-    counts: dict[str, Counter[str]] = defaultdict(Counter)
-    parts: dict[str, set[str]] = defaultdict(set)
+    tried: dict[str, Counter[str]] = defaultdict(Counter)
+    won: dict[str, Counter[str]] = defaultdict(Counter)
     failures: Counter[int] = Counter()
     discarded: Counter[str] = Counter()
     versions: Counter[tuple[tuple[str, str], ...]] = Counter()
@@ -99,8 +103,8 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
         codes = columns["failure"]
         if len(codes) and not 0 <= codes.min() <= codes.max() < len(FAILURES):
             raise BadDataset(f"{path}: failure counts what has no name; delete it and collect again")
-        counts[info.family].update(attempts=len(columns["success"]), successes=int(columns["success"].sum()))
-        parts[info.family].add(info.part)
+        tried[info.family][info.part] += len(columns["success"])
+        won[info.family][info.part] += int(columns["success"].sum())
         failures.update(columns["failure"][~columns["success"]].tolist())
         discarded.update(info.discarded)
         versions[tuple(sorted(info.versions.items()))] += 1
@@ -112,8 +116,11 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
     return Card(
         name=folder.resolve().name,
         shards=len(paths),
-        parts=len(set().union(*parts.values())),
-        families={family: Family(parts=len(parts[family]), **counts[family]) for family in sorted(counts)},
+        parts=len({name for parts in tried.values() for name in parts}),
+        families={
+            family: Family(tried=tuple(parts.values()), won=tuple(won[family][name] for name in parts))
+            for family, parts in sorted(tried.items())
+        },
         failures={FAILURES[code]: n for code, n in failures.most_common()},
         discarded=dict(discarded.most_common()),
         displacement=_median_and_tail(np.linalg.norm(held[:, :3], axis=1)),
@@ -146,11 +153,11 @@ def _median_and_tail(values: np.ndarray) -> tuple[float, float] | None:
 
 def tables(card: Card) -> list[CardTable]:
     """Title, headers and rows of each table of the card."""
-    n, won = card.attempts, card.successes
+    n, families = card.attempts, card.families.values()
     facts = [
         ("attempts", f"{n}"),
         ("parts", f"{card.parts} of {len(card.families)} families"),
-        ("success", _share(won, n)),
+        ("success", _share([k for f in families for k in f.won], [k for f in families for k in f.tried])),
     ]
     if card.displacement and card.turn:
         moved, turned = np.array(card.displacement) * 1e3, np.degrees(card.turn)
@@ -166,8 +173,8 @@ def tables(card: Card) -> list[CardTable]:
         ("schema", f"version {SCHEMA_VERSION}"),
         ("on disk", f"{card.shards} shards, {_bytes(card.size)}, {_bytes(card.size / max(n, 1))} an attempt"),
     ]
-    families = [
-        (name, f"{f.parts}", f"{f.attempts}", _share(f.successes, f.attempts))
+    by_family = [
+        (name, f"{len(f.tried)}", f"{sum(f.tried)}", _share(f.won, f.tried))
         for name, f in card.families.items()
     ]
     failures = [(name, f"{count}", f"{count / max(n, 1):.1%}") for name, count in card.failures.items()]
@@ -178,7 +185,7 @@ def tables(card: Card) -> list[CardTable]:
     ]
     return [
         (f"Dataset {card.name}", ("", ""), facts),
-        ("Success by family", ("family", "parts", "attempts", "success (95 % interval)"), families),
+        ("Success by family", ("family", "parts", "attempts", "success (95 % interval)"), by_family),
         ("Failures", ("reason", "attempts", "share"), failures or [("none", "0", "0.0%")]),
         ("Discarded", ("reason", "attempts"), discarded),
         ("Physics", ("setting", "value"), [(key, f"{value}") for key, value in card.physics.items()]),
@@ -214,9 +221,10 @@ def markdown(card: Card) -> str:
     return "\n".join(blocks)
 
 
-def _share(won: int, n: int) -> str:
-    low, high = wilson_interval(won, n)
-    return f"{won / max(n, 1):.1%} ({low:.1%} - {high:.1%})"
+def _share(won: Sequence[int], tried: Sequence[int]) -> str:
+    """Share of successes by their numbers at each part, at which attempts are alike."""
+    low, high = clustered_wilson_interval(np.array(won), np.array(tried))
+    return f"{sum(won) / max(sum(tried), 1):.1%} ({low:.1%} - {high:.1%})"
 
 
 def _bytes(n: float) -> str:

@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 from mskgrasp.dataset import list_shards, read_shard
-from mskgrasp.dataset.card import read_card
+from mskgrasp.dataset.card import Card, Family, read_card, tables
 from mskgrasp.dataset.commands.command_line import main
 from tests import synthetic
 
@@ -24,8 +24,23 @@ def test_the_card_counts_what_the_shards_hold(collected):
     rows = json.loads((collected / "summary.json").read_text())["parts"]
     for family, counts in card.families.items():
         own = [row for row in rows if row["family"] == family]
-        assert counts.attempts == sum(row["attempts"] for row in own)
-        assert counts.successes == sum(row["successes"] for row in own)
+        assert sorted(counts.tried) == sorted(row["attempts"] for row in own)
+        assert sorted(counts.won) == sorted(row["successes"] for row in own)
+
+
+def test_intervals_are_by_parts_at_which_attempts_are_alike():
+    facts = dict(tables(card_of(won=(40, 0, 40, 0), tried=(40, 40, 40, 40)))[0][2])
+    assert facts["success"].startswith("50.0% (")
+    low, high = re.findall(r"([\d.]+)%", facts["success"])[1:]
+    assert float(low) < 10 and float(high) > 90  # by attempts: 42.3 to 57.7 %
+
+
+def card_of(won: tuple[int, ...], tried: tuple[int, ...]) -> Card:
+    return Card(
+        name="made", shards=4, parts=len(won), families={"nut": Family(won=won, tried=tried)}, failures={},
+        discarded={}, displacement=None, turn=None, image=(2, 2), seed=0, physics={}, noise={}, versions=[],
+        size=1,
+    )  # fmt: skip
 
 
 def test_displacements_are_those_of_successes(tmp_path):
