@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,7 +73,7 @@ def export_parquet(folder: Path, out: Path, watch: Watch = iter, *, licence: str
     schema = _schema(read_shard(list_shards(folder)[0])[1])
     n = 0
     with renamed_at_the_end(out.parent, files) as temporary:
-        with pq.ParquetWriter(temporary / out.name, schema, compression="zstd") as file:
+        with _named(out), pq.ParquetWriter(temporary / out.name, schema, compression="zstd") as file:
             for table in _groups(folder, schema, watch):
                 file.write_table(table)
                 n += table.num_rows
@@ -81,6 +82,17 @@ def export_parquet(folder: Path, out: Path, watch: Watch = iter, *, licence: str
         text += markdown(read_card(folder)) + _LAYOUT.format(file=out.name)
         (temporary / CARD).write_text(text, encoding="utf-8")
     return n
+
+
+@contextmanager
+def _named(out: Path) -> Iterator[None]:
+    """Arrow's errors of a full disk do not name the file."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror or str(error), str(out)) from error
 
 
 def _schema(info: ShardInfo) -> pyarrow.Schema:

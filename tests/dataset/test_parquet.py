@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import shutil
 
@@ -57,3 +58,15 @@ def test_parquet_holds_every_column_with_units_images_and_a_card(collected, join
     assert pyarrow.parquet.read_table(tmp_path / "discarded.parquet").num_rows == 12 - len(attempts)
     with pytest.raises(UsageError, match=r"README\.md exists, and is not overwritten"):
         export_parquet(collected, out.with_name("other.parquet"))
+
+
+def test_a_full_disk_is_an_error_that_names_the_file(collected, tmp_path, monkeypatch):
+    """Arrow's errors do not name it."""
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(pyarrow.parquet.ParquetWriter, "write_table", full)
+    with pytest.raises(OSError, match=r"No space left on device: '.*a\.parquet'"):
+        export_parquet(collected, tmp_path / "a.parquet", licence="cc0-1.0")
+    assert list(tmp_path.iterdir()) == []
