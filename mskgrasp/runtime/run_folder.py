@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from mskgrasp.core.config import Config, read_config, write_config
-from mskgrasp.core.errors import BadDataset, UsageError
+from mskgrasp.core.errors import BadConfig, BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock, is_leftover, write_whole
 from mskgrasp.core.json_text import parse_json
 from mskgrasp.runtime.cli import make_folder
@@ -68,7 +68,13 @@ def _compatible_inputs(
     """The inputs recorded in a folder, with which the run is compatible; none for a new folder."""
     settings, fingerprint = out / SETTINGS, out / INPUTS
     if settings.exists() and fingerprint.exists():
-        before = read_config(type(config), settings)
+        try:
+            before = read_config(type(config), settings)
+        except BadConfig as error:
+            raise UsageError(
+                f"--out {out} holds another program's run, or one of another version ({error}); choose "
+                "another"
+            ) from error
         changed = [
             name
             for name in type(config).model_fields

@@ -114,6 +114,13 @@ def test_a_run_that_was_killed_as_it_began_begins_again(tmp_path: Path):
         open_run(tmp_path)
 
 
+def test_a_folder_of_another_programs_run_is_refused_by_that_name(tmp_path: Path):
+    (tmp_path / SETTINGS).write_text("experiment: success\n")
+    (tmp_path / INPUTS).write_text("{}")
+    with pytest.raises(UsageError, match=r"another program's run, .*'experiment'.*; choose another"):
+        open_run(tmp_path)
+
+
 def test_a_folder_with_other_files_is_refused(tmp_path: Path):
     (tmp_path / "thesis.tex").touch()
     with pytest.raises(UsageError, match="holds other files"):
