@@ -59,7 +59,7 @@ class SettingComparison:
             if test is None or test.passed:
                 continue
             if test.parts < LEAST_PARTS:
-                said.append(f"{what}: {test.parts} parts were compared, {LEAST_PARTS} are needed")
+                said.append(f"{what}: not shown by fewer than {LEAST_PARTS} parts (here {test.parts})")
             elif not np.isfinite(test.excess):
                 said.append(f"{what}: no grasps to compare")
             else:

@@ -143,6 +143,8 @@ def label_error_section(record: Record) -> Section:
 def label_error_text(record: Record) -> str:
     """The error of a label in a sentence, as for a dataset's card."""
     one = record["label_error"]
+    if one["shift_median"] is None:
+        return f"No grasp lifts the part both as it is and with hand and table drawn ({one['n']} grasps)."
     return (
         f"With the hand and the table drawn from their ranges, a label differs by "
         f"{_millimetres(one['shift_median'])} mm and {_degrees(one['turn_median'])} degrees (median), "

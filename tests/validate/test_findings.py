@@ -98,7 +98,7 @@ def test_without_successes_in_common_nothing_can_be_said():
     nothing = outcomes(40, success=np.zeros(n, bool), displacement=np.full((n, 4), np.nan))
     result = judged(nothing)
     assert result.complaints()[0] == (
-        "median displacement beyond the floor: 0 parts were compared, 10 are needed"
+        "median displacement beyond the floor: not shown by fewer than 10 parts (here 0)"
     )
     assert result.to_json()["shift_median"] is None and not result.passed
     assert size(nothing).to_json()["shift_median"] is None

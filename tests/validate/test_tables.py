@@ -86,6 +86,11 @@ def test_the_error_of_a_label_is_a_sentence_and_absent_without_ranges():
     (table,) = by_title(record())["Error of a label"].tables
     assert table.rows == [("finger_force", "20", "40")]
     assert "Error of a label" not in by_title(record(label_error=None))
+    nothing = record()["label_error"] | dict.fromkeys(
+        ("shift_median", "turn_median", "shift_p90", "turn_p90")
+    )
+    text = label_error_text(record(label_error=nothing))
+    assert text.startswith("No grasp lifts the part both as it is and with hand and table drawn (")
 
 
 def test_attempts_that_are_no_labels_are_counted_by_reason():
