@@ -32,6 +32,8 @@ _RADIUS = 0.03
 """Radius of gyration of a typical part, metres: variance scores here use one for all parts."""
 _LEAST_TO_SCALE = 50
 """Fewest successes from which a 90 % quantile is estimated."""
+_LEAST_SLOPE = 0.01
+"""Of the calibration of the quality, whose own odds have slope 1."""
 
 
 def _chunk(models: Models) -> int:
@@ -111,16 +113,19 @@ def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> ModelCali
 
 
 def _platt(odds: np.ndarray, success: np.ndarray) -> tuple[float, float]:
-    """Fit slope and offset of the log odds by maximum likelihood; Platt's targets avoid 0 and 1."""
+    """Fit slope and offset of the log odds by maximum likelihood; Platt's targets avoid 0 and 1.
+
+    The slope is `_LEAST_SLOPE` at least: without one a planner could not tell grasps apart.
+    """
     n_success, n_failure = int(success.sum()), int((~success).sum())
     target = np.where(success, (n_success + 1) / (n_success + 2), 1 / (n_failure + 2))
 
     def loss(values: np.ndarray) -> float:
-        z = np.exp(values[0]) * odds + values[1]
+        z = max(np.exp(values[0]), _LEAST_SLOPE) * odds + values[1]
         return float((np.logaddexp(0.0, z) - target * z).mean())
 
     found = minimize(loss, np.zeros(2), method="Nelder-Mead").x
-    return float(np.exp(found[0])), float(found[1])
+    return max(float(np.exp(found[0])), _LEAST_SLOPE), float(found[1])
 
 
 def measure_models(

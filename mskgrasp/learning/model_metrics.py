@@ -16,7 +16,8 @@ class EpochMetrics:
         stage: The network: ``gqn``, ``transfer`` or ``gdn``.
         epoch: Number of the epoch, from 1.
         train_loss: Mean loss of the training batches.
-        validation_loss: Loss on the validation parts.
+        validation_loss: Loss on the validation parts; of ``gdn`` that of one Gaussian with the prediction's
+            mean and variance, averaged over its views, whatever loss trains.
         auroc: Of the predicted qualities; None for ``gdn``.
         translation_rmse: Of the predicted displacements, metres; of ``gdn`` alone.
         rotation_rmse: The same, radians.

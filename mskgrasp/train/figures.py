@@ -120,8 +120,10 @@ def draw_curves(history: list[EpochMetrics], report: dict[str, Any], path: Path)
         panels = figure.subplots(len(stages), 3)
         for line, name in zip(panels, stages, strict=True):
             rows = [one for one in history if one.stage == name]
+            # A displacement network is compared by another loss than the one that trains it.
+            held_out = "held-out parts, as one Gaussian" if name == "gdn" else "held-out parts"
             _curve(line[0], rows, "train_loss", "training (with noise and dropout)", FAINT)
-            _curve(line[0], rows, "validation_loss", "held-out parts", _COLOURS[0])
+            _curve(line[0], rows, "validation_loss", held_out, _COLOURS[0])
             line[0].set(title=f"{_TITLES[name]} loss", xlabel="epoch")
             line[0].legend(fontsize=8)
             if name != "gdn":

@@ -10,17 +10,16 @@ import sys
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import torch
 
 from mskgrasp.core.config import read_config, write_config
-from mskgrasp.core.errors import UsageError
+from mskgrasp.core.errors import BadConfig, BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock, is_leftover, write_whole
 from mskgrasp.core.json_text import finite
 from mskgrasp.dataset.fingerprint import dataset_fingerprint
 from mskgrasp.learning.compute_device import compute_device
-from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, read_meta, save_model
+from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, ModelMeta, read_meta, save_model
 from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples, read_samples
@@ -33,6 +32,7 @@ from mskgrasp.train.config import TrainConfig
 from mskgrasp.train.figures import draw_curves, draw_uncertainty
 
 CHECKPOINT = "checkpoint.safetensors"
+_CHANCE = 0.5
 FEW_ATTEMPTS, FEW_PARTS = 1000, 10
 """Data of fewer attempts or parts to train on are warned of."""
 
@@ -137,7 +137,7 @@ def _train_into(out: Path, config: TrainConfig, samples: Samples, sides: Sides, 
     _write(out / "card.md", model_card(models.meta))
     save_model(out, models)  # last: it says that the training is finished
     (out / CHECKPOINT).unlink(missing_ok=True)
-    _summarise(models.meta.metrics, out)
+    _summarise(models.meta, out)
 
 
 def _check_out(config: TrainConfig, out: Path) -> None:
@@ -147,7 +147,10 @@ def _check_out(config: TrainConfig, out: Path) -> None:
     if not (out / "config.yaml").is_file():
         raise UsageError(f"{out} exists and holds no training run; choose another --out")
     here = {"data", "out", "device"}
-    before = read_config(TrainConfig, out / "config.yaml").model_dump(exclude=here)
+    try:
+        before = read_config(TrainConfig, out / "config.yaml").model_dump(exclude=here)
+    except BadConfig as error:
+        raise UsageError(f"{out} holds another program's run ({error}); choose another --out") from error
     now = config.model_dump(exclude=here)
     differing = sorted(key for key in now if now[key] != before[key])
     if differing:
@@ -182,7 +185,14 @@ def _warn_of_few(n_attempts: int, n_parts: int) -> None:
 def _read(config: TrainConfig, data: Path) -> Samples:
     with progress(title="read shards", unit="shard") as bar:
         samples = read_samples(data, config.network, advance=partial(advance_to, bar))
-    return samples.of_parts_between(*config.success_range)
+    kept = samples.of_parts_between(*config.success_range)
+    if len(kept.parts) < 2 <= len(samples.parts):
+        low, high = config.success_range
+        raise BadDataset(
+            f"of the {len(samples.parts)} parts only {kept.parts[0]} has a success in {low:g}..{high:g}, and "
+            "validation needs another; widen success_range"
+        )
+    return kept
 
 
 def _table(history: list[EpochMetrics]) -> str:
@@ -199,7 +209,8 @@ def _write(path: Path, text: str) -> None:
     write_whole(path, text.encode())
 
 
-def _summarise(report: dict[str, Any], out: Path) -> None:
+def _summarise(meta: ModelMeta, out: Path) -> None:
+    report = meta.metrics
     gqn, gdn = (report.get("test", report)[name] for name in ("gqn", "gdn"))
     print(
         f"quality on held-out parts: AUROC {gqn['auroc']:.3f}, "
@@ -211,4 +222,9 @@ def _summarise(report: dict[str, Any], out: Path) -> None:
             f"displacement, {name.replace('_', ' ')}: {values['translation_rmse'] * 1e3:.2f} mm, "
             f"{math.degrees(values['rotation_rmse']):.2f} deg"
         )
-    print(f"wrote {out}: model.safetensors, model.json, card.md, metrics.json, curves.png")
+    if not gqn["auroc"] > _CHANCE:
+        note(
+            "warning: on held-out parts the quality ranks grasps no better than chance; collect more attempts"
+        )
+    figures = "curves.png, uncertainty.png" if meta.network.variance else "curves.png"
+    print(f"wrote {out}: model.safetensors, model.json, card.md, metrics.json, {figures}")

@@ -136,3 +136,11 @@ def test_a_constant_quality_ranks_nothing_and_has_the_brier_score_worked_out_by_
     by_hand = share * (1 - rate) ** 2 + (1 - share) * rate**2
     assert report.brier == pytest.approx(by_hand, rel=1e-5)
     assert report.brier_of_base_rate == pytest.approx(by_hand)
+
+
+def test_a_quality_that_ranks_the_wrong_way_round_is_flattened_but_keeps_its_order():
+    odds, success = np.tile([-2.0, 2.0], 50), np.tile([True, False], 50)
+    slope, offset = held_out._platt(odds, success)
+    assert slope == pytest.approx(0.01) and abs(offset) < 0.05
+    slope, _ = held_out._platt(odds, np.tile([False, True, False, False], 25))
+    assert 0.05 < slope < 1.5

@@ -6,9 +6,9 @@ import pytest
 import torch
 
 from mskgrasp.core.config import read_config
-from mskgrasp.core.errors import UsageError
+from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock
-from mskgrasp.dataset import shard_path, write_shard
+from mskgrasp.dataset import list_shards, read_shard, shard_path, write_shard
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.train import run as train
@@ -124,6 +124,25 @@ def test_two_trainings_do_not_write_into_one_folder(dataset, tmp_path):
     with exclusive_lock(out), pytest.raises(UsageError, match="another training is writing into"):
         train.run_training(program(SHORT, data=dataset, out=out, epochs=1))
     assert [path.name for path in out.iterdir()] == [".lock"]
+
+
+def test_a_success_range_that_leaves_one_part_names_it(dataset, tmp_path):
+    won = {}
+    for attempts, info in map(read_shard, list_shards(dataset)):
+        won.setdefault(info.part, []).extend(attempts.success)
+    best = max(won, key=lambda part: np.mean(won[part]))
+    least = float(np.mean(won[best]))
+    config = program(SHORT, data=dataset, out=tmp_path / "model", success_range=(least - 1e-6, 1.0))
+    with pytest.raises(
+        BadDataset, match=f"of the 8 parts only {best} has a success in .*; widen success_range"
+    ):
+        train.run_training(config)
+
+
+def test_a_folder_of_another_programs_run_is_refused_by_that_name(dataset, tmp_path):
+    (tmp_path / "config.yaml").write_text("parts: [starter]\n")
+    with pytest.raises(UsageError, match=r"another program's run \(.*'parts'.*; choose another --out"):
+        train.run_training(program(SHORT, data=dataset, out=tmp_path))
 
 
 def test_mistakes_on_the_command_line_are_one_line_each(tmp_path, dataset):
