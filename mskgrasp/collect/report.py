@@ -28,8 +28,8 @@ _HEADER = (
 )  # fmt: skip
 _EXPLAINED = (
     "Success: share of the attempts that lifted the part. Median displacement and turn: of the part in the "
-    "hand, over the attempts that lifted it. Discarded attempts are not counted, and were drawn again. The "
-    "part filter compares the success with part_filter.min_success and max_success."
+    "hand, over the attempts that lifted it. Discarded attempts are not counted; an unsettled one was drawn "
+    "again. The part filter compares the success with part_filter.min_success and max_success."
 )
 
 Columns = dict[str, np.ndarray]

@@ -152,8 +152,10 @@ def ause(error: np.ndarray, uncertainty: np.ndarray) -> float:
     if len(error) < 2:
         return float("nan")
     _, predicted, oracle = sparsification(error, uncertainty)
-    at_random = np.full_like(predicted, predicted[0])
-    return float((predicted - oracle).sum() / (at_random - oracle).sum())
+    whole = float((predicted[0] - oracle).sum())
+    if whole == 0:  # equal errors have no order
+        return float("nan")
+    return float((predicted - oracle).sum()) / whole
 
 
 def reliability(probability: np.ndarray, success: np.ndarray, bins: int = 10) -> np.ndarray:
@@ -203,7 +205,8 @@ def bootstrap_interval(
         seed: Seed of the draws.
 
     Returns:
-        The interval; NaN, NaN of fewer than two objects, which do not show how objects differ.
+        The interval; NaN, NaN of fewer than two objects, which do not show how objects differ, and where the
+        statistic is NaN in every draw.
     """
     if len(values) < 2:
         return float("nan"), float("nan")
@@ -215,6 +218,8 @@ def bootstrap_interval(
     tail, n = (1 - level) / 2, len(values)
     if n > 1:
         tail = float(ndtr(np.sqrt(n / (n - 1)) * stdtrit(n - 1, tail)))
+    if np.isnan(found).all():
+        return float("nan"), float("nan")
     low, high = np.nanquantile(found, [tail, 1 - tail])
     return float(low), float(high)
 

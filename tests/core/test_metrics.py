@@ -147,6 +147,7 @@ def test_ause_is_none_of_an_order_that_knows_and_one_of_an_order_that_does_not()
     assert metrics.ause(error, error) == pytest.approx(0.0)
     assert metrics.ause(error, rng.random(20_000)) == pytest.approx(1.0, abs=0.05)
     assert metrics.ause(error, -error) > 1.5
+    assert np.isnan(metrics.ause(np.ones(5), np.arange(5.0)))  # equal errors have no order
 
 
 def test_reliability_counts_what_happened_at_each_probability():
@@ -165,6 +166,7 @@ def test_one_object_does_not_tell_how_objects_differ_and_two_do():
     assert np.isnan(metrics.bootstrap_interval([np.arange(9.0)], np.mean)).all()
     low, high = metrics.bootstrap_interval([np.zeros(2), np.ones(2)], np.mean)
     assert low <= 0.0 < 1.0 <= high  # one in four draws has either alone
+    assert np.isnan(metrics.bootstrap_interval([np.zeros(2), np.ones(2)], lambda _: float("nan"))).all()
 
 
 def test_the_mean_of_few_objects_is_in_its_interval_nearly_as_often_as_stated():
