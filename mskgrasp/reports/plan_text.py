@@ -33,8 +33,8 @@ def plan_text(plan: GraspPlan) -> str:
         [
             *pose,
             f"grasp         x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, theta {np.degrees(theta):.1f} deg (base)",
-            f"quality       {plan.quality:.3f} ({of})",
-            f"verdict       {verdict(plan.quality)}",
+            f"quality       {'none stated' if np.isnan(plan.quality) else f'{plan.quality:.3f} ({of})'}",
+            *([] if np.isnan(plan.quality) else [f"verdict       {verdict(plan.quality)}"]),
             f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
             *([] if np.isnan(plan.swing).any() else [f"tilt          {tilted}"]),
             *([] if np.isnan(plan.score) else [f"precision     {precision(plan.score)}"]),

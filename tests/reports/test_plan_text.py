@@ -50,3 +50,9 @@ def test_without_a_predicted_variance_no_deviation_is_told():
         plan, grasp_displacement_cov=np.full((4, 4), np.nan), swing_var=nothing, score=np.nan
     )
     assert "nan" not in plan_text(known) and "dtheta -5.7 deg" in plan_text(known)
+
+
+def test_a_planner_that_states_no_quality_gets_no_verdict():
+    plan = planner().plan(FRAME, np.random.default_rng(0))
+    text = plan_text(dataclasses.replace(plan, quality=np.nan, planned_by="another planner"))
+    assert "quality       none stated\n" in text and "verdict" not in text and "nan" not in text
