@@ -32,6 +32,9 @@ from mskgrasp.parts import Part, parts_folder
 
 SCHEMA_VERSION = 4
 FILE = "grasps.json"
+SIMULATED_ALIKE = np.diag(np.square([5e-5, 5e-5, 5e-5, np.radians(0.1)]))
+"""Covariance, metres and radians, to be added to that of a certified grasp: outcomes of the simulation itself
+differ by so much if the part is moved by 10 um (docs/results/validation.md), where the repeats may not."""
 _LEAST_SPREAD = 1e-12
 """Smaller spreads are alike: (1 um)^2."""
 

@@ -26,6 +26,7 @@ from mskgrasp.parts import Part
 from mskgrasp.parts.alike_poses import PartSurface
 from mskgrasp.perception.part_pose import KnownPart, PartPose, find_part_pose
 from mskgrasp.planning.certified import (
+    SIMULATED_ALIKE,
     CertifiedGrasps,
     half_turned,
     radius_about_vertical,
@@ -41,9 +42,6 @@ from mskgrasp.runtime.progress import note
 AMBIGUOUS_FROM = 1.5e-3
 """Expected distance (RMS) of the part's surface from where the best pose has it, metres: beyond it the
 networks, which err by some millimetres, are the better choice."""
-SIMULATED_ALIKE = np.diag(np.square([5e-5, 5e-5, 5e-5, np.radians(0.1)]))
-"""Covariance, metres and radians, that a plan adds to a certified grasp's: outcomes of the simulation itself
-differ by so much if the part is moved by 10 um (docs/results/validation.md), where the repeats may not."""
 
 
 class CertifiedPlanner:

@@ -13,11 +13,11 @@ import yaml
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.files import write_whole
-from mskgrasp.core.geometry import Pose, quat_to_matrix, wrap_half_turn
+from mskgrasp.core.geometry import Pose, quat_about_z, quat_to_matrix, wrap_half_turn
 from mskgrasp.core.grasp import MAX_OPENING, lowest_grasp_z, pose_base_tcp
 from mskgrasp.core.panda_kinematics import TCP_OFFSET
 from mskgrasp.parts import Part
-from mskgrasp.planning.certified import CertifiedGrasps
+from mskgrasp.planning.certified import SIMULATED_ALIKE, CertifiedGrasps
 
 MOST_BYTES = 2**24
 """Largest file that is read."""
@@ -32,27 +32,35 @@ _TCP_IN_LINK = {"panda_hand": TCP_OFFSET, "panda_hand_tcp": 0.0}
 def write_isaac_grasp(path: Path, part: Part, certified: CertifiedGrasps) -> None:
     """Write certified grasps as poses of ``panda_hand`` in the frame of the part's mesh.
 
-    Each grasp holds for the resting pose that its name ends in. Beside the fields of the format (version 1.0)
-    it has ``displacement`` and ``displacement_cov``, which readers of the format ignore: the expected motion
-    of the part in the hand, and its covariance, metres and radians along the axes of the grasp.
+    Each grasp holds for the resting pose that its name ends in, and is written for every pose that looks like
+    that one, too. Beside the fields of the format (version 1.0) it has ``displacement`` and
+    ``displacement_cov``, which readers of the format ignore: the expected motion of the part in the hand, and
+    its covariance where the part's pose is seen as well as the grasp was certified for, metres and radians
+    along the axes of the grasp.
 
     Raises:
         OSError: The disk is full or not writable.
     """
     T_tcp_hand = Pose.translation(np.array([0.0, 0.0, -TCP_OFFSET]))
+    errors = certified.conditions["pose_errors"]
+    pose_cov = np.diag(np.square([errors["position"], errors["position"], errors["turn"]]))
     grasps = {}
     for number, one in enumerate(certified.grasps):
-        hand = part.resting[one.resting].inverse() @ pose_base_tcp(one.grasp) @ T_tcp_hand
-        w, *xyz = (float(value) for value in hand.quat_wxyz)
-        grasps[f"grasp_{number}_pose_{one.resting}"] = dict(
-            confidence=round(one.expected_share, 4),
-            position=[float(value) for value in hand.position],
-            orientation=dict(w=w, xyz=xyz),
-            cspace_position=dict(panda_finger_joint1=0.0),
-            pregrasp_cspace_position=dict(panda_finger_joint1=MAX_OPENING / 2),
-            displacement=[float(value) for value in one.mean],
-            displacement_cov=one.residual.tolist(),
-        )
+        covariance = one.covariance(pose_cov) + SIMULATED_ALIKE
+        alike = {other: turn for other, (first, turn) in certified.like.items() if first == one.resting}
+        for resting, turn in {one.resting: 0.0, **alike}.items():
+            T_rest_like = Pose(position=np.zeros(3), quat_wxyz=quat_about_z(np.asarray(turn)))
+            hand = part.resting[resting].inverse() @ T_rest_like @ pose_base_tcp(one.grasp) @ T_tcp_hand
+            w, *xyz = (float(value) for value in hand.quat_wxyz)
+            grasps[f"grasp_{number}_pose_{resting}"] = dict(
+                confidence=round(one.expected_share, 4),
+                position=[float(value) for value in hand.position],
+                orientation=dict(w=w, xyz=xyz),
+                cspace_position=dict(panda_finger_joint1=0.0),
+                pregrasp_cspace_position=dict(panda_finger_joint1=MAX_OPENING / 2),
+                displacement=[float(value) for value in one.mean],
+                displacement_cov=covariance.tolist(),
+            )
     values = dict(
         format="isaac_grasp",
         format_version=1.0,

@@ -24,8 +24,8 @@ def test_a_hand_stands_over_the_part_with_its_fingers_down(tmp_path):
     write_isaac_grasp(tmp_path / "grasps.yaml", PART, certified(grasp))
     values = yaml.safe_load((tmp_path / "grasps.yaml").read_text())
     assert (values["format"], values["format_version"]) == ("isaac_grasp", 1.0)
-    ((name, found),) = values["grasps"].items()
-    assert name == "grasp_0_pose_0"
+    assert list(values["grasps"]) == ["grasp_0_pose_0", "grasp_0_pose_1"]
+    found = values["grasps"]["grasp_0_pose_0"]
     assert found["confidence"] == pytest.approx(24 / 26, abs=1e-4)
     assert found["pregrasp_cspace_position"]["panda_finger_joint1"] == pytest.approx(0.04)
     quat = np.array([found["orientation"]["w"], *found["orientation"]["xyz"]])
@@ -42,6 +42,30 @@ def test_a_hand_stands_over_the_part_with_its_fingers_down(tmp_path):
     assert abs(across @ [-np.sin(theta), np.cos(theta), 0.0]) == pytest.approx(1.0)
 
 
+def test_a_grasp_is_written_for_every_pose_that_looks_alike(tmp_path):
+    """The nut lies on either face; its rest frame in the second pose is turned by half a radian."""
+    grasp = certified_grasp()
+    write_isaac_grasp(tmp_path / "grasps.yaml", PART, certified(grasp))
+    read = read_isaac_grasp(tmp_path / "grasps.yaml")
+    second = [number == 1 for number in range(len(PART.resting_probability))]
+    turned = top_down_grasp(PART, read.T_mesh_tcp["grasp_0_pose_1"], second)
+    assert turned is not None and turned.tilt == pytest.approx(0.0, abs=1e-6)
+    (x, y), (c, s) = grasp.grasp[:2], (np.cos(0.5), np.sin(0.5))
+    assert turned.grasp == pytest.approx([c * x - s * y, s * x + c * y, grasp.grasp[2], grasp.grasp[3] + 0.5])
+
+
+def test_the_covariance_is_that_of_a_part_whose_pose_is_seen_with_errors(tmp_path):
+    slope = np.zeros((4, 3))
+    slope[0, 0] = 1.0  # along the pads the part stays where it really was
+    write_isaac_grasp(tmp_path / "grasps.yaml", PART, certified(certified_grasp(slope=slope)))
+    found = yaml.safe_load((tmp_path / "grasps.yaml").read_text())["grasps"]["grasp_0_pose_0"]
+    assert found["displacement"] == pytest.approx([1e-4, 2e-3, -1e-4, 0.02])
+    deviation = np.sqrt(np.diag(found["displacement_cov"]))
+    # The residual, the errors of the pose that the grasp was certified for, and the simulation's own.
+    expected = [np.sqrt(1e-4**2 + 3e-4**2 + 5e-5**2), np.hypot(2e-5, 5e-5), np.hypot(1e-4, 5e-5)]
+    assert deviation == pytest.approx([*expected, np.hypot(1e-3, np.radians(0.1))])
+
+
 @pytest.mark.parametrize("link", ["panda_hand", "panda_hand_tcp"])
 def test_a_written_grasp_is_read_as_it_was(link, tmp_path):
     grasps = [certified_grasp(), certified_grasp(grasp=np.array([0.001, 0.002, 0.012, -1.4]))]
@@ -55,7 +79,8 @@ def test_a_written_grasp_is_read_as_it_was(link, tmp_path):
             one["position"] = hand.apply(np.array([0.0, 0.0, TCP_OFFSET])).tolist()
         path.write_text(yaml.safe_dump(values | {"gripper_frame_link": link}))
     read = read_isaac_grasp(path)
-    for pose, grasp in zip(read.T_mesh_tcp.values(), grasps, strict=True):
+    own = [pose for name, pose in read.T_mesh_tcp.items() if name.endswith("pose_0")]
+    for pose, grasp in zip(own, grasps, strict=True):
         found = top_down_grasp(PART, pose, [True] + [False] * (len(PART.resting_probability) - 1))
         assert found is not None and found.resting == 0 and found.sign == 1.0
         assert found.grasp == pytest.approx(grasp.grasp, abs=1e-9)
