@@ -27,7 +27,7 @@ from mskgrasp.reports.html import write_html
 from mskgrasp.reports.quantities import counted
 from mskgrasp.reports.section import Figure, Section, View, settings_section
 from mskgrasp.runtime.console_table import Table
-from mskgrasp.trials.placed_trial import CORRECTIONS, PlacedTrial
+from mskgrasp.trials.placed_trial import CORRECTIONS, TOO_HEAVY, PlacedTrial
 
 _HEADINGS = {
     "none": "placed directly",
@@ -118,9 +118,12 @@ def conclusion(
                 f"its faces are {1e3 * width:.0f} mm apart or more, and the hand opens "
                 f"{1e3 * MAX_OPENING:.0f} mm. None"
             )
+        if all((trial.reason or "").startswith(TOO_HEAVY) for trial in trials):
+            return f"{lead} of {len(trials)} attempts could be made ({reasons})."
         return (
             f"{lead} of {len(trials)} attempts lifted it ({reasons}{'; ' + why if why else ''}); "
-            f"95 % interval of the share lifted, by {scenes} scenes: 0 to {most:.0%}."
+            f"95 % interval of the share lifted, by {scenes} scene{'' if scenes == 1 else 's'}: 0 to "
+            f"{most:.0%}."
         )
     lines = [f"With {'an ' if name == EXACT else ''}{name}: {text}." for name, text in verdicts.items()]
     return " ".join(lines)
@@ -238,13 +241,14 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
 
 def _grasps_section(certified: CertifiedGrasps) -> Section:
     rows = []
-    for grasp in (*certified.grasps, *certified.uncertified):
+    for number, grasp in enumerate((*certified.grasps, *certified.uncertified)):
         x, y, z, theta = grasp.grasp
         low, high = grasp.lifted_interval
         std = np.sqrt(np.diag(grasp.residual))
         rows.append(
             (
                 grasp.resting,
+                "yes" if number < len(certified.grasps) else "no",
                 f"{1e3 * x:.1f}, {1e3 * y:.1f}, {1e3 * z:.1f}",
                 f"{np.degrees(theta):.1f}",
                 f"{grasp.lifted} of {grasp.n} [{low:.0%}, {high:.0%}]",
@@ -256,7 +260,7 @@ def _grasps_section(certified: CertifiedGrasps) -> Section:
             )
         )
     header = (
-        "pose", "x, y, z, mm", "theta, deg", "lifted", "shift x, y, z, mm", "turn, deg",
+        "pose", "certified", "x, y, z, mm", "theta, deg", "lifted", "shift x, y, z, mm", "turn, deg",
         "deviations, mm", "deg", "tilt, deg",
     )  # fmt: skip
     return Section(
@@ -264,8 +268,8 @@ def _grasps_section(certified: CertifiedGrasps) -> Section:
         text=[
             "In the part's rest frame: under its centroid, z up, axes of the mesh file turned into the "
             "resting pose. Shift and turn of the part in the hand, and their standard deviations apart from "
-            "errors of the seen pose, along the axes of the grasp. Grasps with a tilt of more than "
-            f"{np.degrees(TILT_LIMIT):g} degrees are not certified, but the best of their pose."
+            "errors of the seen pose, along the axes of the grasp. Grasps that are not certified are the "
+            "best of their pose, which has no certified one."
         ],
         tables=[Table(header=header, rows=rows)],
         page_only=True,

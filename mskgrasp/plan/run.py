@@ -47,6 +47,8 @@ def plan_grasp(config: PlanConfig) -> GraspPlan:
         find_part(part)
     make_folder(config.out)
     with open_cell(config.cell) as cell:
+        if part is not None:
+            cell.arm.check_load(find_part(part).mass)
         planner = make_planner(config.models, config.planner, cell)
         tell_model(planner.models, cell)
         by_hand = config.planner.policy == "certified" and cell.feeder is None

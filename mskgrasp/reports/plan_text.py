@@ -22,11 +22,11 @@ def plan_text(plan: GraspPlan) -> str:
     tilted = f"{tilt:.1f}{_spread(np.degrees(np.sqrt(plan.swing_var.sum())))} deg"
     stages = ", ".join(f"{name} {value:.2f} s" for name, value in plan.seconds.items() if name != "total")
     pose = [] if plan.pose is None else [_pose_text(plan.pose)]
-    n = len(plan.candidates)
+    n, best = len(plan.candidates), float(np.max(plan.qualities, initial=0.0))
     of = {
         "networks": f"best of {n}: {plan.qualities.max():.3f}",
         "uncertified": f"{n} simulated grasps, none certified",
-        "certified": f"{n} certified grasps",
+        "certified": f"{n} certified grasp{'' if n == 1 else 's'}",
         "another planner": "as the planner states it",
     }[plan.planned_by]
     return "\n".join(
@@ -34,7 +34,7 @@ def plan_text(plan: GraspPlan) -> str:
             *pose,
             f"grasp         x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, theta {np.degrees(theta):.1f} deg (base)",
             f"quality       {'none stated' if np.isnan(plan.quality) else f'{plan.quality:.3f} ({of})'}",
-            *([] if np.isnan(plan.quality) else [f"verdict       {verdict(plan.quality)}"]),
+            *([] if np.isnan(plan.quality) else [f"verdict       {verdict(plan.quality, best)}"]),
             f"displacement  {shifts}, {turn} (seen centre, grasp frame)",
             *([] if np.isnan(plan.swing).any() else [f"tilt          {tilted}"]),
             *([] if np.isnan(plan.score) else [f"precision     {precision(plan.score)}"]),
@@ -43,13 +43,18 @@ def plan_text(plan: GraspPlan) -> str:
     )
 
 
-def verdict(quality: float) -> str:
-    """Whether a grasp of this predicted quality is worth trying, in words."""
+def verdict(quality: float, best: float = 0.0) -> str:
+    """Whether a grasp of this predicted quality is worth trying, in words; ``best``: of all candidates."""
     if quality >= MIN_QUALITY:
         return f"worth trying: the part is lifted with a predicted probability of {quality:.0%}"
+    remedy = (
+        f"others reach {best:.0%}, which --planner.min-quality {MIN_QUALITY:g} takes"
+        if best >= MIN_QUALITY
+        else "place it another way"
+    )
     return (
         f"not worth trying: the part is lifted with a predicted probability of {quality:.0%}, under "
-        f"{MIN_QUALITY:.0%}; place it another way"
+        f"{MIN_QUALITY:.0%}; {remedy}"
     )
 
 

@@ -15,6 +15,8 @@ Key = tuple[str, str, int, str]
 """Part, condition, number and planner of a trial."""
 Correction = Literal["none", "predicted", "seen"]
 CORRECTIONS: tuple[Correction, ...] = ("none", "predicted", "seen")
+TOO_HEAVY = "too heavy for the arm"
+"""Reason of a trial that was not made, followed by the mass."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,7 +33,7 @@ from mskgrasp.planning.place_pose import (
 )
 from mskgrasp.planning.release import release_opening
 from mskgrasp.trials.engine import PlannedGrasp, PlansGrasps, TrialEngine
-from mskgrasp.trials.placed_trial import PlacedTrial
+from mskgrasp.trials.placed_trial import TOO_HEAVY, PlacedTrial
 from mskgrasp.trials.trial import reason_of
 
 TURNS = float(np.radians(45.0))
@@ -70,7 +70,7 @@ def trials_of_scene(
         try:
             planned = engine.present(str(part.folder), seeds[0], planner_of(trial.planner))
         except LoadTooHeavy:
-            yield replace(trial, reason=f"too heavy for the arm ({part.mass:.1f} kg)")
+            yield replace(trial, reason=f"{TOO_HEAVY} ({part.mass:.1f} kg)")
             continue
         plan = planned.plan
         if plan is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import cv2
@@ -92,6 +93,27 @@ def test_a_part_that_nothing_lifts_gets_a_report_that_says_so_first(tmp_path):
     assert headline.startswith("hex_nut_m20 was not grasped: none of 8 attempts lifted it (")
     assert "refused" in headline and "no grasp lifts it" in headline
     assert "by 2 scenes: 0 to 66%" in headline  # in which both planners plan the same
+
+
+def test_a_part_that_is_too_heavy_was_not_tried(tmp_path):
+    trials = [
+        failed(0, "too heavy for the arm (4.2 kg)", planner=planner, planned_by=None)
+        for planner in ("certified", "networks")
+    ]
+    known = certified(certified_grasp(), conditions=CONDITIONS)
+    headline, _ = write_report(tmp_path, PART, known, trials, parse_tolerance("1mm,2deg"), {})
+    assert headline == (
+        "hex_nut_m20 was not grasped: none of 2 attempts could be made (too heavy for the arm (4.2 kg) 2)."
+    )
+
+
+def test_every_grasp_says_whether_it_is_certified(tmp_path):
+    slipping = certified_grasp(resting=2, lifted=20)
+    known = certified(certified_grasp(), uncertified=(slipping,), conditions=CONDITIONS)
+    write_report(tmp_path, PART, known, [made(0)], parse_tolerance("1mm,2deg"), {})
+    table = (tmp_path / "report.html").read_text().split("All grasps</h2>")[1]
+    found = re.findall(r"<td[^>]*>(yes|no)</td>", table)
+    assert found == ["yes", "no"]
 
 
 def test_a_pose_in_which_the_part_always_tilts_is_told_with_its_grasps():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ import pytest
 
 from hal import Cell, open_cell
 from hal.arm import JOINT_TOLERANCE
-from hal.errors import ArmInView
+from hal.errors import ArmInView, LoadTooHeavy
 from mskgrasp.core.errors import BadConfig, UnknownPart
 from mskgrasp.parts import find_part
 from mskgrasp.plan.config import PlanConfig
@@ -60,6 +61,14 @@ def test_no_grasp_is_planned_while_the_arm_may_be_in_view_unless_it_goes_home(tm
     assert (config.out / "plan.json").exists()
     assert off_home[0] == pytest.approx([0.3, 0, 0, 0, 0, 0, 0], abs=JOINT_TOLERANCE)
     assert off_home[1] == pytest.approx(np.zeros(7), abs=JOINT_TOLERANCE)
+
+
+def test_a_part_that_the_arm_cannot_carry_gets_no_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    heavy = dataclasses.replace(find_part(PART), mass=4.2)
+    monkeypatch.setattr("mskgrasp.plan.run.find_part", lambda _: heavy)
+    with pytest.raises(LoadTooHeavy, match=r"the part weighs 4\.200 kg, this arm carries"):
+        plan_grasp(PlanConfig(part=PART, out=tmp_path / "plan"))
+    assert not (tmp_path / "plan" / "plan.json").exists()
 
 
 def test_an_unknown_part_and_an_unknown_cell_are_refused_and_nothing_is_written(tmp_path: Path):

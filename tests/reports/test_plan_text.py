@@ -32,7 +32,9 @@ def test_a_plan_is_described_in_millimetres_and_degrees():
 
 def test_a_plan_says_whether_it_is_worth_trying():
     assert verdict(0.5) == "worth trying: the part is lifted with a predicted probability of 50%"
-    assert verdict(0.31).startswith("not worth trying: ") and "31%, under 50%" in verdict(0.31)
+    assert verdict(0.31, 0.4).startswith("not worth trying: ") and "31%, under 50%" in verdict(0.31)
+    assert verdict(0.31, 0.4).endswith("; place it another way")
+    assert verdict(0.01, 0.695).endswith("; others reach 70%, which --planner.min-quality 0.5 takes")
     plan = planner().plan(FRAME, np.random.default_rng(0))
     assert f"verdict       {verdict(plan.quality)}" in plan_text(plan).splitlines()
 
