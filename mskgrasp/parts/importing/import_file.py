@@ -96,7 +96,7 @@ def import_file(
     content = read_content(path)
     sha256 = _sha256(content)
     origin = Origin(path=path.resolve(), sha256=sha256.hex(), unit=unit, bodies=bodies)
-    digest = _recipe_hash(path, sha256, family, unit, density, licence, bodies)
+    digest = _recipe_hash(path.resolve(), sha256, family, unit, density, licence, bodies)
     if bodies != "split":
         _check_available(name, check_name)
         known = _known(name, digest)
@@ -178,10 +178,14 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
         note(f"{path} has changed since its import; imported again with {known.density:g} kg/m^3{read_in}")
     elif not current:
         note(f"{path} was imported by another version of mskgrasp; imported again")
-    return import_part(
+    imported = import_file(
         path, name=name, unit=unit, family=known.family, density=known.density, licence=known.licence,
         bodies=origin.bodies,
     )  # fmt: skip
+    if len(imported.parts) != 1:
+        names = ", ".join(part.name for part in imported.parts)
+        raise BadPart(f"{path} holds {len(imported.parts)} bodies now, which are the parts {names}: name one")
+    return imported.parts[0]
 
 
 def _sha256(content: bytes) -> bytes:

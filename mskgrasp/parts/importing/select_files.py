@@ -44,6 +44,9 @@ def select_files(arguments: Sequence[Path]) -> Selected:
             if not found:
                 refused.append((argument, f"no file matches {argument}: check the path and the quotes"))
                 continue
+        elif not os.path.lexists(argument):
+            refused.append((argument, f"there is no file or folder {argument}: check the path"))
+            continue
         else:
             files.setdefault(os.path.abspath(argument), argument)
             continue

@@ -136,6 +136,7 @@ def test_mistakes_of_the_command_line_are_reported_in_one_line(importing, tmp_pa
     for file, options, said in (
         ("*.step", {}, "no file matches *.step"),
         ("bare", {}, "the folder bare holds no CAD file"),
+        ("gone.stl", {}, "there is no file or folder gone.stl"),
         ("box.stl", {"split": True, "union": True}, "--split and --union exclude each other"),
         ("box.stl", {"density": 7.85}, "in kg/m^3, not g/cm^3"),
         ("box.stl", {"workers": -1}, "--workers -1: give a number of processes"),

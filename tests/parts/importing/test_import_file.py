@@ -109,6 +109,25 @@ def test_a_file_that_has_changed_is_imported_again_with_the_options_of_its_impor
     assert capsys.readouterr().err == ""
 
 
+def test_a_file_is_the_same_part_through_a_link(tmp_path, capsys):
+    trimesh.creation.box((40, 30, 20)).export(tmp_path / "box.stl")
+    link = tmp_path / "link.stl"
+    link.symlink_to("box.stl")
+    part = import_part(link, density=1050.0)
+    assert (part.name, part_of_file(link).content_hash) == ("link", part.content_hash)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_file_that_was_to_be_split_and_now_holds_two_bodies_is_no_part(tmp_path):
+    file = tmp_path / "pair.stl"
+    trimesh.creation.box((40, 30, 20)).export(file)
+    import_part(file, bodies="split", density=1000)
+    write_two_bodies(file)
+    for _ in range(2):
+        with pytest.raises(BadPart, match="holds 2 bodies now, which are the parts pair-1, pair-2: name one"):
+            part_of_file(file)
+
+
 def test_another_version_imports_a_file_again_with_the_options_of_its_import(tmp_path, monkeypatch, capsys):
     file = tmp_path / "box.stl"
     trimesh.creation.box((1, 0.5, 0.4)).export(file)

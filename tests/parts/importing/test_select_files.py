@@ -39,5 +39,9 @@ def test_links_out_of_a_folder_are_refused_unless_the_user_names_them(folder, tm
 
 def test_nothing_that_matches_is_a_refusal_with_a_remedy(tmp_path):
     (tmp_path / "empty").mkdir()
-    reasons = [reason for _, reason in select_files([tmp_path / "empty", tmp_path / "*.stl"]).refused]
-    assert "holds no CAD file" in reasons[0] and "no file matches" in reasons[1]
+    asked = [tmp_path / "empty", tmp_path / "*.stl", tmp_path / "nothere", tmp_path / "gone.stl"]
+    found = select_files(asked)
+    reasons = [reason for _, reason in found.refused]
+    assert "holds no CAD file" in reasons[0] and "no file matches" in reasons[1] and not found.files
+    for path, said in zip(asked[2:], reasons[2:], strict=True):
+        assert f"there is no file or folder {path}" in said
