@@ -26,7 +26,9 @@ def written(path, shift: np.ndarray):
     theta = 0.1
     vectors = [(0.0, 0.0, 0.0105, theta), (0.0, 0.06, 0.0105, theta)]
     write_isaac_grasp(
-        path, PART, certified(*(certified_grasp(resting=FLAT, grasp=np.array(one)) for one in vectors))
+        path,
+        PART,
+        certified(*(certified_grasp(resting=FLAT, grasp=np.array(one)) for one in vectors), like={}),
     )
     values = yaml.safe_load(path.read_text())
     good, miss = values["grasps"].values()

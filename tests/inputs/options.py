@@ -153,7 +153,7 @@ ROWS = [
         "assess",
         "fewer simulations than any grasp comes of",
         _words("hex_nut_m30", "--simulations", "19"),
-        "--simulations: at least 20",
+        "--simulations: at least 24",
     ),
     Row("plan", "the unit of no CAD file", _words("--part", "hex_nut_m30", "--unit", "mm"), "--unit is for"),
     Row(
