@@ -222,7 +222,7 @@ def _summarise(meta: ModelMeta, out: Path) -> None:
             f"displacement, {name.replace('_', ' ')}: {values['translation_rmse'] * 1e3:.2f} mm, "
             f"{math.degrees(values['rotation_rmse']):.2f} deg"
         )
-    if not gqn["auroc"] > _CHANCE:
+    if gqn["auroc"] <= _CHANCE:
         note(
             "warning: on held-out parts the quality ranks grasps no better than chance; collect more attempts"
         )
