@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from mskgrasp.assess.config import AssessConfig, Tolerance, parse_tolerance
+from hal.errors import LoadTooHeavy
+from mskgrasp.assess.config import LEAST_SIMULATIONS, AssessConfig, Tolerance, parse_tolerance
 from mskgrasp.assess.index import IndexEntry, write_index
 from mskgrasp.assess.report import poses_section, trials_section, write_report
 from mskgrasp.assess.summary import Row
-from mskgrasp.assess.trials import AssessSetup, scene_tasks, trial_bench, write_cells
+from mskgrasp.assess.trials import EXACT, AssessSetup, scene_tasks, trial_bench, write_cells
 from mskgrasp.core.errors import BadPart, MskgraspError, UsageError
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import Part, find_part
@@ -24,6 +25,7 @@ from mskgrasp.runtime.run_folder import TRIALS, opened_run, resume_trials, rewri
 from mskgrasp.runtime.worker_pool import process_count
 from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.simulation.certify_parts import certify
+from mskgrasp.trials.cell_file import check_loads
 from mskgrasp.trials.placed_scenes import placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 
@@ -129,10 +131,11 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
     workers = process_count(config.workers)
     inputs = {"part": part.name} | model_digests(config.models) | part_digests([place])
     with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
-        settings = CertifyConfig(simulations=config.n_simulations, seed=config.seed)
+        cells = write_cells(out)
+        settings = CertifyConfig(simulations=_simulations(part, config, cells[EXACT]), seed=config.seed)
         certified = certify([place], settings, config.models, workers)[part.name]
         begin_trials(out, certified)
-        trials = _trials(part, certified, config, out, workers)
+        trials = _trials(part, certified, config, cells, out, workers)
         headline, rows = write_report(out, part, certified, trials, tolerance, config.model_dump(mode="json"))
     print_sections(
         [
@@ -141,6 +144,19 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
         ]
     )
     return Assessed(part=part, headline=headline, rows=rows)
+
+
+def _simulations(part: Part, config: AssessConfig, cell_file: Path) -> int:
+    """As many as were asked for; the fewest where the arm cannot carry the part, so that nothing is tried."""
+    try:
+        check_loads(cell_file, [part])
+    except LoadTooHeavy:
+        note(
+            f"{part.name} ({part.mass:.1f} kg) is too heavy for the arm: nothing is tried, and few grasps "
+            "are simulated"
+        )
+        return LEAST_SIMULATIONS
+    return config.n_simulations
 
 
 def begin_trials(out: Path, certified: CertifiedGrasps) -> None:
@@ -162,13 +178,18 @@ def begin_trials(out: Path, certified: CertifiedGrasps) -> None:
 
 
 def _trials(
-    part: Part, certified: CertifiedGrasps, config: AssessConfig, out: Path, workers: int
+    part: Part,
+    certified: CertifiedGrasps,
+    config: AssessConfig,
+    cells: dict[str, Path],
+    out: Path,
+    workers: int,
 ) -> list[PlacedTrial]:
     setup = AssessSetup(
         source=str(part.folder),
         certified=certified,
         models=config.models,
-        cells=write_cells(out),
+        cells=cells,
         out=out,
         seed=config.seed,
     )
