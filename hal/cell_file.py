@@ -55,11 +55,15 @@ def write_values(path: Path, section: str, values: Mapping[str, str], *, after: 
     Raises:
         BadConfig: The file cannot be rewritten; it is as before.
     """
-    # A link stays a link.
-    write_whole(path.resolve(), _with_values_of(path, section, values, after))
+    new = _edited(path, section, values, after)
+    if new is None:
+        by_hand = ", ".join(f"{key}: {value}" for key, value in values.items())
+        raise BadConfig(f"{path}: the text cannot be edited; write {by_hand} into {section} by hand")
+    write_whole(path.resolve(), new)  # a link stays a link
 
 
-def _with_values_of(path: Path, section: str, values: Mapping[str, str], after: str) -> bytes:
+def _edited(path: Path, section: str, values: Mapping[str, str], after: str) -> bytes | None:
+    """The file with other values; None where editing its text would not set these alone."""
     stored = path.read_bytes().decode()
     line_end = "\r\n" if "\r\n" in stored else "\n"
     text = stored.replace("\r\n", "\n")
@@ -70,10 +74,7 @@ def _with_values_of(path: Path, section: str, values: Mapping[str, str], after: 
     before, found = yaml.safe_load(text), _load(new)
     told = {key: yaml.safe_load(value) for key, value in values.items()}
     expected = {**before, section: {**before[section], **told}}
-    if found != expected:
-        by_hand = ", ".join(f"{key}: {value}" for key, value in values.items())
-        raise BadConfig(f"{path}: the text cannot be edited; write {by_hand} into {section} by hand")
-    return new.replace("\n", line_end).encode()
+    return new.replace("\n", line_end).encode() if found == expected else None
 
 
 def require_writable(path: Path, what: str, section: str, values: Mapping[str, str], *, after: str) -> None:
@@ -92,7 +93,11 @@ def require_writable(path: Path, what: str, section: str, values: Mapping[str, s
     """
     if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):
         raise UsageError(f"{path} is not writable; {what} is written there: copy the file, give the copy")
-    _with_values_of(path, section, values, after)
+    if _edited(path, section, values, after) is None:
+        raise BadConfig(
+            f"{path}: {what} could not be written into {section}, whose text stands for other places, too; "
+            "write the section out, without an alias (*)"
+        )
 
 
 def number(value: float, digits: int = 5) -> str:

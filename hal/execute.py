@@ -227,7 +227,7 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
 
     Raises:
         HandFull: The hand holds something that nobody took; nothing moved.
-        OutOfWorkspace: No way home is free of table and keep-outs; only the fingers moved.
+        OutOfWorkspace: The way up, or home, is refused; the fingers are open.
         MotionAborted: The hand touched something.
     """
     arm = cell.arm

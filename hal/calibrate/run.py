@@ -32,7 +32,7 @@ from hal.cell import Cell, Workspace
 from hal.charuco import Board
 from hal.errors import OutOfWorkspace
 from hal.open_cell import cell_from_values, cell_from_yaml
-from hal.operator import Operator
+from hal.operator import Operator, StoppedByOperator
 from hal.table import fit_table
 from mskgrasp.core.config import check_config, read_config, read_yaml, write_config
 from mskgrasp.core.errors import UsageError
@@ -105,7 +105,12 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
             rng=np.random.default_rng(config.seed),
             keep=keep,
         )
-        operator.wait_for("Take hold of the board; Enter: the fingers open, q to stop: ")
+        try:
+            operator.wait_for("Take hold of the board; Enter: the fingers open, q to stop: ")
+        except StoppedByOperator as error:
+            raise StoppedByOperator(
+                f"stopped by the operator, the board in the hand; solve the pictures with --from {config.out}"
+            ) from error
         if operator.asks:
             cell.arm.open_gripper()
     return cell.workspace

@@ -43,12 +43,11 @@ def plan_grasp(config: PlanConfig) -> GraspPlan:
     part = None if config.part is None else part_name(config.part, config.unit)
     if config.unit is not None and part is None:
         raise UsageError("--unit is for a CAD file in --part; omit it")
-    if part is not None:
-        find_part(part)
+    known = None if part is None else find_part(part)
     make_folder(config.out)
     with open_cell(config.cell) as cell:
-        if part is not None:
-            cell.arm.check_load(find_part(part).mass)
+        if known is not None:
+            cell.arm.check_load(known.mass)
         planner = make_planner(config.models, config.planner, cell)
         tell_model(planner.models, cell)
         by_hand = config.planner.policy == "certified" and cell.feeder is None
@@ -57,7 +56,7 @@ def plan_grasp(config: PlanConfig) -> GraspPlan:
         if config.go_home:
             _go_home(cell, Operator(cell))
         frame = capture_at_home(cell)
-        chooser = planner if part is None else planner_of_part(planner, cell, find_part(part))
+        chooser = planner if known is None else planner_of_part(planner, cell, known)
         plan = chooser.plan(frame, np.random.default_rng(config.seed))
     text = json.dumps(dict(plan.to_json(), seed=config.seed), indent=1, allow_nan=False)
     write_whole(config.out / "plan.json", (text + "\n").encode())

@@ -99,7 +99,7 @@ def test_trials_planned_by_other_certified_grasps_are_made_again(tmp_path, capsy
     assert (tmp_path / FILE).read_bytes() == more.contents()
 
 
-def test_several_parts_of_which_one_cannot_be_assessed_end_with_1_and_an_index(cad, tmp_path, monkeypatch):
+def test_several_parts_that_cannot_be_assessed_end_with_1_and_an_index(cad, tmp_path, monkeypatch):
     for name in ("broken", "torn"):
         (cad / f"{name}.stl").write_bytes(b"solid nothing\n")
     assert run(monkeypatch, cad / "broken.stl", cad / "torn.stl", "--out", tmp_path / "out") == 1

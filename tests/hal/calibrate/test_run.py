@@ -163,13 +163,19 @@ def test_an_operator_gives_the_board_and_takes_it_back(monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize(
-    ("answers", "n_pictures"), [("q\n", 0), ("\nq\n", 0), ("\n\nq\n", 0), ("\n\n\nq\n", 8)]
+    ("answers", "n_pictures", "remedy"),
+    [
+        ("q\n", 0, "the same command goes on"),
+        ("\nq\n", 0, "the same command goes on"),
+        ("\n\nq\n", 0, "the same command goes on"),
+        ("\n\n\nq\n", 8, "the board in the hand; solve the pictures with --from"),
+    ],
 )
 def test_an_operator_may_stop_at_every_question(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, answers: str, n_pictures: int
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, answers: str, n_pictures: int, remedy: str
 ):
     with_operator(monkeypatch, bench(), answers)
-    with pytest.raises(StoppedByOperator):
+    with pytest.raises(StoppedByOperator, match=remedy):
         capture(TOY.model_copy(update={"out": tmp_path}), SAPIEN)
     assert len(picture_paths(tmp_path)) == n_pictures
 

@@ -141,7 +141,7 @@ def test_a_table_that_is_not_found_writes_nothing(tmp_path: Path, monkeypatch: p
         (
             REAL + "v: &v {table_z: 0.0}\nworkspace: *v\n",
             (),
-            "write table_z: 0.0, table_slope: [0.0, 0.0] into workspace by",
+            "the table could not be written into workspace, whose text stands for other places",
         ),
         (REAL + "workspace: {table_z: null}\n", ("--table-at", "0"), "standard input is no terminal"),
         ("type: mujoco\n", ("--table-at", "0"), "--table-at is for a cell with arm and camera"),
