@@ -62,6 +62,7 @@ def find_part_pixels(
     table_z: float,
     region: tuple[float, float, float, float],
     min_height: float = 0.002,
+    part_height: float = math.inf,
 ) -> FoundPart:
     """Find the largest connected group of pixels higher than ``min_height``; an exact image is not filtered.
 
@@ -79,6 +80,7 @@ def find_part_pixels(
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
         min_height: Least height of a part above the table, metres.
+        part_height: Height of a known part as it lies flattest, metres; infinite: it is not known.
 
     Raises:
         NoPartFound: Nothing rises above the table there, a noisy camera measures the table more than
@@ -91,10 +93,10 @@ def find_part_pixels(
     x_min, x_max, y_min, y_max = region
     near = (x > x_min - REGION_MARGIN) & (x < x_max + REGION_MARGIN)
     near &= (y > y_min - REGION_MARGIN) & (y < y_max + REGION_MARGIN)
-    table_offset, reach, link_height = 0.0, 1, min_height
+    table_offset = 0.0
     noise = _noise(heights, near)
     if noise > QUIET:
-        min_height, reach = max(min_height, noise), 5
+        min_height = max(min_height, noise)
         tops = _median(heights)
         table_offset = _offset(tops[near], min_height)
         if abs(table_offset) > min_height:
@@ -103,17 +105,18 @@ def find_part_pixels(
                 f"{min_height * 1e3:g} mm are forgiven: the camera's pose or table_z is wrong; calibrate "
                 "again"
             )
-        tops = tops - table_offset
-        heights = _mean(heights - table_offset, 2 * min_height)
-        link_height = min(min_height, max(min_height / 2, LINK_DEVIATIONS * MEAN_NOISE * noise))
-    raised = near & (heights > min_height)
-    if raised.sum() > MOST_RAISED * max(near.sum(), 1):
+        tops, heights = tops - table_offset, heights - table_offset
+    raised, mask, n_other = _raised_group(heights, near, min_height, noise)
+    if _too_much(raised, near):
         raise NoPartFound(
             f"{raised.sum() / near.sum():.0%} of the region rise more than {min_height * 1e3:g} mm above the "
             f"table (median {np.median(tops[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
             f"{table_z:g} or the camera's pose is wrong; calibrate the camera again"
         )
-    mask, n_other = _largest_group(raised, near & (heights > link_height), reach)
+    flat = max(part_height / 2, LINK_DEVIATIONS * MEAN_NOISE * noise)
+    if mask is None and flat < min_height:
+        raised, mask, n_other = _raised_group(heights, near, flat, noise)
+        mask = None if _too_much(raised, near) else mask
     if mask is None:
         highest = tops[near].max() if near.any() else np.nan
         raise NoPartFound(
@@ -125,6 +128,22 @@ def find_part_pixels(
     )
 
 
+def _raised_group(
+    heights: np.ndarray, near: np.ndarray, least: float, noise: float
+) -> tuple[np.ndarray, np.ndarray | None, int]:
+    """Find the pixels higher than ``least``, their largest group, and the size of the second largest."""
+    reach, link_height = 1, least
+    if noise > QUIET:
+        reach, heights = 5, _mean(heights, 2 * least)
+        link_height = min(least, max(least / 2, LINK_DEVIATIONS * MEAN_NOISE * noise))
+    raised = near & (heights > least)
+    return raised, *_largest_group(raised, near & (heights > link_height), reach)
+
+
+def _too_much(raised: np.ndarray, near: np.ndarray) -> bool:
+    return bool(raised.sum() > MOST_RAISED * max(near.sum(), 1))
+
+
 def view_part(
     depth: Array,
     intrinsics: np.ndarray,
@@ -133,6 +152,7 @@ def view_part(
     table_z: float,
     region: tuple[float, float, float, float],
     min_height: float = 0.002,
+    part_height: float = math.inf,
     alone: bool = False,
 ) -> PartView:
     """Detect the part on the table: the box around its pixels (`find_part_pixels`).
@@ -148,6 +168,7 @@ def view_part(
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
         min_height: Least height of a part above the table, metres.
+        part_height: As of `find_part_pixels`.
         alone: Refuse a second part; in a noisy image one that is more than four pixels away.
 
     Raises:
@@ -155,8 +176,9 @@ def view_part(
             the image is no depth in metres.
     """
     found = find_part_pixels(
-        depth, intrinsics, T_base_camera, table_z=table_z, region=region, min_height=min_height
-    )
+        depth, intrinsics, T_base_camera,
+        table_z=table_z, region=region, min_height=min_height, part_height=part_height,
+    )  # fmt: skip
     mask, (x, y, _) = found.mask, found.points_base
     x_min, x_max, y_min, y_max = region
     if mask[[0, -1]].any() or mask[:, [0, -1]].any():

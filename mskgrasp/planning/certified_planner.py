@@ -65,10 +65,10 @@ class CertifiedPlanner:
         certified: CertifiedGrasps,
         reachable: Callable[[Grasp], bool] | None = None,
     ):
-        self._planner = planner
+        self._known = KnownPart.of(part, certified.stands)
+        self._planner = planner.for_part(self._known.least_top)
         self._part = part
         self._certified = certified
-        self._known = KnownPart.of(part, certified.stands)
         self._surface = PartSurface.of(part)
         self._reachable = reachable or (lambda grasp: True)
 

@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+import copy
+import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -73,6 +75,7 @@ class Planner:
         self.table_z = table_z
         self.region = region
         self.min_height = min_height
+        self._part_height = math.inf
         self._lowest_grasp_z = lowest_grasp_z
 
     @classmethod
@@ -90,6 +93,12 @@ class Planner:
             min_height=workspace.min_height,
             lowest_grasp_z=workspace.lowest_grasp_z,
         )
+
+    def for_part(self, height: float) -> Planner:
+        """The same planner for a known part of a height as it lies flattest, metres."""
+        other = copy.copy(self)
+        other._part_height = height
+        return other
 
     def plan(self, frame: RgbdFrame, rng: np.random.Generator) -> GraspPlan:
         """Plan a grasp of the part in a frame.
@@ -148,6 +157,7 @@ class Planner:
                 self.config.least_quality,
                 region=self.region,
                 min_height=self.min_height,
+                part_height=self._part_height,
             )
             raise GraspRefused(f"no grasp found (best quality {best:.2f}): {reason}", best)
 
@@ -256,6 +266,7 @@ class Planner:
             table_z=self.table_z,
             region=self.region,
             min_height=self.min_height,
+            part_height=self._part_height,
             alone=True,
         )
         if view.table_offset > HIGHEST_TABLE:

@@ -24,6 +24,7 @@ def refusal_reason(
     *,
     region: tuple[float, float, float, float],
     min_height: float,
+    part_height: float,
 ) -> str:
     """State why the predicted qualities are low, as far as the image shows it.
 
@@ -34,6 +35,7 @@ def refusal_reason(
         bound: Lowest predicted quality of a grasp that is tried.
         region: x_min, x_max, y_min, y_max where parts lie, base frame, metres.
         min_height: Least height of a part above the table, metres.
+        part_height: As of `mskgrasp.perception.part_detection.find_part_pixels`.
 
     Returns:
         A clause with its remedy; where the image shows no reason, that the model predicts no better.
@@ -43,7 +45,7 @@ def refusal_reason(
     if fits < CORNERS:
         found = find_part_pixels(
             frame.depth, frame.intrinsics, frame.T_base_camera,
-            table_z=scene.table_z, region=region, min_height=min_height,
+            table_z=scene.table_z, region=region, min_height=min_height, part_height=part_height,
         )  # fmt: skip
         width = narrowest_width(found.points_base[:2, found.mask].T)
         if width > MAX_OPENING:

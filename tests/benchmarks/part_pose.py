@@ -202,7 +202,7 @@ def accuracy_row(model: NoiseModel, results: Sequence[Result]) -> list[str]:
 
     return [
         model, str(len(results)), str(len(results) - len(accepted)), str(sum(one.unseen for one in results)),
-        share([one.look for one in accepted]),
+        share([one.look for one in results]),
         share([one.within(bounds) for one in results]), share([one.within(bounds) for one in accepted]),
         share([one.named_within(bounds) for one in accepted]),
         share([one.squared < CHI_SQUARED_95[one.unknowns] for one in accepted if one.look]),

@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -98,10 +99,17 @@ def test_pixels_without_a_depth_are_left_out(nothing):
     assert synthetic.view(partly).size == pytest.approx(synthetic.view(depth).size)
 
 
-def noisy_view(depth, model, seed, min_height=0.003):
+def noisy_view(depth, model, seed, min_height=0.003, **known):
     noisy = add_noise(depth, INTRINSICS, SensorNoise(model=model), np.random.default_rng(seed))
     return view_part(
-        noisy, INTRINSICS, OVERHEAD, table_z=TABLE_Z, region=REGION, min_height=min_height, alone=True
+        noisy,
+        INTRINSICS,
+        OVERHEAD,
+        table_z=TABLE_Z,
+        region=REGION,
+        min_height=min_height,
+        alone=True,
+        **known,
     )
 
 
@@ -160,10 +168,48 @@ def test_two_parts_are_two_through_noise_on_a_tilted_table_too(degrees):
 
 
 @pytest.mark.parametrize("model", ["iid", "kinect2"])
-def test_an_empty_table_stays_empty_whatever_the_noise(model):
+@pytest.mark.parametrize("part_height", [math.inf, 0.004])
+def test_an_empty_table_stays_empty_whatever_the_noise(model, part_height):
     for seed in range(30):
         with pytest.raises(NoPartFound):
-            noisy_view(render([]), model, seed)
+            noisy_view(render([]), model, seed, part_height=part_height)
+
+
+def test_a_wire_of_4_mm_is_seen_through_the_noise_of_a_kinect_where_that_is_what_is_looked_for():
+    """Two pixels wide: smoothed, it rises by less than the 3 mm that may be noise."""
+    unseen, errors = 0, []
+    for seed in range(30):
+        yaw = float(np.random.default_rng(seed).uniform(-1.5, 1.5))
+        depth = render([Box(x=0.455, y=0.0, yaw=yaw, size=(0.05, 0.004, 0.004))])
+        try:
+            noisy_view(depth, "kinect2", seed)
+        except NoPartFound:
+            unseen += 1
+        seen = noisy_view(depth, "kinect2", seed, part_height=0.004)
+        errors.append(seen.centre_base[:2] - [0.455, 0.0])
+    assert unseen > 10
+    assert np.abs(errors).max() < 0.015  # an end may be missing
+
+
+def test_a_flat_part_that_is_looked_for_shows_itself_in_an_exact_image():
+    box = Box(x=0.455, y=0.0, yaw=0.2, size=(0.06, 0.03, 0.0016))
+    with pytest.raises(NoPartFound, match="more than 2 mm"):
+        view_part(render([box]), INTRINSICS, OVERHEAD, table_z=TABLE_Z, region=REGION)
+    view = view_part(render([box]), INTRINSICS, OVERHEAD, table_z=TABLE_Z, region=REGION, part_height=0.0016)
+    assert view.size[2] == pytest.approx(0.0016, abs=1e-5)
+
+
+def test_a_part_that_is_known_to_be_flat_is_seen_as_before_where_it_rises_high_enough():
+    depth = render([Box(x=0.455, y=0.0, yaw=0.4, size=(0.06, 0.04, 0.03))])
+    usual, known = (noisy_view(depth, "kinect2", 0, part_height=one) for one in (math.inf, 0.004))
+    assert np.array_equal(usual.centre_base, known.centre_base) and np.array_equal(usual.size, known.size)
+
+
+def test_a_table_that_is_seen_tilted_is_not_taken_for_a_flat_part():
+    """2.6 mm up and down over the region: most of it rises over half of a flat part's height."""
+    depth = render([]) + np.linspace(0.0026, -0.0026, 160, dtype=np.float32)
+    with pytest.raises(NoPartFound, match="nothing rises"):
+        view_part(noisy(depth, 0.0004), INTRINSICS, OVERHEAD, **FIND, part_height=0.001)
 
 
 def test_noise_does_not_raise_the_top():

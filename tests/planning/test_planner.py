@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from mskgrasp.core.errors import BadModel, NoGraspFound, NoPartFound, TableTooHigh
+from mskgrasp.core.errors import BadModel, GraspRefused, NoGraspFound, NoPartFound, TableTooHigh
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.learning.compute_device import compute_device
 from mskgrasp.learning.grasp_models import load_models
@@ -212,6 +212,17 @@ def test_two_parts_are_refused():
     other = Box(x=0.45, y=-0.06, yaw=0.0, size=(0.04, 0.02, 0.02))
     with pytest.raises(NoPartFound, match="two things lie in the region.*take one away"):
         planner().plan(synthetic.frame([BOX, other]), np.random.default_rng(0))
+
+
+def test_a_part_that_is_known_to_be_flat_is_seen_and_refused_as_such():
+    flat = synthetic.frame([Box(x=0.5, y=0.0, yaw=0.0, size=(0.06, 0.09, 0.0018))])
+    demanding = PlannerConfig(n_candidates=600, min_quality=0.999)
+    with pytest.raises(NoPartFound, match="nothing rises"):
+        planner(demanding).plan(flat, np.random.default_rng(0))
+    known = planner(demanding).for_part(0.0018)
+    assert known.view(flat).size[2] == pytest.approx(0.0018, abs=1e-5)
+    with pytest.raises(GraspRefused):
+        known.plan(flat, np.random.default_rng(0))
 
 
 def test_no_candidate_is_lower_than_the_cell_allows():

@@ -146,6 +146,11 @@ class KnownPart:
                 groups.append([(seen, 0.0)])
         return cls(part=part, cell=cell, looks=tuple(map(_look, groups)))
 
+    @property
+    def least_top(self) -> float:
+        """Height of the highest point of the part as it lies flattest, metres."""
+        return min(look.top for look in self.looks)
+
     def pose(self, lying: Lying, x: float, y: float, turn: float, table_z: float) -> Pose:
         """``T_base_obj`` of the part at a place and turn of the frame of a resting pose."""
         place = Pose(position=np.array([x, y, table_z]), quat_wxyz=quat_about_z(np.asarray(turn)))

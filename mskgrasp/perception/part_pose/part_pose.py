@@ -96,7 +96,7 @@ def find_part_pose(
     """
     found = find_part_pixels(
         frame.depth, frame.intrinsics, frame.T_base_camera,
-        table_z=table_z, region=region, min_height=min_height,
+        table_z=table_z, region=region, min_height=min_height, part_height=known.least_top,
     )  # fmt: skip
     seen = see(found, frame, known, table_z)
     fits = search(seen, known)

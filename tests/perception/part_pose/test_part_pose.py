@@ -56,6 +56,16 @@ def test_a_part_in_mujocos_image_is_found_through_a_kinects_noise(mujoco_cell, n
     assert angle < np.radians(1.5)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_wire_that_is_as_high_as_the_noise_of_a_kinect_is_found(mujoco_cell, seed):
+    """A hook of 4 mm of wire, the least height with this noise being 3 mm."""
+    true = resting_at("s_hook_4x10", 0, 0.5, 0.03, 0.7 * seed)
+    frame = kinect2(posed(mujoco_cell, "s_hook_4x10", true), seed)
+    distance, angle = nearest_symmetric(find(mujoco_cell, frame, "s_hook_4x10", 0.003), true)
+    assert distance < 1e-3
+    assert angle < np.radians(1.5)
+
+
 @pytest.mark.parametrize("resting", range(4))
 def test_every_resting_pose_of_a_bracket_is_distinguished(mujoco_cell, resting):
     true = resting_at("l_bracket_60x40", resting, 0.55, 0.06, -1.0)
