@@ -67,13 +67,15 @@ def _curve(axis: Axes, errors: Sequence[float], n: int, colour: str, style: str)
     axis.step(x, y, where="post", color=colour, linestyle=style, linewidth=1.5)
 
 
+def drawn_poses(part: Part, certified: CertifiedGrasps) -> list[int]:
+    """The most probable resting poses, those that are alike as one, the most probable first."""
+    different = [number for number in range(len(part.resting_probability)) if number not in certified.like]
+    return sorted(different, key=lambda number: -_share_of(part, certified, number))[:MOST_POSES]
+
+
 def draw_grasps(part: Part, certified: CertifiedGrasps, path: Path) -> None:
     """Draw the certified grasps of the most probable resting poses from above."""
-    numbers = [
-        int(number)
-        for number in np.argsort(-part.resting_probability, kind="stable")
-        if number not in certified.like
-    ][:MOST_POSES]
+    numbers = drawn_poses(part, certified)
     mesh = trimesh.load_mesh(part.mesh_path, process=False)
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
     columns = min(3, len(numbers))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mskgrasp.assess.config import Tolerance
-from mskgrasp.assess.figures import MOST_POSES, draw_grasps, draw_shares
+from mskgrasp.assess.figures import MOST_POSES, draw_grasps, draw_shares, drawn_poses
 from mskgrasp.assess.scene import scene_page
 from mskgrasp.assess.summary import DISTANCES, Row, summarise, summary_json, verdict
 from mskgrasp.assess.trials import EXACT, NOISY
@@ -69,6 +69,7 @@ def write_report(
     rows = summarise(trials, tolerance, TILT_LIMIT)
     verdicts = {name: verdict(rows, name, tolerance) for name in (EXACT, NOISY)}
     headline = conclusion(part, certified, trials, verdicts)
+    poses = drawn_poses(part, certified)
     certified.write(out)
     write_isaac_grasp(out / "grasps.isaac.yaml", part, certified)
     draw_shares(trials, rows, tolerance.distance, out / "shares.png")
@@ -86,9 +87,10 @@ def write_report(
             title="Certified grasps in 3-D",
             views=[
                 View(
-                    page=scene_page(part, certified),
-                    caption="Resting poses, each with the best certified grasp; translucent: where the "
-                    "part is expected once the fingers have closed. Drag to turn, scroll to zoom.",
+                    page=scene_page(part, certified, poses),
+                    caption=f"Pose {', '.join(map(str, poses))} in the order of the figure above, each with "
+                    "its best certified grasp; translucent: where the part is expected once the fingers have "
+                    "closed. Drag to turn, scroll to zoom.",
                 )
             ],
             page_only=True,

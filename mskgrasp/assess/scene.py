@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import trimesh
 from trimesh.viewer.notebook import scene_to_html
@@ -19,31 +21,29 @@ from mskgrasp.reports.hand_boxes import hand_boxes
 
 MOST_FACES = 20_000
 """A finer mesh is shown with its collision hulls instead, so that a report stays small enough to send."""
+_COLUMNS = 3
+"""As in the figure of grasps from above."""
 _PART, _HAND, _GHOST = (160, 165, 175, 255), (31, 111, 235, 255), (232, 89, 12, 90)
 
 
-def scene_page(part: Part, certified: CertifiedGrasps, n_poses: int = 4) -> str:
-    """A page with the most probable resting poses side by side, each with the hand of its best grasp.
+def scene_page(part: Part, certified: CertifiedGrasps, poses: Sequence[int]) -> str:
+    """A page with resting poses in rows of three, each with the hand of its best grasp.
 
     A translucent part shows where it is expected to lie relative to the hand once the fingers have closed.
 
     Args:
         part: The part.
         certified: Its certified grasps.
-        n_poses: Greatest number of resting poses.
+        poses: Numbers of the resting poses, from left to right, the last row in front.
     """
     mesh = trimesh.load_mesh(part.mesh_path, process=False)
     if len(mesh.faces) > MOST_FACES:
         mesh = trimesh.load_scene(part.hulls_path).to_mesh().apply_scale(1e-3)
     scene = trimesh.Scene()
-    numbers = [
-        int(number)
-        for number in np.argsort(-part.resting_probability, kind="stable")
-        if number not in certified.like
-    ][:n_poses]
     step = 1.3 * float(np.linalg.norm(part.extents)) + 0.05
-    for column, number in enumerate(numbers):
-        aside = np.array([column * step, 0.0, 0.0])
+    for place, number in enumerate(poses):
+        row, column = divmod(place, _COLUMNS)
+        aside = np.array([column * step, -row * step, 0.0])
         at = Pose.translation(aside)
         lying = at @ part.resting[number]
         scene.add_geometry(_painted(mesh, _PART), transform=lying.as_matrix())
@@ -57,7 +57,7 @@ def scene_page(part: Part, certified: CertifiedGrasps, n_poses: int = 4) -> str:
     # The viewer's up is y.
     upright = trimesh.transformations.rotation_matrix(-np.pi / 2, [1, 0, 0])
     scene.apply_transform(upright)
-    scene.set_camera(angles=(-0.5, 0.5, 0.0), distance=1.1 * scene.scale, center=scene.centroid)
+    scene.set_camera(angles=(-0.8, 0.2, 0.0), distance=0.95 * scene.scale, center=scene.centroid)
     return scene_to_html(scene)
 
 

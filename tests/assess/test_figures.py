@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mskgrasp.assess.config import parse_tolerance
-from mskgrasp.assess.figures import draw_grasps, draw_shares
+from mskgrasp.assess.figures import draw_grasps, draw_shares, drawn_poses
 from mskgrasp.assess.summary import summarise
 from mskgrasp.assess.trials import NOISY
 from mskgrasp.core.grasp import TILT_LIMIT
@@ -39,3 +39,13 @@ def test_the_best_grasp_is_blue_and_a_pose_without_grasps_is_drawn_too(tmp_path)
     some, none = (picture(tmp_path / f"{name}.png") for name in ("some", "none"))
     assert blue(some) > 200 and blue(none) == 0
     assert some.shape == none.shape
+
+
+def test_poses_that_are_alike_are_drawn_once_and_count_together():
+    n = len(PART.resting_probability)
+    order = np.argsort(-PART.resting_probability, kind="stable").tolist()
+    assert drawn_poses(PART, certified(like={})) == order[:6]
+    # All but the most probable one are like the least probable: together they exceed it.
+    like = {number: (order[-1], 0.0) for number in order[1:-1]}
+    assert n > 2 and PART.resting_probability[order[0]] < 0.5
+    assert drawn_poses(PART, certified(like=like)) == [order[-1], order[0]]
