@@ -26,6 +26,8 @@ _NAMES: dict[Correction, str] = {
 }  # fmt: skip
 MOST_POSES = 6
 """Resting poses drawn, the most probable ones."""
+COLUMNS = 3
+"""Of them in a row."""
 
 
 def draw_shares(trials: Sequence[PlacedTrial], rows: Sequence[Row], distance: float, path: Path) -> None:
@@ -78,7 +80,7 @@ def draw_grasps(part: Part, certified: CertifiedGrasps, path: Path) -> None:
     numbers = drawn_poses(part, certified)
     mesh = trimesh.load_mesh(part.mesh_path, process=False)
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
-    columns = min(3, len(numbers))
+    columns = min(COLUMNS, len(numbers))
     rows = -(-len(numbers) // columns)
     with saved_figure(path, 3.4 * columns, 3.4 * rows) as figure:
         axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()

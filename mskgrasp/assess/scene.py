@@ -10,6 +10,7 @@ from trimesh.viewer.notebook import scene_to_html
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
+from mskgrasp.assess.figures import COLUMNS
 from mskgrasp.core.geometry import Pose, quat_about_z
 from mskgrasp.core.grasp import (
     pose_base_grasp,
@@ -21,8 +22,6 @@ from mskgrasp.reports.hand_boxes import hand_boxes
 
 MOST_FACES = 20_000
 """A finer mesh is shown with its collision hulls instead, so that a report stays small enough to send."""
-_COLUMNS = 3
-"""As in the figure of grasps from above."""
 _PART, _HAND, _GHOST = (160, 165, 175, 255), (31, 111, 235, 255), (232, 89, 12, 90)
 
 
@@ -42,7 +41,7 @@ def scene_page(part: Part, certified: CertifiedGrasps, poses: Sequence[int]) -> 
     scene = trimesh.Scene()
     step = 1.3 * float(np.linalg.norm(part.extents)) + 0.05
     for place, number in enumerate(poses):
-        row, column = divmod(place, _COLUMNS)
+        row, column = divmod(place, COLUMNS)
         aside = np.array([column * step, -row * step, 0.0])
         at = Pose.translation(aside)
         lying = at @ part.resting[number]

@@ -50,3 +50,14 @@ def test_the_moved_part_is_where_it_is_expected():
 def test_poses_without_a_grasp_are_shown_alone():
     parts, boxes = meshes(shown(scene_page(PART, certified(like={}), [0, 1])))
     assert (len(parts), len(boxes)) == (2, 0)
+
+
+def test_poses_stand_in_rows_of_three_the_second_row_in_front():
+    parts, _ = meshes(shown(scene_page(PART, certified(like={}), [0, 1, 2, 0])))
+    # The viewer's up is y, and z comes towards the eye.
+    *behind, front = sorted((one.centroid for one in parts), key=lambda centroid: centroid[2])
+    first, second, third = sorted(behind, key=lambda centroid: centroid[0])
+    step = second[0] - first[0]
+    assert step > max(PART.extents) and third[0] - first[0] == pytest.approx(2 * step, rel=0.2)
+    assert front[:2] == pytest.approx(first[:2], abs=1e-5)
+    assert front[2] - first[2] > max(PART.extents)
