@@ -211,7 +211,7 @@ def test_an_operator_is_asked_before_the_arm_moves_and_may_stop_the_run(
     asked = capfd.readouterr().err
     assert asked.count("May the arm move?") == 3 and re.search(r"quality [01]\.\d\d\n", asked)
     monkeypatch.setattr(sys, "stdin", io.StringIO("y\n"))
-    with pytest.raises(UsageError, match="give --yes"):
+    with pytest.raises(UsageError, match="has --yes give it"):
         evaluate(config(out, trials=2, seed=1))
     report = evaluate(config(out, trials=2, seed=1, yes=True))
     assert report.summary.overall.trials == 2
