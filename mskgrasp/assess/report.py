@@ -89,8 +89,8 @@ def write_report(
                 View(
                     page=scene_page(part, certified, poses),
                     caption=f"Pose {', '.join(map(str, poses))} in the order of the figure above, each with "
-                    "its best certified grasp; translucent: where the part is expected once the fingers have "
-                    "closed. Drag to turn, scroll to zoom.",
+                    "its best certified grasp, if it has one; translucent: where the part is expected once "
+                    "the fingers have closed. Drag to turn, scroll to zoom.",
                 )
             ],
             page_only=True,

@@ -39,7 +39,8 @@ def scene_page(part: Part, certified: CertifiedGrasps, poses: Sequence[int]) -> 
     if len(mesh.faces) > MOST_FACES:
         mesh = trimesh.load_scene(part.hulls_path).to_mesh().apply_scale(1e-3)
     scene = trimesh.Scene()
-    step = 1.3 * float(np.linalg.norm(part.extents)) + 0.05
+    # A grasp is on the part, so that no hand reaches that of the next pose.
+    step = float(np.linalg.norm(part.extents)) + _hand_width()
     for place, number in enumerate(poses):
         row, column = divmod(place, COLUMNS)
         aside = np.array([column * step, -row * step, 0.0])
@@ -56,8 +57,12 @@ def scene_page(part: Part, certified: CertifiedGrasps, poses: Sequence[int]) -> 
     # The viewer's up is y.
     upright = trimesh.transformations.rotation_matrix(-np.pi / 2, [1, 0, 0])
     scene.apply_transform(upright)
-    scene.set_camera(angles=(-0.8, 0.2, 0.0), distance=0.95 * scene.scale, center=scene.centroid)
+    scene.set_camera(angles=(-0.8, 0.2, 0.0), distance=0.92 * scene.scale, center=scene.centroid)
     return scene_to_html(scene)
+
+
+def _hand_width() -> float:
+    return float(max(np.ptp([box.bounds for box in hand_boxes()], axis=(0, 1))))
 
 
 def _motion(grasp: CertifiedGrasp, lying: Pose) -> Pose:

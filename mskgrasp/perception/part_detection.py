@@ -107,16 +107,16 @@ def find_part_pixels(
             )
         tops, heights = tops - table_offset, heights - table_offset
     raised, mask, n_other = _raised_group(heights, near, min_height, noise)
-    if _too_much(raised, near):
+    if _is_mostly_raised(raised, near):
         raise NoPartFound(
             f"{raised.sum() / near.sum():.0%} of the region rise more than {min_height * 1e3:g} mm above the "
             f"table (median {np.median(tops[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
             f"{table_z:g} or the camera's pose is wrong; calibrate the camera again"
         )
-    flat = max(part_height / 2, LINK_DEVIATIONS * MEAN_NOISE * noise)
-    if mask is None and flat < min_height:
-        raised, mask, n_other = _raised_group(heights, near, flat, noise)
-        mask = None if _too_much(raised, near) else mask
+    half = max(part_height / 2, LINK_DEVIATIONS * MEAN_NOISE * noise)
+    if mask is None and half < min_height:
+        raised, mask, n_other = _raised_group(heights, near, half, noise)
+        mask = None if _is_mostly_raised(raised, near) else mask
     if mask is None:
         highest = tops[near].max() if near.any() else np.nan
         raise NoPartFound(
@@ -140,7 +140,8 @@ def _raised_group(
     return raised, *_largest_group(raised, near & (heights > link_height), reach)
 
 
-def _too_much(raised: np.ndarray, near: np.ndarray) -> bool:
+def _is_mostly_raised(raised: np.ndarray, near: np.ndarray) -> bool:
+    """Whether more of the region is raised than a part may cover."""
     return bool(raised.sum() > MOST_RAISED * max(near.sum(), 1))
 
 
