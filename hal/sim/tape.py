@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from mskgrasp.core.errors import TapeDoesNotFit
 from mskgrasp.core.geometry import quat_conjugate, quat_rotate, quat_to_matrix
+from mskgrasp.core.raster import raise_cells
 from mskgrasp.core.settings import Tape
 from mskgrasp.parts import Part
 
@@ -94,27 +95,16 @@ def heights_from_above(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
     Args:
         vertices: (n, 3), x and y in cells, all positive, z in metres.
-        faces: (m, 3), counter-clockwise seen from outside.
+        faces: (m, 3).
 
     Returns:
         (columns, rows) heights over z = 0, indexed [x, y], metres; -inf where a ray meets nothing.
     """
-    size = np.ceil(vertices[:, :2].max(axis=0)).astype(int) + 3
-    heights = np.full(size, -np.inf)
-    for a, b, c in vertices[faces]:
-        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        if area <= 1e-9:  # faces down, or is a wall
-            continue
-        low = np.ceil(np.minimum(np.minimum(a, b), c)[:2]).astype(int)
-        high = np.floor(np.maximum(np.maximum(a, b), c)[:2]).astype(int) + 1
-        x, y = np.arange(low[0], high[0])[:, None], np.arange(low[1], high[1])
-        u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
-        v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
-        inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
-        z = np.where(inside, u * a[2] + v * b[2] + (1 - u - v) * c[2], -np.inf)
-        window = heights[low[0] : high[0], low[1] : high[1]]
-        np.maximum(window, z, out=window)
-    return heights
+    columns, rows = np.ceil(vertices[:, :2].max(axis=0)).astype(int) + 3
+    heights = np.full((rows, columns), -np.inf)
+    x, y, z = np.ascontiguousarray(vertices.T)
+    raise_cells(heights, x, y, z, faces)
+    return heights.T
 
 
 def _room(heights: np.ndarray, side: float) -> np.ndarray:
