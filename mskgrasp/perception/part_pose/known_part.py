@@ -1,4 +1,4 @@
-"""Part prepared for the search for its pose: points of its surface, looks from above, and symmetries."""
+"""Part prepared for the search for its pose: its surface, looks from above, and symmetries."""
 
 from __future__ import annotations
 
@@ -9,27 +9,21 @@ import cv2
 import numpy as np
 import trimesh
 
-from mskgrasp.core.geometry import Pose, quat_about_z, quat_rotate
+from mskgrasp.core.geometry import Pose, quat_about_z
 from mskgrasp.parts import Part
-from mskgrasp.perception.part_pose.surface import (
-    HeightMap,
-    ascending,
-    heights_from,
-    on_plane,
-    sample_surface,
-)
+from mskgrasp.perception.part_pose.surface import HeightMap, Surface, heights_from
 
-MOST_POINTS = 150e3
-"""Greatest number of points on a part's surface, about."""
-LEAST_SPACING = 0.2e-3
-"""Least distance of neighbouring points, metres: a twentieth of the pixel of a Kinect v2 at 0.8 m, halved."""
+MOST_CELLS = 300e3
+"""Greatest number of cells of a map of heights as large as a part's surface, about."""
+LEAST_CELL = 0.2e-3
+"""Least edge of a cell, metres: a tenth of the pixel of a Kinect v2 at 0.8 m."""
 SAME_HEIGHT = 0.3e-3
 """Heights that differ by less, beside a step between neighbouring cells, are the same, metres."""
 SAME_AREA = 3e-6
 """A turned part that differs over less than this, square metres, looks the same: a pixel covers 4.8 mm^2."""
 SAME_SHARE = 0.003
 """The same, as a share of the part's area."""
-SIMILAR_HEIGHT, SIMILAR_AREA, SIMILAR_SHARE = 0.5e-3, 6e-6, 0.03
+SIMILAR_HEIGHT, SIMILAR_AREA, SIMILAR_SHARE = 0.5e-3, 6e-6, 0.04
 """The same for resting poses that are looked for together at first."""
 MOST_ORDERS = 72
 """Greatest order of symmetry other than a full one."""
@@ -39,15 +33,9 @@ _BESIDE = 5
 """Degrees within which there is none that looks more alike."""
 MOST_COMPARED = 12
 """Similar resting poses that are distinguished; more of them are facets of a body of revolution."""
-FEW_POINTS = 20000
-"""Points of a look for a first fit."""
-_TANGENTS = (0.1, 0.18, 0.25)
-"""Tangents of angles between ray and vertical: at 0.8 m a part is at most 0.2 m off the axis, and the walls
-of a deep bore are seen from near the axis only."""
-_SIDES = np.arange(8) * np.pi / 4
-_FAR = 10.0
-_BELOW = 5e-6
-"""Points farther under the table, on which hulls lie and not the mesh, are not seen, metres."""
+_STEEPEST_DOWN = -0.3
+"""Upward component of the normals of faces that look farther down, which no camera above sees: at 0.8 m a
+part is at most 0.2 m off the axis."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,15 +48,14 @@ class Lying:
         resting: Index of the resting pose.
         probability: Of the resting pose.
         turn: The first of those that look alike must be turned by this to look like this one, radians.
-        points: (n, 3) float32 on the surface that a camera above may see, `ascending`, metres; empty where
-            it is not compared with others that look alike.
+        surface: That a camera above may see; None where it is not compared with others that look alike.
         order: Number of turns that look the same; 0: all.
     """
 
     resting: int
     probability: float
     turn: float
-    points: np.ndarray
+    surface: Surface | None
     order: int
 
     @property
@@ -82,18 +69,16 @@ class Look:
     """Resting poses that look alike from above, up to a turn.
 
     Attributes:
-        poses: The most probable first; its frame and points are those of the look.
-        few: (m, 3) some of its points, `ascending`.
-        outline: (k, 2) corners of the convex hull of x, y of one in five of them.
+        poses: The most probable first; its frame and surface are those of the look.
+        outline: (k, 2) corners of the convex hull of x, y of its vertices, metres.
         from_above: Heights of it as seen from straight above.
         top: Height of the highest point, metres.
-        radius: Greatest distance of a point from the vertical through the part's origin, metres.
+        radius: Greatest distance of a vertex from the vertical through the part's origin, metres.
         rivals: Turns at which it nearly looks the same, radians: by a tooth of a gear with holes, or by half
             a turn of a plate with holes at one end.
     """
 
     poses: tuple[Lying, ...]
-    few: np.ndarray
     outline: np.ndarray
     from_above: HeightMap
     top: float
@@ -107,7 +92,7 @@ class KnownPart:
 
     Attributes:
         part: The part.
-        cell: Edge of the cells of height maps of its points, metres.
+        cell: Edge of the cells of its height maps, metres.
         looks: Its resting poses, by how they look from above.
     """
 
@@ -128,15 +113,16 @@ class KnownPart:
             ValueError: No resting pose is looked for.
         """
         mesh = trimesh.load_mesh(part.mesh_path)
-        spacing = max(LEAST_SPACING, float(np.sqrt(mesh.area / MOST_POINTS)))
-        points_obj = sample_surface(np.asarray(mesh.triangles, dtype=float), spacing)
-        cell = spacing / 0.7
+        surface = Surface(
+            vertices=np.asarray(mesh.vertices, dtype=float), faces=np.asarray(mesh.faces, dtype=np.int32)
+        )
+        cell = max(LEAST_CELL, float(np.sqrt(mesh.area / MOST_CELLS)))
         groups: list[list[tuple[_Seen, float]]] = []
         chosen = [i for i in range(len(part.resting_probability)) if stands is None or stands[i]]
         if not chosen:
             raise ValueError(f"no resting pose of {part.name} counts")
         for index in chosen:
-            seen = _Seen.of(part, index, points_obj, cell)
+            seen = _Seen.of(part, index, surface, cell)
             for group in groups:
                 turn = group[0][0].turn_to(seen)
                 if turn is not None:
@@ -163,7 +149,7 @@ class _Seen:
 
     resting: int
     probability: float
-    points: np.ndarray
+    surface: Surface
     from_above: HeightMap
     lower: np.ndarray
     upper: np.ndarray
@@ -171,18 +157,16 @@ class _Seen:
     levels: np.ndarray
 
     @classmethod
-    def of(cls, part: Part, index: int, points_obj: np.ndarray, cell: float) -> _Seen:
-        points = quat_rotate(part.resting.quat_wxyz[index], points_obj)
-        points[:, 2] += part.resting.position[index, 2]
-        # Stored by coordinate, so that each is contiguous.
-        points = np.ascontiguousarray(points.T.astype(np.float32)).T
-        from_above = heights_from(ascending(points), None, plane=0.0, cell=cell, margin=3 * cell)
+    def of(cls, part: Part, index: int, surface: Surface, cell: float) -> _Seen:
+        lying = surface.rotated(part.resting.quat_wxyz[index], part.resting.position[index, 2])
+        lying = lying.facing(_STEEPEST_DOWN)
+        from_above = heights_from(lying, None, plane=0.0, cell=cell, margin=3 * cell)
         lower, upper = from_above.bounds(cell)
         rows, columns = np.mgrid[: lower.shape[0], : lower.shape[1]]
         return cls(
             resting=index,
             probability=float(part.resting_probability[index]),
-            points=points,
+            surface=lying,
             from_above=from_above,
             lower=lower,
             upper=upper,
@@ -274,41 +258,24 @@ class _Seen:
             return max(SIMILAR_AREA, SIMILAR_SHARE * self.area)
         return max(SAME_AREA, SAME_SHARE * self.area)
 
-    def visible(self) -> np.ndarray:
-        """The points that a camera above may see, from any side."""
-        kept, cell = np.zeros(len(self.points), bool), 1.2 * self.from_above.cell
-        above, sorted_points = self.points[:, 2] > -_BELOW, ascending(self.points)
-        for tangent, side in [(0.0, 0.0), *((t, side) for t in _TANGENTS for side in _SIDES)]:
-            eye = _FAR * np.array([tangent * np.cos(side), tangent * np.sin(side), 1.0])
-            shown = heights_from(sorted_points, eye, plane=0.0, cell=cell, margin=2 * cell)
-            x, y = on_plane(self.points, eye, 0.0)
-            column = np.rint((x - shown.corner[0]) / cell).astype(int)
-            row = np.rint((y - shown.corner[1]) / cell).astype(int)
-            # A cell on a wall spans this height.
-            kept |= self.points[:, 2] >= shown.heights[row, column] - cell / (tangent or 0.5)
-        return self.points[kept & above]
-
 
 def _look(group: list[tuple[_Seen, float]]) -> Look:
     first, poses = group[0][0], []
     compared = len(group) <= MOST_COMPARED
-    visible = first.visible()
     for seen, turn in group:
-        points = visible if seen is first else seen.visible() if compared else seen.points[:0]
         poses.append(
             Lying(
                 resting=seen.resting,
                 probability=seen.probability,
                 turn=turn,
-                points=ascending(points),
+                surface=seen.surface if compared or seen is first else None,
                 order=seen.order(similar=not compared) if compared or seen is first else poses[0].order,
             )
         )
-    few = visible[:: max(1, len(visible) // FEW_POINTS)]
+    visible = first.surface.vertices
     return Look(
         poses=tuple(poses),
-        few=ascending(few),
-        outline=cv2.convexHull(np.ascontiguousarray(few[::5, :2]))[:, 0],
+        outline=cv2.convexHull(visible[:, :2].astype(np.float32))[:, 0],
         from_above=first.from_above,
         top=float(visible[:, 2].max()),
         radius=float(np.linalg.norm(visible[:, :2], axis=1).max()),

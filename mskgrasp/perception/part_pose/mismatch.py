@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from mskgrasp.perception.part_pose.known_part import KnownPart
-from mskgrasp.perception.part_pose.likelihood import HeightTable, Pixels, Seen, view
+from mskgrasp.perception.part_pose.likelihood import ExactHeights, Seen
 from mskgrasp.perception.part_pose.search import Fit
 
 UNEXPLAINED, UNEXPLAINED_SIGMAS = 0.7e-3, 3.5
@@ -24,10 +24,8 @@ LARGE = 2.5
 MOST_PATCH, MOST_PATCH_SHARE = 5, 0.03
 """Greatest patch of large excess: pixels, and in an exact image a share of the part's pixels more: there a
 facet of a body of revolution differs from the next by more than the noise."""
-MOST_EXCESS = 0.8
-"""Greatest mean excess of an exact image."""
-MOST_NOISY_EXCESS, EXCESS_SPREAD = 0.58, 3.5
-"""The same of a noisy one, and what is added to it over the root of the number of pixels."""
+MOST_EXCESS, MOST_NOISY_EXCESS, EXCESS_SIGMAS = 0.6, 0.58, 4.0
+"""Greatest mean excess of an exact image and of a noisy one, and how many of its deviations are added."""
 MOST_UNEXPLAINED = 0.1
 """Greatest share of pixels that are unexplained."""
 MOST_RISE, MOST_TILT = 0.4e-3, np.radians(1.2)
@@ -43,6 +41,7 @@ class Mismatch:
     Attributes:
         pixels: Number of pixels of the part, or where the model shows it.
         excess: Mean cost of a pixel of the part above the least possible: about 0.5 where all is noise.
+        excess_sigma: Standard deviation of that mean where all is noise.
         patch: Area of the largest connected patch in which the mean excess of 3 x 3 pixels is large, pixels.
         unexplained: Share of the part's pixels whose height is seen nowhere within a pixel in the model.
         rise: Mean height of the part's even surfaces above the model's, metres.
@@ -54,6 +53,7 @@ class Mismatch:
 
     pixels: int
     excess: float
+    excess_sigma: float
     patch: int
     unexplained: float
     rise: float
@@ -65,16 +65,10 @@ class Mismatch:
     @classmethod
     def of(cls, fit: Fit, seen: Seen, known: KnownPart) -> Mismatch:
         """Compare an image with a fitted pose."""
-        plane = fit.look.top / 2
-        seen_map = view(fit.lying.points, fit.pose, seen.eye, plane=plane, cell=known.cell, reach=seen.pitch)
-        table = HeightTable(
-            seen_map, sigma=seen.sigma, soft=known.cell, flying=seen.pitch if seen.noisy else 0.0
-        )
-        pixels = Pixels.of(seen, plane, fit.pose[:2])
-        cells = table.cells(pixels, fit.pose[None])[0]
-        excess = table.excess(pixels, fit.pose)
-        near_low, near_high = (bound.reshape(-1)[cells] for bound in seen_map.bounds(seen.pitch))
-        predicted = seen_map.heights.reshape(-1)[cells]
+        assert fit.lying.surface is not None
+        exact = ExactHeights(fit.lying.surface, fit.pose, seen)
+        (excess, variance), predicted = exact.excess(), exact.heights
+        near_low, near_high = exact.near_low, exact.near_high
         part = seen.on_part | (predicted > 0)
         off = np.maximum(near_low - seen.heights, seen.heights - near_high)
         missed = off > UNEXPLAINED_SIGMAS * seen.sigma + UNEXPLAINED
@@ -88,6 +82,7 @@ class Mismatch:
         return cls(
             pixels=int(np.count_nonzero(part)),
             excess=float(excess[part].mean()),
+            excess_sigma=float(np.sqrt(variance[part].sum()) / np.count_nonzero(part)),
             patch=_largest_patch(excess, seen.window),
             unexplained=float(missed[part].mean()),
             rise=rise,
@@ -127,11 +122,9 @@ def _plane(xy: np.ndarray, heights: np.ndarray, sigma: float) -> tuple[float, fl
 
 def reason_to_refuse(mismatch: Mismatch, seen: Seen) -> str:
     """Why an image does not show the part in a resting pose; empty if it does."""
-    if seen.noisy:
-        most_excess = MOST_NOISY_EXCESS + EXCESS_SPREAD / np.sqrt(mismatch.pixels)
-        most_patch = MOST_PATCH
-    else:
-        most_excess, most_patch = MOST_EXCESS, MOST_PATCH + MOST_PATCH_SHARE * mismatch.pixels
+    most_excess = MOST_NOISY_EXCESS if seen.noisy else MOST_EXCESS
+    most_excess += EXCESS_SIGMAS * mismatch.excess_sigma
+    most_patch = MOST_PATCH + (0 if seen.noisy else MOST_PATCH_SHARE * mismatch.pixels)
     if mismatch.unexplained > MOST_UNEXPLAINED:
         return f"{mismatch.unexplained:.0%} of its pixels are where the part has no surface"
     if abs(mismatch.rise) > MOST_RISE + SIGNIFICANT * mismatch.rise_sigma:

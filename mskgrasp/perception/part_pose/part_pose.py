@@ -140,17 +140,20 @@ def see(found: FoundPart, frame: RgbdFrame, known: KnownPart, table_z: float) ->
     noise = 1.4826 * float(np.median(np.abs(table - offset))) if len(table) else 0.0
     x, y = points[0][mask], points[1][mask]
     low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+    intrinsics = np.array(frame.intrinsics, dtype=float)
+    intrinsics[:2, 2] -= [window[1].start, window[0].start]
     return Seen(
         points=points[:, near].T,
         heights=points[2][near] - offset,
         on_part=mask[near],
         window=near,
-        eye=position - [0.0, 0.0, table_z],
         sigma=float(np.hypot(noise, EXACT)),
         noisy=noisy,
         pitch=pitch,
         centre=(low + high) / 2,
         size=high - low,
+        intrinsics=intrinsics,
+        T_table_camera=Pose(position=position - [0, 0, table_z], quat_wxyz=frame.T_base_camera.quat_wxyz),
     )
 
 

@@ -1,4 +1,4 @@
-"""Surface of a part as points, and the heights of it that an eye above the table sees."""
+"""Heights of a part's surface that an eye above the table sees."""
 
 from __future__ import annotations
 
@@ -7,44 +7,35 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-DEEP, MOST_MISSED = 1e-3, 3
-"""Gaps of one or two cells' width that are deeper, metres, and longer, cells, are slits, which may be seen to
-their bottom."""
+from mskgrasp.core.geometry import quat_rotate
+from mskgrasp.core.raster import raise_cells
 
 
-def sample_surface(triangles: np.ndarray, spacing: float) -> np.ndarray:
-    """Sample triangles (n, 3, 3) in rows along their longest edges; neighbours are at most ``spacing`` apart.
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """Triangles of a part.
 
-    Returns:
-        (k, 3) points, those of neighbouring triangles merged.
+    Attributes:
+        vertices: (n, 3) in the part's frame or, of a part that lies, from the table, metres.
+        faces: (m, 3) int32 vertices of every triangle.
     """
-    sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=-1)
-    first = np.argmax(sides, axis=1)
-    order = (first[:, None] + np.arange(3)) % 3
-    a, b, c = np.moveaxis(np.take_along_axis(triangles, order[..., None], axis=1), 1, 0)
-    length = sides[np.arange(len(sides)), first]
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=-1) / 2
-    height = 2 * area / np.maximum(length, 1e-12)
-    which, share = _fractions(np.ceil(height / spacing).astype(int) + 1)
-    starts = a[which] + share[:, None] * (c - a)[which]
-    ends = b[which] + share[:, None] * (c - b)[which]
-    row, along = _fractions(np.ceil(length[which] * (1 - share) / spacing).astype(int) + 1)
-    points = starts[row] + along[:, None] * (ends - starts)[row]
-    cell = np.round(points / (0.6 * spacing)).astype(np.int64)
-    _, kept = np.unique(cell @ np.array([1, 1 << 20, 1 << 40]), return_index=True)
-    return points[kept]
 
+    vertices: np.ndarray
+    faces: np.ndarray
 
-def ascending(points: np.ndarray) -> np.ndarray:
-    """Sort points (n, 3) by height, the lowest first; stored by coordinate, so that each is contiguous."""
-    return np.ascontiguousarray(points[np.argsort(points[:, 2], kind="stable")].T).T
+    def rotated(self, quat_wxyz: np.ndarray, height: float) -> Surface:
+        """The surface turned by a quaternion, then raised, metres."""
+        vertices = quat_rotate(quat_wxyz, self.vertices)
+        vertices[:, 2] += height
+        return replace(self, vertices=vertices)
 
-
-def _fractions(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Number ``counts[i]`` items of every i from 0 to 1: i, and the fraction, of every item."""
-    which = np.repeat(np.arange(len(counts)), counts)
-    number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return which, number / np.maximum(counts[which] - 1, 1)
+    def facing(self, steepest: float) -> Surface:
+        """Only the faces whose normals' upward components are at least ``steepest``."""
+        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
+        normals = np.cross(b - a, c - a)
+        up = normals[:, 2] >= steepest * np.linalg.norm(normals, axis=1)
+        used, faces = np.unique(self.faces[up], return_inverse=True)
+        return Surface(vertices=self.vertices[used], faces=faces.reshape(-1, 3).astype(np.int32))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +56,7 @@ class HeightMap:
 
     def bounds(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest height (h, w) within a square of ``reach`` around each cell."""
-        size = 2 * max(1, round(reach / self.cell)) + 1
+        size = 2 * round(reach / self.cell) + 1
         square = np.ones((size, size), np.uint8)
         return cv2.erode(self.heights, square), cv2.dilate(self.heights, square)
 
@@ -76,45 +67,28 @@ class HeightMap:
 
 
 def heights_from(
-    points: np.ndarray, eye: np.ndarray | None, *, plane: float, cell: float, margin: float
+    surface: Surface, eye: np.ndarray | None, *, plane: float, cell: float, margin: float
 ) -> HeightMap:
-    """Compute the heights of a part that an eye sees.
+    """Compute the heights of a part that an eye sees in the middle of every cell.
 
     Args:
-        points: (n, 3) float32 on its surface, z from the table, metres, `ascending`.
+        surface: Of the part.
         eye: (3,) place of the eye in the same frame; None: straight above, infinitely far.
         plane: Height of the plane in which the map lies, metres.
-        cell: Edge of a cell, metres, not less than the distance of neighbouring points.
+        cell: Edge of a cell, metres.
         margin: Empty border around the part, metres.
     """
-    x, y = on_plane(points, eye, plane)
+    x, y = on_plane(surface.vertices, eye, plane)
+    z = surface.vertices[:, 2]
     low = np.array([x.min(), y.min()]) - margin
     width, height = (int(n) + 1 for n in (np.array([x.max(), y.max()]) + margin - low) / cell + 0.5)
-    scale, first = np.float32(1 / cell), (low / cell).astype(np.float32)
-    column = (x * scale - (first[0] - np.float32(0.5))).astype(np.int32)
-    row = (y * scale - (first[1] - np.float32(0.5))).astype(np.int32)
-    heights = np.zeros(width * height, np.float32)
-    # Assignments are made in the order of the points, so that of several in a cell the highest stays. With
-    # maximum.at, which is slow where neighbouring points lie in one cell, a search took twice as long.
-    heights[row * width + column] = np.maximum(points[:, 2], 0)
-    return HeightMap(
-        heights=_without_holes(heights.reshape(height, width)), corner=low, cell=cell, plane=plane
-    )
-
-
-def _without_holes(heights: np.ndarray) -> np.ndarray:
-    """Raise cells that were missed: between points that are nearly a cell apart one or two may be.
-
-    Many of them in a row are a slit.
-    """
-    closed = cv2.morphologyEx(heights, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    deep = (closed - heights > DEEP).astype(np.uint8)
-    if np.count_nonzero(deep) > MOST_MISSED:
-        _, labels, stats, _ = cv2.connectedComponentsWithStats(deep, connectivity=8)
-        slit = stats[:, cv2.CC_STAT_AREA] > MOST_MISSED
-        slit[0] = False  # all other cells
-        closed[slit[labels.astype(np.intp)]] = 0.0
-    return closed
+    # Over the plane the inverse of the distance below the eye is linear on a triangle, the height is not.
+    linear = z if eye is None else 1 / (eye[2] - z)
+    table = 0.0 if eye is None else 1 / eye[2]
+    highest = np.full((height, width), table)
+    raise_cells(highest, (x - low[0]) / cell, (y - low[1]) / cell, linear, surface.faces)
+    heights = highest if eye is None else eye[2] - 1 / highest
+    return HeightMap(heights=heights.astype(np.float32), corner=low, cell=cell, plane=plane)
 
 
 def on_plane(points: np.ndarray, eye: np.ndarray | None, plane: float) -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mskgrasp.parts import find_part
-from mskgrasp.perception.part_pose import KnownPart, known_part
+from mskgrasp.perception.part_pose import KnownPart
 from tests.perception.part_pose.cells import known, resting_at
 
 
@@ -65,27 +65,27 @@ def test_the_pose_at_a_place_and_turn_is_the_resting_pose_moved_there(turn):
             assert np.allclose(found.as_matrix(), true.as_matrix(), atol=1e-9)
 
 
-def test_the_outline_reaches_as_far_as_the_points_at_any_turn(monkeypatch):
-    # In the order in which they are sampled: the outline is that of one in five.
-    monkeypatch.setattr(known_part, "ascending", lambda points: np.ascontiguousarray(points.T).T)
-    for look in KnownPart.of(find_part("spur_gear_m3_z17")).looks:
+def test_the_outline_reaches_as_far_as_the_surface_at_any_turn():
+    for look in known("spur_gear_m3_z17").looks:
+        surface = look.poses[0].surface
+        assert surface is not None
         for turn in np.linspace(0, 2 * np.pi, 12):
             across = np.array([np.cos(turn), np.sin(turn)])
-            reach = (look.few[::5, :2] @ across).max()
+            reach = (surface.vertices[:, :2] @ across).max()
             assert (look.outline @ across).max() == pytest.approx(reach, abs=1e-7)
 
 
-def test_points_are_on_and_above_the_table():
+def test_surfaces_are_on_and_above_the_table():
     for name in ("spur_gear_m3_z17", "l_bracket_60x40"):
         for look in known(name).looks:
-            for one in (one for one in look.poses if len(one.points)):
-                assert one.points[:, 2].min() > -1e-5
-                assert one.points[:, 2].max() == pytest.approx(look.top, abs=0.5e-3)
+            for surface in (one.surface for one in look.poses if one.surface is not None):
+                assert surface.vertices[:, 2].min() > -1e-4  # hulls lie on the table, not the mesh
+                assert surface.vertices[:, 2].max() == pytest.approx(look.top, abs=0.5e-3)
 
 
 def test_facets_of_a_body_of_revolution_are_not_distinguished():
     looks = known("shaft_collar_25").looks
     assert any(len(look.poses) > 12 for look in looks)
     for look in looks:
-        assert len(look.poses[0].points) > 0
-        assert all(bool(len(one.points)) == (len(look.poses) <= 12) for one in look.poses[1:])
+        assert look.poses[0].surface is not None
+        assert all((one.surface is not None) == (len(look.poses) <= 12) for one in look.poses[1:])

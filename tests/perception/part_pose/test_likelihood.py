@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
 
-from mskgrasp.perception.part_pose.likelihood import HeightTable, Pixels
+from mskgrasp.perception.part_detection import find_part_pixels
+from mskgrasp.perception.part_pose.likelihood import ExactHeights, HeightTable, Pixels
+from mskgrasp.perception.part_pose.part_pose import see
 from mskgrasp.perception.part_pose.surface import HeightMap
+from tests.perception.part_pose.cells import kinect2, known, posed, resting_at
 
 CELL = 0.5e-3
 STEP = HeightMap(
@@ -49,3 +52,44 @@ def test_a_part_that_is_moved_and_turned_takes_its_heights_along():
     pixels = Pixels(x=xy[:, 0], y=xy[:, 1], heights=np.full(3, 0.02, np.float32), origin=np.array([0.1, 0.2]))
     found = table.costs(pixels, np.array([[0.2, 0.2, np.pi / 2]]))[0]
     assert found[2] > found[1] + 3  # the bar is now along x
+
+
+NAME = "l_bracket_60x40"
+PLACE = np.array([0.47, -0.06, 0.9])
+
+
+def exact(cell, pose: np.ndarray, *, noisy: bool) -> tuple[ExactHeights, np.ndarray]:
+    """What is seen of a bracket at a pose, in an image of it at ``PLACE``; and the heights measured there."""
+    frame = posed(cell, NAME, resting_at(NAME, 0, *PLACE))
+    frame = kinect2(frame, seed=3) if noisy else frame
+    found = find_part_pixels(
+        frame.depth, frame.intrinsics, frame.T_base_camera,
+        table_z=0.0, region=cell.workspace.region, min_height=0.003,
+    )  # fmt: skip
+    seen = see(found, frame, known(NAME), 0.0)
+    lying = next(look for look in known(NAME).looks if look.poses[0].resting == 0).poses[0]
+    assert lying.surface is not None
+    return ExactHeights(lying.surface, pose, seen), seen.heights
+
+
+def test_exact_heights_are_those_that_a_camera_sees(mujoco_cell):
+    found, measured = exact(mujoco_cell, PLACE, noisy=False)
+    off = np.abs(found.heights - measured)
+    assert np.median(off) < 0.05e-3 and np.count_nonzero(found.heights > 1e-3) > 300
+    assert np.mean(off > 0.3e-3) < 0.01  # rays that pass an edge by a hair
+    assert np.all(found.near_low <= found.heights) and np.all(found.heights <= found.near_high)
+
+
+def test_exact_heights_of_a_part_elsewhere_cost_more(mujoco_cell):
+    for noisy, least in ((False, 100), (True, 30)):
+        here, _ = exact(mujoco_cell, PLACE, noisy=noisy)
+        beside, _ = exact(mujoco_cell, PLACE + [1.5e-3, 0, 0], noisy=noisy)
+        assert beside.costs().sum(dtype=float) > here.costs().sum(dtype=float) + least
+
+
+def test_the_mean_excess_of_exact_heights_is_half_where_all_is_noise(mujoco_cell):
+    found, _ = exact(mujoco_cell, PLACE, noisy=True)
+    excess, variance = found.excess()
+    part = found.heights > 0
+    sigma = np.sqrt(variance[part].sum()) / np.count_nonzero(part)
+    assert sigma < 0.05 and abs(excess[part].mean() - 0.5) < 5 * sigma

@@ -93,19 +93,19 @@ def test_a_hexagonal_nut_looks_the_same_after_a_sixth_of_a_turn_and_on_either_si
         assert distance < 0.5e-3 and angle < np.radians(0.7)
 
 
-def test_an_open_box_that_shows_its_closed_side_may_open_to_either_side(mujoco_cell):
+def test_the_open_side_of_a_box_that_lies_with_it_to_the_left_or_right_is_found_or_both_are_named(
+    mujoco_cell,
+):
     name = "enclosure_85x56x40"
     surface = PartSurface.of(find_part(name))
-    wrong = 0
+    named = []
     for seed in range(8):
         true = resting_at(name, 2, 0.45, -0.05, 0.6 * seed)
         found = find(mujoco_cell, kinect2(posed(mujoco_cell, name, true), seed), name, 0.003)
-        poses = [found.T_base_obj, *(other.T_base_obj for other in found.alternatives)]
-        apart = [surface.apart(true, pose) for pose in poses]
-        assert min(apart) < 1e-3
-        wrong += apart[0] > 10e-3
-        assert sum(other.share for other in found.alternatives) < 0.8
-    assert wrong  # it cannot be seen
+        assert surface.apart(true, found.T_base_obj) < 1e-3
+        named += [surface.apart(true, other.T_base_obj) for other in found.alternatives]
+        assert sum(other.share for other in found.alternatives) < 0.5
+    assert max(named) > 10e-3  # with this noise it can barely be seen
 
 
 def test_any_turn_of_a_round_part_is_the_same(mujoco_cell):

@@ -6,7 +6,7 @@ import pytest
 import mskgrasp.perception.part_pose.search
 from mskgrasp.perception.part_detection import find_part_pixels
 from mskgrasp.perception.part_pose.part_pose import see
-from mskgrasp.perception.part_pose.search import CLOSE, Effort, Fit, _turned, improve, search
+from mskgrasp.perception.part_pose.search import CLOSE, FINAL, Fit, _turned, improve, judge, search
 from tests.perception.part_pose.cells import kinect2, known, posed, resting_at
 
 NAME = "l_bracket_60x40"
@@ -39,10 +39,23 @@ def test_a_fit_beside_the_truth_is_moved_to_it(image):
 
 
 def test_the_truth_costs_less_than_poses_around_it(image):
-    look_only = Effort(rounds=0, draws=0, pixels=0, reach=0.0, fine=True)
-    true = improve(start((0, 0, 0)), image, known(NAME), look_only).cost
+    true = judge(start((0, 0, 0)), image).cost
     for offset in ((3e-3, 0, 0), (0, -3e-3, 0), (0, 0, 0.1), (0, 0, np.pi)):
-        assert improve(start(offset), image, known(NAME), look_only).cost > true + 5
+        assert judge(start(offset), image).cost > true + 5
+
+
+def test_the_exact_costs_of_the_truth_are_those_of_noise(image):
+    """Half of the squared error over the variance, on average, and the normal distribution's factor."""
+    pixel_costs = judge(start((0, 0, 0)), image).pixel_costs
+    assert pixel_costs is not None
+    least = np.log(image.sigma * np.sqrt(2 * np.pi) / 0.99)
+    assert pixel_costs.mean() - least < 0.6
+
+
+def test_the_last_fit_ends_at_the_truth(image):
+    fit = improve(start((0.5e-3, -0.4e-3, 0.01)), image, known(NAME), CLOSE)
+    final = improve(fit, image, known(NAME), FINAL)
+    assert np.linalg.norm(final.pose[:2] - [0.5, 0.02]) < (0.3e-3 if image.noisy else 0.1e-3)
 
 
 def test_the_best_fit_comes_first_and_the_search_is_repeatable(image):
