@@ -22,6 +22,9 @@ FLYING_FROM = 0.007
 FINER = 6
 """In an image without noise a pixel may see whatever lies within this fraction of a pixel: no pose that is
 found is exact enough to say on which side of an edge its ray ends."""
+_SMOOTHED = np.ones((5, 5), np.uint8)
+"""Pixels between whose heights that of the one in their middle may lie in a smoothed image: the reach of the
+filter and, before it, of pixels that float."""
 _SQUARE = np.ones((3, 3), np.uint8)
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
@@ -39,6 +42,7 @@ class Seen:
         T_table_camera: Pose of the camera; axes of base, height from the table.
         sigma: Standard deviation of the heights, metres.
         noisy: Whether it is that of a noisy image.
+        smoothed: Whether a filter of the camera has smoothed the noise, and the edges with it.
         pitch: Distance of neighbouring pixels, metres.
         centre: (2,) middle of the box around the part's pixels along x and y of base, metres.
         size: (2,) its edges, metres.
@@ -52,6 +56,7 @@ class Seen:
     T_table_camera: Pose
     sigma: float
     noisy: bool
+    smoothed: bool
     pitch: float
     centre: np.ndarray
     size: np.ndarray
@@ -221,22 +226,31 @@ class ExactHeights:
         self._pixels = np.arange(len(seen.heights))
         self.heights = image[seen.window]
         self.near_low, self.near_high = (bound[seen.window] for bound in _bounds(image, _SQUARE))
-        if seen.noisy:
+        if seen.smoothed:
+            low, high, edge = self.near_low, self.near_high, None
+        elif seen.noisy:
             low = high = self.heights
             least, most = _bounds(image, _CROSS)
             edge = least[seen.window], most[seen.window]
         else:
             low, high = (bound[::finer, ::finer][seen.window] for bound in _bounds(fine, _SQUARE))
             edge = None
-        self._likelihood = HeightLikelihood(low, high, sigma=seen.sigma, edge=edge)
+        self._likelihood = self._tolerant = HeightLikelihood(low, high, sigma=seen.sigma, edge=edge)
+        if seen.smoothed:
+            low, high = (bound[seen.window] for bound in _bounds(image, _SMOOTHED))
+            self._tolerant = HeightLikelihood(low, high, sigma=seen.sigma, edge=None)
 
     def costs(self) -> np.ndarray:
         """Negative logarithm (n,) of the likelihood of the heights measured."""
         return self._likelihood.costs(self._seen.heights.astype(np.float32), self._pixels)
 
     def excess(self) -> tuple[np.ndarray, np.ndarray]:
-        """Excess of the costs (n,) and its variance (`HeightLikelihood.excess`)."""
-        return self._likelihood.excess(self._seen.heights.astype(np.float32), self._pixels)
+        """Excess of the costs (n,) and its variance (`HeightLikelihood.excess`).
+
+        In a smoothed image heights may be those of pixels farther away than for the costs: with these bounds
+        for both, edges would hardly tell where the part is.
+        """
+        return self._tolerant.excess(self._seen.heights.astype(np.float32), self._pixels)
 
 
 def _image(surface: Surface, pose: np.ndarray, seen: Seen, finer: int) -> np.ndarray:

@@ -23,6 +23,9 @@ BORDER = 4
 """Pixels around the part that are compared, too."""
 NOISY_BORDER, MOST_BORDER = 6, 25
 """The same in a noisy image, in which an end of the part may not be detected."""
+SMOOTHED, FEWEST_PAIRS = 0.25, 150
+"""Correlation of the noise of neighbouring pixels from which an image was smoothed, and the fewest pairs of
+pixels of the table that tell it."""
 MOST_DEVIATIONS = 3.0
 """A pose whose cost exceeds the least by more deviations of the difference than this is no alternative."""
 COVARIANCE_SCALE = 2.0
@@ -135,9 +138,12 @@ def see(found: FoundPart, frame: RgbdFrame, known: KnownPart, table_z: float) ->
     points[2] -= table_z
     valid = np.isfinite(points[2])
     near = valid & _grown(mask, border)
-    table = points[2][near & ~_grown(mask, 2)]
+    beside = near & ~_grown(mask, 2)
+    table = points[2][beside]
     offset = float(np.median(table)) if len(table) else 0.0
     noise = 1.4826 * float(np.median(np.abs(table - offset))) if len(table) else 0.0
+    beside_part = np.where(beside, points[2] - offset, np.nan)
+    smoothed = noise > EXACT and _correlation(beside_part, noise) > SMOOTHED
     x, y = points[0][mask], points[1][mask]
     low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
     intrinsics = np.array(frame.intrinsics, dtype=float)
@@ -148,13 +154,26 @@ def see(found: FoundPart, frame: RgbdFrame, known: KnownPart, table_z: float) ->
         on_part=mask[near],
         window=near,
         sigma=float(np.hypot(noise, EXACT)),
-        noisy=noisy,
+        noisy=noisy or smoothed,
+        smoothed=smoothed,
         pitch=pitch,
         centre=(low + high) / 2,
         size=high - low,
         intrinsics=intrinsics,
         T_table_camera=Pose(position=position - [0, 0, table_z], quat_wxyz=frame.T_base_camera.quat_wxyz),
     )
+
+
+def _correlation(heights: np.ndarray, noise: float) -> float:
+    """Correlation of neighbouring heights (h, w), NaN where there is no table; 0 where there are few."""
+    clipped = np.clip(heights / noise, -3, 3)
+    products = np.concatenate(
+        [(clipped[1:] * clipped[:-1]).ravel(), (clipped[:, 1:] * clipped[:, :-1]).ravel()]
+    )
+    known = np.isfinite(products)
+    if np.count_nonzero(known) < FEWEST_PAIRS:
+        return 0.0
+    return float(products[known].mean() / np.nanmean(clipped**2))
 
 
 def _grown(mask: np.ndarray, reach: int) -> np.ndarray:

@@ -191,8 +191,9 @@ def improve(fit: Fit, seen: Seen, known: KnownPart, effort: Effort) -> Fit:
     pixels = Pixels.of(seen, plane, fit.pose[:2])
     seen_map = view(surface, fit.pose, seen.eye, plane=plane, cell=cell, reach=_DEPENDS_WITHIN * seen.pitch)
     # Between heights that are known well, a search that begins beside the truth must not end at a sharp edge.
-    soft = 0.0 if effort.exact or seen.noisy else cell
-    table = HeightTable(seen_map, sigma=seen.sigma, soft=soft, flying=seen.pitch if seen.noisy else 0.0)
+    soft = seen.pitch if seen.smoothed else 0.0 if effort.exact or seen.noisy else cell
+    flying = seen.pitch if seen.noisy and not seen.smoothed else 0.0
+    table = HeightTable(seen_map, sigma=seen.sigma, soft=soft, flying=flying)
     chosen, weight = _informative(table, seen_map, pixels, fit.pose, seen, effort.pixels)
     some = pixels.take(chosen)
     normals = _normals()[: effort.draws]

@@ -1,6 +1,10 @@
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 
+from hal.camera import RgbdFrame
 from mskgrasp.core.errors import NoPartFound, PartNotRecognised
 from mskgrasp.core.geometry import (
     Pose,
@@ -11,7 +15,10 @@ from mskgrasp.core.geometry import (
 )
 from mskgrasp.parts import find_part
 from mskgrasp.parts.alike_poses import PartSurface
-from tests.perception.part_pose.cells import find, kinect2, posed, presented, resting_at
+from mskgrasp.perception.part_detection import find_part_pixels
+from mskgrasp.perception.part_pose.part_pose import see
+from tests.benchmarks.part_pose import filtered
+from tests.perception.part_pose.cells import find, kinect2, known, posed, presented, resting_at
 
 PARTS = (
     "l_bracket_60x40",
@@ -106,6 +113,50 @@ def test_the_open_side_of_a_box_that_lies_with_it_to_the_left_or_right_is_found_
         named += [surface.apart(true, other.T_base_obj) for other in found.alternatives]
         assert sum(other.share for other in found.alternatives) < 0.5
     assert max(named) > 10e-3  # with this noise it can barely be seen
+
+
+def smooth(frame: RgbdFrame, how: str) -> RgbdFrame:
+    """The frame as a driver gives it that preserves edges, or one that does not."""
+    blurred = cv2.GaussianBlur(np.nan_to_num(frame.depth, nan=np.nanmax(frame.depth)), (3, 3), 0.7)
+    return replace(frame, depth=filtered(frame.depth) if how == "bilateral" else blurred)
+
+
+@pytest.mark.parametrize(
+    ("noisy", "how", "smoothed"),
+    [
+        (False, None, False),
+        (True, None, False),
+        (False, "bilateral", False),
+        (True, "bilateral", True),
+        (True, "gauss", True),
+    ],
+)
+def test_an_image_that_was_smoothed_is_known_by_the_noise_of_neighbours(mujoco_cell, noisy, how, smoothed):
+    frame = posed(mujoco_cell, "l_bracket_60x40", resting_at("l_bracket_60x40", 0, 0.5, 0.0, 0.4))
+    frame = kinect2(frame, seed=1) if noisy else frame
+    frame = smooth(frame, how) if how else frame
+    found = find_part_pixels(
+        frame.depth, frame.intrinsics, frame.T_base_camera,
+        table_z=0.0, region=mujoco_cell.workspace.region, min_height=0.003,
+    )  # fmt: skip
+    assert see(found, frame, known("l_bracket_60x40"), 0.0).smoothed == smoothed
+
+
+@pytest.mark.parametrize("how", ["bilateral", "gauss"])
+def test_parts_are_found_in_smoothed_images_and_another_is_refused(mujoco_cell, how):
+    errors = []
+    for name in ("l_bracket_60x40", "hex_nut_m30", "pillow_block_80x32"):
+        for seed in range(3):
+            true = resting_at(name, 0, 0.48, 0.03 * seed, 0.9 * seed)
+            frame = smooth(kinect2(posed(mujoco_cell, name, true), seed), how)
+            try:
+                found = find(mujoco_cell, frame, name, 0.003)
+                errors.append(np.linalg.norm((found.T_base_obj.position - true.position)[:2]))
+            except PartNotRecognised:
+                errors.append(np.inf)
+            with pytest.raises(PartNotRecognised):
+                find(mujoco_cell, frame, "spur_gear_m3_z17", 0.003)
+    assert np.count_nonzero(np.array(errors) < 1e-3) >= 8  # of 9
 
 
 def test_any_turn_of_a_round_part_is_the_same(mujoco_cell):
