@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 _FLAT = 1e-12
-"""An edge that rises by less than this, in cells, has one end at every row that it crosses."""
+"""Of an edge that rises by less than this, in cells, the lower end counts."""
 
 
 @njit(cache=True)
@@ -15,17 +15,21 @@ def raise_cells(
 ) -> None:
     """Raise cells to the highest value that a triangle has in their middle, in place.
 
-    Triangles that share an edge leave no gap between them.
+    Triangles that share an edge leave no gap between them. Of one that is seen edge-on, some value on it
+    counts. Triangles with a coordinate that is not finite are left out.
 
     Args:
-        cells: (h, w) values, row along y, column along x; the middle of cell (0, 0) is the origin.
+        cells: (h, w) floats, row along y, column along x; the middle of cell (0, 0) is the origin.
         x: (n,) of the vertices, in cells.
         y: (n,) likewise.
         values: (n,) at the vertices; between them they are linear.
         faces: (m, 3) vertices of every triangle, in any order.
     """
+    last_row, last_column = len(cells) - 1.0, cells.shape[1] - 1.0
     for index in range(len(faces)):
         a, b, c = faces[index]
+        if not np.isfinite(x[a] + x[b] + x[c] + y[a] + y[b] + y[c]):
+            continue
         # Row by row, from the edge between the lowest and the highest vertex to those at the third.
         if y[a] > y[b]:
             a, b = b, a
@@ -33,7 +37,10 @@ def raise_cells(
             b, c = c, b
         if y[a] > y[b]:
             a, b = b, a
-        for row in range(max(0, int(np.ceil(y[a]))), min(len(cells) - 1, int(np.floor(y[c]))) + 1):
+        if y[c] < 0 or y[a] > last_row:
+            continue
+        # Clipped before they become integers, which have a range.
+        for row in range(int(max(0.0, np.ceil(y[a]))), int(min(last_row, np.floor(y[c]))) + 1):
             start, first = _crossing(row, a, c, x, y, values)
             if row < y[b]:
                 end, last = _crossing(row, a, b, x, y, values)
@@ -42,8 +49,10 @@ def raise_cells(
             if start > end:
                 start, end, first, last = end, start, last, first
             slope = (last - first) / (end - start) if end - start > _FLAT else 0.0
-            most = min(cells.shape[1] - 1, int(np.floor(end)))
-            for column in range(max(0, int(np.ceil(start))), most + 1):
+            if end < 0 or start > last_column:
+                continue
+            most = int(min(last_column, np.floor(end)))
+            for column in range(int(max(0.0, np.ceil(start))), most + 1):
                 here = first + slope * (column - start)
                 if here > cells[row, column]:
                     cells[row, column] = here

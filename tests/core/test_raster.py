@@ -64,3 +64,37 @@ def test_triangles_seen_edge_on_raise_nothing_above_their_edge():
     wall = np.array([[1.0, 2.0, 0.0], [6.0, 2.0, 0.0], [3.0, 2.0, 9.0]])
     cells = drawn(wall, np.array([[0, 1, 2]]), (5, 8), 0.0)
     assert cells.max() <= 9.0 and np.all(cells[[0, 1, 3, 4]] == 0.0)
+
+
+def test_random_triangles_are_drawn_as_barycentric_coordinates_say():
+    rng = np.random.default_rng(1)
+    row, column = np.mgrid[:20, :25]
+    for _ in range(200):
+        corners = np.column_stack([rng.uniform(-4, 28, (3, 2)), rng.uniform(1, 9, 3)])
+        if rng.random() < 0.3:
+            corners[1, 1] = corners[0, 1] + rng.uniform(0, 0.05)  # a nearly flat edge
+        cells = drawn(corners, np.array([[0, 1, 2]]), (20, 25), 0.0)
+        a, b, c = corners
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        u = ((b[0] - column) * (c[1] - row) - (b[1] - row) * (c[0] - column)) / area
+        v = ((c[0] - column) * (a[1] - row) - (c[1] - row) * (a[0] - column)) / area
+        least = np.minimum(np.minimum(u, v), 1 - u - v)
+        value = u * a[2] + v * b[2] + (1 - u - v) * c[2]
+        assert np.allclose(cells[least > 1e-6], value[least > 1e-6], atol=1e-6)
+        assert np.all(cells[least < -1e-6] == 0)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_triangles_that_are_not_finite_are_left_out(bad, axis):
+    vertices = np.array([[0.0, 0, 1], [9, 0, 1], [0, 9, 1], [2, 2, 5]])
+    vertices[3, axis] = bad
+    cells = drawn(vertices, np.array([[0, 3, 2], [0, 1, 2]]), (10, 10), 0.0)
+    assert cells.max() == 1.0 and cells[0, 0] == 1.0
+
+
+@pytest.mark.parametrize("far", [1e9, 9.3e18, 1e300])
+def test_triangles_that_reach_far_beyond_the_grid_are_clipped(far):
+    vertices = np.array([[-far, -far, 1], [far, -far, 1], [0, far, 1]])
+    assert np.all(drawn(vertices, np.array([[0, 1, 2]]), (6, 6), 0.0) == 1.0)
+    assert np.all(drawn(vertices + [3 * far, 0, 0], np.array([[0, 1, 2]]), (6, 6), 0.0) == 0.0)

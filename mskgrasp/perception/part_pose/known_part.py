@@ -14,7 +14,7 @@ from mskgrasp.parts import Part
 from mskgrasp.perception.part_pose.surface import HeightMap, Surface, heights_from
 
 MOST_CELLS = 300e3
-"""Greatest number of cells of a map of heights as large as a part's surface, about."""
+"""Greatest area of a part's surface, in cells."""
 LEAST_CELL = 0.2e-3
 """Least edge of a cell, metres: a tenth of the pixel of a Kinect v2 at 0.8 m."""
 SAME_HEIGHT = 0.3e-3
@@ -34,8 +34,8 @@ _BESIDE = 5
 MOST_COMPARED = 12
 """Similar resting poses that are distinguished; more of them are facets of a body of revolution."""
 _STEEPEST_DOWN = -0.3
-"""Upward component of the normals of faces that look farther down, which no camera above sees: at 0.8 m a
-part is at most 0.2 m off the axis."""
+"""Upward component of the normals of faces that look farther down, which no camera straight above sees: at
+0.8 m a part is at most 0.2 m off the axis."""
 
 
 @dataclass(frozen=True, kw_only=True)

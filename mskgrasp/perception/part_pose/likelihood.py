@@ -177,7 +177,7 @@ class HeightTable:
     def __init__(self, seen_map: HeightMap, *, sigma: float, soft: float, flying: float):
         self._corner, self._cell, self._shape = seen_map.corner, seen_map.cell, seen_map.heights.shape
         low, high = _flat(seen_map.bounds(soft))
-        edge = _flat(seen_map.bounds(flying)) if flying else None
+        edge = _flat(seen_map.bounds(max(flying, seen_map.cell))) if flying else None
         self._likelihood = HeightLikelihood(low, high, sigma=sigma, edge=edge)
 
     def cells(self, pixels: Pixels, poses: np.ndarray) -> np.ndarray:
@@ -263,7 +263,7 @@ def _image(surface: Surface, pose: np.ndarray, seen: Seen, finer: int) -> np.nda
     rows, columns = (np.arange((n - 1) * finer + 1) for n in seen.window.shape)
     rays = np.stack(np.broadcast_arrays((columns - cx) / fx, ((rows - cy) / fy)[:, None], 1.0), axis=-1)
     falls = -(rays @ quat_to_matrix(seen.T_table_camera.quat_wxyz)[2])
-    # The inverse of the depth is linear on a triangle; that of the table is least.
+    # The inverse of the depth is linear on a triangle. Nothing lies under the table, on which all rays end.
     inverse = falls / seen.eye[2]
     raise_cells(inverse, fx * x / depth + cx, fy * y / depth + cy, 1 / depth, surface.faces)
     return (seen.eye[2] - falls / inverse).astype(np.float32)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from mskgrasp.perception.part_pose.known_part import KnownPart
 from mskgrasp.perception.part_pose.likelihood import ExactHeights, Seen
 from mskgrasp.perception.part_pose.search import Fit
 
@@ -63,7 +62,7 @@ class Mismatch:
     residual: float
 
     @classmethod
-    def of(cls, fit: Fit, seen: Seen, known: KnownPart) -> Mismatch:
+    def of(cls, fit: Fit, seen: Seen) -> Mismatch:
         """Compare an image with a fitted pose."""
         assert fit.lying.surface is not None
         exact = ExactHeights(fit.lying.surface, fit.pose, seen)

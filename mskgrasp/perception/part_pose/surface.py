@@ -30,7 +30,7 @@ class Surface:
         return replace(self, vertices=vertices)
 
     def facing(self, steepest: float) -> Surface:
-        """Only the faces whose normals' upward components are at least ``steepest``."""
+        """Only the faces whose normals' upward components are at least ``steepest``; they point outwards."""
         a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
         normals = np.cross(b - a, c - a)
         up = normals[:, 2] >= steepest * np.linalg.norm(normals, axis=1)

@@ -1,10 +1,19 @@
 import numpy as np
 import pytest
+import trimesh
 
+from mskgrasp.core.geometry import Pose, quat_multiply, quat_rotate
 from mskgrasp.perception.part_detection import find_part_pixels
-from mskgrasp.perception.part_pose.likelihood import ExactHeights, HeightTable, Pixels
+from mskgrasp.perception.part_pose.likelihood import (
+    FLYING,
+    ExactHeights,
+    HeightLikelihood,
+    HeightTable,
+    Pixels,
+    Seen,
+)
 from mskgrasp.perception.part_pose.part_pose import see
-from mskgrasp.perception.part_pose.surface import HeightMap
+from mskgrasp.perception.part_pose.surface import HeightMap, Surface
 from tests.perception.part_pose.cells import kinect2, known, posed, resting_at
 
 CELL = 0.5e-3
@@ -93,3 +102,51 @@ def test_the_mean_excess_of_exact_heights_is_half_where_all_is_noise(mujoco_cell
     part = found.heights > 0
     sigma = np.sqrt(variance[part].sum()) / np.count_nonzero(part)
     assert sigma < 0.05 and abs(excess[part].mean() - 0.5) < 5 * sigma
+
+
+def test_exact_heights_are_where_the_rays_of_a_tilted_camera_meet_the_part():
+    """Pixels twice as wide as high, from a camera that looks 30 degrees from the vertical."""
+    cone = trimesh.creation.cone(0.03, 0.04, sections=9)
+    half = np.radians(30) / 2
+    looks_down = np.array([0.0, 1.0, 0.0, 0.0])
+    T_table_camera = Pose(
+        position=np.array([0.5, -0.4, 0.7]),
+        quat_wxyz=quat_multiply(np.array([np.cos(half), np.sin(half), 0, 0]), looks_down),
+    )
+    intrinsics, shape = np.array([[400.0, 0, 30], [0, 800.0, 60], [0, 0, 1]]), (121, 61)
+    pixels = shape[0] * shape[1]
+    seen = Seen(
+        points=np.zeros((pixels, 3)), heights=np.zeros(pixels), on_part=np.ones(pixels, bool),
+        window=np.ones(shape, bool), intrinsics=intrinsics, T_table_camera=T_table_camera, sigma=1e-3,
+        noisy=True, smoothed=False, pitch=2e-3, centre=np.zeros(2), size=np.zeros(2),
+    )  # fmt: skip
+    pose = np.array([0.5, 0.0, 0.7])
+    surface = Surface(vertices=np.asarray(cone.vertices), faces=np.asarray(cone.faces, np.int32))
+    found = ExactHeights(surface, pose, seen).heights
+
+    rows, columns = np.mgrid[: shape[0], : shape[1]].reshape(2, -1)
+    rays = np.column_stack([(columns - 30) / 400, (rows - 60) / 800, np.ones(pixels)])
+    along = quat_rotate(T_table_camera.quat_wxyz, rays)
+    cone.apply_transform(trimesh.transformations.rotation_matrix(0.7, [0, 0, 1]))
+    cone.apply_translation([0.5, 0.0, 0.0])
+    eye = np.asarray(T_table_camera.position)
+    ahead = ((cone.triangles[:, 0] - eye) * cone.face_normals).sum(axis=-1)
+    towards = along @ cone.face_normals.T
+    with np.errstate(divide="ignore"):
+        enters = np.where(towards < 0, ahead / towards, -np.inf).max(axis=1)
+        leaves = np.where(towards > 0, ahead / towards, np.inf).min(axis=1)
+    true = np.where(enters < leaves, eye[2] + enters * along[:, 2], 0.0)
+    assert np.count_nonzero(true > 1e-3) > 300
+    assert np.count_nonzero(np.abs(found - true) > 1e-5) <= 3  # rays along the silhouette
+
+
+def test_the_excess_of_heights_that_follow_the_model_has_the_mean_and_variance_that_are_told():
+    rng, sigma, n = np.random.default_rng(0), 1e-3, 40_000
+    low, high = np.zeros(1, np.float32), np.full(1, 0.03, np.float32)
+    for edge, share in ((None, 0.0), ((low, high), FLYING)):
+        model = HeightLikelihood(low, low, sigma=sigma, edge=edge)
+        heights = sigma * rng.standard_normal(n)
+        heights += np.where(rng.random(n) < share, rng.uniform(0.005, 0.03, n), 0.0)
+        excess, variance = model.excess(heights.astype(np.float32), np.zeros(n, int))
+        assert excess.mean() == pytest.approx(0.45, abs=0.2)
+        assert excess.var() == pytest.approx(variance[0], rel=0.35)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,7 @@ def mismatch(cell, pose: Pose, *, noisy: bool = False) -> tuple[Mismatch, str]:
         table_z=0.0, region=cell.workspace.region, min_height=0.003,
     )  # fmt: skip
     seen = see(found, frame, known(NAME), 0.0)
-    one = Mismatch.of(search(seen, known(NAME))[0], seen, known(NAME))
+    one = Mismatch.of(search(seen, known(NAME))[0], seen)
     return one, reason_to_refuse(one, seen)
 
 
@@ -49,3 +51,37 @@ def test_the_tilt_of_a_leaning_part_is_measured(mujoco_cell):
     found, reason = mismatch(mujoco_cell, leaning)
     assert np.degrees(found.tilt) == pytest.approx(2.0, abs=0.5)
     assert "it is tilted by" in reason
+
+
+FITS = Mismatch(
+    pixels=300, excess=0.5, excess_sigma=0.05, patch=2, unexplained=0.01, rise=0.0, rise_sigma=0.05e-3,
+    tilt=0.0, tilt_sigma=0.001, residual=1e-3,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({}, ""),
+        ({"excess": 0.7}, ""),
+        ({"excess": 0.85}, "its heights differ by more than noise"),
+        ({"excess": 0.85, "excess_sigma": 0.1}, ""),
+        ({"patch": 5}, ""),
+        ({"patch": 40}, "a patch of 40 pixels differs"),
+        ({"unexplained": 0.2}, "20% of its pixels are where the part has no surface"),
+        ({"rise": 1e-3}, "its surfaces are +1.0 mm from where they would be"),
+        ({"rise": 1e-3, "rise_sigma": 0.3e-3}, ""),
+        ({"tilt": 0.05}, "it is tilted by 2.9 degrees"),
+        ({"tilt": 0.05, "tilt_sigma": 0.02}, ""),
+    ],
+)
+@pytest.mark.parametrize("noisy", [False, True])
+def test_each_difference_that_noise_does_not_explain_refuses_a_part(mujoco_cell, change, reason, noisy):
+    frame = posed(mujoco_cell, NAME, resting_at(NAME, 0, 0.48, 0.03, 0.3))
+    frame = kinect2(frame, seed=0) if noisy else frame
+    found = find_part_pixels(
+        frame.depth, frame.intrinsics, frame.T_base_camera,
+        table_z=0.0, region=mujoco_cell.workspace.region, min_height=0.003,
+    )  # fmt: skip
+    told = reason_to_refuse(replace(FITS, **change), see(found, frame, known(NAME), 0.0))
+    assert told.startswith(reason) and bool(told) == bool(reason)

@@ -75,3 +75,9 @@ def test_a_fit_turned_to_where_the_part_nearly_looks_the_same_is_turned_back(ima
     fit = replace(fit, look=replace(fit.look, rivals=(2.0,)))
     best = _turned(fit, image, known(NAME))[0]
     assert abs(best.pose[2] - 0.8) < np.radians(0.7)
+
+
+def test_of_two_poses_that_explain_an_image_the_more_probable_one_costs_less(image):
+    fit = start((0, 0, 0))
+    rare = replace(fit, lying=replace(fit.lying, probability=fit.lying.probability / 3))
+    assert judge(rare, image).cost - judge(fit, image).cost == pytest.approx(np.log(3), abs=1e-6)
