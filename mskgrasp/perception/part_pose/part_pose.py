@@ -143,8 +143,7 @@ def see(found: FoundPart, frame: RgbdFrame, known: KnownPart, table_z: float) ->
     table = points[2][beside]
     offset = float(np.median(table)) if len(table) else 0.0
     noise = 1.4826 * float(np.median(np.abs(table - offset))) if len(table) else 0.0
-    beside_part = np.where(beside, points[2] - offset, np.nan)
-    smoothed = noise > EXACT and _correlation(beside_part, noise) > SMOOTHED
+    smoothed = noise > EXACT and _correlation(np.where(beside, points[2] - offset, np.nan), noise) > SMOOTHED
     x, y = points[0][mask], points[1][mask]
     low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
     intrinsics = np.array(frame.intrinsics, dtype=float)
@@ -166,7 +165,10 @@ def see(found: FoundPart, frame: RgbdFrame, known: KnownPart, table_z: float) ->
 
 
 def _correlation(heights: np.ndarray, noise: float) -> float:
-    """Correlation of neighbouring heights (h, w), NaN where there is no table; 0 where there are few."""
+    """Correlation of neighbouring heights (h, w) of the table, NaN where there is none; 0 if there are few.
+
+    Pixels that float count as three deviations of the noise at most.
+    """
     clipped = np.clip(heights / noise, -3, 3)
     products = np.concatenate(
         [(clipped[1:] * clipped[:-1]).ravel(), (clipped[:, 1:] * clipped[:, :-1]).ravel()]
