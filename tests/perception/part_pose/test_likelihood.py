@@ -3,7 +3,6 @@ import pytest
 import trimesh
 
 from mskgrasp.core.geometry import Pose, quat_multiply, quat_rotate
-from mskgrasp.perception.part_detection import find_part_pixels
 from mskgrasp.perception.part_pose.likelihood import (
     FLYING,
     ExactHeights,
@@ -12,9 +11,8 @@ from mskgrasp.perception.part_pose.likelihood import (
     Pixels,
     Seen,
 )
-from mskgrasp.perception.part_pose.part_pose import see
 from mskgrasp.perception.part_pose.surface import HeightMap, Surface
-from tests.perception.part_pose.cells import kinect2, known, posed, resting_at
+from tests.perception.part_pose.cells import heights_by_rays, kinect2, known, posed, resting_at, seen
 
 CELL = 0.5e-3
 STEP = HeightMap(
@@ -71,14 +69,10 @@ def exact(cell, pose: np.ndarray, *, noisy: bool) -> tuple[ExactHeights, np.ndar
     """What is seen of a bracket at a pose, in an image of it at ``PLACE``; and the heights measured there."""
     frame = posed(cell, NAME, resting_at(NAME, 0, *PLACE))
     frame = kinect2(frame, seed=3) if noisy else frame
-    found = find_part_pixels(
-        frame.depth, frame.intrinsics, frame.T_base_camera,
-        table_z=0.0, region=cell.workspace.region, min_height=0.003,
-    )  # fmt: skip
-    seen = see(found, frame, known(NAME), 0.0)
+    pixels = seen(cell, frame, NAME)
     lying = next(look for look in known(NAME).looks if look.poses[0].resting == 0).poses[0]
     assert lying.surface is not None
-    return ExactHeights(lying.surface, pose, seen), seen.heights
+    return ExactHeights(lying.surface, pose, pixels), pixels.heights
 
 
 def test_exact_heights_are_those_that_a_camera_sees(mujoco_cell):
@@ -115,27 +109,21 @@ def test_exact_heights_are_where_the_rays_of_a_tilted_camera_meet_the_part():
     )
     intrinsics, shape = np.array([[400.0, 0, 30], [0, 800.0, 60], [0, 0, 1]]), (121, 61)
     pixels = shape[0] * shape[1]
-    seen = Seen(
+    camera = Seen(
         points=np.zeros((pixels, 3)), heights=np.zeros(pixels), on_part=np.ones(pixels, bool),
         window=np.ones(shape, bool), intrinsics=intrinsics, T_table_camera=T_table_camera, sigma=1e-3,
         noisy=True, smoothed=False, pitch=2e-3, centre=np.zeros(2), size=np.zeros(2),
     )  # fmt: skip
     pose = np.array([0.5, 0.0, 0.7])
     surface = Surface(vertices=np.asarray(cone.vertices), faces=np.asarray(cone.faces, np.int32))
-    found = ExactHeights(surface, pose, seen).heights
+    found = ExactHeights(surface, pose, camera).heights
 
     rows, columns = np.mgrid[: shape[0], : shape[1]].reshape(2, -1)
     rays = np.column_stack([(columns - 30) / 400, (rows - 60) / 800, np.ones(pixels)])
     along = quat_rotate(T_table_camera.quat_wxyz, rays)
     cone.apply_transform(trimesh.transformations.rotation_matrix(0.7, [0, 0, 1]))
     cone.apply_translation([0.5, 0.0, 0.0])
-    eye = np.asarray(T_table_camera.position)
-    ahead = ((cone.triangles[:, 0] - eye) * cone.face_normals).sum(axis=-1)
-    towards = along @ cone.face_normals.T
-    with np.errstate(divide="ignore"):
-        enters = np.where(towards < 0, ahead / towards, -np.inf).max(axis=1)
-        leaves = np.where(towards > 0, ahead / towards, np.inf).min(axis=1)
-    true = np.where(enters < leaves, eye[2] + enters * along[:, 2], 0.0)
+    true = heights_by_rays(cone, np.tile(T_table_camera.position, (pixels, 1)), along)
     assert np.count_nonzero(true > 1e-3) > 300
     assert np.count_nonzero(np.abs(found - true) > 1e-5) <= 3  # rays along the silhouette
 

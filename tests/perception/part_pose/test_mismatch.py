@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from mskgrasp.core.geometry import Pose, quat_multiply
-from mskgrasp.perception.part_detection import find_part_pixels
 from mskgrasp.perception.part_pose.mismatch import Mismatch, reason_to_refuse
-from mskgrasp.perception.part_pose.part_pose import see
 from mskgrasp.perception.part_pose.search import search
-from tests.perception.part_pose.cells import kinect2, known, posed, resting_at
+from tests.perception.part_pose.cells import kinect2, known, posed, resting_at, seen
 
 NAME = "pillow_block_80x32"
 
@@ -16,13 +14,9 @@ NAME = "pillow_block_80x32"
 def mismatch(cell, pose: Pose, *, noisy: bool = False) -> tuple[Mismatch, str]:
     frame = posed(cell, NAME, pose)
     frame = kinect2(frame, seed=0) if noisy else frame
-    found = find_part_pixels(
-        frame.depth, frame.intrinsics, frame.T_base_camera,
-        table_z=0.0, region=cell.workspace.region, min_height=0.003,
-    )  # fmt: skip
-    seen = see(found, frame, known(NAME), 0.0)
-    one = Mismatch.of(search(seen, known(NAME))[0], seen)
-    return one, reason_to_refuse(one, seen)
+    pixels = seen(cell, frame, NAME)
+    one = Mismatch.of(search(pixels, known(NAME))[0], pixels)
+    return one, reason_to_refuse(one, pixels)
 
 
 @pytest.mark.parametrize("noisy", [False, True])
@@ -79,9 +73,5 @@ FITS = Mismatch(
 def test_each_difference_that_noise_does_not_explain_refuses_a_part(mujoco_cell, change, reason, noisy):
     frame = posed(mujoco_cell, NAME, resting_at(NAME, 0, 0.48, 0.03, 0.3))
     frame = kinect2(frame, seed=0) if noisy else frame
-    found = find_part_pixels(
-        frame.depth, frame.intrinsics, frame.T_base_camera,
-        table_z=0.0, region=mujoco_cell.workspace.region, min_height=0.003,
-    )  # fmt: skip
-    told = reason_to_refuse(replace(FITS, **change), see(found, frame, known(NAME), 0.0))
+    told = reason_to_refuse(replace(FITS, **change), seen(mujoco_cell, frame, NAME))
     assert told.startswith(reason) and bool(told) == bool(reason)

@@ -15,10 +15,8 @@ from mskgrasp.core.geometry import (
 )
 from mskgrasp.parts import find_part
 from mskgrasp.parts.alike_poses import PartSurface
-from mskgrasp.perception.part_detection import find_part_pixels
-from mskgrasp.perception.part_pose.part_pose import see
 from tests.benchmarks.part_pose import filtered
-from tests.perception.part_pose.cells import find, kinect2, known, posed, presented, resting_at
+from tests.perception.part_pose.cells import find, kinect2, posed, presented, resting_at, seen
 
 PARTS = (
     "l_bracket_60x40",
@@ -135,11 +133,7 @@ def test_an_image_that_was_smoothed_is_known_by_the_noise_of_neighbours(mujoco_c
     frame = posed(mujoco_cell, "l_bracket_60x40", resting_at("l_bracket_60x40", 0, 0.5, 0.0, 0.4))
     frame = kinect2(frame, seed=1) if noisy else frame
     frame = smooth(frame, how) if how else frame
-    found = find_part_pixels(
-        frame.depth, frame.intrinsics, frame.T_base_camera,
-        table_z=0.0, region=mujoco_cell.workspace.region, min_height=0.003,
-    )  # fmt: skip
-    assert see(found, frame, known("l_bracket_60x40"), 0.0).smoothed == smoothed
+    assert seen(mujoco_cell, frame, "l_bracket_60x40").smoothed == smoothed
 
 
 @pytest.mark.parametrize("how", ["bilateral", "gauss"])

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 import mskgrasp.perception.part_pose.search
-from mskgrasp.perception.part_detection import find_part_pixels
-from mskgrasp.perception.part_pose.part_pose import see
 from mskgrasp.perception.part_pose.search import CLOSE, FINAL, Fit, _turned, improve, judge, search
-from tests.perception.part_pose.cells import kinect2, known, posed, resting_at
+from tests.perception.part_pose.cells import kinect2, known, posed, resting_at, seen
 
 NAME = "l_bracket_60x40"
 
@@ -17,11 +15,7 @@ def image(mujoco_cell, request):
     true = resting_at(NAME, 0, 0.5, 0.02, 0.8)
     frame = posed(mujoco_cell, NAME, true)
     frame = kinect2(frame, seed=2) if request.param else frame
-    found = find_part_pixels(
-        frame.depth, frame.intrinsics, frame.T_base_camera,
-        table_z=0.0, region=mujoco_cell.workspace.region, min_height=0.003,
-    )  # fmt: skip
-    return see(found, frame, known(NAME), 0.0)
+    return seen(mujoco_cell, frame, NAME)
 
 
 def start(offset: tuple[float, float, float]) -> Fit:

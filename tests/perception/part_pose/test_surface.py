@@ -5,6 +5,7 @@ from trimesh.transformations import translation_matrix as translation
 
 from mskgrasp.core.geometry import quat_about_z
 from mskgrasp.perception.part_pose.surface import Surface, heights_from, on_plane
+from tests.perception.part_pose.cells import heights_by_rays
 
 
 def surface_of(mesh: trimesh.Trimesh) -> Surface:
@@ -32,14 +33,7 @@ def test_heights_are_where_rays_meet_the_mesh(eye):
     middles = np.stack([columns, rows], axis=-1).reshape(-1, 2) * cell + seen.corner
     on = np.column_stack([middles, np.full(len(middles), plane)])
     start = on + [0, 0, 1] if eye is None else np.broadcast_to(eye, on.shape)
-    along = on - start
-    # A ray enters a convex body where it has passed the last of the planes that it meets from outside.
-    ahead = ((cone.triangles[:, 0] - start[:, None]) * cone.face_normals).sum(axis=-1)
-    towards = along @ cone.face_normals.T
-    with np.errstate(divide="ignore"):
-        enters = np.where(towards < 0, ahead / towards, -np.inf).max(axis=1)
-        leaves = np.where(towards > 0, ahead / towards, np.inf).min(axis=1)
-    heights = np.where(enters < leaves, (start + enters[:, None] * along)[:, 2], 0.0)
+    heights = heights_by_rays(cone, start, on - start)
     off = np.abs(seen.heights.ravel() - heights)
     assert np.count_nonzero(heights > 0) > 2000
     assert np.count_nonzero(off > 1e-6) <= 3  # rays along the silhouette
