@@ -21,6 +21,11 @@ LEAST_SIMULATIONS = 24
 """Fewest of which any grasp comes, as in `mskgrasp.simulation.certify.CertifyConfig`."""
 TRIALS, QUICK_TRIALS = 24, 8
 """Trials of each policy with an exact camera; half as many with noise, a quarter with each friction."""
+LEAST_PROBABILITY, QUICK_LEAST_PROBABILITY = 0.02, 0.05
+"""Probability of the rarest resting poses whose grasps are certified."""
+USUAL_HULLS = 48
+"""Convex pieces up to which a part gets all simulations and trials; the catalogue's parts have no more. The
+solver's time grows with the pieces that pads touch: a simulation of 127 takes five times as long."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,16 +51,18 @@ class AssessConfig(Config):
     """Folder for report.html, grasps.json, grasps.isaac.yaml and trials.jsonl; with several parts, of a
     folder for each, and index.html."""
     quick: bool = False
-    """A third of the simulations and trials: about three minutes on two cores."""
+    """A third of the simulations and trials, and no certified grasps of resting poses rarer than 5 % instead
+    of 2 %: two to three minutes on two cores."""
     unit: Unit | None = None
     """Unit of a CAD file's coordinates, where the format states none; mm if not given."""
     models: Path = PRETRAINED
     """Folder with model.safetensors and model.json; by default the shipped one."""
     simulations: int = Field(default=0, ge=0, le=1_000_000)
     """About so many simulated grasps certify a part's grasps, at least 24 for each kind of resting pose;
-    0: 1200, or 400 with --quick."""
+    0: 1200, or 400 with --quick, and fewer of a part of more than 48 convex pieces."""
     trials: int = Field(default=0, ge=0, le=100_000)
-    """Trials of each policy with an exact camera; 0: 24, or 8 with --quick."""
+    """Trials of each policy with an exact camera; 0: 24, or 8 with --quick, and fewer of a part of more than
+    48 convex pieces."""
     workers: int = Field(default=0, ge=0)
     """Processes; 0: one per core. The results do not depend on their number."""
     seed: int = Field(default=0, ge=0, lt=2**63)
@@ -75,14 +82,23 @@ class AssessConfig(Config):
         return text
 
     @property
-    def n_simulations(self) -> int:
-        """Simulated grasps of a part."""
-        return self.simulations or (QUICK_SIMULATIONS if self.quick else SIMULATIONS)
+    def least_probability(self) -> float:
+        """Probability of the rarest resting poses whose grasps are certified."""
+        return QUICK_LEAST_PROBABILITY if self.quick else LEAST_PROBABILITY
 
-    @property
-    def n_trials(self) -> int:
-        """Trials of each policy with an exact camera."""
-        return self.trials or (QUICK_TRIALS if self.quick else TRIALS)
+    def n_simulations(self, n_hulls: int) -> int:
+        """Simulated grasps of a part of so many convex pieces."""
+        usual = QUICK_SIMULATIONS if self.quick else SIMULATIONS
+        return self.simulations or max(LEAST_SIMULATIONS, _affordable(usual, n_hulls))
+
+    def n_trials(self, n_hulls: int) -> int:
+        """Trials of each policy with an exact camera, of a part of so many convex pieces."""
+        usual = QUICK_TRIALS if self.quick else TRIALS
+        return self.trials or max(1, _affordable(usual, n_hulls))
+
+
+def _affordable(usual: int, n_hulls: int) -> int:
+    return round(usual * min(1.0, USUAL_HULLS / n_hulls))
 
 
 def parse_tolerance(text: str) -> Tolerance:

@@ -132,7 +132,11 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
     inputs = {"part": part.name} | model_digests(config.models) | part_digests([place])
     with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         cells = write_cells(out)
-        settings = CertifyConfig(simulations=_simulations(part, config, cells[EXACT]), seed=config.seed)
+        settings = CertifyConfig(
+            simulations=_simulations(part, config, cells[EXACT]),
+            least_probability=config.least_probability,
+            seed=config.seed,
+        )
         certified = certify([place], settings, config.models, workers)[part.name]
         begin_trials(out, certified)
         trials = _trials(part, certified, config, cells, out, workers)
@@ -156,7 +160,7 @@ def _simulations(part: Part, config: AssessConfig, cell_file: Path) -> int:
             "are simulated"
         )
         return LEAST_SIMULATIONS
-    return config.n_simulations
+    return config.n_simulations(part.n_hulls)
 
 
 def begin_trials(out: Path, certified: CertifiedGrasps) -> None:
@@ -193,4 +197,4 @@ def _trials(
         out=out,
         seed=config.seed,
     )
-    return placed_trials(trial_bench, setup, scene_tasks(part, config.n_trials), out, workers)
+    return placed_trials(trial_bench, setup, scene_tasks(part, config.n_trials(part.n_hulls)), out, workers)

@@ -109,7 +109,6 @@ def certify(
     for plan in plans.values():
         grasps = _merged(plan, config, conditions, digest)
         folder = certified_folder(plan.part)
-        folder.mkdir(parents=True, exist_ok=True)  # a part whose poses are all rare has no streams
         grasps.write(folder)
         found[plan.part.name] = grasps
     return found
@@ -182,8 +181,10 @@ def _plan(part: Part, config: CertifyConfig) -> _Plan:
         member = Member(which=which[number], turn=turn, probability=float(share))
         groups.setdefault(first, []).append(member)
     shares = {first: sum(one.probability for one in members) for first, members in groups.items()}
+    # The likeliest pose of a part that may come to rest in many is not left out.
+    least = min(config.least_probability, max(shares.values()))
     for first, share in shares.items():
-        if share < config.least_probability:
+        if share < least:
             without[first] = f"it is rare (probability {share:.1%})"
     kept = {first: share for first, share in shares.items() if first not in without}
     total = sum(share**0.5 for share in kept.values())

@@ -2,10 +2,19 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mskgrasp.assess.config import LEAST_SIMULATIONS, AssessConfig, parse_tolerance
+from mskgrasp.assess.config import (
+    LEAST_PROBABILITY,
+    LEAST_SIMULATIONS,
+    SIMULATIONS,
+    TRIALS,
+    USUAL_HULLS,
+    AssessConfig,
+    parse_tolerance,
+)
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.runtime.options import parse
 from mskgrasp.simulation.certify import CertifyConfig
+from tasks.scene.physics import MOST_HULLS
 
 
 @pytest.mark.parametrize(
@@ -42,5 +51,22 @@ def test_as_few_simulations_are_asked_for_as_a_certification_takes():
 def test_parts_come_first_and_quick_makes_less():
     found = parse(AssessConfig, prog="assess", description="", argv=["a.stl", "b", "--quick"])
     assert found.parts == ("a.stl", "b")
-    assert found.n_simulations < AssessConfig().n_simulations and found.n_trials < AssessConfig().n_trials
-    assert AssessConfig(quick=True, trials=30).n_trials == 30
+    usual = AssessConfig()
+    assert found.n_simulations(10) < usual.n_simulations(10) and found.n_trials(10) < usual.n_trials(10)
+    assert found.least_probability > usual.least_probability
+    assert AssessConfig(quick=True, trials=30).n_trials(10) == 30
+
+
+def test_a_part_of_many_pieces_gets_fewer_simulations_and_trials_unless_they_are_asked_for():
+    usual = AssessConfig()
+    assert usual.n_simulations(2) == usual.n_simulations(USUAL_HULLS) == SIMULATIONS
+    assert usual.n_simulations(2 * USUAL_HULLS) == SIMULATIONS / 2
+    assert usual.n_trials(2 * USUAL_HULLS) == TRIALS / 2
+    assert usual.n_simulations(10**6) == LEAST_SIMULATIONS and usual.n_trials(10**6) == 1
+    given = AssessConfig(simulations=SIMULATIONS, trials=TRIALS)
+    assert (given.n_simulations(2 * USUAL_HULLS), given.n_trials(2 * USUAL_HULLS)) == (SIMULATIONS, TRIALS)
+
+
+def test_usual_parts_are_those_of_the_catalogue():
+    assert USUAL_HULLS == MOST_HULLS
+    assert CertifyConfig().least_probability == LEAST_PROBABILITY

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from hal.hand import HAND_MASS, PAYLOAD
-from mskgrasp.assess.config import AssessConfig, parse_tolerance
+from mskgrasp.assess.config import USUAL_HULLS, AssessConfig, parse_tolerance
 from mskgrasp.assess.run import assess, begin_trials
 from mskgrasp.assess.summary import DISTANCES, Row, summarise
 from mskgrasp.assess.trials import CONDITIONS, EXACT, PLANNERS, AssessSetup, trial_bench, write_cells
@@ -74,11 +74,16 @@ def main() -> int:
     options = parser.parse_args()
     parts = chosen_parts(options.parts, options.n_parts)
     workers = process_count()
+    # As many of a part whose simulations take long as of any other.
+    usual = AssessConfig(quick=options.quick)
     config = AssessConfig(
         parts=tuple(str(part.folder) for part in parts), quick=options.quick, tolerance=options.tolerance,
+        simulations=usual.n_simulations(USUAL_HULLS), trials=usual.n_trials(USUAL_HULLS),
         out=options.out / "reports",
     )  # fmt: skip
-    settings = CertifyConfig(simulations=config.n_simulations, seed=config.seed)
+    settings = CertifyConfig(
+        simulations=config.simulations, least_probability=config.least_probability, seed=config.seed
+    )
     certify(config.parts, settings, config.models, workers)  # all at once: workers start a single time
     assess(config)
     alone = len(parts) == 1
