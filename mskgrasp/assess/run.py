@@ -132,11 +132,7 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
     inputs = {"part": part.name} | model_digests(config.models) | part_digests([place])
     with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         cells = write_cells(out)
-        settings = CertifyConfig(
-            simulations=_simulations(part, config, cells[EXACT]),
-            least_probability=config.least_probability,
-            seed=config.seed,
-        )
+        settings = certify_config(_simulations(part, config, cells[EXACT]), config)
         certified = certify([place], settings, config.models, workers)[part.name]
         begin_trials(out, certified)
         trials = _trials(part, certified, config, cells, out, workers)
@@ -148,6 +144,18 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
         ]
     )
     return Assessed(part=part, headline=headline, rows=rows)
+
+
+def certify_config(simulations: int, config: AssessConfig) -> CertifyConfig:
+    """Settings that certify a part's grasps by so many simulations."""
+    usual = CertifyConfig()
+    return CertifyConfig(
+        simulations=simulations,
+        # A stream keeps one core busy: two at least, also of the only resting pose.
+        per_stream=min(usual.per_stream, max(LEAST_SIMULATIONS, simulations // 2)),
+        least_probability=config.least_probability,
+        seed=config.seed,
+    )
 
 
 def _simulations(part: Part, config: AssessConfig, cell_file: Path) -> int:

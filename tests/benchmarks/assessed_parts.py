@@ -16,7 +16,7 @@ import numpy as np
 
 from hal.hand import HAND_MASS, PAYLOAD
 from mskgrasp.assess.config import USUAL_HULLS, AssessConfig, parse_tolerance
-from mskgrasp.assess.run import assess, begin_trials
+from mskgrasp.assess.run import assess, begin_trials, certify_config
 from mskgrasp.assess.summary import DISTANCES, Row, summarise
 from mskgrasp.assess.trials import CONDITIONS, EXACT, PLANNERS, AssessSetup, trial_bench, write_cells
 from mskgrasp.core.errors import BadPart
@@ -81,9 +81,7 @@ def main() -> int:
         simulations=usual.n_simulations(USUAL_HULLS), trials=usual.n_trials(USUAL_HULLS),
         out=options.out / "reports",
     )  # fmt: skip
-    settings = CertifyConfig(
-        simulations=config.simulations, least_probability=config.least_probability, seed=config.seed
-    )
+    settings = certify_config(config.simulations, config)
     certify(config.parts, settings, config.models, workers)  # all at once: workers start a single time
     assess(config)
     alone = len(parts) == 1
