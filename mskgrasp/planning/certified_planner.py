@@ -154,8 +154,9 @@ class CertifiedPlanner:
             return None
         view = planner.view(frame)
         T_base_rest = turned(rest_frame(found.T_base_obj, part.resting.quat_wxyz[found.resting]), turn)
+        # Over the table as it was measured: where a camera sees it elsewhere, the camera's depth is off.
         vectors = planner.cleared(
-            to_base(T_base_rest, np.stack([one.grasp for one in grasps]), planner.table_z + view.table_offset)
+            to_base(T_base_rest, np.stack([one.grasp for one in grasps]), planner.table_z)
         )
         radius = radius_about_vertical(part, found.resting)
         facing = float(twist_and_swing(T_base_rest.quat_wxyz)[0])

@@ -118,6 +118,20 @@ def test_a_table_seen_too_high_is_refused_as_by_the_networks(cell, planner):
         own.plan(high, np.random.default_rng(0))
 
 
+def test_a_camera_that_measures_too_far_does_not_lower_the_grasp(cell, planner):
+    frame, true = present(cell, 3)
+    noise = np.random.default_rng(0).normal(0, 1e-3, frame.depth.shape)
+    far = dataclasses.replace(frame, depth=(frame.depth + noise + 2e-3).astype(np.float32))
+    known = grasps(resting_of(true))
+    raised = [dataclasses.replace(one, grasp=one.grasp + [0, 0, 0.01, 0]) for one in known.grasps]
+    known = dataclasses.replace(known, grasps=tuple(raised))
+    own = CertifiedPlanner(planner, PART, known, reachable_by(cell))
+    exact, found = (own.plan(one, np.random.default_rng(0)) for one in (frame, far))
+    assert found.certified and found.view.table_offset == pytest.approx(-2e-3, abs=3e-4)
+    assert found.grasp.position == pytest.approx(exact.grasp.position, abs=1e-3)
+    assert found.grasp.position[2] == exact.grasp.position[2]
+
+
 def test_grasps_out_of_reach_are_left_out(cell, planner):
     frame, true = present(cell, 1)
     own = CertifiedPlanner(planner, PART, grasps(resting_of(true)))
