@@ -7,15 +7,12 @@ memory as a dataset's do. A step is everything from the stored samples to the ne
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import torch
-from rich.console import Console
-from rich.table import Table
 
 from mskgrasp.core.config import read_config
 from mskgrasp.learning.compute_device import compute_device
@@ -26,37 +23,42 @@ from mskgrasp.learning.sides import split
 from mskgrasp.learning.stage import Stage
 from mskgrasp.learning.trainer import describe_networks
 from mskgrasp.runtime import cli
+from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import progress
+from tests.benchmarks.report import show
 
 REPOSITORY = Path(__file__).parents[2]
+WHOSE = {"default": "ours", "paper": "the paper's"}
+"""Whose networks a configuration of training describes."""
 
 
-def main() -> None:
-    """Prints a table and, last, one JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+def main() -> int:
+    """Prints the table."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks.train_speed", description="Measure samples/s of training."
+    )
     parser.add_argument("--samples", type=int, default=2048, help="samples to learn from (default 2048)")
     parser.add_argument("--seconds", type=float, default=20.0, help="for each network (default 20)")
+    parser.add_argument("--out", type=Path, help="folder of report.json and report.md")
     options = parser.parse_args()
     torch.set_num_threads(min(2, os.cpu_count() or 1))
     device = str(compute_device())
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column(f"learning on {device}")
-    for header in ("GQN samples/s", "GDN samples/s", "share in the network"):
-        table.add_column(header, justify="right")
-    found: dict[str, dict[str, float]] = {}
-    for name in progress(("default", "paper"), unit="network"):
+    found = {}
+    for name in progress(WHOSE, unit="architecture"):
         config = read_config(LearningConfig, REPOSITORY / "configs" / "train" / f"{name}.yaml")
-        found[name] = measure(random_samples(config, options.samples), config, device, options.seconds / 2)
-        rates = (f"{found[name][stage]:.0f}" for stage in ("gqn", "gdn"))
-        table.add_row("ours" if name == "default" else name, *rates, f"{found[name]['share']:.0%}")
-    Console(width=100).print(table)
-    ours, paper = found["default"], found["paper"]
-    result = {
-        "samples_per_s": round(ours["gqn"]),
-        "paper_samples_per_s": round(paper["gqn"]),
-        "network_share": round(ours["share"], 3),
-    }
-    print(json.dumps(result))
+        found[name] = measure(random_samples(config, options.samples), config, device, options.seconds)
+    rows = [(WHOSE[name], *(format(round(one[key]), ",").replace(",", " ") for key in ("gqn", "gdn")),
+             f"{one['share']:.0%}") for name, one in found.items()]  # fmt: skip
+    ours, paper = found.values()
+    rows.append(("ours, times as many", *(f"{ours[key] / paper[key]:.0f}" for key in ("gqn", "gdn")), "-"))
+    header = (
+        f"samples/s, {device}",
+        "quality network",
+        "displacement network",
+        "quality network: time without preparing samples",
+    )
+    show([Table(header=header, rows=rows)], options.out)
+    return 0
 
 
 def measure(samples: Samples, config: LearningConfig, device: str, seconds: float) -> dict[str, float]:
