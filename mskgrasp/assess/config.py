@@ -24,8 +24,8 @@ TRIALS, QUICK_TRIALS = 24, 8
 LEAST_PROBABILITY, QUICK_LEAST_PROBABILITY = 0.02, 0.05
 """Probability of the rarest resting poses whose grasps are certified."""
 USUAL_HULLS = 48
-"""Convex pieces up to which a part gets all simulations and trials; the catalogue's parts have no more. The
-solver's time grows with the pieces that pads touch: a simulation of 127 takes five times as long."""
+"""Convex pieces up to which a part gets all simulations and trials; the catalogue's parts have no more.
+Imported ones have up to 128, and the more of them the pads touch, the longer the solver takes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,8 +51,8 @@ class AssessConfig(Config):
     """Folder for report.html, grasps.json, grasps.isaac.yaml and trials.jsonl; with several parts, of a
     folder for each, and index.html."""
     quick: bool = False
-    """A third of the simulations and trials, and no certified grasps of resting poses rarer than 5 % instead
-    of 2 %: two to three minutes on two cores."""
+    """A third of the simulations and trials, and certified grasps only of resting poses of at least 5 %, not
+    2 %: two to three minutes on two cores."""
     unit: Unit | None = None
     """Unit of a CAD file's coordinates, where the format states none; mm if not given."""
     models: Path = PRETRAINED
@@ -89,12 +89,12 @@ class AssessConfig(Config):
     def n_simulations(self, n_hulls: int) -> int:
         """Simulated grasps of a part of so many convex pieces."""
         usual = QUICK_SIMULATIONS if self.quick else SIMULATIONS
-        return self.simulations or max(LEAST_SIMULATIONS, _affordable(usual, n_hulls))
+        return self.simulations or _affordable(usual, n_hulls)
 
     def n_trials(self, n_hulls: int) -> int:
         """Trials of each policy with an exact camera, of a part of so many convex pieces."""
         usual = QUICK_TRIALS if self.quick else TRIALS
-        return self.trials or max(1, _affordable(usual, n_hulls))
+        return self.trials or _affordable(usual, n_hulls)
 
 
 def _affordable(usual: int, n_hulls: int) -> int:

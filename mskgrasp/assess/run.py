@@ -6,7 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hal.errors import LoadTooHeavy
-from mskgrasp.assess.config import LEAST_SIMULATIONS, AssessConfig, Tolerance, parse_tolerance
+from mskgrasp.assess.config import (
+    LEAST_SIMULATIONS,
+    USUAL_HULLS,
+    AssessConfig,
+    Tolerance,
+    parse_tolerance,
+)
 from mskgrasp.assess.index import IndexEntry, write_index
 from mskgrasp.assess.report import poses_section, trials_section, write_report
 from mskgrasp.assess.summary import Row
@@ -132,11 +138,13 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
     inputs = {"part": part.name} | model_digests(config.models) | part_digests([place])
     with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         cells = write_cells(out)
-        settings = certify_config(_simulations(part, config, cells[EXACT]), config)
+        n_simulations, n_trials = _sizes(part, config, cells[EXACT])
+        settings = certify_config(n_simulations, config)
         certified = certify([place], settings, config.models, workers)[part.name]
         begin_trials(out, certified)
-        trials = _trials(part, certified, config, cells, out, workers)
-        headline, rows = write_report(out, part, certified, trials, tolerance, config.model_dump(mode="json"))
+        trials = _trials(part, certified, config, cells, out, n_trials, workers)
+        shown = config.model_dump(mode="json") | dict(simulations=n_simulations, trials=n_trials)
+        headline, rows = write_report(out, part, certified, trials, tolerance, shown)
     print_sections(
         [
             poses_section(part, certified, out / "grasps.png"),
@@ -148,18 +156,22 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
 
 def certify_config(simulations: int, config: AssessConfig) -> CertifyConfig:
     """Settings that certify a part's grasps by so many simulations."""
-    usual = CertifyConfig()
+    # A stream keeps one core busy: two, also of the only resting pose, if there are enough simulations.
+    per_stream = simulations // 2 if simulations >= 2 * LEAST_SIMULATIONS else simulations
     return CertifyConfig(
         simulations=simulations,
-        # A stream keeps one core busy: two at least, also of the only resting pose.
-        per_stream=min(usual.per_stream, max(LEAST_SIMULATIONS, simulations // 2)),
+        per_stream=min(CertifyConfig().per_stream, per_stream),
         least_probability=config.least_probability,
         seed=config.seed,
     )
 
 
-def _simulations(part: Part, config: AssessConfig, cell_file: Path) -> int:
-    """As many as were asked for; the fewest where the arm cannot carry the part, so that nothing is tried."""
+def _sizes(part: Part, config: AssessConfig, cell_file: Path) -> tuple[int, int]:
+    """Numbers of simulated grasps and of trials of a part; says why, where they are not the usual ones.
+
+    Where the arm cannot carry the part nothing is tried, and the fewest grasps are simulated.
+    """
+    n_simulations, n_trials = config.n_simulations(part.n_hulls), config.n_trials(part.n_hulls)
     try:
         check_loads(cell_file, [part])
     except LoadTooHeavy:
@@ -167,8 +179,13 @@ def _simulations(part: Part, config: AssessConfig, cell_file: Path) -> int:
             f"{part.name} ({part.mass:.1f} kg) is too heavy for the arm: nothing is tried, and few grasps "
             "are simulated"
         )
-        return LEAST_SIMULATIONS
-    return config.n_simulations(part.n_hulls)
+        return LEAST_SIMULATIONS, n_trials
+    if part.n_hulls > USUAL_HULLS and not (config.simulations and config.trials):
+        note(
+            f"{part.name} has {part.n_hulls} convex pieces, whose contacts take long: {n_simulations} "
+            f"simulations, and {n_trials} trials with an exact camera (--simulations, --trials)"
+        )
+    return n_simulations, n_trials
 
 
 def begin_trials(out: Path, certified: CertifiedGrasps) -> None:
@@ -195,6 +212,7 @@ def _trials(
     config: AssessConfig,
     cells: dict[str, Path],
     out: Path,
+    n_trials: int,
     workers: int,
 ) -> list[PlacedTrial]:
     setup = AssessSetup(
@@ -205,4 +223,4 @@ def _trials(
         out=out,
         seed=config.seed,
     )
-    return placed_trials(trial_bench, setup, scene_tasks(part, config.n_trials(part.n_hulls)), out, workers)
+    return placed_trials(trial_bench, setup, scene_tasks(part, n_trials), out, workers)

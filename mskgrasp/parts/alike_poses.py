@@ -118,8 +118,7 @@ class _Lying:
         turns = np.arange(0.0, 2 * np.pi, _STEP)
         few = other._points(60)
         moved = np.concatenate([_turned(few, turn) for turn in turns])
-        distance, _ = self.surface.tree.query(moved @ self.rotation, workers=-1)
-        apart = distance.reshape(len(turns), -1).mean(axis=1)
+        apart = self.surface.tree.query(moved @ self.rotation)[0].reshape(len(turns), -1).mean(axis=1)
         compared = other._points(N_COMPARED)
         for which in np.argsort(apart)[:4]:
             if apart[which] > 2 * self.surface.spacing:

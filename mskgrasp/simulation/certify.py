@@ -62,7 +62,7 @@ class CertifyConfig(Config):
     kept: int = Field(default=8, ge=1)
     """Greatest number of certified grasps of a resting pose."""
     least_probability: float = Field(default=0.02, ge=0, le=1)
-    """Resting poses that are rarer are left to the networks."""
+    """Resting poses that are rarer are left to the networks, but for the likeliest."""
     least_lifted: float = Field(default=0.95, ge=0, le=1)
     """Least share of its last simulations that a certified grasp lifts."""
     most_error: float = Field(default=0.002, gt=0)

@@ -117,8 +117,9 @@ def certify(
 def certify_missing(parts: Sequence[str], models: Path, workers: int) -> None:
     """Certify grasps of the parts that have none of today's, with the settings by default.
 
-    Those of another number of simulations, or of candidates of other networks, remain; those that another
-    version of the simulation or of the certification measured, or under other conditions, are made again.
+    Those of another number of simulations, of fewer resting poses, or of candidates of other networks remain,
+    such as those of ``assess --quick``; those that another version of the simulation or of the certification
+    measured, or under other conditions, are made again.
 
     Args:
         parts: Names or folders.
@@ -185,10 +186,10 @@ def _plan(part: Part, config: CertifyConfig) -> _Plan:
     least = min(config.least_probability, max(shares.values()))
     for first, share in shares.items():
         if share < least:
-            without[first] = f"it is rare (probability {share:.1%})"
+            without[first] = f"it is rare (probability {share:.1%}, the limit is {least:.0%})"
     kept = {first: share for first, share in shares.items() if first not in without}
     total = sum(share**0.5 for share in kept.values())
-    n_streams = max(len(kept), round(config.simulations / config.per_stream), 1)
+    n_streams = max(len(kept), round(config.simulations / config.per_stream))
     size = max(LEAST_STREAM, min(config.per_stream, config.simulations // n_streams))
     streams = [
         Stream(

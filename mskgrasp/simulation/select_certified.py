@@ -13,7 +13,7 @@ from mskgrasp.planning.certified import CertifiedGrasp, radius_about_vertical, w
 from mskgrasp.simulation.certify import CertifyConfig, spread_out
 from mskgrasp.simulation.pad_contact import HeldPart, moment_share
 
-SELECT_VERSION = 8
+SELECT_VERSION = 9
 """Raised by every change after which others of the simulated grasps are certified."""
 PREFERRED_MOMENT = 0.5
 """Grasps up to this `moment_share` are preferred: half of it is left for pads that press unevenly."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -9,12 +10,15 @@ import pytest
 import trimesh
 
 from mskgrasp.assess.__main__ import main
-from mskgrasp.assess.config import AssessConfig
-from mskgrasp.assess.run import _sources, begin_trials
-from mskgrasp.assess.trials import CONDITIONS, EXACT, NOISY, PLANNERS
+from mskgrasp.assess.config import SIMULATIONS, USUAL_HULLS, AssessConfig
+from mskgrasp.assess.config import TRIALS as TRIALS_OF_A_POLICY
+from mskgrasp.assess.run import _sizes, _sources, begin_trials, certify_config
+from mskgrasp.assess.trials import CONDITIONS, EXACT, NOISY, PLANNERS, write_cells
 from mskgrasp.core.errors import BadPart, MissingModel, UsageError
+from mskgrasp.parts import find_part
 from mskgrasp.planning.certified import FILE
 from mskgrasp.runtime.run_folder import TRIALS, read_trials, rewrite_trials
+from mskgrasp.simulation.certify import CertifyConfig
 from mskgrasp.trials.placed_trial import PlacedTrial
 from tests.assess.made_trials import made
 from tests.browser import Page
@@ -82,6 +86,32 @@ def test_a_block_too_wide_and_too_heavy_gets_a_report_that_says_so(cad, tmp_path
     with Page(out / "report.html") as page:
         line = page.evaluate("document.querySelector('.conclusion').textContent")
     assert line.startswith("block is wider than the hand in every resting pose")
+
+
+@pytest.mark.parametrize(
+    ("simulations", "per_stream"), [(24, 24), (30, 30), (151, 75), (400, 200), (1200, 200)]
+)
+def test_simulations_of_a_single_pose_keep_two_cores_busy_if_they_suffice(simulations, per_stream):
+    found = certify_config(simulations, AssessConfig())
+    assert (found.simulations, found.per_stream) == (simulations, per_stream)
+
+
+def test_a_quick_assessment_leaves_more_resting_poses_to_the_networks():
+    full, quick = (certify_config(400, AssessConfig(quick=one)) for one in (False, True))
+    assert full.least_probability == CertifyConfig().least_probability < quick.least_probability
+
+
+def test_a_part_of_many_pieces_is_told_how_little_is_simulated(tmp_path, capsys):
+    cell_file = write_cells(tmp_path)[EXACT]
+    part = dataclasses.replace(find_part("hex_nut_m20"), n_hulls=2 * USUAL_HULLS)
+    assert _sizes(part, AssessConfig(), cell_file) == (SIMULATIONS // 2, TRIALS_OF_A_POLICY // 2)
+    assert "hex_nut_m20 has 96 convex pieces, whose contacts take long: 600 simulations" in (
+        capsys.readouterr().err
+    )
+    given = AssessConfig(simulations=300, trials=20)
+    assert _sizes(part, given, cell_file) == (300, 20)
+    assert _sizes(find_part("hex_nut_m20"), AssessConfig(), cell_file) == (SIMULATIONS, TRIALS_OF_A_POLICY)
+    assert not capsys.readouterr().err
 
 
 def test_trials_planned_by_other_certified_grasps_are_made_again(tmp_path, capsys):

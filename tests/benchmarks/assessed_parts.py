@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from hal.hand import HAND_MASS, PAYLOAD
-from mskgrasp.assess.config import USUAL_HULLS, AssessConfig, parse_tolerance
-from mskgrasp.assess.run import assess, begin_trials, certify_config
+from mskgrasp.assess.config import AssessConfig, parse_tolerance
+from mskgrasp.assess.run import assess, begin_trials
 from mskgrasp.assess.summary import DISTANCES, Row, summarise
 from mskgrasp.assess.trials import CONDITIONS, EXACT, PLANNERS, AssessSetup, trial_bench, write_cells
 from mskgrasp.core.errors import BadPart
@@ -38,7 +38,6 @@ from mskgrasp.runtime.progress import note
 from mskgrasp.runtime.run_folder import TRIALS, read_trials
 from mskgrasp.runtime.worker_pool import process_count
 from mskgrasp.simulation.certify import CertifyConfig
-from mskgrasp.simulation.certify_parts import certify
 from mskgrasp.trials.placed_scenes import SceneTask, placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 from tests.benchmarks.report import show
@@ -74,15 +73,10 @@ def main() -> int:
     options = parser.parse_args()
     parts = chosen_parts(options.parts, options.n_parts)
     workers = process_count()
-    # As many of a part whose simulations take long as of any other.
-    usual = AssessConfig(quick=options.quick)
     config = AssessConfig(
         parts=tuple(str(part.folder) for part in parts), quick=options.quick, tolerance=options.tolerance,
-        simulations=usual.n_simulations(USUAL_HULLS), trials=usual.n_trials(USUAL_HULLS),
         out=options.out / "reports",
     )  # fmt: skip
-    settings = certify_config(config.simulations, config)
-    certify(config.parts, settings, config.models, workers)  # all at once: workers start a single time
     assess(config)
     alone = len(parts) == 1
     reported, fresh = {}, {}
