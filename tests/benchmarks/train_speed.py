@@ -50,12 +50,12 @@ def main() -> int:
     rows = [(WHOSE[name], *(format(round(one[key]), ",").replace(",", " ") for key in ("gqn", "gdn")),
              f"{one['share']:.0%}") for name, one in found.items()]  # fmt: skip
     ours, paper = found.values()
-    rows.append(("ours, times as many", *(f"{ours[key] / paper[key]:.0f}" for key in ("gqn", "gdn")), "-"))
+    rows.append(("ours / the paper's", *(f"{ours[key] / paper[key]:.0f}" for key in ("gqn", "gdn")), "-"))
     header = (
         f"samples/s, {device}",
         "quality network",
         "displacement network",
-        "quality network: time without preparing samples",
+        "quality network: share of a step after preparing its samples",
     )
     show([Table(header=header, rows=rows)], options.out)
     return 0
@@ -76,19 +76,19 @@ def measure(samples: Samples, config: LearningConfig, device: str, seconds: floa
 def rate(stage: Stage, work: Callable[[torch.Tensor], object], seconds: float) -> float:
     """Samples/s of some work on a stage's batches, the first few not counted."""
     order = torch.Generator().manual_seed(0)
-    done, began = -3, 0.0
-    batch = stage.settings.batch_size
-    while done < 1 or time.perf_counter() - began < seconds:
-        for rows in stage.order(order).to(stage.models.device).split(batch):
-            if done == 0:
+    steps, samples, began = -3, 0, 0.0
+    while steps < 1 or time.perf_counter() - began < seconds:
+        for rows in stage.order(order).to(stage.models.device).split(stage.settings.batch_size):
+            if steps == 0:
                 began = time.perf_counter()
             work(rows)
-            done += 1
-            if done > 0 and time.perf_counter() - began > seconds:
+            samples += len(rows) if steps >= 0 else 0
+            steps += 1
+            if steps > 0 and time.perf_counter() - began > seconds:
                 break
     if stage.models.device.type == "cuda":
         torch.cuda.synchronize()
-    return done * batch / (time.perf_counter() - began)
+    return samples / (time.perf_counter() - began)
 
 
 def random_samples(config: LearningConfig, n: int) -> Samples:
