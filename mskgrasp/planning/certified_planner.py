@@ -154,7 +154,7 @@ class CertifiedPlanner:
             return None
         view = planner.view(frame)
         T_base_rest = turned(rest_frame(found.T_base_obj, part.resting.quat_wxyz[found.resting]), turn)
-        # Over the table as it was measured: where a camera sees it elsewhere, the camera's depth is off.
+        # Over the stated height of the table, which a hand can touch: a camera's depth may be off by more.
         vectors = planner.cleared(
             to_base(T_base_rest, np.stack([one.grasp for one in grasps]), planner.table_z)
         )
