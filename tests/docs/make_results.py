@@ -159,7 +159,8 @@ def record(name: str) -> None:
     values = dict(
         record=dict(
             n=facts.get("n") or _size(report),
-            simulation=_labels(report)
+            simulation=facts.get("simulation")
+            or _labels(report)
             or (
                 f"{physics.rate_hz} Hz, {physics.position_iterations} iterations; simulation version "
                 f"{SIMULATION_VERSION}, parts of version {PART_VERSION}"
