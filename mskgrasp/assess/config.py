@@ -21,8 +21,6 @@ LEAST_SIMULATIONS = 24
 """Fewest of which any grasp comes, as in `mskgrasp.simulation.certify.CertifyConfig`."""
 TRIALS, QUICK_TRIALS = 24, 8
 """Trials of each policy with an exact camera; half as many with noise, a quarter with each friction."""
-LEAST_PROBABILITY, QUICK_LEAST_PROBABILITY = 0.02, 0.05
-"""Probability of the rarest resting poses whose grasps are certified."""
 USUAL_HULLS = 48
 """Convex pieces up to which a part gets all simulations and trials; the catalogue's parts have no more.
 Imported ones have up to 128, and the more of them the pads touch, the longer the solver takes."""
@@ -51,8 +49,8 @@ class AssessConfig(Config):
     """Folder for report.html, grasps.json, grasps.isaac.yaml and trials.jsonl; with several parts, of a
     folder for each, and index.html."""
     quick: bool = False
-    """A third of the simulations and trials, and certified grasps only of resting poses of at least 5 %, not
-    2 %: two to three minutes on two cores."""
+    """A third of the simulations and trials: two to three minutes on two cores. Of a part of more than 48
+    convex pieces the rarest resting poses are left to the networks."""
     unit: Unit | None = None
     """Unit of a CAD file's coordinates, where the format states none; mm if not given."""
     models: Path = PRETRAINED
@@ -81,24 +79,26 @@ class AssessConfig(Config):
         parse_tolerance(text)
         return text
 
-    @property
-    def least_probability(self) -> float:
-        """Probability of the rarest resting poses whose grasps are certified."""
-        return QUICK_LEAST_PROBABILITY if self.quick else LEAST_PROBABILITY
-
     def n_simulations(self, n_hulls: int) -> int:
         """Simulated grasps of a part of so many convex pieces."""
         usual = QUICK_SIMULATIONS if self.quick else SIMULATIONS
-        return self.simulations or _affordable(usual, n_hulls)
+        return self.simulations or round(usual / _excess(n_hulls))
 
     def n_trials(self, n_hulls: int) -> int:
         """Trials of each policy with an exact camera, of a part of so many convex pieces."""
         usual = QUICK_TRIALS if self.quick else TRIALS
-        return self.trials or _affordable(usual, n_hulls)
+        return self.trials or round(usual / _excess(n_hulls))
+
+    def least_probability_factor(self, n_hulls: int) -> float:
+        """How many times as likely the rarest resting pose with certified grasps must be as by default.
+
+        Each kind of resting pose takes the fewest simulations at least, which a quick run must not exceed.
+        """
+        return _excess(n_hulls) if self.quick else 1.0
 
 
-def _affordable(usual: int, n_hulls: int) -> int:
-    return round(usual * min(1.0, USUAL_HULLS / n_hulls))
+def _excess(n_hulls: int) -> float:
+    return max(1.0, n_hulls / USUAL_HULLS)
 
 
 def parse_tolerance(text: str) -> Tolerance:

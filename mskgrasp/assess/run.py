@@ -139,7 +139,7 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
     with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         cells = write_cells(out)
         n_simulations, n_trials = _sizes(part, config, cells[EXACT])
-        settings = certify_config(n_simulations, config)
+        settings = certify_config(part.n_hulls, n_simulations, config)
         certified = certify([place], settings, config.models, workers)[part.name]
         begin_trials(out, certified)
         trials = _trials(part, certified, config, cells, out, n_trials, workers)
@@ -154,14 +154,15 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
     return Assessed(part=part, headline=headline, rows=rows)
 
 
-def certify_config(simulations: int, config: AssessConfig) -> CertifyConfig:
-    """Settings that certify a part's grasps by so many simulations."""
+def certify_config(n_hulls: int, simulations: int, config: AssessConfig) -> CertifyConfig:
+    """Settings that certify grasps of a part of so many convex pieces by so many simulations."""
+    usual = CertifyConfig()
     # A stream keeps one core busy: two, also of the only resting pose, if there are enough simulations.
     per_stream = simulations // 2 if simulations >= 2 * LEAST_SIMULATIONS else simulations
     return CertifyConfig(
         simulations=simulations,
-        per_stream=min(CertifyConfig().per_stream, per_stream),
-        least_probability=config.least_probability,
+        per_stream=min(usual.per_stream, per_stream),
+        least_probability=usual.least_probability * config.least_probability_factor(n_hulls),
         seed=config.seed,
     )
 

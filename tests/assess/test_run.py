@@ -92,13 +92,14 @@ def test_a_block_too_wide_and_too_heavy_gets_a_report_that_says_so(cad, tmp_path
     ("simulations", "per_stream"), [(24, 24), (30, 30), (151, 75), (400, 200), (1200, 200)]
 )
 def test_simulations_of_a_single_pose_keep_two_cores_busy_if_they_suffice(simulations, per_stream):
-    found = certify_config(simulations, AssessConfig())
+    found = certify_config(10, simulations, AssessConfig())
     assert (found.simulations, found.per_stream) == (simulations, per_stream)
 
 
-def test_a_quick_assessment_leaves_more_resting_poses_to_the_networks():
-    full, quick = (certify_config(400, AssessConfig(quick=one)) for one in (False, True))
-    assert full.least_probability == CertifyConfig().least_probability < quick.least_probability
+@pytest.mark.parametrize(("quick", "n_hulls", "times"), [(True, 48, 1), (True, 120, 2.5), (False, 120, 1)])
+def test_a_quick_assessment_of_many_pieces_leaves_more_poses_to_the_networks(quick, n_hulls, times):
+    found = certify_config(n_hulls, 400, AssessConfig(quick=quick))
+    assert found.least_probability == pytest.approx(times * CertifyConfig().least_probability)
 
 
 def test_a_part_of_many_pieces_is_told_how_little_is_simulated(tmp_path, capsys):
