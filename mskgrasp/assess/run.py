@@ -183,7 +183,7 @@ def _sizes(part: Part, config: AssessConfig, cell_file: Path) -> tuple[int, int]
         return LEAST_SIMULATIONS, n_trials
     if part.n_hulls > USUAL_HULLS and not (config.simulations and config.trials):
         note(
-            f"{part.name} has {part.n_hulls} convex pieces, whose contacts take long: {n_simulations} "
+            f"{part.name} has {part.n_hulls} convex pieces, whose contacts take long: about {n_simulations} "
             f"simulations, and {n_trials} trials with an exact camera (--simulations, --trials)"
         )
     return n_simulations, n_trials
