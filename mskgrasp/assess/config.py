@@ -13,6 +13,7 @@ from pydantic import Field, field_validator
 from mskgrasp.core.config import Config
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.core.units import Unit
+from mskgrasp.simulation.hull_count import hull_excess
 
 _TOLERANCE = re.compile(r"\s*([0-9.]+)\s*(mm|m)\s*,\s*([0-9.]+)\s*(deg|rad)\s*")
 SIMULATIONS, QUICK_SIMULATIONS = 1200, 400
@@ -21,9 +22,6 @@ LEAST_SIMULATIONS = 24
 """Fewest of which any grasp comes, as in `mskgrasp.simulation.certify.CertifyConfig`."""
 TRIALS, QUICK_TRIALS = 24, 8
 """Trials of each policy with an exact camera; half as many with noise, a quarter with each friction."""
-USUAL_HULLS = 48
-"""Convex pieces up to which a part gets all simulations and trials; the catalogue's parts have no more.
-Imported ones have up to 128, and the more of them the pads touch, the longer the solver takes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,23 +80,19 @@ class AssessConfig(Config):
     def n_simulations(self, n_hulls: int) -> int:
         """Simulated grasps of a part of so many convex pieces."""
         usual = QUICK_SIMULATIONS if self.quick else SIMULATIONS
-        return self.simulations or round(usual / _excess(n_hulls))
+        return self.simulations or round(usual / hull_excess(n_hulls))
 
     def n_trials(self, n_hulls: int) -> int:
         """Trials of each policy with an exact camera, of a part of so many convex pieces."""
         usual = QUICK_TRIALS if self.quick else TRIALS
-        return self.trials or round(usual / _excess(n_hulls))
+        return self.trials or round(usual / hull_excess(n_hulls))
 
     def least_probability_factor(self, n_hulls: int) -> float:
         """How many times as likely the rarest resting pose with certified grasps must be as by default.
 
         Each kind of resting pose takes the fewest simulations at least, which a quick run must not exceed.
         """
-        return _excess(n_hulls) if self.quick else 1.0
-
-
-def _excess(n_hulls: int) -> float:
-    return max(1.0, n_hulls / USUAL_HULLS)
+        return hull_excess(n_hulls) if self.quick else 1.0
 
 
 def parse_tolerance(text: str) -> Tolerance:

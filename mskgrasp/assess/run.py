@@ -8,7 +8,6 @@ from pathlib import Path
 from hal.errors import LoadTooHeavy
 from mskgrasp.assess.config import (
     LEAST_SIMULATIONS,
-    USUAL_HULLS,
     AssessConfig,
     Tolerance,
     parse_tolerance,
@@ -29,8 +28,8 @@ from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import note
 from mskgrasp.runtime.run_folder import TRIALS, opened_run, resume_trials, rewrite_trials
 from mskgrasp.runtime.worker_pool import process_count
-from mskgrasp.simulation.certify import CertifyConfig
-from mskgrasp.simulation.certify_parts import certify
+from mskgrasp.simulation.certify_parts import certify, certify_config
+from mskgrasp.simulation.hull_count import USUAL_HULLS
 from mskgrasp.trials.cell_file import check_loads
 from mskgrasp.trials.placed_scenes import placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
@@ -139,7 +138,9 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
     with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         cells = write_cells(out)
         n_simulations, n_trials = _sizes(part, config, cells[EXACT])
-        settings = certify_config(part.n_hulls, n_simulations, config)
+        settings = certify_config(
+            n_simulations, factor=config.least_probability_factor(part.n_hulls), seed=config.seed
+        )
         certified = certify([place], settings, config.models, workers)[part.name]
         begin_trials(out, certified)
         trials = _trials(part, certified, config, cells, out, n_trials, workers)
@@ -152,19 +153,6 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
         ]
     )
     return Assessed(part=part, headline=headline, rows=rows)
-
-
-def certify_config(n_hulls: int, simulations: int, config: AssessConfig) -> CertifyConfig:
-    """Settings that certify grasps of a part of so many convex pieces by so many simulations."""
-    usual = CertifyConfig()
-    # A stream keeps one core busy: two, also of the only resting pose, if there are enough simulations.
-    per_stream = simulations // 2 if simulations >= 2 * LEAST_SIMULATIONS else simulations
-    return CertifyConfig(
-        simulations=simulations,
-        per_stream=min(usual.per_stream, per_stream),
-        least_probability=usual.least_probability * config.least_probability_factor(n_hulls),
-        seed=config.seed,
-    )
 
 
 def _sizes(part: Part, config: AssessConfig, cell_file: Path) -> tuple[int, int]:

@@ -35,6 +35,7 @@ from mskgrasp.simulation.certify import (
     Stream,
     run_stream,
 )
+from mskgrasp.simulation.hull_count import hull_excess
 from mskgrasp.simulation.resting import resting_of
 from mskgrasp.simulation.select_certified import SELECT_VERSION, select_certified
 from mskgrasp.simulation.versions import versions
@@ -117,9 +118,10 @@ def certify(
 def certify_missing(parts: Sequence[str], models: Path, workers: int) -> None:
     """Certify grasps of the parts that have none of today's, with the settings by default.
 
-    Those of another number of simulations, of fewer resting poses, or of candidates of other networks remain,
-    such as those of ``assess --quick``; those that another version of the simulation or of the certification
-    measured, or under other conditions, are made again.
+    A part of very many convex pieces gets fewer simulations, as in an assessment. Grasps of another number of
+    simulations, of fewer resting poses, or of candidates of other networks remain, such as those of
+    ``assess --quick``; those that another version of the simulation or of the certification measured, or
+    under other conditions, are made again.
 
     Args:
         parts: Names or folders.
@@ -127,9 +129,34 @@ def certify_missing(parts: Sequence[str], models: Path, workers: int) -> None:
         workers: Processes; 0: one per core.
     """
     missing = [name for name in parts if not _of_today(find_part(name))]
-    if missing:
-        note(f"certifying grasps of {len(missing)} of {len(parts)} parts, some minutes each")
-        certify(missing, CertifyConfig(), models, process_count(workers))
+    if not missing:
+        return
+    note(f"certifying grasps of {len(missing)} of {len(parts)} parts, some minutes each")
+    alike: dict[int, list[str]] = {}
+    for name in missing:
+        simulations = round(CertifyConfig().simulations / hull_excess(find_part(name).n_hulls))
+        alike.setdefault(simulations, []).append(name)
+    for simulations, names in alike.items():
+        certify(names, certify_config(simulations), models, process_count(workers))
+
+
+def certify_config(simulations: int, *, factor: float = 1.0, seed: int = 0) -> CertifyConfig:
+    """Settings of a part's certification by about so many simulations.
+
+    Args:
+        simulations: Simulated grasps.
+        factor: How many times as likely the rarest resting pose with certified grasps must be as by default.
+        seed: Of the simulations.
+    """
+    usual = CertifyConfig()
+    # A stream keeps one core busy: two, also of the only resting pose, if there are enough simulations.
+    per_stream = simulations // 2 if simulations >= 2 * LEAST_STREAM else simulations
+    return CertifyConfig(
+        simulations=simulations,
+        per_stream=min(usual.per_stream, per_stream),
+        least_probability=usual.least_probability * factor,
+        seed=seed,
+    )
 
 
 def _of_today(part: Part) -> bool:

@@ -6,7 +6,6 @@ from mskgrasp.assess.config import (
     LEAST_SIMULATIONS,
     SIMULATIONS,
     TRIALS,
-    USUAL_HULLS,
     AssessConfig,
     parse_tolerance,
 )
@@ -14,7 +13,7 @@ from mskgrasp.core.errors import BadConfig
 from mskgrasp.parts.solids.mesh_pieces import MOST_MESH_HULLS
 from mskgrasp.runtime.options import parse
 from mskgrasp.simulation.certify import CertifyConfig
-from tasks.scene.physics import MOST_HULLS
+from mskgrasp.simulation.hull_count import USUAL_HULLS
 
 
 @pytest.mark.parametrize(
@@ -67,5 +66,6 @@ def test_a_part_of_many_pieces_gets_fewer_simulations_and_trials_unless_they_are
     assert (given.n_simulations(2 * USUAL_HULLS), given.n_trials(2 * USUAL_HULLS)) == (SIMULATIONS, TRIALS)
 
 
-def test_usual_parts_have_as_many_pieces_as_the_engine_makes_room_for():
-    assert USUAL_HULLS == MOST_HULLS
+@pytest.mark.parametrize(("quick", "n_hulls", "times"), [(True, 48, 1), (True, 120, 2.5), (False, 120, 1)])
+def test_a_quick_assessment_of_many_pieces_leaves_more_poses_to_the_networks(quick, n_hulls, times):
+    assert AssessConfig(quick=quick).least_probability_factor(n_hulls) == times

@@ -10,15 +10,15 @@ import pytest
 import trimesh
 
 from mskgrasp.assess.__main__ import main
-from mskgrasp.assess.config import SIMULATIONS, USUAL_HULLS, AssessConfig
+from mskgrasp.assess.config import SIMULATIONS, AssessConfig
 from mskgrasp.assess.config import TRIALS as TRIALS_OF_A_POLICY
-from mskgrasp.assess.run import _sizes, _sources, begin_trials, certify_config
+from mskgrasp.assess.run import _sizes, _sources, begin_trials
 from mskgrasp.assess.trials import CONDITIONS, EXACT, NOISY, PLANNERS, write_cells
 from mskgrasp.core.errors import BadPart, MissingModel, UsageError
 from mskgrasp.parts import find_part
 from mskgrasp.planning.certified import FILE
 from mskgrasp.runtime.run_folder import TRIALS, read_trials, rewrite_trials
-from mskgrasp.simulation.certify import CertifyConfig
+from mskgrasp.simulation.hull_count import USUAL_HULLS
 from mskgrasp.trials.placed_trial import PlacedTrial
 from tests.assess.made_trials import made
 from tests.browser import Page
@@ -86,20 +86,6 @@ def test_a_block_too_wide_and_too_heavy_gets_a_report_that_says_so(cad, tmp_path
     with Page(out / "report.html") as page:
         line = page.evaluate("document.querySelector('.conclusion').textContent")
     assert line.startswith("block is wider than the hand in every resting pose")
-
-
-@pytest.mark.parametrize(
-    ("simulations", "per_stream"), [(24, 24), (30, 30), (151, 75), (400, 200), (1200, 200)]
-)
-def test_simulations_of_a_single_pose_keep_two_cores_busy_if_they_suffice(simulations, per_stream):
-    found = certify_config(10, simulations, AssessConfig())
-    assert (found.simulations, found.per_stream) == (simulations, per_stream)
-
-
-@pytest.mark.parametrize(("quick", "n_hulls", "times"), [(True, 48, 1), (True, 120, 2.5), (False, 120, 1)])
-def test_a_quick_assessment_of_many_pieces_leaves_more_poses_to_the_networks(quick, n_hulls, times):
-    found = certify_config(n_hulls, 400, AssessConfig(quick=quick))
-    assert found.least_probability == pytest.approx(times * CertifyConfig().least_probability)
 
 
 def test_a_part_of_many_pieces_is_told_how_little_is_simulated(tmp_path, capsys):

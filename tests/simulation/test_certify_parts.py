@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import pytest
@@ -12,7 +13,8 @@ from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.planning.certified import FILE, certified_folder, read_certified
 from mskgrasp.simulation import certify_parts, resting
 from mskgrasp.simulation.certify import CertifyConfig
-from mskgrasp.simulation.certify_parts import certify
+from mskgrasp.simulation.certify_parts import certify, certify_config
+from mskgrasp.simulation.hull_count import USUAL_HULLS
 from mskgrasp.simulation.versions import versions
 from tests.boxes import make_box
 from tests.planning.test_certified import certified, certified_grasp
@@ -102,3 +104,28 @@ def test_grasps_of_another_simulation_or_conditions_are_made_again(box, monkeypa
     monkeypatch.setattr(certify_parts, "certify", lambda parts, *rest: wanted.extend(parts))
     certify_parts.certify_missing([str(box.folder)], PRETRAINED, 1)
     assert wanted == [str(box.folder)] * made_again
+
+
+def test_missing_grasps_of_parts_of_many_pieces_are_certified_by_fewer_simulations(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    parts = {name: make_box(tmp_path, name, (0.07, 0.03, 0.02), 0.1) for name in ("few", "many", "as_few")}
+    parts["many"] = dataclasses.replace(parts["many"], n_hulls=3 * USUAL_HULLS)
+    monkeypatch.setattr(certify_parts, "find_part", parts.__getitem__)
+    made = []
+    monkeypatch.setattr(certify_parts, "certify", lambda *values: made.append(values[:2]))
+    certify_parts.certify_missing(list(parts), PRETRAINED, 1)
+    usual = CertifyConfig()
+    fewer = usual.model_copy(update=dict(simulations=usual.simulations // 3))
+    assert made == [(["few", "as_few"], usual), (["many"], fewer)]
+
+
+@pytest.mark.parametrize(
+    ("simulations", "per_stream"), [(24, 24), (30, 30), (151, 75), (400, 200), (1200, 200)]
+)
+def test_simulations_of_a_single_pose_keep_two_cores_busy_if_they_suffice(simulations, per_stream):
+    found = certify_config(simulations)
+    assert (found.simulations, found.per_stream) == (simulations, per_stream)
+
+
+def test_rarer_poses_are_left_out_if_so_asked():
+    assert certify_config(400, factor=2.5).least_probability == 2.5 * CertifyConfig().least_probability
