@@ -42,6 +42,9 @@ from mskgrasp.runtime.progress import note
 AMBIGUOUS_FROM = 1.5e-3
 """Expected distance (RMS) of the part's surface from where the best pose has it, metres: beyond it the
 networks, which err by some millimetres, are the better choice."""
+MOST_RAISED = 4e-4
+"""Greatest height by which a grasp may be raised to keep the cell's clearance, metres: two standard
+deviations of the heights at which it was simulated. Higher, the hand would hold the part elsewhere."""
 
 
 class CertifiedPlanner:
@@ -91,9 +94,11 @@ class CertifiedPlanner:
         planner = self._planner
         found = self._find(frame)
         located = time.perf_counter()
-        plan = None if self._ambiguous(found) else self._simulated_plan(frame, found)
-        if plan is None or not plan.certified:
-            self._tell(found, plan)
+        plan, reason = None, "the image fits two poses of it"
+        if not self._ambiguous(found):
+            plan, reason = self._simulated_plan(frame, found)
+        if reason:
+            self._tell(found, plan, reason)
         if plan is None:
             return replace(planner.plan(frame, rng), pose=found)
         now = time.perf_counter()
@@ -128,45 +133,56 @@ class CertifiedPlanner:
         )
         return squared > AMBIGUOUS_FROM**2
 
-    def _tell(self, found: PartPose, plan: GraspPlan | None) -> None:
+    def _tell(self, found: PartPose, plan: GraspPlan | None, reason: str) -> None:
         """Report why no certified grasp is planned, unless the networks' was asked for."""
         if not (self._certified.grasps or self._certified.uncertified or self._certified.without):
             return
-        resting = self._certified.like.get(found.resting, (found.resting, 0.0))[0]
-        reason = self._certified.without.get(resting, "the arm reaches none of its certified grasps")
-        if self._ambiguous(found):
-            reason = "the image fits two poses of it"
-        elif plan is None and self._certified.uncertified_of(found.resting)[0]:
-            reason += ", and the arm reaches none of these"
         by = "by the networks" if plan is None else "with the best that was simulated"
         which = f"'{self._part.name}' in resting pose {found.resting}"
         note(f"{which} gets no certified grasp: {reason}; planned {by}")
 
-    def _simulated_plan(self, frame: RgbdFrame, found: PartPose) -> GraspPlan | None:
-        """The plan of the best simulated grasp within reach, certified ones first; None: none is."""
+    def _simulated_plan(self, frame: RgbdFrame, found: PartPose) -> tuple[GraspPlan | None, str]:
+        """The plan of the best simulated grasp that the cell can execute, certified ones first.
+
+        Returns:
+            The plan, None if there is none; and why it is not a certified one, empty if it is.
+        """
         planner, part = self._planner, self._part
         planned_by: PlannedBy = "certified"
         grasps, turn = self._certified.of(found.resting)
+        reason = ""
         if not grasps:
             planned_by = "uncertified"
             grasps, turn = self._certified.uncertified_of(found.resting)
+            group = self._certified.like.get(found.resting, (found.resting, 0.0))[0]
+            reason = self._certified.without.get(group, "it has none")
         if not grasps:
-            return None
+            return None, reason
         view = planner.view(frame)
         T_base_rest = turned(rest_frame(found.T_base_obj, part.resting.quat_wxyz[found.resting]), turn)
         # Over the stated height of the table, which a hand can touch: a camera's depth may be off by more.
-        vectors = planner.cleared(
-            to_base(T_base_rest, np.stack([one.grasp for one in grasps]), planner.table_z)
-        )
+        vectors = to_base(T_base_rest, np.stack([one.grasp for one in grasps]), planner.table_z)
+        vectors[:, 2] += planner.rise(vectors[:, :2])
+        certified_z = vectors[:, 2].copy()
+        high_enough = planner.cleared(vectors)[:, 2] - certified_z <= MOST_RAISED
         radius = radius_about_vertical(part, found.resting)
         facing = float(twist_and_swing(T_base_rest.quat_wxyz)[0])
         scores = np.array(
             [one.score(_turned_covariance(found.covariance, facing + one.grasp[3]), radius) for one in grasps]
         )
         order = np.argsort(scores, kind="stable")
-        row = next((row for row in order if self._reachable(Grasp.from_vector(vectors[row]))), None)
+        fit = (row for row in order if high_enough[row] and self._reachable(Grasp.from_vector(vectors[row])))
+        row = next(fit, None)
         if row is None:
-            return None
+            which = "these" if reason else "its certified grasps"
+            none = f"the arm reaches none of {which}"
+            if not high_enough.all():
+                least = np.ceil(1e4 * planner.clearance - 1e-6) / 1e4
+                none = (
+                    f"the arm reaches none of {which} that keeps the cell's clearance from the table; assess "
+                    f"the part with --clearance {least:g}"
+                )
+            return None, f"{reason}, and {none}" if reason else none
         chosen = grasps[row]
         sign = half_turned(T_base_rest, chosen.grasp, vectors[row])
         covariance = chosen.covariance(_turned_covariance(found.covariance, facing + chosen.grasp[3]))
@@ -174,7 +190,7 @@ class CertifiedPlanner:
         covariance = half_turned_covariance(covariance, sign) + SIMULATED_ALIKE
         origin = centre_in_grasp_frame(np.asarray(found.T_base_obj.position), vectors[row])
         motion = to_grasp_displacement(mean, origin)
-        return GraspPlan(
+        plan = GraspPlan(
             grasp=Grasp.from_vector(vectors[row]),
             quality=chosen.expected_share,
             grasp_displacement=motion,
@@ -191,6 +207,7 @@ class CertifiedPlanner:
             pose=found,
             planned_by=planned_by,
         )
+        return plan, reason
 
 
 def planner_of_part(

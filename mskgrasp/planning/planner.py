@@ -22,7 +22,14 @@ from mskgrasp.core.displacement_covariance import (
     swing_squared,
 )
 from mskgrasp.core.errors import BadModel, GraspRefused, NoGraspFound, TableTooHigh
-from mskgrasp.core.grasp import Grasp, PartView, centre_in_grasp_frame, sample_grasps
+from mskgrasp.core.grasp import (
+    PAD_REACH,
+    Grasp,
+    PartView,
+    centre_in_grasp_frame,
+    lowest_grasp_z,
+    sample_grasps,
+)
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
@@ -276,6 +283,24 @@ class Planner:
                 "table_z holds, correct camera.depth_offset"
             )
         return view
+
+    @property
+    def clearance(self) -> float:
+        """Least distance of the pads from the table, metres; on a slope, of their middle."""
+        return float(self._lowest(self._middle)) - self.table_z - PAD_REACH
+
+    def rise(self, xy: np.ndarray) -> np.ndarray:
+        """Heights (n,) of a sloping table at points (n, 2) over its height in the region's middle, metres."""
+        return self._lowest(xy) - self._lowest(self._middle)
+
+    @property
+    def _middle(self) -> np.ndarray:
+        return np.reshape(self.region, (2, 2)).mean(axis=1)
+
+    def _lowest(self, xy: np.ndarray) -> np.ndarray:
+        if self._lowest_grasp_z is None:
+            return np.full(np.shape(xy)[:-1], lowest_grasp_z(self.table_z))
+        return self._lowest_grasp_z(xy)
 
     def cleared(self, grasps: np.ndarray) -> np.ndarray:
         """Raise grasps (n, 4) whose pads would be too near the table."""

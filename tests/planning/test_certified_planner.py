@@ -132,6 +132,48 @@ def test_a_camera_that_measures_too_far_does_not_lower_the_grasp(cell, planner):
     assert found.grasp.position[2] == exact.grasp.position[2]
 
 
+def test_grasps_keep_their_height_over_a_table_that_slopes(cell, planner):
+    frame, true = present(cell, 3)
+    known = grasps(resting_of(true))
+    raised = [dataclasses.replace(one, grasp=one.grasp + [0, 0, 0.01, 0]) for one in known.grasps]
+    known = dataclasses.replace(known, grasps=tuple(raised))
+    space = dataclasses.replace(cell.workspace, table_slope=(0.01, -0.005))
+    sloping = Planner.of_workspace(planner.models, planner.config, space)
+    level, found = (
+        CertifiedPlanner(one, PART, known).plan(frame, np.random.default_rng(0)).grasp.position
+        for one in (planner, sloping)
+    )
+    rise = (found[:2] - space.centre) @ space.table_slope
+    assert found[:2] == pytest.approx(level[:2]) and abs(rise) > 2e-4
+    assert found[2] - level[2] == pytest.approx(rise, abs=1e-9)
+
+
+def test_grasps_too_near_to_the_table_for_the_cell_are_left_out_and_the_remedy_is_named(
+    cell, planner, capsys
+):
+    frame, true = present(cell, 3)
+    resting = resting_of(true)
+    known = grasps(resting)
+    poor, sure = known.grasps
+    # The pads of the surest grasp are 1 mm over the table, those of the other one 3 mm.
+    higher = dataclasses.replace(poor, grasp=poor.grasp + [0, 0, 2e-3, 0])
+    cautious = Planner.of_workspace(
+        planner.models, planner.config, dataclasses.replace(cell.workspace, clearance=3e-3)
+    )
+    both = dataclasses.replace(known, grasps=(sure, higher))
+    plan = CertifiedPlanner(cautious, PART, both).plan(frame, np.random.default_rng(0))
+    assert (
+        plan.certified
+        and plan.score > CertifiedPlanner(planner, PART, both).plan(frame, np.random.default_rng(0)).score
+    )
+    assert not capsys.readouterr().err
+    plan = CertifiedPlanner(cautious, PART, known).plan(frame, np.random.default_rng(0))
+    assert not plan.certified
+    assert "keeps the cell's clearance from the table; assess the part with --clearance 0.003; " in (
+        capsys.readouterr().err
+    )
+
+
 def test_grasps_out_of_reach_are_left_out(cell, planner):
     frame, true = present(cell, 1)
     own = CertifiedPlanner(planner, PART, grasps(resting_of(true)))
