@@ -11,6 +11,7 @@ import tyro
 from pydantic import Field, field_validator
 
 from mskgrasp.core.config import Config
+from mskgrasp.core.grasp import TABLE_CLEARANCE
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.core.units import Unit
 from mskgrasp.simulation.hull_count import hull_excess
@@ -59,6 +60,9 @@ class AssessConfig(Config):
     trials: int = Field(default=0, ge=0, le=100_000)
     """Trials of each policy with an exact camera; 0: 24, or 8 with --quick, and fewer of a part of more than
     48 convex pieces."""
+    clearance: float = Field(default=TABLE_CLEARANCE, ge=TABLE_CLEARANCE, le=0.05)
+    """Least distance of the pads from the table, m: `workspace.clearance` of your cell's file, which is 0.003
+    if the file does not say; 0.001 is that of the simulated cells."""
     workers: int = Field(default=0, ge=0)
     """Processes; 0: one per core. The results do not depend on their number."""
     seed: int = Field(default=0, ge=0, lt=2**63)

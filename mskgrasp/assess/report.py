@@ -228,7 +228,8 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
             f"{1e3 * conditions['most_error']:g} mm. The expected error is the root of the mean squared "
             "distance by which the part's points miss their predicted places, with errors of the seen pose "
             f"of {1e3 * errors['position']:g} mm and {np.degrees(errors['turn']):.2g} degrees, friction "
-            f"{friction}, force {force} N a pad, and the arm's {1e3 * noise['arm_position_std']:g} mm. "
+            f"{friction}, force {force} N a pad, and the arm's {1e3 * noise['arm_position_std']:g} mm. The "
+            f"pads stay {1e3 * conditions['clearance']:g} mm over the table (--clearance). "
             "The smallest of several estimates is somewhat too small; the trials above are other simulations."
         ],
         tables=[

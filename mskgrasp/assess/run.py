@@ -136,10 +136,13 @@ def _assess_one(part: Part, config: AssessConfig, out: Path, tolerance: Toleranc
     workers = process_count(config.workers)
     inputs = {"part": part.name} | model_digests(config.models) | part_digests([place])
     with opened_run(config, out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
-        cells = write_cells(out)
+        cells = write_cells(out, config.clearance)
         n_simulations, n_trials = _sizes(part, config, cells[EXACT])
         settings = certify_config(
-            n_simulations, factor=config.least_probability_factor(part.n_hulls), seed=config.seed
+            n_simulations,
+            factor=config.least_probability_factor(part.n_hulls),
+            clearance=config.clearance,
+            seed=config.seed,
         )
         certified = certify([place], settings, config.models, workers)[part.name]
         begin_trials(out, certified)

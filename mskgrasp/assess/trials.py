@@ -11,6 +11,7 @@ from typing import Any, Literal
 import yaml
 
 from mskgrasp.core.files import write_whole
+from mskgrasp.core.grasp import TABLE_CLEARANCE
 from mskgrasp.core.seeds import trial_seeds
 from mskgrasp.parts import Part, find_part
 from mskgrasp.planning.certified import CertifiedGrasps
@@ -58,12 +59,13 @@ class AssessSetup:
     spread: bool = True
 
 
-def write_cells(out: Path) -> dict[str, Path]:
-    """Write the files of the simulated cells of all conditions."""
+def write_cells(out: Path, clearance: float = TABLE_CLEARANCE) -> dict[str, Path]:
+    """Write the files of the simulated cells of all conditions, whose pads keep a clearance, metres."""
     found = {}
     for condition, (_, other) in CONDITIONS.items():
         path = out / f"cell-{condition.replace(' ', '_')}.yaml"
-        write_whole(path, yaml.safe_dump({"type": "sapien"} | other, sort_keys=False).encode())
+        values = {"type": "sapien", "clearance": clearance} | other
+        write_whole(path, yaml.safe_dump(values, sort_keys=False).encode())
         found[condition] = path
     return found
 

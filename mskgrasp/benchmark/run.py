@@ -76,7 +76,7 @@ def benchmark(config: BenchmarkConfig) -> None:
     inputs |= package_digests(config.rows)
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         if "certified" in config.rows:
-            certify_missing(sources, config.models, workers)
+            certify_missing(sources, config.models, workers, clearance=cell.clearance)
             keep_certified(config.out, sources)
         trials = _trials(config, cell, sources, workers)
         facts = RunFacts(

@@ -125,9 +125,9 @@ class Grasp:
         return pose_base_tcp(self.as_vector())
 
 
-def lowest_grasp_z(table_z: float) -> float:
+def lowest_grasp_z(table_z: float, clearance: float = TABLE_CLEARANCE) -> float:
     """The lowest z, metres, of a grasp whose pads keep clear of a table at ``table_z``."""
-    return table_z + PAD_REACH + TABLE_CLEARANCE
+    return table_z + PAD_REACH + clearance
 
 
 def pose_base_grasp(grasp: Array) -> Pose:

@@ -147,7 +147,7 @@ def evaluate(config: EvaluateConfig) -> Report:
     config, compared, tasks = one.config, one.compared, one.tasks
     with opened_run(config, config.out, one.inputs, scene_version=SCENE_VERSION, may_change=MAY_CHANGE):
         if config.planner.policy == "certified":
-            certify_missing(one.sources, config.models, config.workers)
+            certify_missing(one.sources, config.models, config.workers, clearance=one.cell.clearance)
             keep_certified(config.out, one.sources)
         trials = _make_trials(one)
         if compared is not None:

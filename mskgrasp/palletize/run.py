@@ -107,10 +107,11 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
     may_change = ["out", "trials", "corrections", "workers", "yes", *BY_CONTENT]
     # The parts determine which of them fills which slot.
     may_change += ["parts", "n_parts"] if config.slots is None else []
-    tell_model(models, cell_from_yaml(config.cell))
+    cell = cell_from_yaml(config.cell)
+    tell_model(models, cell)
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
         if config.planner.policy == "certified":
-            certify_missing(names, config.models, config.workers)
+            certify_missing(names, config.models, config.workers, clearance=cell.workspace.clearance)
             keep_certified(config.out, names)
         make_folder(config.out / "placements")
         for leftover in (config.out / "placements").glob("*.tmp"):

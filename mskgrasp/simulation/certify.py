@@ -20,6 +20,7 @@ from mskgrasp.core.config import Config
 from mskgrasp.core.errors import NoPartFound
 from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.grasp import (
+    TABLE_CLEARANCE,
     TILT_LIMIT,
     centre_in_grasp_frame,
     lowest_grasp_z,
@@ -67,6 +68,8 @@ class CertifyConfig(Config):
     """Least share of its last simulations that a certified grasp lifts."""
     most_error: float = Field(default=0.002, gt=0)
     """Greatest expected distance (RMS) by which a certified grasp's part misses its predicted place, m."""
+    clearance: float = Field(default=TABLE_CLEARANCE, ge=TABLE_CLEARANCE, le=0.05)
+    """Least distance of the pads from the table, m."""
     pose_errors: PoseErrors = PoseErrors()
     """Errors of the part's pose as the camera gives it."""
     noise: ExecutionNoise = ExecutionNoise(
@@ -187,8 +190,9 @@ def run_stream(
         yield from simulate(candidate, 0, FIRST)
     best = sorted(found, key=lambda one: one.score(radius))[: n_second // 2]
     height = float(env.standing[0].poses.position[stream.members[0].which, 2])
+    lowest = lowest_grasp_z(0.0, config.clearance)
     best = [_Candidate(one.grasp, []) for one in best] + [
-        _Candidate(grasp, []) for one in best if (grasp := _without_motion(one, height)) is not None
+        _Candidate(grasp, []) for one in best if (grasp := _without_motion(one, height, lowest)) is not None
     ]
     for candidate in best:
         yield from simulate(candidate, FIRST, SECOND)
@@ -310,12 +314,13 @@ def _apart(first: np.ndarray, second: np.ndarray) -> bool:
     return far or abs(float(wrap_half_turn(np.asarray(first[3] - second[3])))) > APART[1]
 
 
-def _without_motion(candidate: _Candidate, height: float) -> np.ndarray | None:
+def _without_motion(candidate: _Candidate, height: float, lowest: float) -> np.ndarray | None:
     """The grasp in which the part would not have moved, since it is already where it came to lie in the hand.
 
     Args:
         candidate: With its outcomes.
         height: Of the part's origin over the table, metres.
+        lowest: Least height of a grasp over the table, metres.
     """
     moved = [one.displacement for one in candidate.repeats if not one.reason]
     tilts = [np.linalg.norm(one.swing) for one in candidate.repeats if not one.reason]
@@ -325,7 +330,7 @@ def _without_motion(candidate: _Candidate, height: float) -> np.ndarray | None:
     motion = to_grasp_displacement(np.mean(moved, axis=0), origin)
     grasp = candidate.grasp.copy()
     grasp[:2] = pose_base_grasp(candidate.grasp).apply(motion[:3])[:2]
-    grasp[2] = max(grasp[2], lowest_grasp_z(0.0))
+    grasp[2] = max(grasp[2], lowest)
     grasp[3] = wrap_half_turn(np.asarray(grasp[3] + motion[3]))
     return grasp
 

@@ -10,8 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mskgrasp.core.errors import BadPart
 from mskgrasp.core.files import write_whole
+from mskgrasp.core.grasp import TABLE_CLEARANCE, lowest_grasp_z
 from mskgrasp.core.settings import REGION, TABLE_Z, Overhead
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import Part, find_part
@@ -115,7 +118,9 @@ def certify(
     return found
 
 
-def certify_missing(parts: Sequence[str], models: Path, workers: int) -> None:
+def certify_missing(
+    parts: Sequence[str], models: Path, workers: int, *, clearance: float = TABLE_CLEARANCE
+) -> None:
     """Certify grasps of the parts that have none of today's, with the settings by default.
 
     A part of very many convex pieces gets fewer simulations, as in an assessment. Grasps of another number of
@@ -127,8 +132,10 @@ def certify_missing(parts: Sequence[str], models: Path, workers: int) -> None:
         parts: Names or folders.
         models: Folder of the networks that choose candidates.
         workers: Processes; 0: one per core.
+        clearance: Least distance of the pads from the cell's table, metres. Grasps that were certified for a
+            smaller one are made again.
     """
-    missing = [name for name in parts if not _of_today(find_part(name))]
+    missing = [name for name in parts if not _of_today(find_part(name), clearance)]
     if not missing:
         return
     note(f"certifying grasps of {len(missing)} of {len(parts)} parts, some minutes each")
@@ -137,15 +144,19 @@ def certify_missing(parts: Sequence[str], models: Path, workers: int) -> None:
         simulations = round(CertifyConfig().simulations / hull_excess(find_part(name).n_hulls))
         alike.setdefault(simulations, []).append(name)
     for simulations, names in alike.items():
-        certify(names, certify_config(simulations), models, process_count(workers))
+        config = certify_config(simulations, clearance=clearance)
+        certify(names, config, models, process_count(workers))
 
 
-def certify_config(simulations: int, *, factor: float = 1.0, seed: int = 0) -> CertifyConfig:
+def certify_config(
+    simulations: int, *, factor: float = 1.0, clearance: float = TABLE_CLEARANCE, seed: int = 0
+) -> CertifyConfig:
     """Settings of a part's certification by about so many simulations.
 
     Args:
         simulations: Simulated grasps.
         factor: How many times as likely the rarest resting pose with certified grasps must be as by default.
+        clearance: Least distance of the pads from the table, metres.
         seed: Of the simulations.
     """
     usual = CertifyConfig()
@@ -155,22 +166,25 @@ def certify_config(simulations: int, *, factor: float = 1.0, seed: int = 0) -> C
         simulations=simulations,
         per_stream=min(usual.per_stream, per_stream),
         least_probability=usual.least_probability * factor,
+        clearance=clearance,
         seed=seed,
     )
 
 
-def _of_today(part: Part) -> bool:
-    """Whether a part's certified grasps in the cache are measured as today's would be."""
+def _of_today(part: Part, clearance: float) -> bool:
+    """Whether a part's certified grasps in the cache are measured as today's would be, and high enough."""
     try:
         known = read_certified(part).conditions
     except BadPart:
         return False
     now = CertifyConfig().model_dump(mode="json") | _VERSIONS
-    made_by = known.get("versions")
+    made_by, least = known.get("versions"), known.get("clearance", TABLE_CLEARANCE)
     return (
         isinstance(made_by, dict)
         and made_by.get("simulation") == versions()["simulation"]
         and all(known.get(name) == now[name] for name in _MEASURED_BY)
+        and isinstance(least, int | float)
+        and least >= clearance
     )
 
 
@@ -238,7 +252,11 @@ def _certifier(settings: _Settings) -> Iterator[Callable[[Stream], Iterator[_Mad
 
     config = settings.config
     simulator = Simulator(config.physics, Overhead(), config.noise)
-    planner = Planner(load_models(settings.models, "cpu"), PlannerConfig(), table_z=TABLE_Z, region=REGION)
+    lowest = lowest_grasp_z(TABLE_Z, config.clearance)
+    planner = Planner(
+        load_models(settings.models, "cpu"), PlannerConfig(), table_z=TABLE_Z, region=REGION,
+        lowest_grasp_z=lambda xy: np.full(len(xy), lowest),
+    )  # fmt: skip
 
     def certify_stream(stream: Stream) -> Generator[_Made | None, None, None]:
         grasps = yield from run_stream(simulator.load(stream.part), planner, stream, config)

@@ -32,12 +32,14 @@ class CellFile:
         values: Its contents with the overrides.
         tape: Sizes of the tape squares that measure; None where a tracker measures.
         simulated: Whether the cell is simulated, so that several can run in parallel.
+        clearance: Least distance of the pads from its table, metres.
     """
 
     path: Path
     values: dict[str, Any]
     tape: Tape | None
     simulated: bool
+    clearance: float
 
     @property
     def noise(self) -> str:
@@ -107,7 +109,9 @@ def read_cell(
             values |= {"tape": squares, "colour_scale": max(FINE, int(values.get("colour_scale", 1)))}
         squares = check_config(Tape, squares, "--tape" if tape else f"{path}: tape")
     cell_from_values(values, path)  # refuses an invalid file before any worker starts
-    return CellFile(path=path, values=values, tape=squares, simulated=cell.simulated)
+    return CellFile(
+        path=path, values=values, tape=squares, simulated=cell.simulated, clearance=cell.workspace.clearance
+    )
 
 
 def check_loads(cell_file: Path, parts: Iterable[Part]) -> None:

@@ -22,6 +22,7 @@ CONDITIONS = dict(
     least_lifted=0.95,
     most_error=0.002,
     pose_errors=dict(position=3e-4, height=2e-4, turn=5e-3),
+    clearance=1e-3,
     noise=dict(arm_position_std=2e-4, friction_pad_part=[0.2, 0.6], finger_force=None),
     physics=dict(finger_force=40.0),
 )

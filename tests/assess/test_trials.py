@@ -18,7 +18,8 @@ def test_the_exact_camera_has_most_scenes_and_every_condition_some():
 
 
 def test_cells_differ_in_what_their_names_say(tmp_path):
-    cells = {name: cell_from_yaml(path) for name, path in write_cells(tmp_path).items()}
+    cells = {name: cell_from_yaml(path) for name, path in write_cells(tmp_path, clearance=0.003).items()}
+    assert {cell.workspace.clearance for cell in cells.values()} == {0.003}
     assert set(cells) == set(CONDITIONS)
     frictions = {name: cell.physics.friction_pad_part for name, cell in cells.items()}
     assert (frictions["friction 0.3"], frictions["friction 0.8"]) == (0.3, 0.8)

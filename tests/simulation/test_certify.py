@@ -119,8 +119,8 @@ def test_a_part_grasped_where_it_came_to_lie_would_not_have_moved(grasp):
     """It lies at the origin of its rest frame, and is to have the pose in the hand that it took before."""
     grasp = np.array(grasp)
     moved = np.array([3e-3, -1e-3, 0.0, 0.2])
-    again = _without_motion(_Candidate(grasp, [lifted(*moved), lifted(*moved), DROPPED]), 0.01)
-    assert again is not None
+    again = _without_motion(_Candidate(grasp, [lifted(*moved), lifted(*moved), DROPPED]), 0.01, 0.012)
+    assert again is not None and again[2] == 0.012
     part = np.array([0.0, 0.0, 0.01])
     came_to = pose_base_grasp(grasp).inverse().apply(part) + moved[:3]
     assert pose_base_grasp(again).inverse().apply(part)[:2] == pytest.approx(came_to[:2], abs=1e-9)
@@ -128,8 +128,8 @@ def test_a_part_grasped_where_it_came_to_lie_would_not_have_moved(grasp):
 
 
 def test_a_grasp_that_lifts_nothing_or_lets_the_part_swing_is_not_moved():
-    assert _without_motion(_Candidate(GRASP, [DROPPED]), 0.01) is None
-    assert _without_motion(_Candidate(GRASP, [lifted(1e-3, 0, 0, 0, swing=0.2)]), 0.01) is None
+    assert _without_motion(_Candidate(GRASP, [DROPPED]), 0.01, 0.0105) is None
+    assert _without_motion(_Candidate(GRASP, [lifted(1e-3, 0, 0, 0, swing=0.2)]), 0.01, 0.0105) is None
 
 
 def test_candidates_meet_the_same_scenes_and_the_steadiest_is_kept(monkeypatch):

@@ -8,6 +8,7 @@ import json
 import pytest
 
 from mskgrasp.core.errors import BadPart
+from mskgrasp.core.grasp import PAD_REACH
 from mskgrasp.core.settings import Physics
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.planning.certified import FILE, certified_folder, read_certified
@@ -86,10 +87,13 @@ def test_a_part_that_stands_in_no_resting_pose_is_refused_in_a_line(box):
         (dict(certify_version=0), True),
         (dict(select_version=0), True),
         (dict(pose_errors=dict(position=0.0, height=0.0, turn=0.0)), True),
+        (dict(clearance=0.003), False),
+        (dict(clearance=0.001), True),
+        (dict(clearance=None), True),
     ],
 )
 def test_grasps_of_another_simulation_or_conditions_are_made_again(box, monkeypatch, changes, made_again):
-    conditions = CertifyConfig().model_dump(mode="json") | dict(
+    conditions = CertifyConfig(clearance=0.002).model_dump(mode="json") | dict(
         certify_version=certify_parts.CERTIFY_VERSION,
         select_version=certify_parts.SELECT_VERSION,
         versions=versions(),
@@ -102,7 +106,7 @@ def test_grasps_of_another_simulation_or_conditions_are_made_again(box, monkeypa
     stored.write(certified_folder(box))
     wanted = []
     monkeypatch.setattr(certify_parts, "certify", lambda parts, *rest: wanted.extend(parts))
-    certify_parts.certify_missing([str(box.folder)], PRETRAINED, 1)
+    certify_parts.certify_missing([str(box.folder)], PRETRAINED, 1, clearance=0.002)
     assert wanted == [str(box.folder)] * made_again
 
 
@@ -129,3 +133,12 @@ def test_simulations_of_a_single_pose_keep_two_cores_busy_if_they_suffice(simula
 
 def test_rarer_poses_are_left_out_if_so_asked():
     assert certify_config(400, factor=2.5).least_probability == 2.5 * CertifyConfig().least_probability
+
+
+@pytest.mark.slow
+def test_pads_keep_the_clearance_in_every_simulated_grasp(box):
+    config = CONFIG.model_copy(update=dict(clearance=0.004, least_probability=1.0))
+    found = certify([str(box.folder)], config, PRETRAINED, 1, hidden=True)[box.name]
+    heights = [grasp.grasp[2] - PAD_REACH for grasp in (*found.grasps, *found.uncertified)]
+    assert found.grasps and min(heights) >= 0.004 - 1e-9
+    assert read_certified(box).conditions["clearance"] == 0.004
