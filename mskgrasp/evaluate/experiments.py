@@ -85,7 +85,7 @@ class Compared:
 
 
 def load_compared(
-    compare: Iterable[str], models: Path, lowess_data: Path | None, parts: list[str], chunk_size: int
+    compare: Iterable[str], models: Path, lowess_data: Path | None, parts: Mapping[str, str], chunk_size: int
 ) -> Compared:
     """Load the models of an experiment.
 
@@ -93,7 +93,7 @@ def load_compared(
         compare: ``label=folder`` each.
         models: Folder of the run's own model.
         lowess_data: Dataset from whose grasps of the same part LOWESS predicts; None: no LOWESS.
-        parts: Names of the parts.
+        parts: Content hashes of the parts, by name.
         chunk_size: As in `mskgrasp.planning.config.PlannerConfig`.
 
     Raises:

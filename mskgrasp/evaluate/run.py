@@ -34,7 +34,13 @@ from mskgrasp.learning.grasp_models import load_models, require_model
 from mskgrasp.parts import find_part, starter_names
 from mskgrasp.parts.select_parts import part_names
 from mskgrasp.planning.for_cell import tell_model
-from mskgrasp.planning.run_inputs import BY_CONTENT, keep_certified, model_digests, part_digests
+from mskgrasp.planning.run_inputs import (
+    BY_CONTENT,
+    calibration_digest,
+    keep_certified,
+    model_digests,
+    part_digests,
+)
 from mskgrasp.reports.html import write_html
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import note, progress
@@ -124,10 +130,11 @@ def prepare(config: EvaluateConfig) -> Prepared:
     parts = {part.name: source for part, source in zip(found, sources, strict=True)}
     compared, chooses = None, {}
     if config.experiment == "displacement":
-        chunk = config.planner.chunk_size
-        compared = load_compared(config.compare, config.models, config.lowess_data, list(parts), chunk)
+        chunk, hashes = config.planner.chunk_size, {part.name: part.content_hash for part in found}
+        compared = load_compared(config.compare, config.models, config.lowess_data, hashes, chunk)
         chooses = own_choices(config.chooses, compared)
     inputs = {"cell": cell.digest} | model_digests(config.models) | part_digests(parts.values())
+    inputs |= calibration_digest(cell.path)
     inputs |= compared.inputs if compared is not None else {}
     tell_model(models, cell_from_values(cell.values, cell.path))
     return Prepared(

@@ -100,10 +100,10 @@ class CertifiedPlanner:
         if reason:
             self._tell(found, plan, reason)
         if plan is None:
-            return replace(planner.plan(frame, rng), pose=found)
+            plan = replace(planner.plan(frame, rng), pose=found)
         now = time.perf_counter()
-        seconds = {"pose": located - started, "select": now - located, "total": now - started}
-        return replace(plan, seconds=seconds)
+        known = plan.seconds or {"select": now - located}
+        return replace(plan, seconds=known | {"pose": located - started, "total": now - started})
 
     def _find(self, frame: RgbdFrame) -> PartPose:
         """The part's pose: one that stands in the simulation or, if none fits, any resting pose.

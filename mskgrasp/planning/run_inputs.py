@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from hal.camera_calibration import calibration_path
+from mskgrasp.core.config import read_yaml
 from mskgrasp.core.files import write_whole
 from mskgrasp.parts import Part, find_part
 from mskgrasp.planning.certified import FILE, certified_folder
@@ -15,8 +17,18 @@ BY_CONTENT = ("models", "cell")
 
 
 def inputs_of(cell: Path, models: Path, parts: Iterable[str]) -> dict[str, str]:
-    """Compute digests of a cell's file, a model and parts."""
-    return {"cell": file_digest(cell)} | model_digests(models) | part_digests(parts)
+    """Compute digests of a cell's file and its calibration, a model and parts."""
+    digests = {"cell": file_digest(cell)} | calibration_digest(cell)
+    return digests | model_digests(models) | part_digests(parts)
+
+
+def calibration_digest(cell: Path) -> dict[str, str]:
+    """Compute the digest of the calibration that a cell's file names; empty where there is none."""
+    camera = read_yaml(cell).get("camera")
+    name = camera.get("calibration") if isinstance(camera, dict) else None
+    path = calibration_path(name, cell) if isinstance(name, str) else None
+    # One that is missing is refused, with the remedy, when the camera is connected.
+    return {"calibration": file_digest(path)} if path is not None and path.is_file() else {}
 
 
 def model_digests(models: Path, label: str = "") -> dict[str, str]:

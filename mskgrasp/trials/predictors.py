@@ -12,7 +12,7 @@ import numpy as np
 
 from hal.camera import RgbdFrame
 from mskgrasp.core.displacement_covariance import object_displacement_covariance
-from mskgrasp.core.errors import NoGraspFound
+from mskgrasp.core.errors import BadDataset, NoGraspFound
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import (
     Grasp,
@@ -158,21 +158,25 @@ def predicted_by(
     return replace(trial, predictions=trial.predictions | more)
 
 
-def fit_lowess(data: Path, parts: list[str]) -> tuple[dict[str, Lowess], dict[str, str]]:
+def fit_lowess(data: Path, parts: Mapping[str, str]) -> tuple[dict[str, Lowess], dict[str, str]]:
     """Fit LOWESS to each part of which a dataset holds at least two successful grasps.
+
+    Args:
+        data: Folder of the dataset.
+        parts: Content hashes of the parts, by name: in another version a part may have other axes.
 
     Returns:
         Fits by part, and the digest of the grasps of each.
 
     Raises:
-        BadDataset: The folder is not a dataset, or a shard is damaged.
+        BadDataset: The folder is not a dataset, a shard is damaged, or its part has changed since.
     """
     shards: dict[str, list[Path]] = {}
     for path in list_shards(data):
         shards.setdefault(path.stem.rsplit("-", 1)[0], []).append(path)
     fits, digests = {}, {}
-    for part in parts:
-        rows = [_successes(path) for path in shards.get(part, ())]
+    for part, content_hash in parts.items():
+        rows = [_successes(path, content_hash) for path in shards.get(part, ())]
         if not rows or sum(len(grasps) for _, grasps, _ in rows) < 2:
             continue
         poses, grasps, moved = (np.concatenate(columns) for columns in zip(*rows, strict=True))
@@ -181,9 +185,13 @@ def fit_lowess(data: Path, parts: list[str]) -> tuple[dict[str, Lowess], dict[st
     return fits, digests
 
 
-def _successes(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _successes(path: Path, content_hash: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Poses (n, 7) at rest, grasps (n, 4) and grasp displacements (n, 4) of a shard's successes."""
-    rows, _ = read_columns(path, ("grasp", "success", "displacement", "pose_base_obj"))
+    rows, info = read_columns(path, ("grasp", "success", "displacement", "pose_base_obj"))
+    if info.part_hash != content_hash:
+        raise BadDataset(
+            f"{path}: part '{info.part}' has changed since it was grasped; collect its grasps again"
+        )
     held = rows["success"]
     poses, grasps, displacement = (
         rows[name][held].astype(np.float64) for name in ("pose_base_obj", "grasp", "displacement")

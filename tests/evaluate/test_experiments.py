@@ -17,6 +17,7 @@ from mskgrasp.evaluate.experiments import (
     with_predictions,
 )
 from mskgrasp.learning.grasp_models import load_models
+from mskgrasp.parts import find_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.trials.predictors import LOWESS, NetworkPredictor
 from mskgrasp.trials.trial_files import trial_file, write_trial
@@ -61,7 +62,8 @@ def test_trials_of_one_part_and_number_share_a_scene_and_parts_come_in_turn():
 
 @pytest.fixture(scope="module")
 def compared(collected: Path):
-    return load_compared([f"net={PRETRAINED}"], PRETRAINED, collected, [PART, "washer_m36"], 640)
+    hashes = {name: find_part(name).content_hash for name in (PART, "washer_m36")}
+    return load_compared([f"net={PRETRAINED}"], PRETRAINED, collected, hashes, 640)
 
 
 def test_every_model_with_variances_chooses_two_more_grasps_in_a_scene_and_lowess_of_parts_it_knows(compared):
@@ -102,7 +104,7 @@ def test_the_grasps_that_lowess_is_fitted_to_are_an_input_of_the_run(compared):
 
 def test_a_dataset_of_other_parts_is_refused(collected: Path):
     with pytest.raises(UsageError, match="holds successful grasps of none of the parts"):
-        load_compared([], PRETRAINED, collected, ["washer_m36"], 640)
+        load_compared([], PRETRAINED, collected, {"washer_m36": find_part("washer_m36").content_hash}, 640)
 
 
 def test_a_prediction_added_later_is_the_one_that_planned_the_trial(tmp_path: Path):

@@ -192,6 +192,9 @@ def test_without_certified_grasps_the_networks_plan_and_say_why(cell, planner, c
     plan = CertifiedPlanner(planner, PART, others).plan(frame, np.random.default_rng(0))
     assert not plan.certified and plan.pose is not None and len(plan.candidates) >= 400
     assert "gets no certified grasp: no grasp lifts it; planned by the networks" in capsys.readouterr().err
+    assert plan.seconds["pose"] > 0 and plan.seconds["total"] > sum(
+        plan.seconds[stage] for stage in ("pose", "score", "select")
+    )
     network = planner.plan(frame, np.random.default_rng(0))
     assert np.array_equal(plan.grasp.as_vector(), network.grasp.as_vector())
     # The same where no pose has a grasp, but not where the networks are asked for (`assess` does).

@@ -5,6 +5,7 @@ import pytest
 from mskgrasp.core.errors import UsageError
 from mskgrasp.planning.certified import certified_folder, read_certified
 from mskgrasp.planning.run_inputs import (
+    calibration_digest,
     certified_digests,
     inputs_of,
     keep_certified,
@@ -20,8 +21,9 @@ def test_the_digests_name_every_input_and_change_with_its_content(tmp_path, monk
     make_box(tmp_path / "cache", "block", (0.05, 0.03, 0.02), 0.1)
     cell, models = tmp_path / "cell.yaml", tmp_path / "model"
     models.mkdir()
-    for path in (cell, models / "model.json", models / "model.safetensors"):
+    for path in (models / "model.json", models / "model.safetensors"):
         path.write_text("first")
+    cell.write_text("camera: {driver: kinect2, calibration: kinect2.yaml}")
     before = inputs_of(cell, models, ["block"])
     assert set(before) == {"cell", "model.json", "model.safetensors", "part block"}
     (models / "model.safetensors").write_text("second")
@@ -30,6 +32,18 @@ def test_the_digests_name_every_input_and_change_with_its_content(tmp_path, monk
     make_box(tmp_path / "other", "block", (0.05, 0.03, 0.021), 0.1)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
     assert part_digests(["block"]) != {"part block": before["part block"]}
+
+
+def test_a_camera_that_was_calibrated_again_is_another_input(tmp_path):
+    cell, calibration = tmp_path / "cell.yaml", tmp_path / "kinect2.yaml"
+    cell.write_text("camera: {driver: kinect2, calibration: kinect2.yaml}")
+    assert calibration_digest(cell) == {}
+    calibration.write_text("first")
+    before = calibration_digest(cell)
+    calibration.write_text("second")
+    assert set(before) == {"calibration"} and calibration_digest(cell) != before
+    cell.write_text("type: sapien")
+    assert calibration_digest(cell) == {}
 
 
 def test_another_folder_with_a_part_of_the_same_name_is_another_input(tmp_path):

@@ -76,13 +76,24 @@ def test_a_network_knows_its_training_parts_and_says_whether_it_predicts_varianc
     assert spread.shape == (3, 4) and bool(np.isfinite(spread).all()) == variance
 
 
+def hashes(data: Path, name: str) -> dict[str, str]:
+    """Content hash of a part as its shards state it, by its name."""
+    found = [read_shard(path)[1] for path in list_shards(data)]
+    return {info.part: info.part_hash for info in found if info.part == name}
+
+
 def test_lowess_is_fitted_to_the_successes_of_the_parts_that_are_asked_for(data: Path):
-    fits, digests = fit_lowess(data, ["box_1", "nowhere"])
+    fits, digests = fit_lowess(data, hashes(data, "box_1") | {"nowhere": ""})
     assert set(fits) == set(digests) == {"box_1"}
     lowess = LowessPredictor(fits)
     assert lowess.knows("box_1") and not lowess.knows("box_0") and lowess.has_variance
-    assert fit_lowess(data, ["box_1"])[1] == digests  # the same grasps, the same digest
-    assert fit_lowess(data, ["box_0"])[1]["box_0"] != digests["box_1"]
+    assert fit_lowess(data, hashes(data, "box_1"))[1] == digests  # the same grasps, the same digest
+    assert fit_lowess(data, hashes(data, "box_0"))[1]["box_0"] != digests["box_1"]
+
+
+def test_grasps_of_another_version_of_a_part_are_refused(data: Path):
+    with pytest.raises(BadDataset, match="part 'box_1' has changed since it was grasped; collect"):
+        fit_lowess(data, {"box_1": "0" * 64})
 
 
 def test_lowess_predicts_a_recorded_grasp_of_a_box_that_closing_centres(data: Path):
@@ -90,7 +101,7 @@ def test_lowess_predicts_a_recorded_grasp_of_a_box_that_closing_centres(data: Pa
     (path,) = [path for path in list_shards(data) if path.stem.startswith("box_0")]
     attempts, _ = read_shard(path)
     held = np.flatnonzero(attempts.success)
-    lowess = LowessPredictor(fit_lowess(data, ["box_0"])[0])
+    lowess = LowessPredictor(fit_lowess(data, hashes(data, "box_0"))[0])
     errors, sizes = [], []
     for row in held:
         pose = Pose.from_vector(attempts.pose_base_obj[row].astype(np.float64))
@@ -102,7 +113,7 @@ def test_lowess_predicts_a_recorded_grasp_of_a_box_that_closing_centres(data: Pa
 
 
 def test_lowess_without_a_pose_or_of_an_unknown_part_is_an_error_of_one_line(data: Path):
-    lowess = LowessPredictor(fit_lowess(data, ["box_0"])[0])
+    lowess = LowessPredictor(fit_lowess(data, hashes(data, "box_0"))[0])
     grasps = Grasp.from_vector(np.array([[0.45, 0.02, 0.015, 0.4]]))
     for part, pose in (("box_0", None), ("box_1", BOX.T_base_obj)):
         with pytest.raises(

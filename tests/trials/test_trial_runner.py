@@ -19,6 +19,7 @@ from hal import cell_from_yaml
 from hal.operator import Operator
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.shipped import PRETRAINED, SIMULATED_CELL
+from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.evaluate.experiments import scenes
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.trials.engine import TrialEngine
@@ -94,6 +95,7 @@ def test_trials_that_must_be_measured_are_refused_on_a_cell_without_a_tracker(tm
     with pytest.raises(UsageError, match="no tracker; measure by tape: --measure markers"):
         TrialRunner(blind, dataclasses.replace(setup, must_measure=True))
     data = synthetic.write_dataset(tmp_path / "boxes", n_parts=1, n_attempts=30, seed=0)
-    fits, _ = fit_lowess(data, ["box_0"])
+    (shard,) = list_shards(data)
+    fits, _ = fit_lowess(data, {"box_0": read_shard(shard)[1].part_hash})
     with pytest.raises(UsageError, match="LOWESS needs the part's pose.*omit --lowess-data"):
         TrialRunner(blind, dataclasses.replace(setup, lowess=fits))
