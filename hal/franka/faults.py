@@ -6,12 +6,16 @@ for some; the texts are those of libfranka 0.9.2 and 0.21.2, and the tests provo
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from hal import errors
 from hal.franka.driver import DriverName
 
 EXTRA = "EXTRAS=dev,franka .ci/setup"
 _WHEELS: dict[DriverName, str] = {"franky": "franky-control", "panda_py": "panda-python"}
-_NO_ROBOT = ("connection to fci refused", "host not found", "connection error", "network is unreachable")
+_REFUSED = "connection to fci refused"
+_NO_ROBOT = (_REFUSED, "host not found", "connection error", "network is unreachable")
 _LOST = ("timeout", "connection", "socket", "network", "broken pipe", "reset by peer")
 _NO_TRAJECTORY = "motion planner failed"
 
@@ -33,6 +37,26 @@ ERRORS: dict[str, type[errors.HalError]] = {
     )
 }
 """Errors that a driver's process may raise, by name."""
+
+
+@contextmanager
+def opening_hand(host: str) -> Iterator[None]:
+    """Context in which a driver connects to the hand of a robot that has answered.
+
+    The hand is a server of its own, which libfranka reports as missing in the words for a missing robot.
+
+    Raises:
+        NotConnected: There is no hand.
+    """
+    try:
+        yield
+    except Exception as error:
+        if _REFUSED not in str(error).lower():
+            raise
+        raise errors.NotConnected(
+            f"the robot at {host} answers, its hand does not: choose and initialise the Franka Hand in Desk, "
+            "Settings, End Effector; check its cable"
+        ) from error
 
 
 def explain(error: BaseException, driver: DriverName, host: str) -> errors.HalError:

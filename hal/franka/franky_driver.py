@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from hal.franka.driver import MODES, DriverSettings, DriverState, column_major, felt_force
+from hal.franka.faults import opening_hand
 from hal.franka.frames import tool_along
 from hal.franka.path import JointPath, Peaks
 
@@ -52,7 +53,8 @@ class FrankyDriver:
         config = franky.RealtimeConfig.Enforce if settings.realtime else franky.RealtimeConfig.Ignore
         self._robot = franky.Robot(settings.host, realtime_config=config)
         self._robot.set_collision_behavior(settings.contact_torque, settings.contact_force)
-        self._gripper = franky.Gripper(settings.host)
+        with opening_hand(settings.host):
+            self._gripper = franky.Gripper(settings.host)
 
     def state(self) -> DriverState:
         """Measure; may be called during a motion."""

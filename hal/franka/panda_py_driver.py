@@ -11,7 +11,7 @@ import numpy as np
 
 from hal.errors import CommunicationLost
 from hal.franka.driver import MODES, DriverSettings, DriverState, felt_force
-from hal.franka.faults import explain
+from hal.franka.faults import explain, opening_hand
 from hal.franka.path import JointPath
 
 _PERIOD_S = 1e-3
@@ -58,7 +58,8 @@ class PandaPyDriver:
         self._robot = self._panda.get_robot()
         torque, force = settings.contact_torque, [settings.contact_force] * 6
         self._robot.set_collision_behavior(torque, torque, force, force)
-        self._gripper = libfranka.Gripper(settings.host)
+        with opening_hand(settings.host):
+            self._gripper = libfranka.Gripper(settings.host)
 
     def state(self) -> DriverState:
         """Measure; may be called during a motion."""

@@ -6,6 +6,7 @@ the tests: it knows external torque control alone, which is what panda_py uses. 
 that the client loads for its dynamics. Faults are commanded on standard input, one a line:
 
     reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | unhomed | flange |
+    no_hand (its server refuses clients) |
     table Z SLOPE (a table that pushes the hand up) | hand KG (the end effector's mass in Desk) |
     fingers M (opening to that width, once homed) | load (answers with what was set) |
     q (answers with the joints) | clock (answers with the robot's time, s)
@@ -245,6 +246,8 @@ class Hand:
                 self.part = float(words[1])
             case "answer":
                 self.answer = words[1]
+            case "no_hand":
+                self.channel.refuse()
             case "unhomed":
                 self.max_width = 0.0
             case "fingers":

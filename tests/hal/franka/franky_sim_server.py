@@ -4,6 +4,7 @@ An FR3 over the real wire protocol of server version 10, its dynamics in MuJoCo.
 not have, are commanded on standard input, one a line, as in `tests.hal.franka.fci5_server`:
 
     reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | q | clock |
+    no_hand (its server refuses clients) |
     table Z SLOPE (a table that pushes the hand up) | load (answers with what was set) |
     record (the commands of motions from now on) | save FILE (them, as `commands` reads it)
 """
@@ -180,6 +181,9 @@ def obey(words: list[str], simulator: MujocoSimulator, robot: FaultyServer, answ
             robot.set_fault(RobotMode.kUserStopped, MoveStatus.kPreempted)
         case ["user_release"]:
             robot.fault = None
+        case ["no_hand"]:
+            robot.gripper_server.cleanup()
+            robot.gripper_server.process_commands = lambda: None
         case ["answer", status]:
             answers.status = ANSWERS[status]
         case ["table", z, slope_x]:
