@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -206,6 +207,9 @@ class PandaPyDriver:
     def recover(self) -> bool:
         """Acknowledge the robot's errors, and a stop; False where the gripper has not answered yet."""
         self._stopped.clear()
+        # What ended the control loop after `stop` had ended the motion: the next one would report it.
+        with contextlib.suppress(RuntimeError):
+            self._panda.raise_error()
         with self._use:
             if MODES[int(self._robot.read_once().robot_mode)] == "reflex":
                 self._robot.automatic_error_recovery()

@@ -5,8 +5,8 @@ have inertia and dry friction, and a hand that can hold a part. Written from the
 the tests: it knows external torque control alone, which is what panda_py uses. MODEL is the shared object
 that the client loads for its dynamics. Faults are commanded on standard input, one a line:
 
-    reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | unhomed | flange |
-    no_hand (its server refuses clients) |
+    reflex | reflex_at_end (of the next motion) | user_stop | user_release | part WIDTH |
+    answer ok|unsuccessful|fail|aborted | unhomed | flange | no_hand (its server refuses clients) |
     table Z SLOPE (a table that pushes the hand up) | hand KG (the end effector's mass in Desk) |
     fingers M (opening to that width, once homed) | load (answers with what was set) |
     q (answers with the joints) | clock (answers with the robot's time, s)
@@ -70,6 +70,7 @@ class Robot:
     generator: int = 0
     controller: int = 3
     reflexes: tuple[int, ...] = ()
+    reflex_at_end: bool = False
     answered: bool = False
     tick: int = 0
     stale: bool = False
@@ -147,7 +148,10 @@ class Robot:
             return
         self.answered = True
         values = COMMAND.unpack(data)
-        if values[40]:  # motion_generation_finished
+        if values[40] and self.reflex_at_end:  # motion_generation_finished
+            self.reflex_at_end = False
+            self.fault(["reflex"])
+        elif values[40]:
             self.finish(0, IDLE)
         else:
             self.torque = values[41:48]
@@ -165,6 +169,8 @@ class Robot:
             case "reflex":
                 self.reflexes = (7,)  # cartesian_reflex
                 self.finish(6, REFLEX)
+            case "reflex_at_end":
+                self.reflex_at_end = True
             case "user_stop":
                 self.finish(2, USER_STOPPED)
             case "user_release":
