@@ -17,6 +17,7 @@ _WHEELS: dict[DriverName, str] = {"franky": "franky-control", "panda_py": "panda
 _REFUSED = "connection to fci refused"
 _NO_ROBOT = (_REFUSED, "host not found", "connection error", "network is unreachable")
 _LOST = ("timeout", "connection", "socket", "network", "broken pipe", "reset by peer")
+_WRONG_MODE = "command not possible in the current mode"
 _NO_TRAJECTORY = "motion planner failed"
 
 
@@ -84,6 +85,11 @@ def explain(error: BaseException, driver: DriverName, host: str) -> errors.HalEr
         return errors.CommunicationLost(
             f"the link to {host} is lost ({text.rstrip('.')}); the robot has stopped: check cable and Desk, "
             "then open the cell again"
+        )
+    if _WRONG_MODE in low:
+        return errors.MotionAborted(
+            f"{text.rstrip('.')}; unlock the joints and release the user stop (after a reflex check the arm, "
+            "then press and release it), then start again, or call recover() where the arm is connected"
         )
     kind = NoTrajectory if _NO_TRAJECTORY in low else errors.MotionAborted
     return kind(f"{text.rstrip('.') or name}; check the arm, then call recover()")

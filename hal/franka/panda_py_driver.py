@@ -57,10 +57,17 @@ class PandaPyDriver:
         self._settings = settings
         self._panda = self._panda_py.Panda(settings.host, realtime_config=config)
         self._robot = self._panda.get_robot()
-        torque, force = settings.contact_torque, [settings.contact_force] * 6
-        self._robot.set_collision_behavior(torque, torque, force, force)
+        self._limited = False
+        # A robot refuses thresholds in any other mode, and could not be recovered without a connection.
+        if MODES[int(self._robot.read_once().robot_mode)] == "idle":
+            self._limit_contacts()
         with opening_hand(settings.host):
             self._gripper = libfranka.Gripper(settings.host)
+
+    def _limit_contacts(self) -> None:
+        torque, force = self._settings.contact_torque, [self._settings.contact_force] * 6
+        self._robot.set_collision_behavior(torque, torque, force, force)
+        self._limited = True
 
     def state(self) -> DriverState:
         """Measure; may be called during a motion."""
@@ -105,6 +112,8 @@ class PandaPyDriver:
         wanted = path.curve()
         speed = wanted.derivative()
         with self._use:
+            if not self._limited:
+                self._limit_contacts()
             at_start = list(self._robot.read_once().O_F_ext_hat_K)
             self._panda.start_controller(controller)
             self._moving = True

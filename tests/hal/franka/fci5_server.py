@@ -9,7 +9,8 @@ that the client loads for its dynamics. Faults are commanded on standard input, 
     answer ok|unsuccessful|fail|aborted | unhomed | flange | no_hand (its server refuses clients) |
     table Z SLOPE (a table that pushes the hand up) | hand KG (the end effector's mass in Desk) |
     fingers M (opening to that width, once homed) | load (answers with what was set) |
-    q (answers with the joints) | clock (answers with the robot's time, s)
+    thresholds (answers with those of the reflex that the client has set: torque and force) | q (answers
+    with the joints) | clock (answers with the robot's time, s)
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from mskgrasp.core.panda_kinematics import forward
 from tests.hal.franka.wire import Channel, GripperState, RobotState, Table, ask_for_priority
 
 VERSION, GRIPPER_VERSION = 5, 3
-CONNECT, MOVE, STOP_MOVE, SET_LOAD, RECOVER, LOAD_MODEL = 0, 1, 2, 10, 12, 13
+CONNECT, MOVE, STOP_MOVE, SET_THRESHOLDS, SET_LOAD, RECOVER, LOAD_MODEL = 0, 1, 2, 4, 10, 12, 13
 IDLE, MOVING, REFLEX, USER_STOPPED = 1, 2, 4, 5
 READY = [0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398]
 INERTIA = [1.0, 1.0, 1.0, 1.0, 0.3, 0.2, 0.1]
@@ -79,6 +80,7 @@ class Robot:
     table: Table | None = None
     ee_mass: float = 0.73
     load: tuple[float, ...] = (0.0,) * 13
+    thresholds: tuple[float, ...] = ()
 
     def step(self) -> None:
         self.tick += 1
@@ -88,6 +90,7 @@ class Robot:
             self.command(data)
         if self.channel.left:
             self.channel.left = False
+            self.thresholds = ()
             self.finish(None, IDLE if self.mode == MOVING else self.mode)
         if any(self.torque) or any(self.dq):
             self.dq = [*map(speed_after, self.dq, self.torque, FRICTION, INERTIA)]
@@ -134,10 +137,15 @@ class Robot:
             if self.mode == REFLEX:
                 self.mode, self.reflexes = IDLE, ()
             reply(command, number, b"\x00")
+        elif command in (SET_LOAD, SET_THRESHOLDS) and self.mode != IDLE:
+            reply(command, number, b"\x01")  # not possible in this mode
         elif command == SET_LOAD:
-            if self.mode == IDLE:
-                self.load = struct.unpack("<d3d9d", payload)
-            reply(command, number, b"\x00" if self.mode == IDLE else b"\x02")  # not possible in this mode
+            self.load = struct.unpack("<d3d9d", payload)
+            reply(command, number, b"\x00")
+        elif command == SET_THRESHOLDS:
+            values = struct.unpack("<52d", payload)
+            self.thresholds = (values[0], values[-1])
+            reply(command, number, b"\x00")
         elif command == LOAD_MODEL:
             reply(command, number, b"\x00" + self.model)
         else:
@@ -288,6 +296,7 @@ def main() -> None:
                 "q": " ".join(map(str, robot.q)),
                 "clock": f"{robot.tick * TICK}",
                 "load": " ".join(map(str, robot.load)),
+                "thresholds": " ".join(map(str, robot.thresholds)),
             }
             print(answers.get(words[0], "done"), flush=True)
         due = max(due + TICK, time.monotonic() - 0.005)

@@ -25,6 +25,8 @@ from franky_sim.franka_robot_protocol import (
     MoveStatus,
     RobotCommand,
     RobotMode,
+    SetCollisionBehaviorCommand,
+    SetLoadCommand,
     StopMoveCommand,
     UDPCommand,
 )
@@ -132,6 +134,22 @@ class Stop(StopMoveCommand):
             super().handle(server)
 
 
+class Thresholds(SetCollisionBehaviorCommand):
+    def handle(self, server: FaultyServer) -> None:
+        if server.fault is None:
+            super().handle(server)
+        else:
+            self.reply(_NOT_POSSIBLE)
+
+
+class Payload(SetLoadCommand):
+    def handle(self, server: FaultyServer) -> None:
+        if server.fault is None:
+            super().handle(server)
+        else:
+            self.reply(_NOT_POSSIBLE)
+
+
 class Answers:
     """Stands in the way of the gripper's answers to grasps; after a failure it reports no grasp."""
 
@@ -158,7 +176,7 @@ def main() -> None:
             robot.__class__ = FaultyServer
             answers.hand = robot.gripper_server
             commands = robot._FrankaServer__command_class_map
-            for command in (Recovery, Stop):
+            for command in (Recovery, Stop, Thresholds, Payload):
                 assert commands[command.command_type] is command.__base__
                 commands[command.command_type] = command
             ask_for_priority()
