@@ -143,8 +143,15 @@ class Operator:
                 return value
             self.inform(f"{line!r} is no number from {lower:g} to {upper:g}.")
 
-    def recover(self, cell: Cell, reason: str) -> None:
+    def recover(
+        self, cell: Cell, reason: str, *, then: str = "it may open its fingers, moves up and home"
+    ) -> None:
         """Recover the arm after a contact, once the operator confirms.
+
+        Args:
+            cell: Connected.
+            reason: Why the arm stopped.
+            then: What moves next, for the operator.
 
         Raises:
             StoppedByOperator: The operator ended the run; the arm stays stopped.
@@ -152,10 +159,7 @@ class Operator:
         """
         if self.asks:
             self.inform(f"The arm stopped: {reason}")
-            self.wait_for(
-                "Check it and remove obstacles. Enter to continue (it may open its fingers, moves up and "
-                "home), q to stop: "
-            )
+            self.wait_for(f"Check it and remove obstacles. Enter to continue ({then}), q to stop: ")
         cell.arm.recover()
 
     def inform(self, text: str) -> None:

@@ -231,7 +231,17 @@ def check_reach(arm: Arm, workspace: Workspace) -> Finding:
 
 
 def check_motion(arm: Arm) -> Iterator[Finding]:
-    """Move every joint by a small step and back, and the fingers, and report the errors."""
+    """Move every joint by a small step and back, and the fingers, and report the errors.
+
+    Nothing moves while the hand holds something.
+    """
+    if arm.in_hand() is not None:
+        yield Finding(
+            level="fail",
+            subject="motion",
+            text="the hand holds something, which would fall: hold it, run python -m hal.home",
+        )
+        return
     start = arm.state().joints
     try:
         target = start + _STEP

@@ -73,7 +73,8 @@ class FrankaArm(Arm):
         Raises:
             DriverMissing: The extra [franka] is not installed.
             IncompatibleDriver: The robot speaks another version than the installed wheel.
-            NotConnected: No robot there, another program holds it, or its end effector is another.
+            NotConnected: No robot or hand there, another program holds it, its end effector is another, or
+                with franky it is not idle, as in a reflex.
         """
         if self._link is None:
             self._link = self._new_link()
@@ -323,11 +324,14 @@ class FrankaArm(Arm):
             "user_stopped": "release the user stop (external activation device)",
             "guiding": "let go of the guiding button",
             "reflex": "free the arm and check it",
+            "other": "unlock the joints in Desk",
         }
         errors = f" with {state.errors}" if state.errors not in ("", "[]") else ""
         remedy = remedies.get(state.mode, "see Desk")
+        start = "press and release the user stop and start" if state.mode == "reflex" else "start"
         raise NeedsRecovery(
-            f"the robot is in mode {state.mode}{errors}, not idle: {remedy}, then call recover()"
+            f"the robot is in mode {state.mode}{errors}, not idle: {remedy}, then call recover(), "
+            f"or {start} again"
         )
 
     def _raise_aborted(self, error: MotionAborted) -> NoReturn:

@@ -6,13 +6,18 @@ for some; the texts are those of libfranka 0.9.2 and 0.21.2, and the tests provo
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from hal import errors
 from hal.franka.driver import DriverName
 
 EXTRA = "EXTRAS=dev,franka .ci/setup"
 _WHEELS: dict[DriverName, str] = {"franky": "franky-control", "panda_py": "panda-python"}
-_NO_ROBOT = ("connection to fci refused", "host not found", "connection error", "network is unreachable")
+_REFUSED = "connection to fci refused"
+_NO_ROBOT = (_REFUSED, "host not found", "connection error", "network is unreachable")
 _LOST = ("timeout", "connection", "socket", "network", "broken pipe", "reset by peer")
+_WRONG_MODE = "command not possible in the current mode"
 _NO_TRAJECTORY = "motion planner failed"
 
 
@@ -33,6 +38,26 @@ ERRORS: dict[str, type[errors.HalError]] = {
     )
 }
 """Errors that a driver's process may raise, by name."""
+
+
+@contextmanager
+def opening_hand(host: str) -> Iterator[None]:
+    """Context in which a driver connects to the hand of a robot that has answered.
+
+    The hand is a server of its own, which libfranka reports as missing in the words for a missing robot.
+
+    Raises:
+        NotConnected: There is no hand.
+    """
+    try:
+        yield
+    except Exception as error:
+        if _REFUSED not in str(error).lower():
+            raise
+        raise errors.NotConnected(
+            f"the robot at {host} answers, its hand does not: choose and initialise the Franka Hand in Desk, "
+            "Settings, End Effector; check its cable"
+        ) from error
 
 
 def explain(error: BaseException, driver: DriverName, host: str) -> errors.HalError:
@@ -60,6 +85,11 @@ def explain(error: BaseException, driver: DriverName, host: str) -> errors.HalEr
         return errors.CommunicationLost(
             f"the link to {host} is lost ({text.rstrip('.')}); the robot has stopped: check cable and Desk, "
             "then open the cell again"
+        )
+    if _WRONG_MODE in low:
+        return errors.MotionAborted(
+            f"{text.rstrip('.')}; unlock the joints and release the user stop (after a reflex check the arm, "
+            "then press and release it), then start again, or call recover() where the arm is connected"
         )
     kind = NoTrajectory if _NO_TRAJECTORY in low else errors.MotionAborted
     return kind(f"{text.rstrip('.') or name}; check the arm, then call recover()")

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from hal.franka.driver import MODES, DriverSettings, DriverState, column_major, felt_force
+from hal.franka.faults import opening_hand
 from hal.franka.frames import tool_along
 from hal.franka.path import JointPath, Peaks
 
@@ -52,7 +53,8 @@ class FrankyDriver:
         config = franky.RealtimeConfig.Enforce if settings.realtime else franky.RealtimeConfig.Ignore
         self._robot = franky.Robot(settings.host, realtime_config=config)
         self._robot.set_collision_behavior(settings.contact_torque, settings.contact_force)
-        self._gripper = franky.Gripper(settings.host)
+        with opening_hand(settings.host):
+            self._gripper = franky.Gripper(settings.host)
 
     def state(self) -> DriverState:
         """Measure; may be called during a motion."""
@@ -180,7 +182,7 @@ class FrankyDriver:
         self._robot.move(motion, asynchronous=True)
         while not self._robot.join_motion(timeout=_POLL_S if until_force is None else _TOUCH_POLL_S):
             if self._stopped.is_set():
-                self._robot.stop()
+                self._stop_motion()
             elif until_force is not None:
                 state = self._robot.state
                 if felt_force(state.O_F_ext_hat_K, at_start) > until_force:
@@ -190,14 +192,21 @@ class FrankyDriver:
 
     def _end_at_contact(self) -> None:
         """Stop the arm; the end of the motion by this stop is no fault."""
-        self._robot.stop()
         try:
-            self._robot.join_motion()
+            self._stop_motion()
+            while not self._robot.join_motion(timeout=_POLL_S):
+                self._stop_motion()
         except self._franky.ControlException as error:
             if "preempted" not in str(error):
                 raise
         if self._stopped.is_set():
             raise RuntimeError("Move command preempted!")
+
+    def _stop_motion(self) -> None:
+        # A robot in a reflex refuses to stop. Joining the motion tells whether it is over, and why; without
+        # that the next motion would report it.
+        with contextlib.suppress(self._franky.CommandException):
+            self._robot.stop()
 
     def home_gripper(self) -> bool:
         """Open and close the fingers to find their greatest width."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -11,7 +12,7 @@ import numpy as np
 
 from hal.errors import CommunicationLost
 from hal.franka.driver import MODES, DriverSettings, DriverState, felt_force
-from hal.franka.faults import explain
+from hal.franka.faults import explain, opening_hand
 from hal.franka.path import JointPath
 
 _PERIOD_S = 1e-3
@@ -56,9 +57,17 @@ class PandaPyDriver:
         self._settings = settings
         self._panda = self._panda_py.Panda(settings.host, realtime_config=config)
         self._robot = self._panda.get_robot()
-        torque, force = settings.contact_torque, [settings.contact_force] * 6
+        self._limited = False
+        # A robot refuses thresholds in any other mode, and could not be recovered without a connection.
+        if MODES[int(self._robot.read_once().robot_mode)] == "idle":
+            self._limit_contacts()
+        with opening_hand(settings.host):
+            self._gripper = libfranka.Gripper(settings.host)
+
+    def _limit_contacts(self) -> None:
+        torque, force = self._settings.contact_torque, [self._settings.contact_force] * 6
         self._robot.set_collision_behavior(torque, torque, force, force)
-        self._gripper = libfranka.Gripper(settings.host)
+        self._limited = True
 
     def state(self) -> DriverState:
         """Measure; may be called during a motion."""
@@ -103,6 +112,8 @@ class PandaPyDriver:
         wanted = path.curve()
         speed = wanted.derivative()
         with self._use:
+            if not self._limited:
+                self._limit_contacts()
             at_start = list(self._robot.read_once().O_F_ext_hat_K)
             self._panda.start_controller(controller)
             self._moving = True
@@ -205,6 +216,9 @@ class PandaPyDriver:
     def recover(self) -> bool:
         """Acknowledge the robot's errors, and a stop; False where the gripper has not answered yet."""
         self._stopped.clear()
+        # What ended the control loop after `stop` had ended the motion: the next one would report it.
+        with contextlib.suppress(RuntimeError):
+            self._panda.raise_error()
         with self._use:
             if MODES[int(self._robot.read_once().robot_mode)] == "reflex":
                 self._robot.automatic_error_recovery()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hal.arm_state import ArmState
+from hal.errors import NeedsRecovery
 from hal.home.config import HomeConfig
 from hal.open_cell import cell_from_yaml
 from hal.operator import Operator, StoppedByOperator
@@ -12,7 +13,8 @@ DESCRIPTION = """Homes the hand of a cell: its fingers close and open, so that i
 
 Run it whenever the fingers were changed: until then the hand believes in the width of those before, opens to
 the wrong distance and reports wrong widths. The arm stands still; what is between the fingers falls. Asks
-before the fingers of a real cell move (--yes: does not ask), and prints the width that was found.
+before the fingers of a real cell move (--yes: does not ask), and prints the width that was found. A robot
+that an earlier program left in its reflex is recovered first, after a question of its own.
 
 python -m hal.home --cell configs/cells/panda_kinect2.yaml"""
 
@@ -27,7 +29,7 @@ def home(config: HomeConfig) -> tuple[ArmState, ArmState]:
         BadConfig: The cell's file is missing or not valid.
         UsageError: An operator must be asked, and standard input is no terminal.
         HalError: The hand could not be homed, or the arm is not there.
-        StoppedByOperator: The operator does not want the fingers to move.
+        StoppedByOperator: The operator does not want the fingers to move, or the arm to recover.
     """
     cell = cell_from_yaml(config.cell)
     operator = Operator(cell, yes=config.yes)
@@ -38,7 +40,11 @@ def home(config: HomeConfig) -> tuple[ArmState, ArmState]:
         raise StoppedByOperator("stopped by the operator; nothing moved")
     with cell.arm as arm:
         before = arm.state()
-        arm.home()
+        try:
+            arm.home()
+        except NeedsRecovery as error:  # an earlier program left the robot in a reflex
+            operator.recover(cell, str(error), then="the fingers close and open")
+            arm.home()
         arm.open_gripper()
         return before, arm.state()
 

@@ -91,6 +91,8 @@ def touch_table(
         assert point is not None
         touched(number, point)
         points.append(point)
+    # Going home opens the fingers first, which must not press on the table then.
+    arm.move_to_pose(_above(places[-1], travel), speed=_TRAVEL_SPEED)
     go_home(cell)
     return np.array(points)
 

@@ -14,6 +14,7 @@ from hal.camera_calibration import Calibration, write_calibration
 from hal.doctor.checks import (
     check_calibration,
     check_drivers,
+    check_motion,
     check_stream,
     check_table,
     check_view,
@@ -22,6 +23,7 @@ from hal.doctor.checks import (
 from hal.errors import CaptureFailed
 from mskgrasp.core.geometry import Pose
 from tests.hal.flat_table import DOWN, WORKSPACE, frame_of_table
+from tests.hal.franka.robots import arm_at, fci5
 
 
 @pytest.mark.parametrize(
@@ -159,3 +161,18 @@ def test_a_wheel_for_another_robot_is_found():
     for arm in both:
         (finding,) = check_drivers(dict(type="devices", arm=arm, camera=dict(driver="replay")))
         assert finding.level in ("warn", "fail") and str(arm["driver"]) in finding.subject
+
+
+def test_a_part_in_the_hand_is_not_dropped(tmp_path: Path):
+    """An earlier program grasped it; what the hand itself reports tells."""
+    with fci5() as robot:
+        robot.order("part 0.03")
+        with arm_at(tmp_path, "panda_py", robot.host) as arm:
+            assert arm.grasp(20.0).holding
+        with arm_at(tmp_path, "panda_py", robot.host) as arm:
+            (finding,) = check_motion(arm)
+            assert finding.level == "fail" and "run python -m hal.home" in finding.text
+            assert arm.in_hand() is not None
+            robot.order("part 0")
+            arm.open_gripper()
+            assert [finding.level for finding in check_motion(arm)] == ["ok", "ok"]

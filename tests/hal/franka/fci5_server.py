@@ -5,10 +5,12 @@ have inertia and dry friction, and a hand that can hold a part. Written from the
 the tests: it knows external torque control alone, which is what panda_py uses. MODEL is the shared object
 that the client loads for its dynamics. Faults are commanded on standard input, one a line:
 
-    reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | unhomed | flange |
+    reflex | reflex_at_end (of the next motion) | user_stop | user_release | part WIDTH |
+    answer ok|unsuccessful|fail|aborted | unhomed | flange | no_hand (its server refuses clients) |
     table Z SLOPE (a table that pushes the hand up) | hand KG (the end effector's mass in Desk) |
     fingers M (opening to that width, once homed) | load (answers with what was set) |
-    q (answers with the joints) | clock (answers with the robot's time, s)
+    thresholds (answers with those of the reflex that the client has set: torque and force) | q (answers
+    with the joints) | clock (answers with the robot's time, s)
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from mskgrasp.core.panda_kinematics import forward
 from tests.hal.franka.wire import Channel, GripperState, RobotState, Table, ask_for_priority
 
 VERSION, GRIPPER_VERSION = 5, 3
-CONNECT, MOVE, STOP_MOVE, SET_LOAD, RECOVER, LOAD_MODEL = 0, 1, 2, 10, 12, 13
+CONNECT, MOVE, STOP_MOVE, SET_THRESHOLDS, SET_LOAD, RECOVER, LOAD_MODEL = 0, 1, 2, 4, 10, 12, 13
 IDLE, MOVING, REFLEX, USER_STOPPED = 1, 2, 4, 5
 READY = [0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398]
 INERTIA = [1.0, 1.0, 1.0, 1.0, 0.3, 0.2, 0.1]
@@ -69,6 +71,7 @@ class Robot:
     generator: int = 0
     controller: int = 3
     reflexes: tuple[int, ...] = ()
+    reflex_at_end: bool = False
     answered: bool = False
     tick: int = 0
     stale: bool = False
@@ -77,6 +80,7 @@ class Robot:
     table: Table | None = None
     ee_mass: float = 0.73
     load: tuple[float, ...] = (0.0,) * 13
+    thresholds: tuple[float, ...] = ()
 
     def step(self) -> None:
         self.tick += 1
@@ -86,6 +90,7 @@ class Robot:
             self.command(data)
         if self.channel.left:
             self.channel.left = False
+            self.thresholds = ()
             self.finish(None, IDLE if self.mode == MOVING else self.mode)
         if any(self.torque) or any(self.dq):
             self.dq = [*map(speed_after, self.dq, self.torque, FRICTION, INERTIA)]
@@ -132,10 +137,15 @@ class Robot:
             if self.mode == REFLEX:
                 self.mode, self.reflexes = IDLE, ()
             reply(command, number, b"\x00")
+        elif command in (SET_LOAD, SET_THRESHOLDS) and self.mode != IDLE:
+            reply(command, number, b"\x01")  # not possible in this mode
         elif command == SET_LOAD:
-            if self.mode == IDLE:
-                self.load = struct.unpack("<d3d9d", payload)
-            reply(command, number, b"\x00" if self.mode == IDLE else b"\x02")  # not possible in this mode
+            self.load = struct.unpack("<d3d9d", payload)
+            reply(command, number, b"\x00")
+        elif command == SET_THRESHOLDS:
+            values = struct.unpack("<52d", payload)
+            self.thresholds = (values[0], values[-1])
+            reply(command, number, b"\x00")
         elif command == LOAD_MODEL:
             reply(command, number, b"\x00" + self.model)
         else:
@@ -146,7 +156,10 @@ class Robot:
             return
         self.answered = True
         values = COMMAND.unpack(data)
-        if values[40]:  # motion_generation_finished
+        if values[40] and self.reflex_at_end:  # motion_generation_finished
+            self.reflex_at_end = False
+            self.fault(["reflex"])
+        elif values[40]:
             self.finish(0, IDLE)
         else:
             self.torque = values[41:48]
@@ -164,6 +177,8 @@ class Robot:
             case "reflex":
                 self.reflexes = (7,)  # cartesian_reflex
                 self.finish(6, REFLEX)
+            case "reflex_at_end":
+                self.reflex_at_end = True
             case "user_stop":
                 self.finish(2, USER_STOPPED)
             case "user_release":
@@ -245,6 +260,8 @@ class Hand:
                 self.part = float(words[1])
             case "answer":
                 self.answer = words[1]
+            case "no_hand":
+                self.channel.refuse()
             case "unhomed":
                 self.max_width = 0.0
             case "fingers":
@@ -279,6 +296,7 @@ def main() -> None:
                 "q": " ".join(map(str, robot.q)),
                 "clock": f"{robot.tick * TICK}",
                 "load": " ".join(map(str, robot.load)),
+                "thresholds": " ".join(map(str, robot.thresholds)),
             }
             print(answers.get(words[0], "done"), flush=True)
         due = max(due + TICK, time.monotonic() - 0.005)

@@ -4,6 +4,7 @@ An FR3 over the real wire protocol of server version 10, its dynamics in MuJoCo.
 not have, are commanded on standard input, one a line, as in `tests.hal.franka.fci5_server`:
 
     reflex | user_stop | user_release | part WIDTH | answer ok|unsuccessful|fail|aborted | q | clock |
+    no_hand (its server refuses clients) | refuse_stops N (the next commands to stop) |
     table Z SLOPE (a table that pushes the hand up) | load (answers with what was set) |
     record (the commands of motions from now on) | save FILE (them, as `commands` reads it)
 """
@@ -24,6 +25,9 @@ from franky_sim.franka_robot_protocol import (
     MoveStatus,
     RobotCommand,
     RobotMode,
+    SetCollisionBehaviorCommand,
+    SetLoadCommand,
+    StopMoveCommand,
     UDPCommand,
 )
 from franky_sim.franka_robot_server import FrankaRobotServer
@@ -39,6 +43,8 @@ _TURN_S = 3e-4
 _AT_REST_TICKS, _RESTING = 200, 4
 """A robot that was told nothing for so many ticks simulates one of so many, and sends its state as often."""
 _CARTESIAN_REFLEX = 7
+_NOT_POSSIBLE = 1
+"""Answer to a command that is not possible in the robot's mode."""
 ANSWERS = {
     "ok": GripperCommandStatus.kSuccess,
     "unsuccessful": GripperCommandStatus.kUnsuccessful,
@@ -56,6 +62,7 @@ class FaultyServer(FrankaRobotServer):
     busy_until = 0
     record: list[UDPCommand] | None = None
     answered = False
+    refused_stops = 0
 
     @property
     def robot_state(self) -> FrankaRobotState:
@@ -118,6 +125,31 @@ class Recovery(AutomaticErrorRecoveryCommand):
         super().handle(server)
 
 
+class Stop(StopMoveCommand):
+    def handle(self, server: FaultyServer) -> None:
+        if server.refused_stops:
+            server.refused_stops -= 1
+            self.reply(_NOT_POSSIBLE)
+        else:
+            super().handle(server)
+
+
+class Thresholds(SetCollisionBehaviorCommand):
+    def handle(self, server: FaultyServer) -> None:
+        if server.fault is None:
+            super().handle(server)
+        else:
+            self.reply(_NOT_POSSIBLE)
+
+
+class Payload(SetLoadCommand):
+    def handle(self, server: FaultyServer) -> None:
+        if server.fault is None:
+            super().handle(server)
+        else:
+            self.reply(_NOT_POSSIBLE)
+
+
 class Answers:
     """Stands in the way of the gripper's answers to grasps; after a failure it reports no grasp."""
 
@@ -144,8 +176,9 @@ def main() -> None:
             robot.__class__ = FaultyServer
             answers.hand = robot.gripper_server
             commands = robot._FrankaServer__command_class_map
-            assert commands[RobotCommand.kAutomaticErrorRecovery] is AutomaticErrorRecoveryCommand
-            commands[RobotCommand.kAutomaticErrorRecovery] = Recovery
+            for command in (Recovery, Stop, Thresholds, Payload):
+                assert commands[command.command_type] is command.__base__
+                commands[command.command_type] = command
             ask_for_priority()
             print("ready", flush=True)
             serve(server, simulator, robot, answers)
@@ -180,6 +213,11 @@ def obey(words: list[str], simulator: MujocoSimulator, robot: FaultyServer, answ
             robot.set_fault(RobotMode.kUserStopped, MoveStatus.kPreempted)
         case ["user_release"]:
             robot.fault = None
+        case ["refuse_stops", count]:
+            robot.refused_stops = int(count)
+        case ["no_hand"]:
+            robot.gripper_server.cleanup()
+            robot.gripper_server.process_commands = lambda: None
         case ["answer", status]:
             answers.status = ANSWERS[status]
         case ["table", z, slope_x]:

@@ -26,7 +26,17 @@ from hal.errors import (
     NotConnected,
 )
 from hal.franka.driver import DriverName
-from tests.hal.franka.robots import TIMEOUT_S, FakeRobot, arm_at, fci5, robot_for, write_cell
+from hal.franka.path import joint_path
+from tests.hal.franka.robots import (
+    TIMEOUT_S,
+    FakeRobot,
+    arm_at,
+    fci5,
+    linked,
+    plain_path,
+    robot_for,
+    write_cell,
+)
 
 
 @contextmanager
@@ -147,6 +157,41 @@ def test_the_user_stop_is_reported_and_recover_waits_for_its_release(
         robot.order("user_release")
         arm.recover()
         nudge(arm)
+
+
+def test_franky_cannot_connect_to_a_robot_that_is_not_idle_and_the_error_tells_what_to_do(tmp_path: Path):
+    """It states thresholds of its own as it connects, which such a robot refuses."""
+    with robot_for("franky") as robot:
+        for fault in ("reflex", "user_stop"):
+            robot.order(fault)
+            with pytest.raises(NotConnected, match="not possible .* release the user stop .* start again"):
+                arm_at(tmp_path, "franky", robot.host).connect()
+            robot.order("user_release")
+        with arm_at(tmp_path, "franky", robot.host) as arm:
+            nudge(arm)
+
+
+@pytest.mark.parametrize("fault", ["reflex", "user_stop"])
+def test_a_robot_that_is_not_idle_gets_its_thresholds_from_panda_py_before_it_moves(
+    tmp_path: Path, fault: str
+):
+    with fci5() as robot:
+        robot.order(fault)
+        begin = robot.joints()
+        with linked("panda_py", robot.host) as link:
+            path = joint_path(begin, begin + 0.1, speed=np.full(7, 0.5), acceleration=np.full(7, 3.0))
+            with pytest.raises(MotionAborted, match="Set Collision Behavior .* release the user stop"):
+                link.ask("move_joints", timeout_s=TIMEOUT_S, **plain_path(path))
+        assert robot.joints() == pytest.approx(begin, abs=1e-3)
+        with arm_at(tmp_path, "panda_py", robot.host, contact_force=18.0) as arm:
+            assert robot.order("thresholds") == ""
+            with pytest.raises(NeedsRecovery, match="mode (reflex|user_stopped).* start again"):
+                nudge(arm)
+            if fault == "user_stop":
+                robot.order("user_release")
+            arm.recover()
+            nudge(arm)
+            assert robot.order("thresholds") == "20.0 18.0"
 
 
 def test_a_state_is_measured_after_it_was_asked_for(driver: DriverName, robot: FakeRobot, tmp_path: Path):

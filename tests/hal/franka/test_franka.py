@@ -55,6 +55,10 @@ def test_reach_ends_where_the_arm_does():
         ("libfranka: server closed connection", "CommunicationLost"),
         ('libfranka: Move command aborted: motion aborted by reflex! ["cartesian_reflex"]', "MotionAborted"),
         ("libfranka: Move command preempted!", "MotionAborted"),
+        (
+            'libfranka: Set Load command rejected: command not possible in the current mode ("Reflex")!',
+            "MotionAborted",
+        ),
         ("Motion planner failed with error code -110", "NoTrajectory"),
         ("libfranka gripper: Command failed!", "MotionAborted"),
     ],

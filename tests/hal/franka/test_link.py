@@ -11,7 +11,7 @@ import pytest
 
 from hal.errors import CommunicationLost, DriverMissing, IncompatibleDriver, NotConnected
 from hal.franka.driver import DriverName
-from tests.hal.franka.robots import arm_at, fci5
+from tests.hal.franka.robots import arm_at, fci5, robot_for
 
 
 @pytest.fixture(scope="module", params=["franky", pytest.param("panda_py", marks=pytest.mark.slow)])
@@ -32,6 +32,14 @@ def test_a_robot_of_another_version_is_reported_with_the_remedy(
 def test_no_robot_at_the_address_is_reported(driver: DriverName, tmp_path: Path):
     with pytest.raises(NotConnected, match="no robot at 127.0.0.250"):
         arm_at(tmp_path, driver, "127.0.0.250").connect()
+
+
+def test_a_robot_without_a_hand_is_told_from_no_robot(driver: DriverName, tmp_path: Path):
+    with robot_for(driver) as robot:
+        robot.order("no_hand")
+        with pytest.raises(NotConnected, match="answers, its hand does not: .*in Desk") as caught:
+            arm_at(tmp_path, driver, robot.host).connect()
+        assert "\n" not in str(caught.value) and "no robot" not in str(caught.value)
 
 
 def test_a_missing_package_is_reported_with_its_extra(driver: DriverName, tmp_path: Path, monkeypatch):

@@ -92,3 +92,19 @@ def test_a_reflex_is_recovered_from(robot: FakeRobot, link: DriverLink):
     assert link.ask("state", timeout_s=TIMEOUT_S)["mode"] == "reflex"
     assert link.ask("recover", timeout_s=TIMEOUT_S) is True
     assert link.ask("state", timeout_s=TIMEOUT_S)["mode"] == "idle"
+
+
+def test_a_reflex_of_a_stopped_motion_is_no_error_of_the_next(robot: FakeRobot, link: DriverLink):
+    """panda_py keeps an error until it is asked, here one that came after the stop had ended the motion."""
+    begin, path = robot.joints(), path_by(robot, 0.3, speed=0.1)
+    robot.order("reflex_at_end")
+    stopper = threading.Thread(
+        target=lambda: (robot.wait_until_moved(begin), link.ask("stop", timeout_s=TIMEOUT_S))
+    )
+    stopper.start()
+    with pytest.raises(MotionAborted, match="preempted"):
+        link.ask("move_joints", timeout_s=TIMEOUT_S, **plain_path(path))
+    stopper.join()
+    assert link.ask("state", timeout_s=TIMEOUT_S)["mode"] == "reflex"
+    assert link.ask("recover", timeout_s=TIMEOUT_S) is True
+    link.ask("move_joints", timeout_s=TIMEOUT_S, **plain_path(path_by(robot, -0.05)))

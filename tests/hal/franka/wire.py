@@ -105,7 +105,7 @@ class Channel:
 
     def __init__(self, host: str, port: int, header: str):
         self._header = struct.Struct(header)
-        self._listener = socket.create_server((host, port), backlog=1)
+        self._listener: socket.socket | None = socket.create_server((host, port), backlog=1)
         self._listener.setblocking(False)
         self._client: socket.socket | None = None
         self._udp: socket.socket | None = None
@@ -115,7 +115,7 @@ class Channel:
 
     def requests(self) -> Iterator[tuple[int, int, bytes]]:
         """Command, number and payload of every whole message that has come."""
-        if self._client is None:
+        if self._client is None and self._listener is not None:
             with contextlib.suppress(BlockingIOError):
                 self._client, (self._peer, _) = self._listener.accept()
                 self._client.setblocking(False)
@@ -175,6 +175,12 @@ class Channel:
         """Returns when something has come by UDP."""
         if self._udp is not None:
             select.select([self._udp], [], [], timeout_s)
+
+    def refuse(self) -> None:
+        """Accepts no client any more, as where nothing listens on the port."""
+        if self._listener is not None:
+            self._listener.close()
+            self._listener = None
 
     def _hang_up(self) -> None:
         for one in (self._client, self._udp):

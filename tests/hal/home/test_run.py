@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 from pathlib import Path
 
@@ -30,6 +31,25 @@ def test_changed_fingers_are_found_and_the_arm_stands_still(tmp_path: Path):
         assert robot.joints() == pytest.approx(before, abs=1e-3)
     assert done.returncode == 0, done.stderr
     assert "open to 65.5 mm, 80.0 mm before; they stand at 65.5 mm" in done.stdout
+
+
+@pytest.mark.parametrize(("answers", "code"), [("y\n\n", 0), ("y\nq\n", 130)])
+def test_a_robot_left_in_a_reflex_is_recovered_once_its_operator_has_checked_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answers: str, code: int
+):
+    prompts = io.StringIO()
+    asked = functools.partial(Operator, answers=io.StringIO(answers), prompts=prompts)
+    monkeypatch.setattr(home, "Operator", asked)
+    with fci5() as robot:
+        robot.order("reflex")
+        before = robot.joints()
+        done = run_here(home.main, "--cell", str(write_cell(tmp_path, "panda_py", robot.host)))
+        assert robot.joints() == pytest.approx(before, abs=1e-3)
+    assert done.returncode == code, done.stderr
+    assert (
+        "is in mode reflex" in prompts.getvalue() and "the fingers close and open), q" in prompts.getvalue()
+    )
+    assert done.stdout.startswith("homed: ") == (code == 0)
 
 
 def test_an_operator_who_does_not_want_the_fingers_to_move_ends_it(

@@ -20,7 +20,7 @@ REGION = (0.38, 0.62, -0.12, 0.12)
 
 
 class FeelingArm(ToyArm):
-    """A toy arm that stops at a table and keeps the places at which it did."""
+    """A toy arm that stops at a table, keeps the places at which it did, and moves no fingers there."""
 
     def __init__(self, height: Callable[[np.ndarray], float], limits: ArmLimits) -> None:
         super().__init__()
@@ -34,6 +34,11 @@ class FeelingArm(ToyArm):
         assert position[2] - PAD_REACH > self._height(position[:2]), "pressed into the table"
         self._joints = np.concatenate([position, np.zeros(4)])
         self._quat_wxyz = T_base_tcp.quat_wxyz
+
+    def _move_gripper(self, width: float) -> None:
+        position = self._joints[:3]
+        assert position[2] - PAD_REACH > self._height(position[:2]), "fingers moved on the table"
+        super()._move_gripper(width)
 
     def _move_until_contact(self, T_base_tcp: Pose, force: float, speed: float) -> Pose | None:
         position = np.array(T_base_tcp.position)
