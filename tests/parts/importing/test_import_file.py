@@ -67,6 +67,19 @@ def test_a_thin_sheet_is_cut_until_physx_takes_its_hulls(tmp_path):
     assert part.n_hulls > 1 and part.hull_error < 1e-5
 
 
+def test_a_pyramid_a_tetrahedron_and_a_cone_become_parts(tmp_path):
+    square = [[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]]
+    corners = np.array([[0, 0, 0], [40, 0, 0], [0, 40, 0], [0, 0, 40]])
+    trimesh.convex.convex_hull(np.array([*square, [20, 20, 30]])).export(tmp_path / "pyramid.stl")
+    trimesh.convex.convex_hull(corners).export(tmp_path / "tetra.stl")
+    trimesh.creation.cone(15, 30, sections=64).export(tmp_path / "cone.stl")
+    around = 32 * np.sin(2 * np.pi / 64) * 15**2  # area of the cone's polygon
+    for name, volume in dict(pyramid=40**2 * 30 / 3, tetra=40**3 / 6, cone=around * 30 / 3).items():
+        part = import_part(tmp_path / f"{name}.stl", density=1000.0)
+        assert part.mass == pytest.approx(1e-6 * volume, rel=1e-5)
+        assert part.grade == "fine"
+
+
 def test_the_same_file_is_not_imported_twice_and_a_changed_one_replaces_the_part(tmp_path):
     file = tmp_path / "box.stl"
     trimesh.creation.box((40, 30, 20)).export(file)
