@@ -128,12 +128,12 @@ def _collect(config: CollectConfig, parts: list[Part], known: Mapping[tuple[str,
     prepare_folder(config)
     tasks = plan_shards(config, parts)
     if config.part_filter.bounds_success:
-        _make_missing(config, [task for task in tasks if task.index == 0], parts)
+        _make_missing(config, [task for task in tasks if task.index == 0], parts, known)
         parts = passing_parts(config, parts)
         print(f"{len(parts)} parts pass the part filter by the success of their first shard")
         names = {part.name for part in parts}
         tasks = [task for task in tasks if task.index > 0 and task.part in names]
-    _make_missing(config, tasks, parts)
+    _make_missing(config, tasks, parts, known)
     with ctrl_c_deferred():  # takes seconds
         from mskgrasp.collect.report import draw_summary, print_summary, summarise_parts, write_summary
 
@@ -149,11 +149,20 @@ def passing_parts(config: CollectConfig, parts: list[Part]) -> list[Part]:
     return [part for part in parts if config.part_filter.takes_success(success_rate(first[part.name]))]
 
 
-def _make_missing(config: CollectConfig, tasks: list[ShardTask], parts: list[Part]) -> None:
+def _make_missing(
+    config: CollectConfig,
+    tasks: list[ShardTask],
+    parts: list[Part],
+    known: Mapping[tuple[str, int], ShardLabels],
+) -> None:
     """Simulate those of the shards that are not on disk."""
     hashes = {part.name: part.content_hash for part in parts}
     checked = progress(tasks, title="check shards", unit="shard")
-    missing = [task for task in checked if not is_done(config.out, task, hashes[task.part])]
+    missing = [
+        task
+        for task in checked
+        if not is_done(config.out, task, hashes[task.part], known.get((task.part, task.index)))
+    ]
     done = sum(task.n for task in tasks) - sum(task.n for task in missing)
     print(
         f"{len(parts)} parts, {sum(task.n for task in tasks)} attempts into {config.out}"
@@ -260,8 +269,14 @@ def plan_shards(config: CollectConfig, parts: list[Part]) -> list[ShardTask]:
     ]
 
 
-def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
+def is_done(out: Path, task: ShardTask, part_hash: str, labels: ShardLabels | None = None) -> bool:
     """Whether a shard is on disk and whole; a damaged one is reported, and will be made again.
+
+    Args:
+        out: The dataset.
+        task: The shard.
+        part_hash: Content hash of its part.
+        labels: Its labels, where they are known: a shard made from them states the software that made them.
 
     Raises:
         BadDataset: The part or the simulation has changed since the shard was made.
@@ -292,7 +307,7 @@ def is_done(out: Path, task: ShardTask, part_hash: str) -> bool:
             "another --out"
         )
     other = other_versions(info.versions)
-    if other:
+    if other and (labels is None or labels.info.versions != info.versions):
         raise BadDataset(f"{path} was made by other software: {other}; choose another --out")
     return True
 

@@ -28,7 +28,7 @@ from mskgrasp.dataset.fingerprint import OUTCOMES
 from mskgrasp.dataset.shards import require_own_name
 from mskgrasp.learning.label_source import LabelSource, distinct, source_of
 from mskgrasp.learning.network_config import NetworkConfig
-from mskgrasp.parts.catalogue import Split, read_index
+from mskgrasp.parts.catalogue import Split, read_index, splits_of
 from mskgrasp.perception.height_patches import crop_patches, height_image
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.runtime.worker_pool import Work, process_count, results
@@ -329,7 +329,7 @@ def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "cat
         parts: Names.
         fraction: Share of validation parts, for a split by name.
         by: name: a hash of the part's name; catalogue: the catalogue's split, which holds out whole families,
-            and the name for parts that are not in it.
+            those of parts that are not built on this machine, too, and the name for parts without a recipe.
 
     Raises:
         BadDataset: There are fewer than two parts, or no catalogue.
@@ -343,12 +343,12 @@ def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "cat
         name: "validation" if _name_hash(name) < fraction else "train" for name in parts
     }
     if by == "catalogue":
-        index = read_index().parts
-        if not index:
+        index = read_index()
+        if not index.parts:
             raise BadDataset(
                 "sides: catalogue needs the catalogue: python -m mskgrasp.parts build --catalogue"
             )
-        sides |= {name: index[name].split for name in parts if name in index}
+        sides |= splits_of(parts, index)
     order = sorted(parts, key=_name_hash)
     if "validation" not in sides.values():
         sides[order[0]] = "validation"

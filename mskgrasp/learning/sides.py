@@ -10,7 +10,7 @@ from torch import Tensor
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.samples import Samples, part_sides
-from mskgrasp.parts.catalogue import SPLITS
+from mskgrasp.parts.catalogue import SPLITS, read_index, splits_of
 from mskgrasp.runtime.progress import note
 
 
@@ -39,6 +39,8 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
         BadDataset: Training or validation lacks successes or failures.
     """
     sides = part_sides(samples.parts, config.validation_fraction, config.sides)
+    if config.sides == "catalogue":
+        _note_missing(samples.parts)
     rows = [
         torch.nonzero(torch.isin(samples.part, torch.tensor(numbers, dtype=torch.int64)))[:, 0]
         for numbers in (
@@ -55,3 +57,19 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
             note(f"warning: no success among the {len(rows[k])} attempts at the {name} parts; left out")
             rows[k] = rows[k][:0]
     return Sides(training=rows[0], validation=rows[1], test=rows[2], new_sizes=rows[3])
+
+
+def _note_missing(parts: tuple[str, ...]) -> None:
+    """Report the parts whose side the catalogue of this machine does not decide alone."""
+    index = read_index()
+    known = splits_of(parts, index)
+    for names, fate in (
+        ([name for name in parts if name in known and name not in index.parts], "their families"),
+        ([name for name in parts if name not in known], "their names"),
+    ):
+        if names:
+            some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+            note(
+                f"{len(names)} of {len(parts)} parts are not in the catalogue of this machine ({some}): "
+                f"{fate} decide on which side they are"
+            )

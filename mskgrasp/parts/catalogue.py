@@ -20,6 +20,7 @@ from mskgrasp.core.errors import BadPart, UnknownPart
 from mskgrasp.core.files import write_whole
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import builtin_names, recipe_hash, starter_names, unknown_part
+from mskgrasp.parts.recipes import cad, families
 from mskgrasp.parts.recipes.families import VARIANT_OF
 
 INDEX_VERSION = 2
@@ -269,6 +270,22 @@ def split_of(family: str, group: str) -> Split:
         if number < 0:
             return side
     return "new_sizes" if _hash(group) < _KNOWN_SHARE else "train"
+
+
+def splits_of(names: Iterable[str], index: Index) -> dict[str, Split]:
+    """The split of those parts that have a recipe, of parts that the index lacks, too.
+
+    An index lacks what could not be built on this machine, such as all CAD parts without the extra ``[cad]``.
+    Their families are known from the recipes; the groups of such parts are not, and each counts as its own.
+    """
+    family_of = {one.name: one.family for one in (*families.recipes().values(), *cad.recipes())}
+    found: dict[str, Split] = {}
+    for name in names:
+        if name in index.parts:
+            found[name] = index.parts[name].split
+        elif name in family_of:
+            found[name] = split_of(family_of[name], name)
+    return found
 
 
 def _hash(name: str) -> float:

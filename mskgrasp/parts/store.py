@@ -76,7 +76,9 @@ def write_part(name: str, mesh: bytes, hulls: bytes, record: dict[str, Any]) -> 
     """
     record = record | {"content_hash": content_hash(mesh, hulls, record)}
     text = json.dumps(record, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
-    contents = dict(zip(FILES, (mesh, hulls, text.encode()), strict=True))
+    # The bytes of a file's name need not be UTF-8: what Python reads them as has an escape in JSON alone.
+    encoded = text.encode(errors="backslashreplace")
+    contents = dict(zip(FILES, (mesh, hulls, encoded), strict=True))
     return read_part(_put(parts_folder(), name, contents))
 
 

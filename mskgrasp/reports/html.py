@@ -55,7 +55,8 @@ def write_html(
         command=shlex.join(["python", *sys.orig_argv[1:]]) if command is None else command,
         palette=palette,
     )
-    write_whole(path, page.encode() + b"\n")
+    # A file's name in the command need not be UTF-8.
+    write_whole(path, page.encode(errors="backslashreplace") + b"\n")
 
 
 def _check_links(sections: Sequence[Section]) -> None:

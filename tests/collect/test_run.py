@@ -208,6 +208,23 @@ def test_shards_of_other_software_are_not_added_to(collected, tmp_path):
         is_done(out, task, info.part_hash)
 
 
+def test_a_collection_from_labels_of_other_software_is_resumed_with_them(collected, tmp_path):
+    out = Path(shutil.copytree(collected, tmp_path / "data"))
+    for path in list_shards(out):
+        with h5py.File(path, "r+") as file:
+            stated = json.loads(file.attrs["versions"]) | {"python": "3.11.0"}
+            file.attrs["versions"] = json.dumps(stated)
+    export_labels(out, tmp_path / "all.labels")
+    done = run_here(main, *arguments(out, "--labels", str(tmp_path / "all.labels")))
+    assert done.returncode == 0, done.stderr
+    assert "12 attempts" in done.stdout and "12 of them already there" in done.stdout
+    for options in ((), ("--labels", str(tmp_path / "own.labels"))):
+        if options:
+            export_labels(collected, tmp_path / "own.labels")
+        done = run_here(main, *arguments(out, *options))
+        assert done.returncode == 1 and "was made by other software: python 3.11.0" in done.stderr
+
+
 def test_two_collections_do_not_write_into_one_folder(collected, tmp_path):
     out = tmp_path / "data"
     shutil.copytree(collected, out)

@@ -8,6 +8,9 @@ from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.geometry import Pose
 from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.learning.samples import part_sides, read_samples
+from mskgrasp.parts import build_part
+from mskgrasp.parts.catalogue import Index, entry_of, make_index, split_of, write_index
+from mskgrasp.parts.recipes import cad
 from tests import synthetic
 from tests.learning.small import HAND, PATCH
 
@@ -101,6 +104,18 @@ def test_the_catalogue_decides_the_sides_where_it_is_asked_to(monkeypatch, tmp_p
     with pytest.raises(BadDataset, match="build --catalogue"):
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
         part_sides(names, 0.2, "catalogue")
+
+
+def test_parts_that_were_not_built_here_are_on_the_side_of_their_family(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    write_index(make_index([entry_of(build_part("washer_m36").name)], {}, Index(parts={}, left_out={})))
+    drawn = {recipe.name: split_of(recipe.family, "group 0") for recipe in cad.recipes()}
+    sides = part_sides(("washer_m36", *drawn), 0.2, "catalogue")
+    assert sides["washer_m36"] == split_of("washer", "washer_m36")
+    for side in ("test", "validation"):
+        assert {name for name in drawn if sides[name] == side} == {
+            n for n, one in drawn.items() if one == side
+        }
 
 
 def test_the_quality_network_sees_every_second_pixel_of_the_middle_columns(dataset):

@@ -22,9 +22,11 @@ from mskgrasp.parts.catalogue import (
     read_index,
     representative_entries,
     split_of,
+    splits_of,
     with_ratings,
     write_index,
 )
+from mskgrasp.parts.recipes import cad
 from mskgrasp.parts.recipes.families import VARIANT_OF
 
 EMPTY = Index(parts={}, left_out={})
@@ -117,6 +119,17 @@ def test_variants_of_a_family_are_on_its_side():
     assert split_of("hex_nut", "group 0") == "train"
     assert all(sides[variant] == sides[family] for variant, family in VARIANT_OF.items())
     assert [list(sides.values()).count(side) for side in SPLITS] == [186, 33, 36, 0]
+
+
+def test_a_part_that_the_index_lacks_is_on_the_side_of_its_family():
+    drawn = {recipe.name: recipe.family for recipe in cad.recipes()}
+    of_family = {family: split_of(family, "group 0") for family in drawn.values()}
+    held_out = {name: of_family[family] for name, family in drawn.items() if of_family[family] != "train"}
+    assert {"test", "validation"} == set(held_out.values())
+    index = make_index(bars("bar", [50]), {}, EMPTY)
+    found = splits_of([*drawn, "bar_50", "my_clamp"], index)
+    assert set(found) == {*drawn, "bar_50"} and found["bar_50"] == index.parts["bar_50"].split
+    assert {name: side for name, side in found.items() if side in ("test", "validation")} == held_out
 
 
 def test_ratings_stay_with_a_part_until_its_shape_changes():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -125,3 +126,9 @@ def test_what_cannot_be_shown_is_refused(tmp_path):
     with pytest.raises(ValueError, match="'nowhere', which is not in the report"):
         write(tables=[Table(header=("a",), rows=[(Link(text="x", to="nowhere"),)])])
     assert not (tmp_path / "r.html").exists()
+
+
+def test_a_command_with_a_file_name_that_is_not_utf_8_is_shown(tmp_path):
+    command = "python -m mskgrasp.assess " + os.fsdecode(b"geh\xe4use.stl")
+    write_html(tmp_path / "report.html", title="A", conclusion="B", sections=[], command=command)
+    assert r"mskgrasp.assess geh\udce4use.stl" in (tmp_path / "report.html").read_text(encoding="utf-8")

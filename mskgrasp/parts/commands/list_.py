@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import difflib
+import errno
+import io
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from mskgrasp.core.errors import BadPart, UsageError, shown
+from mskgrasp.core.files import write_whole
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import imported_names, is_built, starter_names
 from mskgrasp.parts.catalogue import SPLITS, THIN, Entry, Index, read_index
@@ -36,7 +39,7 @@ class List:
 def run_list(command: List) -> int:
     """Print a table, with the number of parts in the last line."""
     if command.csv is not None:
-        write_csv(_built_index(), command.csv)
+        _write(_built_index(), command.csv)
         print(command.csv)
     if command.family is not None:
         index = _built_index()
@@ -65,23 +68,47 @@ def run_list(command: List) -> int:
 
 
 def write_csv(index: Index, path: Path) -> None:
-    """Write the catalogue as CSV, one row for each part, sorted by name."""
+    """Write the catalogue atomically as CSV, one row for each part, sorted by name.
+
+    Raises:
+        OSError: The disk is full or not writable.
+    """
     columns = (
         "name", "family", "source", "licence", "split", "group", "longest_axis_mm", "edge_1_mm", "edge_2_mm",
         "edge_3_mm", "volume_cm3", "mass_g", "hulls", "hull_error_p95_mm", "hull_error_largest_mm",
         "hull_volume_ratio", "attempts", "successes",
     )  # fmt: skip
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        for name, e in sorted(index.parts.items()):
-            writer.writerow([
-                name, e.family, e.source, e.licence, e.split, e.group,
-                *(f"{1e3 * length:.2f}" for length in (e.longest_axis, *e.extents)),
-                f"{1e6 * e.volume:.3f}", f"{1e3 * e.mass:.1f}", e.n_hulls, f"{1e3 * e.hull_error_p95:.2f}",
-                f"{1e3 * e.hull_error:.2f}", f"{e.hull_volume_ratio:.3f}",
-                *((e.rating.attempts, e.rating.successes) if e.rating else ("", "")),
-            ])  # fmt: skip
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for name, e in sorted(index.parts.items()):
+        writer.writerow([
+            name, e.family, e.source, e.licence, e.split, e.group,
+            *(f"{1e3 * length:.2f}" for length in (e.longest_axis, *e.extents)),
+            f"{1e6 * e.volume:.3f}", f"{1e3 * e.mass:.1f}", e.n_hulls, f"{1e3 * e.hull_error_p95:.2f}",
+            f"{1e3 * e.hull_error:.2f}", f"{e.hull_volume_ratio:.3f}",
+            *((e.rating.attempts, e.rating.successes) if e.rating else ("", "")),
+        ])  # fmt: skip
+    write_whole(path, text.getvalue().encode())
+
+
+def _write(index: Index, path: Path) -> None:
+    """Write the CSV file that the user names.
+
+    Raises:
+        UsageError: There can be no file.
+    """
+    if path.exists() and not path.is_file():
+        raise UsageError(f"--csv {path} is no file: choose another path")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_csv(index, path)
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise UsageError(
+            f"--csv {path}: cannot be written ({error.strerror}): choose another path"
+        ) from error
 
 
 def _built_index() -> Index:

@@ -6,8 +6,10 @@ from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from mskgrasp.core.errors import UsageError
-from mskgrasp.core.metrics import wilson_interval
+from mskgrasp.core.metrics import clustered_wilson_interval
 from mskgrasp.parts.catalogue import Entry, Index, read_index, with_ratings, write_index
 from mskgrasp.runtime.console_table import Table, print_table
 
@@ -72,7 +74,11 @@ def _report(index: Index, low: float, high: float) -> None:
         if not rated:
             continue
         n, won = sum(r.attempts for r in rated), sum(r.successes for r in rated)
-        interval = wilson_interval(won, n)
+        tried = [r for r in rated if r.attempts]
+        # By parts: grasps of one part are alike.
+        interval = clustered_wilson_interval(
+            np.array([r.successes for r in tried]), np.array([r.attempts for r in tried])
+        )
         rows.append((
             family, len(entries), len(rated), n, f"{won / max(n, 1):.0%}",
             f"{interval[0]:.0%} - {interval[1]:.0%}",

@@ -14,7 +14,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from mskgrasp.core.errors import BadPart
+from mskgrasp.parts.importing.winding import winding_number
 from mskgrasp.parts.solids.surface import Surface
+
+_LOOKS = 16
+"""Faces of a body at which it is looked whether another encloses it."""
 
 WELD_MM = 1e-3
 """Vertices closer than this are merged where the surface is open otherwise (as between faces of STEP)."""
@@ -172,14 +176,17 @@ def _drop_faces(surface: Surface, repairs: Repairs, *, keep_one: bool) -> tuple[
     """Without faces that name a vertex twice or repeat another face.
 
     Two faces back to back enclose nothing and both go, unless ``keep_one``: some exporters write every face
-    from both sides.
+    from both sides. Where they do so with some bodies of a file only, one side of these stays in any case.
     """
     faces = surface.faces
     a, b, c = faces.T
     sound = (a != b) & (b != c) & (c != a)
     faces = faces[sound]
     degenerate = len(sound) - len(faces)
-    keep = _without_doubles(faces, keep_one=keep_one)
+    keep, gone = _without_doubles(faces, keep_one=keep_one)
+    if len(gone):
+        bodies = _bodies_beside(Surface(vertices=surface.vertices, faces=faces), keep, gone)
+        keep = np.sort(np.concatenate([keep, bodies]))
     repairs = replace(repairs, degenerate=degenerate, doubled=len(faces) - len(keep))
     faces = faces[keep]
     used = np.zeros(len(surface.vertices), dtype=bool)
@@ -188,15 +195,42 @@ def _drop_faces(surface: Surface, repairs: Repairs, *, keep_one: bool) -> tuple[
     return Surface(vertices=surface.vertices[used], faces=compact[faces]), repairs
 
 
-def _without_doubles(faces: np.ndarray, *, keep_one: bool) -> np.ndarray:
-    """Index of the faces to keep: of several alike the first."""
+def _bodies_beside(surface: Surface, keep: np.ndarray, gone: np.ndarray) -> np.ndarray:
+    """Index of those of the faces ``gone`` that bound bodies beside what the faces ``keep`` bound.
+
+    A closed surface within that is no body: there it is the cavity that another body fills.
+    """
+    rest = Surface(vertices=surface.vertices, faces=surface.faces[keep])
+    if _open_edges(rest) != (0, 0):
+        return gone[:0]
+    lost = Surface(vertices=surface.vertices, faces=surface.faces[gone])
+    key = _edges(lost)[0]
+    order = np.argsort(key, kind="stable")
+    face, same = order // 3, key[order][1:] == key[order][:-1]
+    piece = _components(face[:-1][same], face[1:][same], len(gone))
+    _, edge, count = np.unique(key, return_inverse=True, return_counts=True)
+    is_open = np.zeros(piece.max() + 1, dtype=bool)
+    is_open[np.repeat(piece, 3)[count[np.reshape(edge, -1)] % 2 == 1]] = True
+    if len(keep):
+        rest = wind_consistently(rest)[0]
+    chosen = [gone[:0]]
+    for number in np.flatnonzero(~is_open):
+        members = np.flatnonzero(piece == number)
+        looked = lost.triangles[members[:: -(-len(members) // _LOOKS)]].mean(axis=1)
+        if not all(abs(winding_number(rest.triangles, point)) > 0.5 for point in looked):
+            chosen.append(gone[members])
+    return np.concatenate(chosen)
+
+
+def _without_doubles(faces: np.ndarray, *, keep_one: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Index of the faces to keep, of several alike the first; the first of those that go altogether."""
     everything = np.arange(len(faces))
     low, middle, top = np.sort(faces, axis=1).T
     order = np.lexsort((top, middle, low))
     key = np.stack([low, middle, top], axis=1)[order]
     fresh = np.r_[True, (key[1:] != key[:-1]).any(axis=1)] if len(key) else np.zeros(0, dtype=bool)
     if fresh.all():
-        return everything
+        return everything, everything[:0]
     group = np.empty(len(faces), dtype=np.int64)
     group[order] = np.cumsum(fresh) - 1
     # Even permutations of the sorted triple run one way round, odd ones the other.
@@ -205,7 +239,9 @@ def _without_doubles(faces: np.ndarray, *, keep_one: bool) -> np.ndarray:
     wanted = (np.sign(np.bincount(group, weights=way))[group] == way) | keep_one
     candidates = everything[wanted]
     _, leading = np.unique(group[candidates], return_index=True)
-    return np.sort(candidates[leading])
+    keep = candidates[leading]
+    _, first = np.unique(group, return_index=True)
+    return np.sort(keep), np.sort(first[~np.isin(np.arange(len(first)), group[keep])])
 
 
 def _check_not_flat(surface: Surface) -> None:

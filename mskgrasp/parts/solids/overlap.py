@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from manifold3d import Manifold, OpType
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, aspect_ratio
 from mskgrasp.parts.solids.solid import MAX_HULL_VERTICES
@@ -162,7 +162,11 @@ def _without_flat_corners(points: np.ndarray) -> np.ndarray:
     number = 0
     while number < len(points):
         others = np.delete(points, number, axis=0)
-        if (ConvexHull(others).equations @ [*points[number], 1.0]).max() < _FLAT_MM:
+        try:
+            outside = (ConvexHull(others).equations @ [*points[number], 1.0]).max()
+        except QhullError:
+            outside = np.inf  # without the apex of a pyramid the others lie in a plane
+        if outside < _FLAT_MM:
             points = others
         else:
             number += 1

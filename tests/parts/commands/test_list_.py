@@ -1,6 +1,7 @@
 """Tables and the CSV file of the command ``list``."""
 
 import csv
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -60,6 +61,23 @@ def test_the_csv_file_has_the_numbers_of_the_index(index: Index, tmp_path: Path)
         assert float(row["longest_axis_mm"]) == pytest.approx(1e3 * entry.longest_axis, abs=0.006)
         assert float(row["mass_g"]) == pytest.approx(1e3 * entry.mass, abs=0.06)
     assert rows["parallel_pin_12x60"]["successes"] == "50" and rows["washer_m36"]["successes"] == ""
+
+
+def test_the_csv_file_is_written_whole_where_there_can_be_one(index: Index, tmp_path: Path, program):
+    made = tmp_path / "made" / "parts.csv"
+    linked = tmp_path / "linked.csv"
+    for _ in range(2):
+        done = program("list", "--csv", str(made))
+        assert done.returncode == 0 and len(made.read_text(encoding="utf-8").splitlines()) == 4
+        assert [path.name for path in made.parent.iterdir()] == ["parts.csv"]
+        os.link(made, linked) if not linked.exists() else None
+    before = linked.read_bytes()
+    write_csv(replace(index, parts={}), made)
+    assert linked.read_bytes() == before  # not written over
+    for unusable in (tmp_path / "made", made / "parts.csv", Path("/dev/null"), Path("/proc/parts.csv")):
+        done = program("list", "--csv", str(unusable))
+        assert done.returncode == 2 and "choose another path" in done.stderr
+        assert len(done.stderr.splitlines()) == 1
 
 
 def test_an_unknown_family_is_refused_with_the_legal_ones(index: Index):

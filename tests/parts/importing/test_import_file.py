@@ -1,6 +1,7 @@
 """CAD files as they come: good ones become parts, others are refused in one line."""
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,19 @@ def test_a_thin_sheet_is_cut_until_physx_takes_its_hulls(tmp_path):
     assert part.n_hulls > 1 and part.hull_error < 1e-5
 
 
+def test_a_pyramid_a_tetrahedron_and_a_cone_become_parts(tmp_path):
+    square = [[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]]
+    corners = np.array([[0, 0, 0], [40, 0, 0], [0, 40, 0], [0, 0, 40]])
+    trimesh.convex.convex_hull(np.array([*square, [20, 20, 30]])).export(tmp_path / "pyramid.stl")
+    trimesh.convex.convex_hull(corners).export(tmp_path / "tetra.stl")
+    trimesh.creation.cone(15, 30, sections=64).export(tmp_path / "cone.stl")
+    around = 32 * np.sin(2 * np.pi / 64) * 15**2  # area of the cone's polygon
+    for name, volume in dict(pyramid=40**2 * 30 / 3, tetra=40**3 / 6, cone=around * 30 / 3).items():
+        part = import_part(tmp_path / f"{name}.stl", density=1000.0)
+        assert part.mass == pytest.approx(1e-6 * volume, rel=1e-5)
+        assert part.grade == "fine"
+
+
 def test_the_same_file_is_not_imported_twice_and_a_changed_one_replaces_the_part(tmp_path):
     file = tmp_path / "box.stl"
     trimesh.creation.box((40, 30, 20)).export(file)
@@ -90,6 +104,22 @@ def test_a_file_that_a_program_is_given_is_the_part_that_was_imported_from_it(tm
     moved = file.rename(tmp_path / "box.STL")
     assert part_of_file(moved).content_hash == inches.content_hash
     assert capsys.readouterr().err == ""
+
+
+def test_a_file_whose_name_is_not_utf_8_is_a_part_like_any_other(tmp_path, capsys):
+    file = tmp_path / os.fsdecode(b"geh\xe4use.stl")
+    trimesh.creation.box((40, 30, 20)).export(tmp_path / "box.stl")
+    (tmp_path / "box.stl").rename(file)
+    part = import_part(file, density=1050.0)
+    assert part.name == "gehuse" and import_file(file, density=1050.0).unchanged
+    assert part_of_file(file).content_hash == part.content_hash
+    file.write_bytes(trimesh.creation.box((50, 30, 20)).export(file_type="stl"))
+    changed = part_of_file(file)
+    assert (changed.density, changed.extents[0]) == (1050.0, pytest.approx(0.05))
+    assert "use.stl has changed since its import; imported again" in capsys.readouterr().err
+    (tmp_path / "gehuse.stl").write_bytes(trimesh.creation.box((60, 30, 20)).export(file_type="stl"))
+    with pytest.raises(BadPart, match="is another file"):
+        part_of_file(tmp_path / "gehuse.stl")
 
 
 def test_a_file_that_has_changed_is_imported_again_with_the_options_of_its_import(tmp_path, capsys):

@@ -1,6 +1,7 @@
 """The file of an imported part, as its folder names it."""
 
 import json
+import os
 
 import pytest
 import trimesh
@@ -16,6 +17,16 @@ def test_a_part_names_its_file_and_what_it_was_imported_with(tmp_path):
     origin = read_origin(import_part(file, unit="in", bodies="union").folder)
     assert origin is not None and (origin.path, origin.unit, origin.bodies) == (file, "in", "union")
     assert read_origin(find_part("hex_nut_m30").folder) is None
+
+
+def test_a_path_that_is_not_utf_8_is_read_as_it_was(tmp_path):
+    folder = tmp_path / os.fsdecode(b"W\xfcrfel\x80\xff")
+    folder.mkdir()
+    trimesh.creation.box((40, 30, 20)).export(folder / "Würfel.stl")
+    part = import_part(folder / "Würfel.stl")
+    origin = read_origin(part.folder)
+    assert origin is not None and origin.path == folder / "Würfel.stl"
+    assert "/Würfel.stl" in (part.folder / "part.json").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import trimesh
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts.importing.bodies import repair_bodies
 from mskgrasp.parts.solids.surface import Surface
-from tests.parts.importing.surfaces import TORUS_VOLUME, box, grid, one, refusal, torus
+from tests.parts.importing.surfaces import TORUS_VOLUME, box, grid, one, refusal, soup, torus
 
 
 def test_equal_vertices_are_merged_and_the_torus_keeps_the_volume_of_the_formula():
@@ -51,6 +51,40 @@ def test_a_body_drawn_from_both_sides_loses_the_inner_side():
     repaired = one(box(40, 30, 20), box(40, 30, 20, inward=True))
     assert repaired.notes[0] == "dropped 12 faces lying on another"
     assert repaired.bodies[0].volume == pytest.approx(24_000)
+
+
+def both_sides(surface: Surface) -> Surface:
+    return Surface(vertices=surface.vertices, faces=np.concatenate([surface.faces, surface.faces[:, ::-1]]))
+
+
+@pytest.mark.parametrize("others", [1, 2])
+def test_a_body_drawn_from_both_sides_stays_beside_others(others):
+    beside = [box(30, 30, 20, at=(60 * n, 0, 0), inward=n == 2) for n in range(1, 1 + others)]
+    repaired = repair_bodies([soup(both_sides(box(40, 30, 20)), *beside)], bodies="split")
+    assert [body.volume for body in repaired.bodies] == pytest.approx([24_000] + others * [18_000])
+    assert repaired.notes[0] == "dropped 12 faces lying on another"
+    assert f"has {1 + others} separate bodies" in refusal(both_sides(box(40, 30, 20)), *beside)
+
+
+def test_a_body_drawn_from_both_sides_stays_within_a_hollow_one():
+    hollow = [box(100, 100, 100), box(80, 80, 80, inward=True)]
+    repaired = repair_bodies([soup(*hollow, both_sides(box(40, 30, 20)))], bodies="split")
+    assert [body.volume for body in repaired.bodies] == pytest.approx([1e6 - 512_000, 24_000])
+
+
+def test_walls_between_bodies_that_fill_each_other_go():
+    filled = one(box(100, 100, 100), box(80, 80, 80, inward=True), box(80, 80, 80))
+    assert [body.volume for body in filled.bodies] == pytest.approx([1e6])
+    # Six cubes around a seventh, mirrored at its sides so that the triangles on both sides coincide.
+    middle = box(20, 20, 20)
+    around = [
+        Surface(vertices=middle.vertices * (1 - 2 * axis) + 20 * side * axis, faces=middle.faces[:, ::-1])
+        for axis in np.eye(3)
+        for side in (-1, 1)
+    ]
+    cross = one(middle, *around)
+    assert cross.notes == ("dropped 24 faces lying on another",)
+    assert [body.volume for body in cross.bodies] == pytest.approx([7 * 8000])
 
 
 def test_a_fin_without_thickness_is_dropped_and_the_body_stays():

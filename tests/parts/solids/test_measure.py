@@ -20,6 +20,17 @@ def test_a_box_has_the_mass_and_inertia_of_the_formula_about_its_centroid():
     assert np.allclose(found.quat_principal, [1, 0, 0, 0])
 
 
+@pytest.mark.parametrize("far", [1e5, 1e6, 1e7])
+def test_mass_and_inertia_do_not_depend_on_the_distance_from_the_origin(far):
+    ring = trimesh.creation.annulus(10, 20, 15)
+    here = mass_properties(ring, 7850)
+    ring.apply_translation((far, -far, far / 3))
+    found = mass_properties(ring, 7850)
+    assert found.mass == pytest.approx(here.mass, rel=1e-6)
+    assert np.allclose(found.inertia, here.inertia, rtol=1e-5, atol=1e-5 * here.inertia.max())
+    assert np.allclose(1000 * found.centroid, [far, -far, far / 3], rtol=0, atol=1e-4)
+
+
 def test_the_longest_axis_does_not_depend_on_the_orientation():
     box = trimesh.creation.box((60, 20, 10))
     box.apply_transform(trimesh.transformations.rotation_matrix(0.7, (1, 2, 3)))

@@ -73,6 +73,14 @@ def test_one_piece_and_pieces_apart_stay():
         assert all(np.array_equal(a, b) for a, b in zip(overlapped(pieces), pieces, strict=True))
 
 
+def test_a_corner_without_which_the_others_lie_in_a_plane_stays():
+    square = np.array([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]], float)
+    pyramid = np.vstack([square, [20, 20, 30]])
+    tetrahedron = np.vstack([square[[0, 1, 3]], [0, 0, 40]])
+    for points in (pyramid, tetrahedron):
+        assert np.array_equal(overlapped([points])[0], points)
+
+
 def test_the_bound_of_what_lies_outside_is_one_and_close():
     """Random bodies, each corner of which is given to the first of them."""
     rng, shares = np.random.default_rng(0), []

@@ -12,17 +12,23 @@ import numpy as np
 import trimesh
 
 from mskgrasp.parts.importing.formats import MOST_TRIANGLES, Loaded, Unreadable
+from mskgrasp.parts.importing.formats.float32 import COARSEST, check_resolution
 from mskgrasp.parts.solids.surface import Surface
 
 _PACKED = ("draco", "meshopt", "quantization")
 _MOST_INSTANCES = 10_000
 
 
-def load_glb(content: bytes) -> Loaded:
+def load_glb(content: bytes, *, coarsest: float = COARSEST) -> Loaded:
     """Read all meshes of a GLB, each instance placed by its nodes; metres by the standard.
 
+    Args:
+        content: The file's bytes.
+        coarsest: Largest step between neighbouring coordinates, by the length of all meshes.
+
     Raises:
-        Unreadable: It is damaged, compressed, or keeps its geometry in other files.
+        Unreadable: It is damaged, compressed, keeps its geometry in other files, or is too far from its
+            origin.
     """
     _check_header(_header(content))
     try:
@@ -35,7 +41,8 @@ def load_glb(content: bytes) -> Loaded:
                 skip_materials=True,
                 merge_primitives=True,
             )
-            objects = _objects(scene)
+            objects, farthest = _objects(scene)
+            check_resolution(objects, farthest, coarsest=coarsest)
     except Unreadable:
         raise
     except Exception as error:  # the reader raises exceptions of many types
@@ -44,9 +51,10 @@ def load_glb(content: bytes) -> Loaded:
     return Loaded(objects=objects, unit="m", unit_mm=1000.0, unit_by_convention=True)
 
 
-def _objects(scene: trimesh.Scene) -> tuple[Surface, ...]:
+def _objects(scene: trimesh.Scene) -> tuple[tuple[Surface, ...], float]:
+    """The meshes as they are placed, and the largest coordinate as it is stored, in the scene's unit."""
     placed = scene.graph.nodes_geometry
-    total = 0
+    total, farthest = 0, 0.0
     result = []
     for number, node in enumerate(placed):
         matrix, name = scene.graph.get(node)
@@ -60,11 +68,14 @@ def _objects(scene: trimesh.Scene) -> tuple[Surface, ...]:
             )
         vertices = np.asarray(mesh.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
         faces = np.asarray(mesh.faces, dtype=np.int64)
+        # Matrices of nodes are text, with all digits: what is placed far away by one is as fine as before.
+        scale = np.linalg.norm(matrix[:3, :3], axis=0).max()
+        farthest = max(farthest, float(scale * np.abs(mesh.vertices).max(initial=0.0)))
         # A mirrored instance is wound the other way round.
         result.append(
             Surface(vertices=vertices, faces=faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else faces)
         )
-    return tuple(result)
+    return tuple(result), farthest
 
 
 def _header(content: bytes) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 
 from mskgrasp.parts.importing.formats import Loaded, Unreadable
+from mskgrasp.parts.importing.formats.float32 import check_resolution
 from mskgrasp.parts.solids.surface import Surface
 
 
@@ -16,7 +17,7 @@ def load_ply(content: bytes) -> Loaded:
     """Read a PLY; its unit is unknown.
 
     Raises:
-        Unreadable: It is damaged or holds only points.
+        Unreadable: It is damaged, holds only points, or is too far from its origin.
     """
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -28,11 +29,9 @@ def load_ply(content: bytes) -> Loaded:
         raise Unreadable(f"is not a readable PLY ({reason[:80]}): export or copy it again") from error
     if not isinstance(mesh, trimesh.Trimesh):
         raise Unreadable("holds no triangles (a point cloud?): export it from the CAD program as a mesh")
-    return Loaded(
-        objects=(
-            Surface(
-                vertices=np.asarray(mesh.vertices, dtype=np.float64),
-                faces=np.asarray(mesh.faces, dtype=np.int64),
-            ),
-        )
+    surface = Surface(
+        vertices=np.asarray(mesh.vertices, dtype=np.float64), faces=np.asarray(mesh.faces, dtype=np.int64)
     )
+    if mesh.metadata["_ply_raw"]["vertex"]["data"]["x"].dtype == np.float32:  # as its header says
+        check_resolution([surface])
+    return Loaded(objects=(surface,))

@@ -12,13 +12,11 @@ import re
 import numpy as np
 
 from mskgrasp.parts.importing.formats import MOST_TRIANGLES, Loaded, Unreadable
+from mskgrasp.parts.importing.formats.float32 import check_resolution
 from mskgrasp.parts.solids.surface import Surface
 
 _HEADER = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
-
-_COARSEST = 1e-5
-"""Largest step between neighbouring float32 coordinates, by the part's length."""
 
 
 def load_stl(content: bytes) -> Loaded:
@@ -48,16 +46,9 @@ def _binary(content: bytes, count: int, notes: tuple[str, ...]) -> Loaded:
     if count > MOST_TRIANGLES:
         raise Unreadable(f"has {count:,} triangles, the most is {MOST_TRIANGLES:,}: export it coarser")
     records = np.frombuffer(content, dtype=_TRIANGLE, count=count, offset=_HEADER)
-    corners = records["corners"].reshape(-1, 3)
-    if count and np.isfinite(corners).all():
-        farthest, length = np.abs(corners).max(), np.ptp(corners, axis=0).max()
-        if length > 0 and np.spacing(farthest) > _COARSEST * length:
-            raise Unreadable(
-                f"lies {farthest / length:,.0f} times its length from its origin, where STL resolves only "
-                f"steps of {100 * np.spacing(farthest) / length:.2g} % of it: move it to the origin and "
-                "export it again"
-            )
-    return Loaded(objects=(_soup(corners.astype(np.float64)),), notes=notes)
+    objects = (_soup(records["corners"].reshape(-1, 3).astype(np.float64)),)
+    check_resolution(objects)
+    return Loaded(objects=objects, notes=notes)
 
 
 def _text(content: bytes) -> Loaded:

@@ -38,6 +38,9 @@ _UNITS = {
 _FOREIGN = ("beamlattice", "securecontent", "volumetric", "boolean")
 """Extensions that describe the shape by something other than triangles, by a word of their namespace."""
 
+_SPACE = " "
+"""Between namespace and name of an element or attribute, as expat reports them."""
+
 _Key = tuple[str, str]
 
 
@@ -59,9 +62,24 @@ class _Model:
         self.objects: dict[_Key, _Object] = {}
         self.items: list[tuple[_Key, np.ndarray]] = []
         self._current = _Object()
+        self._core: str | None = None
+        self._namespaces: dict[str, str] = {}
+
+    def declare(self, prefix: str | None, namespace: str | None) -> None:
+        """Note a prefix, which expat reports before the element that declares it."""
+        self._namespaces[prefix or ""] = namespace or ""
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
-        match name.rpartition(":")[2]:
+        """Read an element of the core specification; the root is one in every version of it.
+
+        Extensions have elements of the same names: a ``vertex`` of the slice extension has no z.
+        """
+        namespace, _, local = name.rpartition(_SPACE)
+        if self._core is None:
+            self._core = namespace
+        if namespace != self._core:
+            return
+        match local:
             case "vertex":
                 self._current.vertices.extend(float(attributes[axis]) for axis in "xyz")
             case "triangle":
@@ -75,13 +93,19 @@ class _Model:
                 self.items.append((self._key(attributes), _matrix(attributes)))
             case "model":
                 self.unit = attributes.get("unit")
-                _check_extensions(attributes)
+                self._check_extensions(attributes)
 
     def _key(self, attributes: dict[str, str]) -> _Key:
         path = next(
-            (value for key, value in attributes.items() if key.rpartition(":")[2] == "path"), self.file
+            (value for key, value in attributes.items() if key.rpartition(_SPACE)[2] == "path"), self.file
         )
         return path.lstrip("/"), attributes["objectid"]
+
+    def _check_extensions(self, attributes: dict[str, str]) -> None:
+        for prefix in attributes.get("requiredextensions", "").split():
+            namespace = self._namespaces.get(prefix, "")
+            if any(word in namespace for word in _FOREIGN):
+                raise Unreadable(f"needs the 3MF extension {namespace}: export it as a plain mesh")
 
 
 def load_3mf(content: bytes) -> Loaded:
@@ -129,9 +153,10 @@ def _models(archive: zipfile.ZipFile) -> list[_Model]:
     models = []
     for entry in [main[0], *(entry for entry in entries if entry is not main[0])]:
         model = _Model(entry.filename.lstrip("/"))
-        parser = expat.ParserCreate()
+        parser = expat.ParserCreate(namespace_separator=_SPACE)
         parser.buffer_text = True
         parser.StartElementHandler = model.start
+        parser.StartNamespaceDeclHandler = model.declare
         # The core specification forbids a DTD; its entities could expand without limit.
         parser.StartDoctypeDeclHandler = _refuse_dtd
         with archive.open(entry) as file:
@@ -182,13 +207,6 @@ def _matrix(attributes: dict[str, str]) -> np.ndarray:
         values = [float(word) for word in attributes["transform"].split()]
         matrix[:, :3] = np.reshape(values, (4, 3))
     return matrix
-
-
-def _check_extensions(attributes: dict[str, str]) -> None:
-    for prefix in attributes.get("requiredextensions", "").split():
-        namespace = attributes.get(f"xmlns:{prefix}", "")
-        if any(word in namespace for word in _FOREIGN):
-            raise Unreadable(f"needs the 3MF extension {namespace}: export it as a plain mesh")
 
 
 def _refuse_dtd(*_: Any) -> None:

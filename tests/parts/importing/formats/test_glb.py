@@ -49,6 +49,20 @@ def test_a_glb_in_millimetres_is_found_out_by_its_size_and_read_with_unit():
     assert file.notes == ("read in mm as --unit says; GLB is in m by its standard",)
 
 
+def test_a_glb_too_far_from_its_origin_for_its_numbers_is_refused_and_one_that_a_node_moves_is_not():
+    small = trimesh.creation.box((0.04, 0.03, 0.02))
+    moved = trimesh.Scene()
+    moved.add_geometry(small, transform=trimesh.transformations.translation_matrix((1000, 0, 0)))
+    assert volume(read("moved.glb", glb(moved))) == pytest.approx(24_000, rel=1e-6)
+    far = small.copy()
+    far.apply_translation((1000, 0, 0))
+    message = refusal("far.glb", glb(trimesh.Scene([far])))
+    assert "lies 24,976 times its length from its origin" in message and "move it to the origin" in message
+    back = trimesh.Scene()
+    back.add_geometry(far, transform=trimesh.transformations.translation_matrix((-1000, 0, 0)))
+    assert "move it to the origin" in refusal("back.glb", glb(back))
+
+
 def test_a_hostile_or_foreign_glb_is_refused():
     content = glb(trimesh.Scene([BOX]))
     outside = with_json(content, lambda tree: tree["buffers"][0].update(uri="/etc/passwd"))

@@ -31,6 +31,15 @@ def test_an_assembly_in_step_keeps_its_bodies_apart(tmp_path):
     assert sorted(item.volume for item in file.objects) == pytest.approx([1000, 8000], rel=1e-5)
 
 
+def test_a_step_whose_triangles_are_too_far_from_their_origin_is_refused(tmp_path):
+    def block(at: float):
+        place = Pos(at, 0, 0)
+        return step(tmp_path, place * Box(40, 30, 20) - place * Cylinder(5, 30))
+
+    assert volume(read("near.step", block(1e4))) == pytest.approx(24_000 - np.pi * 25 * 20, rel=2e-4)
+    assert "lies 24,976 times its length from its origin" in refusal("far.step", block(1e6))
+
+
 def test_a_step_in_metres_comes_out_right_and_a_wrong_unit_is_refused(tmp_path):
     content = step(tmp_path, Box(40, 30, 20))
     assert "states its own unit, mm, and --unit says in" in refusal("box.step", content, "in")

@@ -88,6 +88,44 @@ def test_a_3mf_may_keep_its_objects_in_further_models_as_slicers_do():
     assert "states several units, inch and meter" in refusal("sliced.3mf", mixed)
 
 
+def test_elements_of_extensions_are_not_taken_for_those_of_the_core_specification():
+    slices = (
+        '<s:slicestack id="5"><s:slice ztop="1"><s:vertices><s:vertex x="0" y="0"/></s:vertices></s:slice>'
+        "</s:slicestack>"
+    )
+    root = 'xmlns:s="http://schemas.microsoft.com/3dmanufacturing/slice/2015/07"'
+    ten = f'<object id="1" s:slicestackid="5">{mesh_xml(trimesh.creation.box((10, 10, 10)))}</object>'
+    content = model(slices + ten, ITEM, root=root)
+    assert volume(read("sliced.3mf", three_mf(content))) == pytest.approx(1000)
+    # The same with a prefix for the core specification, and the extension as the namespace without one.
+    other = content.replace(f'xmlns="{CORE}"', f'xmlns:c="{CORE}"').replace("xmlns:s=", "xmlns=")
+    for word in (
+        "model",
+        "resources",
+        "object",
+        "mesh",
+        "vertices",
+        "vertex",
+        "triangles",
+        "triangle",
+        "build",
+    ):
+        for start in ("<", "</"):
+            other = other.replace(f"{start}{word} ", f"{start}c:{word} ").replace(
+                f"{start}{word}>", f"{start}c:{word}>"
+            )
+    other = other.replace("<item ", "<c:item ").replace("<s:", "<").replace("</s:", "</")
+    other = other.replace("s:slicestackid", "slicestackid")
+    assert "<vertex x" in other and "<c:vertex x" in other
+    assert volume(read("sliced.3mf", three_mf(other))) == pytest.approx(1000)
+
+
+def test_a_3mf_without_namespaces_or_of_an_older_draft_is_read():
+    for space in ("", 'xmlns="http://schemas.microsoft.com/3dmanufacturing/2013/01"'):
+        content = model(CUBE, ITEM, root='unit="inch"').replace(f'xmlns="{CORE}"', space)
+        assert volume(read("old.3mf", three_mf(content))) == pytest.approx(25.4**3)
+
+
 def test_supports_of_a_3mf_are_left_out_and_reported():
     ten = f'<object id="1">{mesh_xml(trimesh.creation.box((10, 10, 10)))}</object>'
     support = ten.replace('id="1"', 'id="2" type="support"')
