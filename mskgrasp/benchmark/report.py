@@ -151,7 +151,7 @@ def _first_section(rows: Sequence[Row], facts: RunFacts, figure: Path) -> Sectio
     ]
     text = [
         "The share of all attempts in which the part ends within the tolerance of where it was meant to be; "
-        "attempts that find no grasp, refuse the part or do not lift it count.",
+        "attempts that find no grasp, refuse the part or do not lift it count as not placed.",
         "Corrected by the planner's prediction is what was simulated and measured; a planner without one "
         "predicts zero. The other columns follow from it: without a correction the part is off "
         "by its predicted displacement as well; a camera that looks at the part in the hand, with errors of "

@@ -108,7 +108,7 @@ def complaints(found: Comparison) -> list[str]:
     """Differences between two engines that exceed their bounds, in words."""
     said = []
     if found.agreement < LEAST_AGREEMENT:
-        said.append(f"S agrees in {found.agreement:.1%}, at least {LEAST_AGREEMENT:.0%} is needed")
+        said.append(f"success agrees in {found.agreement:.1%}, at least {LEAST_AGREEMENT:.0%} is needed")
     for name, value, most in (
         ("median", found.shift_median, MOST_SHIFT[0]),
         ("90 %", found.shift_p90, MOST_SHIFT[1]),
@@ -194,7 +194,7 @@ def _in_words(record: dict[str, Any]) -> str:
         )
     ]
     return (
-        f"S agrees in {everything.agreement:.1%} (of {everything.n} grasps"
+        f"Success agrees in {everything.agreement:.1%} (of {everything.n} grasps"
         f"{_ends(record['intervals']['agreement'], 100, 1)}); displacements of {everything.n_both} differ by "
         f"{' and '.join(shifts)}. Intervals: 95 %, bootstrap over parts."
     )

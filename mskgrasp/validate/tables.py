@@ -10,7 +10,7 @@ from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table
 
 Record = dict[str, Any]
-_DIFFERENCES = ("S agrees", "shift median, mm", "90 %", "turn median, deg", "90 %")
+_DIFFERENCES = ("success agrees", "shift median, mm", "90 %", "turn median, deg", "90 %")
 
 
 def validation_sections(record: Record) -> list[Section]:
@@ -92,7 +92,7 @@ def _grid(record: Record) -> Section:
 def choice_text(record: Record) -> str:
     """Setting chosen by the tests of equivalence, and the reasons why production does not pass."""
     choice, margins = record["choice"], record["settings"]["margins"]
-    within = f"{1e3 * margins['displacement']:g} mm and {1e2 * margins['success']:g} points of S"
+    within = f"{1e3 * margins['displacement']:g} mm and {1e2 * margins['success']:g} points of success"
     if choice["shown"]:
         said = (
             f"The cheapest setting that, with all finer ones, is equivalent within {within} is "

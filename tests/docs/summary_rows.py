@@ -80,14 +80,17 @@ def _displacement_elsewhere(where: str) -> Callable[[StoredReport], list[Summary
 
 def _displacement_row(stored: StoredReport, policy: str, name: str, theirs: str = "") -> SummaryRow:
     model = next(iter(_report(stored)["models"].values()))
-    both, novel = model[policy]["all"], model[policy]["novel"]
+    both, novel, best = model[policy]["all"], model[policy]["novel"], model["quality"]["all"]
     return SummaryRow(
         name=name,
-        text=f"displacement RMSE {_rmse(both)} (predicting zero: {_rmse(both, '_of_zero')}{theirs}); "
-        f"novel parts alone: {_rmse(novel)}",
-        interval=f"{_rmse_intervals(both)}; {_rmse_intervals(novel)}",
-        n=f"{both['measured']} trials of {both['measured_parts']} parts, {novel['measured']} of "
-        f"{novel['measured_parts']} novel ones",
+        text=f"{both['success_rate']:.1%} lifted (best quality in the same scenes: "
+        f"{best['success_rate']:.1%}); displacement RMSE {_rmse(both)} "
+        f"(predicting zero: {_rmse(both, '_of_zero')}{theirs}); "
+        f"novel parts alone: {novel['success_rate']:.1%}, {_rmse(novel)}",
+        interval=f"{_between(both['success_interval'], 100, '%')}; {_rmse_intervals(both)}; "
+        f"{_rmse_intervals(novel)}",
+        n=f"{both['trials']} trials of {both['measured_parts']} parts, {novel['trials']} of "
+        f"{novel['measured_parts']} novel ones; {both['measured']} and {novel['measured']} lifted",
     )
 
 
@@ -104,11 +107,12 @@ def _certified(parts: str, where: str) -> Callable[[StoredReport], list[SummaryR
 def _certified_row(found: dict[str, Any], where: str) -> SummaryRow:
     certified, planned = found["certified"]
     rotation = math.degrees(found["rotation_rmse"])
+    zero = _rmse(found, "_of_zero")
     return SummaryRow(
         name="certified grasps, by the CAD",
         text=f"{where}: {found['success_rate']:.1%} lifted, displacement RMSE "
-        f"{1e3 * found['translation_rmse']:.2f} mm, {rotation:.2f} degrees; {certified} of {planned} planned "
-        "grasps are certified",
+        f"{1e3 * found['translation_rmse']:.2f} mm, {rotation:.2f} degrees (predicting zero: {zero}); "
+        f"{certified} of {planned} planned grasps are certified",
         interval=f"{_between(found['success_interval'], 100, '%')}; {_rmse_intervals(found, 2)}",
         n=f"{found['trials']} trials of {found['measured_parts']} parts",
     )
@@ -148,6 +152,7 @@ def _benchmark(stored: StoredReport) -> list[SummaryRow]:
             f"; certified grasps, by the CAD, {known.value:.1%}, without correction {known_plain.value:.1%}"
         )
     cell = ", in MuJoCo" if stored.name == "benchmark_mujoco" else ""
+    cell += ", with certified grasps" if "certified" in rows else ""
     return [
         SummaryRow(
             name=f"placed within {TOLERANCE}{cell}",
@@ -353,6 +358,7 @@ ROWS: tuple[tuple[str, Callable[[StoredReport], list[SummaryRow]]], ...] = (
     ("assessed_catalogue", _assessed),
     ("benchmark", _benchmark),
     ("benchmark_mujoco", _benchmark),
+    ("benchmark_certified", _benchmark),
     ("palletize", _palletize),
     ("palletize_quality", _palletize),
     ("shipped_model", _shipped_model),
@@ -386,8 +392,10 @@ IN_README = (
     "success_certified",
     "success_certified_mujoco",
     "success_certified_cad_kinect2",
+    "assessed",
     "benchmark",
     "benchmark_mujoco",
+    "benchmark_certified",
     "palletize",
     "palletize_quality",
     "shipped_model",

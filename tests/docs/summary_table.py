@@ -65,7 +65,7 @@ def _line(row: SummaryRow, stored: StoredReport, page: str) -> str:
     facts = stored.facts
     first = f"[{row.name}]({page}): {row.text}"
     if any(note.startswith(SUPERSEDED) for note in facts.get("notes", [])):
-        first += "; recorded before a change that the page names"
+        first += "; recorded before a later change (see its page)"
     if stored.of_former_model:
         first += FORMER
     cells = (first, row.split or facts["split"], row.n or facts["n"], row.interval, facts["command"])

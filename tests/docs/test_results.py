@@ -101,6 +101,15 @@ def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
     assert len(rows) == 2 and index.read_text().endswith("\n\nMore.\n")
 
 
+def test_a_page_holds_the_words_of_its_recorded_runs():
+    for name, run in known_runs().items():
+        page = run.get("page")
+        if page and (REPORTS / f"{name}.json").exists():
+            text = (ROOT / "docs" / "results" / page["file"]).read_text()
+            section = text.partition(f"\n## {page['heading']}\n")[2].partition("<!-- run: ")[0]
+            assert section.startswith(f"\n{page['words'].strip()}\n"), name
+
+
 def test_the_index_links_every_results_page():
     index = INDEX.read_text(encoding="utf-8").partition("<!-- results -->")[0]
     assert not [page.name for page in RESULTS if f"]({page.name})" not in index]
@@ -184,9 +193,9 @@ def test_the_readme_states_the_stored_intervals_of_the_comparison_of_engines():
     report = dict(
         engines={"all": whole, "sapien, starts moved by 0.1 mm": whole, "nut": whole, "bolt": whole},
         intervals=dict(agreement=[0.8, 0.95], shift_median=[3e-4, 6e-4], shift_p90=[2e-3, 5e-3]),
-        failed=["S agrees in 90.0%, at least 95% is needed"],
+        failed=["success agrees in 90.0%, at least 95% is needed"],
     )
     (row,) = dict(ROWS)["engines"](StoredReport(name="engines", facts={}, report=report))
     assert row.interval == "80.0 - 95.0 %; 0.30 - 0.60 mm; 2.00 - 5.00 mm"
     assert row.n == "20 grasps of 2 parts, 11 lifted in both"
-    assert row.text.endswith("; bound missed: S agrees in 90.0%, at least 95% is needed")
+    assert row.text.endswith("; bound missed: success agrees in 90.0%, at least 95% is needed")

@@ -61,12 +61,12 @@ def test_settings_are_compared_in_millimetres_degrees_and_points():
 
 def test_the_choice_says_whether_equivalence_was_shown_and_why_production_fails():
     assert choice_text(record()) == (
-        "The cheapest setting that, with all finer ones, is equivalent within 0.25 mm and 2 points of S is "
-        "1000 Hz, 50 it. Production, 1000 Hz, 50 it: equivalent."
+        "The cheapest setting that, with all finer ones, is equivalent within 0.25 mm and 2 points of "
+        "success is 1000 Hz, 50 it. Production, 1000 Hz, 50 it: equivalent."
     )
     failing = {"setting": "500 Hz, 8 it", "shown": False, "production_fails": ["success rate: +3", "x"]}
     text = choice_text(record(choice=failing))
-    assert text.startswith("No setting is shown to be equivalent within 0.25 mm and 2 points of S; ")
+    assert text.startswith("No setting is shown to be equivalent within 0.25 mm and 2 points of success; ")
     assert text.endswith("is 500 Hz, 8 it. Production, 1000 Hz, 50 it: success rate: +3; x.")
 
 

@@ -29,15 +29,13 @@ class Physics(Config):
     position_iterations: int = Field(default=50, ge=4)
     """Solver iterations a step; `validate` compares them."""
     hold_iterations: int = Field(default=50, ge=4)
-    """The same, if more, while a part is lifted and held. With 25 some parts swing in the hand that friction
-    holds: a bolt that hangs from one point of each pad, with a sixth of the torque that they bear, by 7
-    degrees, with 50 by 2, with 100 by 0.4; finer steps change nothing."""
+    """The same, if more, while a part is lifted and held: with fewer, some parts swing in the hand that
+    friction holds, such as a bolt that hangs from one point of each pad; finer steps change nothing."""
     contact_offset: float = Field(default=0.001, gt=0, le=0.02)
-    """Margin around each shape, m: contacts are made where two margins meet. Of a hand on its way 2 mm are
-    eight steps. With 3 mm a label costs a sixth more, with ManiSkill's 20 mm a multiple."""
+    """Margin around each shape, m: contacts are made where two margins meet. A larger one costs time."""
     persistent_manifold: bool = False
-    """PhysX' cache of contact points (PCM); on a GPU it is always on. Stale points keep 2 of 100 blocks
-    that spin between closing pads rotated by up to 1.4 degrees."""
+    """PhysX' cache of contact points (PCM); on a GPU it is always on. Stale points keep some blocks that spin
+    between closing pads rotated."""
     friction_pad_part: float = Field(default=0.5, ge=0, le=2)
     """Effective Coulomb coefficient between pads and part (rubber on dry steel: 0.4 to 0.7)."""
     friction_table_part: float = Field(default=0.4, ge=0, le=2)
@@ -53,7 +51,7 @@ class Physics(Config):
     and, by its maker, with no less than 30 N (libfranka issue 111)."""
     finger_stiffness: float = Field(default=8000.0, gt=0)
     """Drive stiffness of a finger, N/m; with the force limit and the speed it decides how soon a stopped pad
-    reaches its full force: 62 ms. The hand's own value is not published. With 16 kN/m pads on a thin sheet
+    reaches its full force. The hand's own value is not published. With 16 kN/m pads on a thin sheet
     begin to oscillate in steps of 4 ms, up to many times the force limit."""
     finger_damping: float = Field(default=100.0, ge=0)
     """Drive damping of a finger, N s/m: critical, with the armature."""
