@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -273,7 +274,7 @@ def test_certified_grasps_are_made_and_executed_in_the_scenes_of_the_others(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     bar = make_box(tmp_path, "bar", (0.07, 0.024, 0.018), 0.2)
     # A box has three resting poses, and few simulations do for it.
-    monkeypatch.setattr(certify_parts, "CertifyConfig", lambda: CertifyConfig(simulations=72))
+    monkeypatch.setattr(certify_parts, "CertifyConfig", partial(CertifyConfig, simulations=72))
     out = tmp_path / "out"
     planning = PlannerConfig(policy="certified", n_candidates=60)
     report = evaluate(
