@@ -59,8 +59,9 @@ def test_an_arm_arrives_within_a_milliradian_although_its_controller_leaves_an_e
     assert link.ask("state", timeout_s=TIMEOUT_S)["mode"] == "idle"
 
 
-def test_a_stop_ends_a_motion_and_is_in_force_until_recover(robot: FakeRobot, link: DriverLink):
-    begin, path = robot.joints(), path_by(robot, -0.5, speed=0.1)
+def stop_on_the_way(robot: FakeRobot, link: DriverLink, path: JointPath) -> None:
+    """Stops a motion as soon as the arm moves, which ends it by an error."""
+    begin = robot.joints()
     stopper = threading.Thread(
         target=lambda: (robot.wait_until_moved(begin), link.ask("stop", timeout_s=TIMEOUT_S))
     )
@@ -68,6 +69,11 @@ def test_a_stop_ends_a_motion_and_is_in_force_until_recover(robot: FakeRobot, li
     with pytest.raises(MotionAborted, match="preempted"):
         link.ask("move_joints", timeout_s=TIMEOUT_S, **plain_path(path))
     stopper.join()
+
+
+def test_a_stop_ends_a_motion_and_is_in_force_until_recover(robot: FakeRobot, link: DriverLink):
+    begin, path = robot.joints(), path_by(robot, -0.5, speed=0.1)
+    stop_on_the_way(robot, link, path)
     stood = robot.joints()
     assert 0.02 <= np.abs(stood - begin).max() < 0.3
     with pytest.raises(MotionAborted, match="preempted"):
@@ -96,15 +102,9 @@ def test_a_reflex_is_recovered_from(robot: FakeRobot, link: DriverLink):
 
 def test_a_reflex_of_a_stopped_motion_is_no_error_of_the_next(robot: FakeRobot, link: DriverLink):
     """panda_py keeps an error until it is asked, here one that came after the stop had ended the motion."""
-    begin, path = robot.joints(), path_by(robot, 0.3, speed=0.1)
+    path = path_by(robot, 0.3, speed=0.1)
     robot.order("reflex_at_end")
-    stopper = threading.Thread(
-        target=lambda: (robot.wait_until_moved(begin), link.ask("stop", timeout_s=TIMEOUT_S))
-    )
-    stopper.start()
-    with pytest.raises(MotionAborted, match="preempted"):
-        link.ask("move_joints", timeout_s=TIMEOUT_S, **plain_path(path))
-    stopper.join()
+    stop_on_the_way(robot, link, path)
     assert link.ask("state", timeout_s=TIMEOUT_S)["mode"] == "reflex"
     assert link.ask("recover", timeout_s=TIMEOUT_S) is True
     link.ask("move_joints", timeout_s=TIMEOUT_S, **plain_path(path_by(robot, -0.05)))
