@@ -32,7 +32,7 @@ from mskgrasp.trials.trial import REFUSED
 
 LEAST_PARTS = 3
 """Parts by which the goal is judged at least: an interval over two parts says nothing."""
-GOAL = 0.5
+GOAL = 0.2
 """Greatest share of the median error that correcting by the prediction is meant to leave."""
 WORST = 10
 _ROWS = 4
