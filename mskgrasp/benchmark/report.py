@@ -166,7 +166,7 @@ def _first_section(rows: Sequence[Row], facts: RunFacts, figure: Path) -> Sectio
             for name, n in facts.chosen_by.items()
         ),
         *(
-            f"{name} is made of networks that were trained on parts of the families of {n} of these parts."
+            f"The networks of {name} were trained on other parts of the families of {n} of these parts."
             for name, n in facts.known_families.items()
         ),
     ]

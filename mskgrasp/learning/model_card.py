@@ -76,12 +76,12 @@ def _result_lines(report: dict[str, Any]) -> list[str]:
 
 
 def _label_lines(source: LabelSource) -> str:
-    """Simulation, camera and drawn errors, and settings that differ from today's defaults, a line each."""
+    """Simulation, camera and drawn errors, and settings that differ from the defaults, a line each."""
     usual = Physics().model_dump()
     other = [f"{name} {value}" for name, value in source.physics.items() if usual.get(name) != value]
     return (
         f"- {source_text(source)}; seed {source.seed}\n"
-        f"- physics other than today's: {', '.join(other) or 'none'}"
+        f"- physics other than the defaults: {', '.join(other) or 'none'}"
     )
 
 

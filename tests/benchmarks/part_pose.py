@@ -351,8 +351,9 @@ def main() -> int:
     show(
         [
             Table(
-                header=("noise", "images", "refused", "of them unseen", "look right", "within bounds",
-                        "of those accepted", "or an alternative is", "inside 95 % ellipse"),
+                header=("noise", "images", "refused", "of them unseen", "resting pose right", "within bounds",
+                        "within bounds, of accepted images", "found pose or an alternative within bounds",
+                        "inside 95 % ellipse"),
                 rows=[accuracy_row(model, found) for model, found in results.items()],
                 caption="Parts by themselves",
             ),
@@ -360,7 +361,7 @@ def main() -> int:
                 header=("noise", "mm, median", "mm, 95 %", "deg, median", "deg, 95 %", "ms, median",
                         "ms, 95 %", "processor ms, median", "processor ms, 95 %"),
                 rows=[error_row(model, found) for model, found in results.items()],
-                caption="Errors where the look is right, and time of a call",
+                caption="Errors where the resting pose is right, and time of a call",
             ),
             Table(header=("shown", "noise", "images", "refused"), rows=wrong, caption="What must be refused"),
         ],

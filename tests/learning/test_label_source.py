@@ -51,7 +51,7 @@ def test_a_model_tells_its_source_and_its_card_shows_what_differs(tmp_path: Path
         update={"physics": source.physics | {"rate_hz": 500}, "noise": {"finger_force": [30.0, 70.0]}}
     )
     card = model_card(models.meta.model_copy(update={"labels": (other,)}))
-    assert "physics other than today's: rate_hz 500\n" in card
+    assert "physics other than the defaults: rate_hz 500\n" in card
     assert "errors of the cell: finger_force 30.0 x 70.0" not in card
     assert "errors of the cell: finger_force 30.0 to 70.0" in card
 

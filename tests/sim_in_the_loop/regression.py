@@ -237,7 +237,7 @@ def _held(pairs: list[tuple[Row, Row]]) -> Difference:
     p = float(binomtest(lost, lost + gained).pvalue) if lost + gained else 1.0
     verdict = "as before" if p > 1 - LEVEL else "worse" if lost > gained else "better"
     return Difference(
-        title="held", unit="%", scale=100.0, n=len(pairs), stored=then, now=today, p=p, verdict=verdict
+        title="lifted", unit="%", scale=100.0, n=len(pairs), stored=then, now=today, p=p, verdict=verdict
     )
 
 
@@ -299,7 +299,7 @@ def figures_of(rows: Sequence[Row]) -> list[StoredFigure]:
     )
     found = [
         StoredFigure(
-            title="held",
+            title="lifted",
             unit="%",
             n=len(rows),
             value=100 * held / len(rows),

@@ -48,8 +48,8 @@ def test_one_lost_grasp_is_within_chance_and_ten_are_not():
         )
         return [replace(row, **lost) if k in held[:n] else row for k, row in enumerate(rows)]
 
-    assert verdicts(without(1))["held"] == "as before"
-    assert verdicts(without(10))["held"] == "worse"
+    assert verdicts(without(1))["lifted"] == "as before"
+    assert verdicts(without(10))["lifted"] == "worse"
     assert verdicts(without(len(rows)))["median placement error"] == "unknown"
 
 
@@ -85,7 +85,7 @@ def test_a_figure_has_the_interval_over_parts_and_a_lost_trial_has_no_error():
     rows = [row("a", True, 0.003), row("a", True, 0.003), row("b", True, 0.004), row("c", False, None)]
     figures = {one.title: one for one in figures_of(rows)}
     assert "the same without correction" not in figures
-    held = figures["held"]
+    held = figures["lifted"]
     # Three parts tell less than four trials, of which Wilson's interval is 30.1 to 95.4: worked out by hand.
     assert (held.n, held.value) == (4, 75) and held.interval == pytest.approx((6.2, 99.3), abs=0.1)
     rmse = figures["RMSE of the displacement"]
