@@ -21,6 +21,7 @@ from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.core.share import Share
 from mskgrasp.parts import Part
 from mskgrasp.parts.least_width import least_widths
+from mskgrasp.perception.part_pose.known_part import KnownPart, Lying
 from mskgrasp.planning.certified import CertifiedGrasps, radius_about_vertical
 from mskgrasp.planning.isaac_grasp import write_isaac_grasp
 from mskgrasp.reports.html import write_html
@@ -34,6 +35,11 @@ _HEADINGS = {
     "predicted": "corrected by the prediction",
     "seen": "part seen in hand",
 }
+_NOT_THE_SAME = "but is not the same"
+_ONLY_LOOKS = (
+    "Where the part only looks the same, the camera cannot tell these turns apart: the trials count a part "
+    "that is placed in another of them as turned."
+)
 _RULES = (
     "Rules of the verdict: of all attempts, failed ones included, at least 95 % must end within the "
     "tolerance. Place directly, if they do without any correction; correct by the prediction, if they do "
@@ -108,7 +114,8 @@ def conclusion(
     """The result in a line or two: that no attempt lifted the part, and why, or the verdicts."""
     if not any(trial.lifted for trial in trials):
         reasons = counted(Counter(trial.reason for trial in trials if trial.reason))
-        why = next(iter(certified.without.values()), "")
+        likeliest = drawn_poses(part, certified)[0]
+        why = certified.without.get(likeliest, "")
         # All planners and conditions share the scenes, and without certified grasps the plans.
         scenes = len({trial.number for trial in trials})
         most = wilson_interval(0, scenes)[1]
@@ -199,6 +206,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
         for name in ("friction_pad_part", "finger_force")
     )
     pose_cov = np.diag(np.square([errors["position"], errors["position"], errors["turn"]]))
+    looks = {pose.resting: pose for look in KnownPart.of(part).looks for pose in look.poses}
     rows = []
     simulated = "; planned with the best that was simulated"
     for number, share in enumerate(part.resting_probability):
@@ -213,6 +221,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
             (
                 f"{number}" + (f" and {len(alike)} alike" if alike else ""),
                 f"{share + part.resting_probability[alike].sum():.1%}",
+                _turns(looks[number]),
                 len(grasps),
                 "-" if best is None else f"{best:.2f} mm",
                 why_not + simulated if certified.uncertified_of(number)[0] else why_not,
@@ -229,17 +238,33 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
             "distance by which the part's points miss their predicted places, with errors of the seen pose "
             f"of {1e3 * errors['position']:g} mm and {np.degrees(errors['turn']):.2g} degrees, friction "
             f"{friction}, force {force} N a pad, and the arm's {1e3 * noise['arm_position_std']:g} mm. The "
-            f"pads stay {1e3 * conditions['clearance']:g} mm over the table (--clearance). "
-            "The smallest of several estimates is somewhat too small; the trials above are other simulations."
+            f"pads stay {1e3 * conditions['clearance']:g} mm over the table (--clearance). The smallest of "
+            "several estimates is somewhat too small; the trials above are other simulations.",
+            *([_ONLY_LOOKS] if any(row[2].endswith(_NOT_THE_SAME) for row in rows) else []),
         ],
         tables=[
             Table(
-                header=("pose", "probability", "certified grasps", "least expected error", "why not"),
+                header=(
+                    "pose",
+                    "probability",
+                    "looks the same turned by",
+                    "certified grasps",
+                    "least expected error",
+                    "why not",
+                ),
                 rows=rows,
             )
         ],
         figures=[Figure(path=figure, caption=f"Certified grasps from above, the best one in blue{drawn}")],
     )
+
+
+def _turns(lying: Lying) -> str:
+    """Turns at which a part that lies so looks the same from above."""
+    if lying.order == 1:
+        return "-"
+    turns = f"{360 / lying.order:.3g} degrees" if lying.order else "any angle"
+    return turns if lying.symmetric else f"{turns}, {_NOT_THE_SAME}"
 
 
 def _grasps_section(certified: CertifiedGrasps) -> Section:

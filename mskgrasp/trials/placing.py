@@ -216,7 +216,8 @@ def _placed(
 def as_turned(part: Part, found: PartPose, true: Pose, like: Mapping[int, tuple[int, float]]) -> Pose | None:
     """The found pose with the orientation that differs least from the true one by symmetries of the part.
 
-    A hexagon nut found 60 degrees off counts as right, by its symmetry.
+    A hexagon nut found 60 degrees off counts as right, by its symmetry. A part that only looks the same, such
+    as a plate with a small hole near one end, does not.
 
     Args:
         part: The part.
@@ -237,9 +238,10 @@ def as_turned(part: Part, found: PartPose, true: Pose, like: Mapping[int, tuple[
         groups.append(group)
     if groups[0] != groups[1]:
         return None
+    order = found.symmetry if found.symmetric else 1
     off = 0.0  # of a body of revolution no turn is wrong
-    if found.symmetry:
-        period = 2 * np.pi / found.symmetry
+    if order:
+        period = 2 * np.pi / order
         off = turns[0] - turns[1]
         off -= period * round(off / period)
     quat = quat_multiply(quat_about_z(np.asarray(off)), true.quat_wxyz)

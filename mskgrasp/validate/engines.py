@@ -89,8 +89,8 @@ def engine_sections(record: dict[str, Any]) -> list[Section]:
         for ours, theirs, count in record["disagreements"]
     ]
     found.append(
-        f"In {record['lasting']} of these, success differs in the same way with the starts moved by 0.1 mm, in both"
-        " engines; in the others a start that near changes the outcome in one of them."
+        f"In {record['lasting']} of these, success differs in the same way with the starts moved by 0.1 mm, "
+        "in both engines; in the others a start that near changes the outcome in one of them."
     )
     tilts = record["tilted"]
     found.append(

@@ -307,7 +307,8 @@ def _plan(stored: StoredReport) -> list[SummaryRow]:
     machine = stored.facts["machine"].partition(",")[0]
     text = (
         f"{ours['median, ms']} ms with the shipped model on {machine}; the paper's network "
-        f"{paper['median, ms']} ms, {ratios['rows'][0][1]} times as long (less on other processors and in bfloat16)"
+        f"{paper['median, ms']} ms, {ratios['rows'][0][1]} times as long "
+        "(less on other processors and in bfloat16)"
     )
     return [SummaryRow(name="planning", text=text, interval=f"{ours['interval of the median']} ms")]
 
@@ -347,11 +348,16 @@ ROWS: tuple[tuple[str, Callable[[StoredReport], list[SummaryRow]]], ...] = (
     ("displacement_mujoco", _displacement_elsewhere("in MuJoCo")),
     ("displacement_kinect2", _displacement_elsewhere("with the noise of a Kinect v2")),
     ("certified", _certified_compared),
-    ("success_certified", _certified("the catalogue's parts", "exact camera, the engine that certified them")),
+    (
+        "success_certified",
+        _certified("the catalogue's parts", "exact camera, the engine that certified them"),
+    ),
     ("success_certified_kinect2", _certified("the catalogue's parts", "noise of a Kinect v2")),
     (
         "success_certified_mujoco",
-        _certified("the catalogue's parts", "in MuJoCo (a rule was changed after an earlier run of these parts)"),
+        _certified(
+            "the catalogue's parts", "in MuJoCo (a rule was changed after an earlier run of these parts)"
+        ),
     ),
     (
         "success_certified_mujoco_validation",

@@ -52,10 +52,10 @@ def pose(resting: int, turn: float, *, off: float = 0.0) -> Pose:
     return Pose(position=np.array([0.5 + off, 0.1, NUT.resting.position[resting, 2]]), quat_wxyz=quat)
 
 
-def found(resting: int, turn: float, *, symmetry: int, off: float = 0.0) -> PartPose:
+def found(resting: int, turn: float, *, symmetry: int, off: float = 0.0, symmetric: bool = True) -> PartPose:
     return PartPose(
         resting=resting, T_base_obj=pose(resting, turn, off=off), covariance=np.zeros((3, 3)),
-        symmetry=symmetry, residual=0.0, alternatives=(),
+        symmetry=symmetry, symmetric=symmetric, residual=0.0, alternatives=(),
     )  # fmt: skip
 
 
@@ -76,6 +76,13 @@ def test_a_nut_turned_by_a_sixth_is_found_rightly():
     # Without the symmetry it would be wrong by a sixth.
     other = as_turned(NUT, found(flat, 0.3 + np.pi / 3, symmetry=1), true, like)
     assert other is not None and turn_between(other, true) == pytest.approx(np.pi / 3, abs=1e-6)
+
+
+def test_a_part_that_only_looks_the_same_after_a_turn_is_found_wrongly():
+    flat = int(np.argmin(NUT.resting.position[:, 2]))
+    true, alike = pose(flat, 0.3), found(flat, 0.3 + np.pi / 3, symmetry=6, symmetric=False)
+    seen = as_turned(NUT, alike, true, alike_poses(NUT))
+    assert seen is not None and turn_between(seen, true) == pytest.approx(np.pi / 3, abs=1e-6)
 
 
 def test_another_side_of_the_nut_is_the_same_pose_and_standing_on_a_side_is_not_lying_flat():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -23,6 +23,9 @@ SAME_AREA = 3e-6
 """A turned part that differs over less than this, square metres, looks the same: a pixel covers 4.8 mm^2."""
 SAME_SHARE = 0.003
 """The same, as a share of the part's area."""
+HIDDEN_AREA = 1e-6
+"""A turned part that differs over more than this, square metres, on its top or its underside is not the
+same, even if the camera cannot tell."""
 SIMILAR_HEIGHT, SIMILAR_AREA, SIMILAR_SHARE = 0.5e-3, 6e-6, 0.04
 """The same for resting poses that are looked for together at first."""
 MOST_ORDERS = 72
@@ -50,6 +53,8 @@ class Lying:
         turn: The first of those that look alike must be turned by this to look like this one, radians.
         surface: That a camera above may see; None where it is not compared with others that look alike.
         order: Number of turns that look the same; 0: all.
+        symmetric: Whether these turns leave the part the same; otherwise a detail tells them apart that is
+            too small for the camera, or on the underside.
     """
 
     resting: int
@@ -57,6 +62,7 @@ class Lying:
     turn: float
     surface: Surface | None
     order: int
+    symmetric: bool
 
     @property
     def period(self) -> float:
@@ -130,7 +136,12 @@ class KnownPart:
                     break
             else:
                 groups.append([(seen, 0.0)])
-        return cls(part=part, cell=cell, looks=tuple(map(_look, groups)))
+
+        def symmetric(seen: _Seen, order: int) -> bool:
+            under = _Seen.of(part, seen.resting, surface, cell, from_below=True)
+            return seen.symmetric(order) and under.symmetric(order)
+
+        return cls(part=part, cell=cell, looks=tuple(_look(group, symmetric) for group in groups))
 
     @property
     def least_top(self) -> float:
@@ -157,8 +168,10 @@ class _Seen:
     levels: np.ndarray
 
     @classmethod
-    def of(cls, part: Part, index: int, surface: Surface, cell: float) -> _Seen:
+    def of(cls, part: Part, index: int, surface: Surface, cell: float, *, from_below: bool = False) -> _Seen:
         lying = surface.rotated(part.resting.quat_wxyz[index], part.resting.position[index, 2])
+        if from_below:
+            lying = lying.rotated(np.array([0.0, 1.0, 0.0, 0.0]), float(lying.vertices[:, 2].max()))
         lying = lying.facing(_STEEPEST_DOWN)
         from_above = heights_from(lying, None, plane=0.0, cell=cell, margin=3 * cell)
         lower, upper = from_above.bounds(cell)
@@ -230,6 +243,11 @@ class _Seen:
             self._same_at(t, similar, 1) for t in turns
         )
 
+    def symmetric(self, order: int) -> bool:
+        """Whether nothing on this side tells the turns of a symmetry apart, all multiples of the first."""
+        turns = [2 * np.pi / order] if order else np.radians([40.5, 97.0, 161.0])
+        return all(self.differs(self, turn, SAME_HEIGHT) <= HIDDEN_AREA for turn in turns)
+
     def rivals(self, order: int) -> tuple[float, ...]:
         """Turns within the period of a symmetry at which it nearly looks the same, the likest first."""
         if not order:
@@ -259,17 +277,20 @@ class _Seen:
         return max(SAME_AREA, SAME_SHARE * self.area)
 
 
-def _look(group: list[tuple[_Seen, float]]) -> Look:
+def _look(group: list[tuple[_Seen, float]], symmetric: Callable[[_Seen, int], bool]) -> Look:
     first, poses = group[0][0], []
     compared = len(group) <= MOST_COMPARED
     for seen, turn in group:
+        order = seen.order(similar=not compared) if compared or seen is first else poses[0].order
         poses.append(
             Lying(
                 resting=seen.resting,
                 probability=seen.probability,
                 turn=turn,
                 surface=seen.surface if compared or seen is first else None,
-                order=seen.order(similar=not compared) if compared or seen is first else poses[0].order,
+                order=order,
+                # Facets of a body of revolution, which are not compared, are the same but for the facets.
+                symmetric=order == 1 or not compared or symmetric(seen, order),
             )
         )
     visible = first.surface.vertices

@@ -60,6 +60,7 @@ class PartPose:
         T_base_obj: Pose of the part; its height and tilt are those of the resting pose.
         covariance: (3, 3) of x, y of the part's origin, metres, and of its turn about the vertical, radians.
         symmetry: Number of turns of the part that look the same; 0: all do, and the turn means nothing.
+        symmetric: Whether these turns leave the part the same (`Lying.symmetric`).
         residual: Root of the mean squared difference of heights on even surfaces, metres.
         alternatives: Other poses that explain the image nearly as well, the most likely first. Resting poses
             of a body of revolution, on its facets, are not distinguished and not listed.
@@ -69,6 +70,7 @@ class PartPose:
     T_base_obj: Pose
     covariance: np.ndarray
     symmetry: int
+    symmetric: bool
     residual: float
     alternatives: tuple[PossiblePose, ...]
 
@@ -117,6 +119,7 @@ def find_part_pose(
         T_base_obj=_pose(best, known, table_z),
         covariance=_covariance(best, seen),
         symmetry=best.lying.order,
+        symmetric=best.lying.symmetric,
         residual=mismatch.residual,
         alternatives=_alternatives(fits, known, table_z),
     )

@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+import trimesh
 
 from mskgrasp.parts import find_part
+from mskgrasp.parts.load import load_part
 from mskgrasp.perception.part_pose import KnownPart
 from tests.perception.part_pose.cells import known, resting_at
 
@@ -21,6 +23,29 @@ def test_a_nut_has_six_turns_flat_and_two_on_a_side():
 def test_a_washer_has_any_turn_and_a_bracket_one():
     assert orders("washer_m36")[0] == 0
     assert orders("l_bracket_60x40")[0] == 1
+
+
+@pytest.mark.parametrize("name", ["hex_nut_m30", "washer_m36"])
+def test_a_nut_and_a_washer_are_the_same_after_every_turn_at_which_they_look_the_same(name):
+    assert all(one.symmetric for look in known(name).looks for one in look.poses)
+
+
+def test_a_plate_keyed_by_a_small_hole_or_on_its_underside_only_looks_the_same(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    plate = trimesh.creation.box([0.1, 0.06, 0.008])
+    # Through holes: one of 3 mm, smaller than a pixel sees, and a blind one of 10 mm.
+    for name, radius, height in (("hole", 0.0015, 0.02), ("blind", 0.005, 0.004)):
+        drill = trimesh.creation.cylinder(radius=radius, height=height)
+        drill.apply_translation([0.04, 0.02, 0.004])
+        path = tmp_path / f"{name}.stl"
+        trimesh.boolean.difference([plate, drill]).apply_scale(1e3).export(path)
+        part = load_part(path)
+        up = part.resting.as_matrix()[:, 2, 2]  # of the drilled side
+        lying = {one.resting: one for look in KnownPart.of(part).looks for one in look.poses}
+        for side in (1, -1):
+            one = lying[int(np.argmax(side * up))]
+            sees = name == "blind" and side == 1
+            assert (one.order, one.symmetric) == ((1, True) if sees else (2, False))
 
 
 def test_a_block_with_ports_nearly_looks_the_same_after_half_a_turn_and_a_bracket_at_no_other_turn():
