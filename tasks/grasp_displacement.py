@@ -356,7 +356,10 @@ class GraspDisplacementEnv(BaseEnv):
             return grasp
         rows = [np.zeros(4) if error is None else error.grasp for error in self._errors]
         executed = grasp + torch.as_tensor(np.stack(rows), dtype=grasp.dtype, device=grasp.device)
-        executed[:, 2].clamp_(min=lowest_grasp_z(TABLE_Z))
+        # Errors of the arm neither press the pads into the table nor lift a command out of it.
+        lowest = lowest_grasp_z(TABLE_Z)
+        inside = grasp[:, 2] < lowest - 1e-6  # but for rounding
+        executed[:, 2] = torch.where(inside, grasp[:, 2], executed[:, 2].clamp(min=lowest))
         return executed
 
     def _step_action(self, action: Any) -> Any:

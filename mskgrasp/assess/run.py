@@ -21,7 +21,7 @@ from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import Part, find_part
 from mskgrasp.parts.importing.mesh_files import LOADERS
 from mskgrasp.planning.certified import FILE, CertifiedGrasps
-from mskgrasp.planning.for_cell import part_name
+from mskgrasp.planning.for_cell import check_unit, part_name
 from mskgrasp.planning.run_inputs import BY_CONTENT, model_digests, part_digests
 from mskgrasp.reports.console import print_sections
 from mskgrasp.runtime.cli import make_folder
@@ -61,7 +61,7 @@ def assess(config: AssessConfig) -> int:
     load_models(config.models)  # refused before a part is imported
     sources = _sources(config)
     tolerance = parse_tolerance(config.tolerance)
-    if len(sources) == 1:
+    if sources == [config.parts[0]]:  # not the only file of a folder, which gets an index
         out = config.out
         found = _assess_one(find_part(part_name(sources[0], config.unit)), config, out, tolerance)
         print(f"\n{found.headline}")
@@ -92,7 +92,8 @@ def _sources(config: AssessConfig) -> list[str]:
     """The parts named by the user; a folder without a part stands for its CAD files.
 
     Raises:
-        UsageError: There is none, or two would share a name, and with it a part and a folder of results.
+        UsageError: There is none, two would share a name, and with it a part and a folder of results, or a
+            unit is given for one that is no file.
     """
     sources: list[str] = []
     for text in config.parts:
@@ -119,10 +120,14 @@ def _sources(config: AssessConfig) -> list[str]:
     named: dict[str, str] = {}
     for text in unique.values():
         path = Path(text)
+        check_unit(text, config.unit)
         try:
-            name = legal_name(path.stem if path.suffix.lower() in LOADERS else path.name)
-        except BadPart:
-            continue  # the import says so
+            if (path / "part.json").exists():
+                name = find_part(text).name
+            else:
+                name = legal_name(path.stem if path.suffix.lower() in LOADERS else path.name)
+        except MskgraspError:
+            continue  # told when the part is assessed
         if named.setdefault(name, text) != text:
             raise UsageError(
                 f"{named[name]} and {text} are both called {name!r}; rename one, or leave one out"

@@ -41,10 +41,11 @@ _LEAST_SPREAD = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class CertifiedGrasp:
-    """A grasp with its measured outcome, over the last simulations, by which the candidate was not chosen.
+    """A grasp with its measured outcome.
 
-    They decide whether it is certified, and which grasp is planned; `without_selection_bias` makes up for
-    the best of many seeming better than it is.
+    But for mean and slope, to which all simulations contribute, it is that of the last simulations, by which
+    the candidate was not chosen. They decide whether it is certified, and which grasp is planned;
+    `without_selection_bias` makes up for the best of many seeming better than it is.
 
     Attributes:
         resting: Index of the part's resting pose.

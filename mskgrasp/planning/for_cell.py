@@ -53,6 +53,16 @@ def present(cell: Cell, part: str, seed: int) -> None:
     cell.feeder.present(part, seed)
 
 
+def check_unit(text: str, unit: Unit | None) -> None:
+    """Refuse a unit for a user's name or folder of a part.
+
+    Raises:
+        UsageError: A unit is given for what is no file.
+    """
+    if unit is not None and not Path(text).is_file() and (Path(text).exists() or example_file(text) is None):
+        raise UsageError(f"--unit is for a CAD file; {text} is none: omit it")
+
+
 def part_name(text: str, unit: Unit | None = None) -> str:
     """Resolve a user's name, folder or CAD file to a part's name or folder.
 
@@ -65,13 +75,12 @@ def part_name(text: str, unit: Unit | None = None) -> str:
         UsageError: A unit is given for what is no file.
     """
     require_name(text)
+    check_unit(text, unit)
     path = Path(text)
     if not path.exists() and (example := example_file(text)) is not None:
         print(f"{text} is not in this folder: using the shipped example {example}")
         path = example
     if not path.is_file():
-        if unit is not None:
-            raise UsageError(f"--unit is for a CAD file; {text} is none: omit it")
         return text
     from mskgrasp.parts.importing.import_file import part_of_file  # most parts need no decomposition
 

@@ -36,7 +36,8 @@ def write_isaac_grasp(path: Path, part: Part, certified: CertifiedGrasps) -> Non
     that one, too. Beside the fields of the format (version 1.0) it has ``displacement`` and
     ``displacement_cov``, which readers of the format ignore: the expected motion of the part in the hand, and
     its covariance where the part's pose is seen as well as the grasp was certified for, metres and radians
-    along the axes of the grasp.
+    along the axes that ``displacement_axes`` names: those of the grasp frame, whose y and z are the hand's
+    reversed.
 
     Raises:
         OSError: The disk is full or not writable.
@@ -66,6 +67,7 @@ def write_isaac_grasp(path: Path, part: Part, certified: CertifiedGrasps) -> Non
         format_version=1.0,
         object_frame_link=part.name,
         gripper_frame_link="panda_hand",
+        displacement_axes="x, -y, -z of panda_hand before the grasp; turn about -z",
         grasps=grasps,
     )
     write_whole(path, yaml.safe_dump(values, sort_keys=False).encode())

@@ -210,7 +210,7 @@ class _Plan:
 def _plan(part: Part, config: CertifyConfig) -> _Plan:
     stands = resting_of(part, config.physics).stands
     if not any(stands):
-        raise BadPart(f"'{part.name}' topples in the simulation in every resting pose")
+        raise BadPart(f"'{part.name}' topples in the simulation in every resting pose; leave it out")
     which = {number: row for row, number in enumerate(i for i, one in enumerate(stands) if one)}
     like = {number: (other, turn) for number, (other, turn) in alike_poses(part).items() if other in which}
     groups: dict[int, list[Member]] = {}

@@ -143,6 +143,8 @@ class ValidateConfig(Config):
             raise ValueError(
                 "physics.friction_table_part must be above 0: closed-form checks slide on the table"
             )
+        if not self.physics.friction_pad_part > 0:
+            raise ValueError("physics.friction_pad_part must be above 0: without friction nothing is held")
         if not self.rates_hz or not self.iterations or not self.references:
             raise ValueError(
                 "rates_hz, iterations and references need at least one value each: --rates-hz 500 1000"

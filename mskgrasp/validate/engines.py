@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from hal.errors import DriverMissing
+from mskgrasp.core.files import write_whole
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.json_text import finite
 from mskgrasp.core.metrics import bootstrap_interval
@@ -74,7 +75,7 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
     }
     print_sections(engine_sections(record))
     path = config.out / "engines.json"
-    path.write_text(json.dumps(finite(record), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_whole(path, (json.dumps(finite(record), indent=1, allow_nan=False) + "\n").encode())
     print(f"wrote {path}")
     print(f"the engines differ: {'; '.join(failed)}" if failed else "the engines agree")
     return 1 if failed else 0

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mskgrasp.core.errors import BadPart
+from mskgrasp.core.files import write_whole
 from mskgrasp.core.json_text import finite
 from mskgrasp.parts import Part, chosen_names, find_part
 from mskgrasp.parts.hulls import hull_corners
@@ -68,7 +69,7 @@ def validate(config: ValidateConfig) -> int:
             failed += [f"production, {config.production}: {said}" for said in found.choice.production_fails]
     record = finite(record | {"failed": failed})
     stored = config.out / "validate.json"
-    stored.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_whole(stored, (json.dumps(record, indent=1, allow_nan=False) + "\n").encode())
     picture = draw(config.out / "validate.png", record)
     print(f"wrote {stored} and {picture}")
     print(f"{len(failed)} of the checks failed: {'; '.join(failed)}" if failed else "all checks passed")

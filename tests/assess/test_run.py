@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -123,6 +124,22 @@ def test_several_parts_that_cannot_be_assessed_end_with_1_and_an_index(cad, tmp_
     assert (tmp_path / "out" / "index.html").read_text().count("torn.stl") >= 1
 
 
+def test_a_folder_gets_an_index_even_of_one_file(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "cad").mkdir()
+    (tmp_path / "cad" / "torn.stl").write_bytes(b"solid nothing\n")
+    assert run(monkeypatch, tmp_path / "cad", "--out", tmp_path / "out") == 1
+    assert "torn.stl" in (tmp_path / "out" / "index.html").read_text()
+
+
+def test_two_part_folders_of_one_name_are_refused(tmp_path):
+    folder = find_part("hex_nut_m20").folder
+    for name in ("one", "two"):
+        shutil.copytree(folder, tmp_path / name)
+    with pytest.raises(UsageError, match="one and .*two are both called 'hex_nut_m20'; rename one"):
+        _sources(AssessConfig(parts=(str(tmp_path / "one"), str(tmp_path / "two"))))
+
+
 def test_a_file_that_is_named_twice_is_one_part(cad, monkeypatch):
     monkeypatch.chdir(cad)
     (cad / "plate.stl").touch()
@@ -139,6 +156,7 @@ def test_a_file_that_is_named_twice_is_one_part(cad, monkeypatch):
         (("CAD/broken.stl",), BadPart, "broken.stl"),
         (("hex_nut_m20", "--models", "nowhere"), MissingModel, "nowhere"),
         (("hex_nut_m20", "--out", "CAD"), UsageError, "holds other files"),
+        (("CAD", "hex_nut_m20", "--unit", "in"), UsageError, "--unit is for a CAD file; hex_nut_m20 is none"),
     ],
 )
 def test_what_cannot_be_assessed_is_refused_in_a_line(arguments, error, message, cad, tmp_path, monkeypatch):

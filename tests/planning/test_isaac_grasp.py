@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from mskgrasp.core.errors import BadConfig
-from mskgrasp.core.geometry import Pose
+from mskgrasp.core.geometry import Pose, quat_about_z, quat_to_matrix
 from mskgrasp.core.grasp import pose_base_tcp
 from mskgrasp.core.panda_kinematics import TCP_OFFSET
 from mskgrasp.planning.isaac_grasp import (
@@ -40,6 +40,11 @@ def test_a_hand_stands_over_the_part_with_its_fingers_down(tmp_path):
     across = (lying @ hand).apply(np.array([0.0, 1.0, 0.0])) - (lying @ hand).position
     theta = grasp.grasp[3]
     assert abs(across @ [-np.sin(theta), np.cos(theta), 0.0]) == pytest.approx(1.0)
+    # The displacement is along the grasp's axes, which the file names by the hand's.
+    axes = quat_to_matrix((lying @ hand).quat_wxyz) * [1, -1, -1]
+    assert values["displacement_axes"].startswith("x, -y, -z of panda_hand")
+    assert axes == pytest.approx(quat_to_matrix(quat_about_z(np.asarray(theta))), abs=1e-9)
+    assert found["displacement"] == pytest.approx(grasp.mean)
 
 
 def test_a_grasp_is_written_for_every_pose_that_looks_alike(tmp_path):

@@ -62,6 +62,12 @@ def test_an_error_of_the_arm_does_not_drive_the_pads_into_the_table(env, monkeyp
     assert heights.min() == pytest.approx(low) and heights.max() > low + 1e-3
 
 
+def test_an_error_of_the_arm_does_not_lift_a_command_out_of_the_table(env, attempt, monkeypatch):
+    monkeypatch.setattr(env, "noise", ExecutionNoise(arm_position_std=1e-4))
+    assert not attempt((0.5, 0.0, TABLE_Z - 0.05, 0.0))["executable"]
+    assert attempt((0.5, 0.0, Z, 0.0))["executable"]
+
+
 def test_an_error_of_the_camera_moves_the_picture(boxes):
     logging.getLogger("mani_skill").setLevel(logging.ERROR)
     made = gymnasium.make(

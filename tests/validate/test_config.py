@@ -140,6 +140,11 @@ def test_a_table_without_friction_is_refused_where_parts_slide_on_it():
     ValidateConfig(physics=Physics(friction_table_part=0.0), engine="mujoco")
 
 
+def test_pads_without_friction_are_refused():
+    with pytest.raises(ValueError, match="friction_pad_part must be above 0"):
+        ValidateConfig(physics=Physics(friction_pad_part=0.0))
+
+
 def test_drawn_settings_lie_within_their_ranges_and_can_be_simulated():
     ranges = {
         "friction_pad_part": (0.3, 0.8),
