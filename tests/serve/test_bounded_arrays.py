@@ -65,6 +65,12 @@ def test_an_array_with_a_side_of_nothing_is_refused(shape: str):
     assert refused.value.status == 400
 
 
+def test_a_side_that_is_a_truth_value_is_refused():
+    with pytest.raises(Rejected, match=r"shape \(True,\)") as refused:
+        read_npz(packed(npy("(True,)", bytes(8))), LIMITS)
+    assert refused.value.status == 400
+
+
 def lying(body: bytes, size: int) -> bytes:
     """The archive, with another unpacked size in both of its headers."""
     at = body.index(b"PK\x01\x02")
