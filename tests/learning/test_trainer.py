@@ -183,6 +183,13 @@ def test_a_checkpoint_of_other_data_is_refused(samples, stopped):
         learn(other, SHORT, checkpoint_path=stopped)
 
 
+def test_a_checkpoint_of_another_split_is_refused(samples, stopped):
+    sides = split(samples, SHORT)
+    swapped = dataclasses.replace(sides, training=sides.validation, validation=sides.training)
+    with pytest.raises(UsageError, match="other parts to train on or to validate on"):
+        learn(samples, SHORT, checkpoint_path=stopped, sides=swapped)
+
+
 def test_a_checkpoint_of_samples_made_otherwise_is_refused(samples, stopped):
     tensors, metadata = contents(stopped)
     progress = json.loads(metadata["progress"])
