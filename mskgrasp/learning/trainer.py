@@ -135,6 +135,7 @@ def train(
     }
     saved = _resumable(checkpoint_path, samples, sides, list(stages))
     history: list[EpochMetrics] = list(saved.history) if saved else []
+    seen = samples.on(models.device)  # once: a stage outlives its training until garbage is collected
     for name in list(stages)[list(stages).index(saved.stage) if saved else 0 :]:
         network = networks[name]
         if quality is not None and name == "gqn":
@@ -144,7 +145,7 @@ def train(
             models.gdn.start_from(models.gqn)
         elif name == "gdn":
             models.gdn.features.load_state_dict(stages["transfer"].gqn.features.state_dict())
-        stage = Stage(name, stages[name], samples, sides, config)
+        stage = Stage(name, stages[name], samples, sides, config, seen=seen)
         best: dict[str, Tensor] = {}
         done = 0
         if saved is not None and saved.stage == name:
