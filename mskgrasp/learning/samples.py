@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -124,7 +125,7 @@ class Samples:
         rates = [float(self.success[self.part == i].float().mean()) for i in range(len(self.parts))]
         kept = [i for i, rate in enumerate(rates) if low <= rate <= high]
         if not kept:
-            found = ", ".join(f"{rate:.0%}" for rate in sorted(rates))
+            found = ", ".join(f"{rate:.0%}" for rate in sorted(rates) if not math.isnan(rate))
             raise BadDataset(
                 f"no part's success lies in {low:g}..{high:g} (found {found}); widen success_range"
             )
