@@ -349,6 +349,7 @@ def test_a_shard_with_too_few_attempts_is_named(data):
         ("intrinsics", [[366.0, 0, 79.5], [0, 366.0, 79.5], [0, 0, 1]]),
         ("physics", '{"rate_hz": 250}'),
         ("fidelity", "gpu"),
+        ("hand", '{"pad_width": 0.02}'),
         ("noise", '{"finger_force": [5.0, 70.0]}'),
         ("family", "spoon"),
     ],
